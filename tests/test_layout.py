@@ -37,6 +37,7 @@ ALLOWED = {
     "wording": set[str](),
     "installable": {"wording"},
     "syntax_fixes": {"wording"},
+    "yaml_fixes": set[str](),
     "portable": {"errors"},
     "ros_env": {"errors", "model", "portable"},
     "ros_packages": {"errors", "host_programs", "installable", "ros_env", "wording"},
@@ -51,10 +52,11 @@ ALLOWED = {
     "faults": BASE | {"files", "intake", "judging", "report", "results", "rubric"},
     "evidence": BASE | {"files", "installable"},
     "package": BASE | {
-        "files", "host_programs", "installable", "limited_child", "rubric.model", "rubric.scenario", "syntax_fixes"
+        "files", "host_programs", "installable", "limited_child", "rubric.model", "rubric.scenario", "syntax_fixes",
+        "yaml_fixes"
     },
     "intake": BASE | {"files", "host_programs", "limited_child"},
-    "checks": BASE | {"evidence", "installable", "syntax_fixes"},
+    "checks": BASE | {"evidence", "installable", "syntax_fixes", "yaml_fixes"},
     "rubric": BASE | {"checks", "evidence", "files", "installable", "ros_packages"},
     "judging": BASE | {"checks", "evidence", "installable", "rubric"},
     "report": BASE | {"checks", "evidence", "files", "judging", "rubric"},

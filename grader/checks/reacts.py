@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import groupby
 from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field, model_validator
@@ -22,7 +23,17 @@ from grader.checks.support.fields import (
     value_text,
 )
 from grader.checks.support.processes import GlobalName, observed_until_ns
-from grader.checks.support.topics import cite, misfit, no_message, refused_type, unheard
+from grader.checks.support.text import near_names
+from grader.checks.support.topics import (
+    cite,
+    losses,
+    misfit,
+    no_message,
+    no_node,
+    published_topics,
+    refused_type,
+    unheard,
+)
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -71,6 +82,14 @@ class Condition(Record):
             return f"a message on {self.topic}"
         return f"{'any of ' if self.items == 'any' else ''}{self.field} of {self.topic} {self._bounds()}"
 
+    @property
+    def absence(self) -> str:
+        """`no message on /cmd_vel with linear.x at least 0.1`."""
+        which = "any of " if self.items == "any" else ""
+        return f"no message on {self.topic}" + (
+            f" with {which}{self.field} {self._bounds()}" if self.field else ""
+        )
+
     def _bounds(self) -> str:
         if self.value is not None:
             near = f", within {significant(self.tolerance)}" if self.tolerance else ""
@@ -99,15 +118,33 @@ class Condition(Record):
 class ReactsParams(Record):
     """Cause and effect."""
 
-    cause: Annotated[Condition, Refers("cause")]
-    """Each time that this becomes true, an effect has to come; without a `field`, one after each message."""
+    cause: Annotated[Condition, Refers("cause")] | None = None
+    """Each time that this becomes true, an effect has to come; without a `field`, one after each message. Null, only
+    with `never`: the whole run."""
     effect: Condition
-    """What has to come."""
-    within_s: Annotated[float, Field(gt=0)]
-    """How soon after the cause the effect has to come."""
+    """What has to come, or with `never` must not come."""
+    within_s: Annotated[float, Field(ge=0)] = 0.0
+    """How soon after the cause the effect has to come. Required with a `cause`."""
+    never: bool = False
+    """The other way around: whether no effect may come, from `within_s` after the cause begins and for as long as it is
+    true. Without a `field`, it is true from its first message until the run ends."""
     not_before: bool = True
     """Whether an effect before the first cause is wrong: one from `within_s` after a message for which the cause is
     not true. Publish such messages for about three times `within_s` first, so that there is something to see."""
+
+    @model_validator(mode="after")
+    def _has_cause(self) -> ReactsParams:
+        if self.cause is None and not self.never:
+            raise ValueError("give a cause, or never: true for a run in which no effect may come")
+        if (self.cause is None) == bool(self.within_s):
+            raise ValueError("give cause and within_s together")
+        return self
+
+    @property
+    def trigger(self) -> Condition:
+        """The cause, where there is one."""
+        assert self.cause is not None  # noqa: S101 - it is missing only where no effect may come in the whole run
+        return self.cause
 
 
 class Answer(NamedTuple):
@@ -123,7 +160,8 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
 
     What it checks
         That each time the cause begins to be true on its topic, a message with the effect follows in time, and
-        that none comes before.
+        that none comes before. If the lab asks for silence: that no such message comes while the cause is true, or
+        in the whole run.
 
     Why it matters on a robot
         A robot that stops half a second late has hit the wall, and one that always stops never arrives.
@@ -131,13 +169,17 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
     How it is measured
         By when the messages reach the recorder. A cause with a field counts when it begins: several
         messages in a row for which it is true count once. If any message is a cause, each needs an answer
-        of its own. In a run with a fast clock, time is the clock's.
+        of its own. In a run with a fast clock, time is the clock's. Silence counts while the node is alive, up to
+        Ctrl-C.
 
     How to fix
         Publish the answer in the callback of the subscriber, or let the loop check what the callback
-        stored. `rostopic echo` on both topics shows which message is answered late, or not at all.
+        stored. `rostopic echo` on both topics shows which message is answered late, or not at all, and which
+        comes where none should.
     """
-    causes = params.cause.read([c for c in run.channels if c.topic == params.cause.topic])
+    if params.never:
+        return _judge_silence(package, run, params)
+    causes = _causes(run, params)
     own = run.student_channels(params.effect.topic)
     effects = params.effect.read(own)
     answers = _answers(run, causes, effects, params)
@@ -148,17 +190,22 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
         or _judge_unanswered(
             answers, run, params, _instead(causes, effects, params) or _other_answer(answers, effects, params)
         )
-        or passed(f"{plural(len(answers), 'time')}, {params.effect.words} follows {params.cause.words}")
+        or passed(f"{plural(len(answers), 'time')}, {params.effect.words} follows {params.trigger.words}")
     )
     times = [one.after_s for one in answers if one.after_s is not None]
     span = (answers[0].at_ns, answers[-1].at_ns) if answers else (None, None)
     return verdict.about(
-        expected=f"{params.effect.words}, {significant(params.within_s)} s at most after {params.cause.words}",
+        expected=f"{params.effect.words}, {significant(params.within_s)} s at most after {params.trigger.words}",
         measured=verdict.measured
         or f"{len(times)} of {plural(len(answers), 'answer')}"
         + (f", up to {max(times):.2f} s after" if times else ""),
-        citations=(cite(run, params.cause.topic, *span), cite(run, params.effect.topic)),
+        citations=(cite(run, params.trigger.topic, *span), cite(run, params.effect.topic)),
     )
+
+
+def _causes(run: Run, params: ReactsParams) -> list[Reading]:
+    cause = params.cause
+    return cause.read([c for c in run.channels if c.topic == cause.topic]) if cause else []
 
 
 def _answers(
@@ -168,13 +215,13 @@ def _answers(
     to_s, until_ns = run_seconds(run), observed_until_ns(run) or run.end_ns
     if to_s is None:
         return []
-    each = params.cause.field is None
+    each = params.trigger.field is None
     # A condition on a field holds for many messages on end: only where it begins to hold is an answer due.
-    before = (False, *(params.cause.holds(one) for one in causes))
+    before = (False, *(params.trigger.holds(one) for one in causes))
     starts = [
         one.time_ns
         for held, one in zip(before, causes, strict=False)
-        if (each or not held) and params.cause.holds(one)
+        if (each or not held) and params.trigger.holds(one)
     ]
     came = [one.time_ns for one in effects if params.effect.holds(one)]
     answers, first = [], 0
@@ -209,36 +256,149 @@ def _early(
 ) -> Verdict | None:
     """The effect without its cause: between a first message that is not a cause, and the first that is one."""
     to_s = run_seconds(run)
-    if not params.not_before or not causes or params.cause.holds(causes[0]) or to_s is None:
+    if not params.not_before or not causes or params.trigger.holds(causes[0]) or to_s is None:
         return None
-    from_s = to_s(causes[0].time_ns) + params.within_s
-    first = next((one.time_ns for one in causes if params.cause.holds(one)), causes[-1].time_ns)
-    between = [
-        one
-        for one in effects
-        if from_s < to_s(one.time_ns) < to_s(first) - ORDER_S and params.effect.holds(one)
-    ]
-    if not between:
+    first_ns = next((one.time_ns for one in causes if params.trigger.holds(one)), causes[-1].time_ns)
+    too_early = _between(effects, (causes[0].time_ns, first_ns), run, params)
+    if not too_early:
         return None
-    lead_s = to_s(first) - to_s(between[0].time_ns)
-    message = f"{params.effect.words} comes {lead_s:.2f} s before {params.cause.words}"
+    lead_s = to_s(first_ns) - to_s(too_early[0])
+    message = f"{params.effect.words} comes {lead_s:.2f} s before {params.trigger.words}"
     hint = "publish it only when the message that you receive calls for it"
-    verdict = failed(message, hint=hint, measured=f"{plural(len(between), 'message')} too early")
-    if to_s(between[-1].time_ns) >= from_s + params.within_s:
+    verdict = failed(message, hint=hint, measured=f"{plural(len(too_early), 'message')} too early")
+    return _unless_late(verdict, too_early[-1], (causes[0].time_ns, first_ns), run, params)
+
+
+def _between(effects: Sequence[Reading], span: tuple[int, int], run: Run, params: ReactsParams) -> list[int]:
+    """Return when effects came in this stretch of time, but for those that may still answer what was before it."""
+    to_s = run_seconds(run)
+    if to_s is None:
+        return []
+    from_s, until_s = to_s(span[0]) + params.within_s, to_s(span[1]) - ORDER_S
+    return [
+        one.time_ns for one in effects if from_s < to_s(one.time_ns) < until_s and params.effect.holds(one)
+    ]
+
+
+def _unless_late(
+    verdict: Verdict, last_ns: int, span: tuple[int, int], run: Run, params: ReactsParams
+) -> Verdict:
+    """Return the verdict on effects where none may be, open where a late machine explains all of them."""
+    to_s = run_seconds(run)
+    if to_s is None or to_s(last_ns) >= to_s(span[0]) + 2 * params.within_s:
         return verdict
     # what ends so soon may be an older answer of a machine that was late itself
-    return excused(verdict.if_repeated(), run, causes[0].time_ns, first, why_late)
+    return excused(verdict.if_repeated(), run, *span, why_late)
+
+
+def _judge_silence(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
+    """Return the verdict where no effect may come, while the cause is true or in the whole run."""
+    own = run.student_channels(params.effect.topic)
+    causes, effects = _causes(run, params), params.effect.read(own)
+    spans = _silent_spans(causes, run, params)
+    verdict = (
+        (_nothing_to_judge(package, run, effects, own, params) if effects else no_clock(run))
+        or _disturbed(effects, spans, run, params)
+        or _silent_without_reason(package, run, causes, spans, params)
+        or _kept_silent(own, params)
+    )
+    return verdict.about(
+        expected=f"{params.effect.absence} {_silent_words(params)}",
+        measured=verdict.measured or "none",
+        citations=(cite(run, params.effect.topic if effects else "/grader/graph"),),
+    )
+
+
+def _kept_silent(own: Sequence[Channel], params: ReactsParams) -> Verdict:
+    verdict = passed(f"{params.effect.absence} came {_silent_words(params)}")
+    # a node of which nothing comes at all shows nothing by it: another criterion has to see that it can publish
+    return (
+        verdict
+        if any(c.messages for c in own)
+        else verdict.model_copy(update={"unjudged": True, "silent": True})
+    )
+
+
+def _silent_words(params: ReactsParams) -> str:
+    """Return when no effect may come: `from 0.5 s after data of /stop true`."""
+    if params.cause is None:
+        return "in the whole run"
+    return f"from {significant(params.within_s)} s after {params.cause.words}"
+
+
+def _silent_spans(causes: Sequence[Reading], run: Run, params: ReactsParams) -> list[tuple[int, int]]:
+    """Return the stretches of time for which the cause is true: the whole run where none is given."""
+    until_ns = observed_until_ns(run) or run.end_ns
+    if params.cause is None:
+        return [(run.start_ns, until_ns)]
+    stretches = [(held, next(group).time_ns) for held, group in groupby(causes, key=params.cause.holds)]
+    ends = [*(from_ns for _, from_ns in stretches[1:]), until_ns]
+    return [
+        (from_ns, min(end_ns, until_ns))
+        for (held, from_ns), end_ns in zip(stretches, ends, strict=False)
+        if held
+    ]
+
+
+def _disturbed(
+    effects: Sequence[Reading], spans: Sequence[tuple[int, int]], run: Run, params: ReactsParams
+) -> Verdict | None:
+    """Return the verdict on effects where none may be."""
+    wrong = [(span, came) for span in spans if (came := _between(effects, span, run, params))]
+    to_s = run_seconds(run)
+    if not wrong or to_s is None:
+        return None
+    (from_ns, until_ns), came = wrong[0]
+    count = sum(len(times) for _, times in wrong)
+    when = f"{to_s(came[0]) - to_s(from_ns):.2f} s after {params.cause.words if params.cause else 'the run began'}"
+    message = f"{params.effect.words} comes {when}, where none may come"
+    hint = f"before you publish on {params.effect.topic}, check whether the node may do so now"
+    verdict = failed(message, hint=hint, measured=plural(count, "message"))
+    if len(wrong) > 1 or params.cause is None:
+        return verdict
+    return _unless_late(verdict, came[-1], (from_ns, until_ns), run, params)
+
+
+def _silent_without_reason(
+    package: PackageFacts,
+    run: Run,
+    causes: Sequence[Reading],
+    spans: Sequence[tuple[int, int]],
+    params: ReactsParams,
+) -> Verdict | None:
+    """Return the verdict where nothing came and this does not show that the node keeps silent."""
+    topic, what = params.effect.topic, f"no message came on {params.effect.topic}"
+    published, to_s = published_topics(run), run_seconds(run)
+    if topic not in published and (run.foreign or near_names(topic, published)):
+        return no_message(package, run, topic)
+    if not run.foreign and (absent := no_node(package, run, what)):
+        return absent
+    if losses(run, topic):
+        return grade_again(f"messages on {topic} were lost, so nobody knows whether one came")
+    heard = (params.cause and refused_type(run, params.cause.topic)) or misfit(run) or unheard(run)
+    if heard:
+        return unjudged(f"{what}, which shows nothing: {heard.message}", hint=heard.hint)
+    silent_s = (
+        [to_s(until_ns) - to_s(from_ns) - params.within_s for from_ns, until_ns in spans] if to_s else []
+    )
+    unseen = params.cause is not None and max(silent_s, default=0) <= 0
+    return (_never_caused(causes, run, params) or _caused_too_late(params)) if unseen else None
+
+
+def _caused_too_late(params: ReactsParams) -> Verdict:
+    what = "effect could be seen after it" if params.never else "answer could be waited for"
+    return grade_again(f"{params.trigger.words} did not come, or so late that no {what}")
 
 
 def _never_caused(causes: Sequence[Reading], run: Run, params: ReactsParams) -> Verdict | None:
     """What a simulator publishes comes of what the node does: a robot has to come to a wall to stop there."""
-    simulated = any(c.topic == params.cause.topic and c.callerid in run.grader_nodes for c in run.channels)
-    if not causes or not simulated or any(map(params.cause.holds, causes)):
+    simulated = any(c.topic == params.trigger.topic and c.callerid in run.grader_nodes for c in run.channels)
+    if not causes or not simulated or any(map(params.trigger.holds, causes)):
         return None
     return unjudged(
-        f"{params.cause.words} never came in this run",
+        f"{params.trigger.words} never came in this run",
         measured=f"0 of {plural(len(causes), 'message')}",
-        hint=f"rostopic echo {params.cause.topic} shows what comes while your node runs",
+        hint=f"rostopic echo {params.trigger.topic} shows what comes while your node runs",
     ).if_repeated()
 
 
@@ -249,10 +409,10 @@ def _instead(
     or nothing can be said of what it came upon."""
     came = next((one.time_ns for one in effects if params.effect.holds(one)), None)
     before = [one for one in causes if came is not None and one.time_ns <= came and one.values]
-    asked = next((one for one in causes if params.cause.holds(one) and one.values), None)
-    if came is None or not before or asked is None or params.cause.holds(before[-1]):
+    asked = next((one for one in causes if params.trigger.holds(one) and one.values), None)
+    if came is None or not before or asked is None or params.trigger.holds(before[-1]):
         return None
-    field, topic = params.cause.field, params.cause.topic
+    field, topic = params.trigger.field, params.trigger.topic
     (then, *_), (wanted, *_) = before[-1].values, asked.values
     words = f"it came when {field} was {value_text(then)}"
     hint = f"look at the condition in the callback of {topic}: it holds for {value_text(then)} and not for"
@@ -268,7 +428,7 @@ def _other_answer(
     if came is None or params.effect.value is None or any(map(params.effect.holds, effects)):
         return None
     field = params.effect.field
-    hint = f"in the callback of {params.cause.topic}, look at what you publish on {params.effect.topic}: "
+    hint = f"in the callback of {params.trigger.topic}, look at what you publish on {params.effect.topic}: "
     return (
         f"{field} is {value_text(came.values[0])} then",
         f"{hint}{field} has to be {value_text(params.effect.value)}",
@@ -278,21 +438,20 @@ def _other_answer(
 def _judge_unanswered(
     answers: Sequence[Answer], run: Run, params: ReactsParams, instead: tuple[str, str] | None
 ) -> Verdict | None:
-    hint = f"each time that {params.cause.words} comes, publish {params.effect.words}"
-    hint = f"{hint}, in the callback of {params.cause.topic}"
-    if not answers and (unsent := misfit(run, params.cause.topic)):
+    hint = f"each time that {params.trigger.words} comes, publish {params.effect.words}"
+    hint = f"{hint}, in the callback of {params.trigger.topic}"
+    if not answers and (unsent := misfit(run, params.trigger.topic)):
         return unsent
-    deaf = refused_type(run, params.cause.topic) or unheard(run)
+    deaf = refused_type(run, params.trigger.topic) or unheard(run)
     if not answers and deaf:
         verdict = failed(f"{params.effect.words} follows nothing: {deaf.message}", hint=deaf.hint)
         return verdict.model_copy(update={"cause": deaf.message})
     if not answers:
-        message = f"{params.cause.words} did not come, or so late that no answer could be waited for"
-        return grade_again(message)
+        return _caused_too_late(params)
     slow = [one for one in answers if one.after_s is None or one.after_s > params.within_s]
     if not slow:
         return None
-    reaction, times = f"{params.effect.words} {{}} {params.cause.words}", plural(len(answers), "time")
+    reaction, times = f"{params.effect.words} {{}} {params.trigger.words}", plural(len(answers), "time")
     late = max((one.after_s for one in slow if one.after_s is not None), default=None)
     if late is None and len(slow) == len(answers):
         seen, hint = (f"; {instead[0]}", instead[1]) if instead else ("", hint)

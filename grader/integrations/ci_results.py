@@ -50,6 +50,7 @@ TITLES = {
     JobStatus.NOT_GRADED: "Not graded",
     JobStatus.WRONG_INPUT: "Wrong input",
 }
+LET_IT_RUN = "without `static` (GRADER_STATIC: true), the job runs the nodes"
 NO_MARK_LOST = "this is not the submission's fault, and this costs no marks"
 WITH_LINES = ("junit", "code-quality", "sarif")
 """Forms that are rendered once more, or only here, with files as the repository has them."""
@@ -92,6 +93,8 @@ def describe_outcome(
     counted: GradingResult, rubric: Rubric, outcome: JobStatus, *, static: bool
 ) -> tuple[str, str]:
     """Return a line about the outcome, with its cause where that is not the student's, and a hint or ""."""
+    if outcome is JobStatus.NOT_GRADED and static and counted.error is None and not counted.criteria:
+        return "no criterion of this lab can be judged from the files alone, and nothing was run", LET_IT_RUN
     if outcome is JobStatus.NOT_GRADED:
         return _describe_error(counted)
     files = " that can be judged from the files alone (nothing was run)" if static else ""

@@ -351,6 +351,7 @@ class Requirements:
             update = {
                 "timing": verdict.timing and (self.verdicts[root].timing or not sure),
                 "status": Status.BLOCKED,
+                "score": 0.0,
                 "message": message,
                 "hint": f"fix {root} first",
                 "blocked_by": root,
@@ -384,7 +385,9 @@ class Requirements:
             return True
         if self._is_repaired(required, criterion, found) and not same_line:
             return False
-        was_there = (found.silent and same_run) or self._leaves_it_there(required, criterion)
+        was_there = (found.silent and (same_run or found.status is Status.PASS)) or self._leaves_it_there(
+            required, criterion
+        )
         return not was_there or bool(verdict.cause) or _cause(verdict) in found.message
 
     def _is_repaired(self, required: str, criterion: Criterion, found: Verdict) -> bool:

@@ -39,7 +39,7 @@ SEEN_IN_RUNS = {"missing-import", "missing-call", "topic-name", "service-name", 
 """These are lost in runs, so no criterion of the files asks for them."""
 DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark", "encoding"}
 """The arena repairs these in the scripts that the rubric starts, so no run of those is lost by them."""
-OF_SYNTAX = {"python-syntax", "launch-syntax"}
+OF_SYNTAX = {"python-syntax", "launch-syntax", "yaml-syntax"}
 """Of a line that could not be read, the copy shows for the first time what it says."""
 MADE_BY_BUILDS = {".msg", ".srv", ".action", ".c", ".cc", ".cpp", ".cxx"}
 NUMBER = re.compile(r"\d+(\.\d+)?")

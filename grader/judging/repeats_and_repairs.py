@@ -279,7 +279,10 @@ def is_used_by(
     if name.endswith((".launch", ".launch.xml")):
         return launches and not known
     a_program = any(name in programs for programs in launched.values())
-    return repair.kind != "launch-type" and (launches or not (known or a_program))
+    not_run = repair.kind == "launch-type" or (
+        repair.kind == "yaml-syntax" and name in _read_by_grader(scenario)
+    )
+    return not not_run and (launches or not (known or a_program))
 
 
 def _may_launch(scenario: Scenario, program: str, launched: Launched) -> bool:
@@ -300,6 +303,11 @@ def is_first_line_added(repair: Repair, rubric: Rubric, repairs: Iterable[Repair
 def _started_files(scenario: Scenario) -> set[str]:
     """Return the names of the files that the scenario starts."""
     return {PurePosixPath(path).name for s in scenario.start for path in (s.script, s.launch) if path}
+
+
+def _read_by_grader(scenario: Scenario) -> set[str]:
+    """Return the names of parameter files whose values the grader sets; what is in one that is not YAML it makes up."""
+    return {PurePosixPath(param.file).name for param in scenario.params if param.file}
 
 
 def _is_worse(first: Mapping[str, Verdict], on_copy: Mapping[str, Verdict], criterion: Criterion) -> bool:

@@ -15,8 +15,8 @@ from grader.wording import join_words, plural
 
 RepairKind = Literal[
     "executable-bit", "encoding", "byte-order-mark", "line-ends", "shebang", "file-name", "python-syntax",
-    "manifest-line", "build-line", "launch-syntax", "package-name", "launch-type", "missing-import", "missing-call",
-    "node-name", "topic-name", "service-name", "parameter-name",
+    "manifest-line", "build-line", "launch-syntax", "yaml-syntax", "package-name", "launch-type", "missing-import",
+    "missing-call", "node-name", "topic-name", "service-name", "parameter-name",
 ]  # fmt: skip
 """In the order in which a student would meet them."""
 
@@ -32,6 +32,7 @@ DEFAULT_SHARES: dict[RepairKind, float] = {
     "manifest-line": 0.5,
     "build-line": 0.5,
     "launch-syntax": 0.5,
+    "yaml-syntax": 0.5,
     "package-name": 1.0,
     "launch-type": 1.0,
     "missing-import": 0.5,
@@ -55,6 +56,7 @@ BY_HAND: dict[RepairKind, str] = {
     "build-line": "a line is missing in CMakeLists.txt: compare it with one that catkin_create_pkg makes",
     "launch-syntax": "a tag or attribute of a launch file that is misspelt or missing, or XML that is not well-formed: "
     "xmllint --noout FILE names the line",
+    "yaml-syntax": "a line of a parameter file that is not YAML: rosparam load FILE names it",
     "package-name": "a misspelt package name: it is the same in package.xml, in project(…) and in each pkg=",
     "launch-type": "type= without .py: it is the file's whole name, as ls shows it",
     "missing-import": "a name that is not imported: from std_msgs.msg import NAME; or an import of what is not there",

@@ -135,13 +135,14 @@ class Verdict(Record):
     """One check's judgement.
 
     `score` is the share of the points, 0 to 1. `unjudged` marks a verdict that rests on the absence of evidence: the
-    judge turns it into `blocked` where a required criterion explains the absence; `unbuilt`: what is absent is made
-    by the build alone; `silent`: a process was there and alive, and only something that is absent explains it.
-    `timing` marks a loss that one run's timing could have made: it counts only if it is seen twice. `of_machine`: it is
-    open until the machine has what it lacks, and grading again before changes nothing. `cause` is what a
-    process ended of, in words that are the same in every verdict that rests on it. `blocked_by` is the criterion that
-    explains the absence, `right` what earned a part of the points, `mistake` the kind of what was done wrong. `said` is
-    what a node printed, logged or published in place of what was asked, `sought` names: the lines of both are cited.
+    judge turns it, even a pass, into `blocked` where a required criterion explains the absence; `unbuilt`: what is
+    absent is made by the build alone; `silent`: a process was there and alive, and only something that is absent
+    explains it. `timing` marks a loss that one run's timing could have made: it counts only if it is seen twice.
+    `of_machine`: it is open until the machine has what it lacks, and grading again before changes nothing. `cause` is
+    what a process ended of, in words that are the same in every verdict that rests on it. `blocked_by` is the criterion
+    that explains the absence, `right` what earned a part of the points, `mistake` the kind of what was done wrong.
+    `said` is what a node printed, logged or published in place of what was asked, `sought` names: the lines of both are
+    cited.
     `callbacks`: a callback came too `late` to what was sent, or never; or it is about what came `before` any callback
     could keep the node waiting. `excused`: what would be lost if the machine had not been late. `dropped`: so much came
     on its topics that the recorder dropped some.

@@ -16,9 +16,10 @@ FILES_MAX = 50
 SHORT_S = 0.1
 """A callback may wait for less than this."""
 _TEXT = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.DOTALL)
-_CALLBACK = re.compile(
-    r"\b(?:subscribe|advertiseService)\s*(?:<[^;()]*>)?\s*\([^;]*?,\s*&?\s*(?P<name>[A-Za-z_][\w:]*)\s*[,)]"
-)
+_LISTENS = re.compile(r"\b(?:subscribe|advertiseService)\s*(?:<[^;()]*>)?\s*\(")
+_NAMED = re.compile(r"\s*&?\s*(?P<name>[A-Za-z_][\w:]*)\s*")
+_BOUND = re.compile(r"\bbind\s*(?:<[^;()]*>)?\s*\(\s*&?\s*(?P<name>[A-Za-z_][\w:]*)\s*,")
+_LAMBDA = re.compile(r"\[[^\[\];]*\]\s*\([^;{}]*?\)[^;{}()]*{")
 _ENDLESS = re.compile(
     r"\bwhile\s*\(\s*(?:(?:ros::|\w+(?:\.|->))ok\s*\(\s*\)|true|1)\s*\)|\bfor\s*\(\s*;\s*;\s*\)"
 )
@@ -37,6 +38,7 @@ _OF_ANGLE = re.compile(
 )
 _TURNED = re.compile(r"180|rad|PI\b", re.IGNORECASE)
 """So an angle in degrees is made one in radians."""
+NEW_LINE = "\n"
 _WHOLE_TURN = 7
 """Of a number of radians, no one writes more."""
 
@@ -69,18 +71,18 @@ def slips_of(path: str, text: str) -> Iterator[PythonSlip]:
 
 
 def _waiting(path: str, code: str) -> Iterator[PythonSlip]:
-    for name in dict.fromkeys(match["name"].rpartition("::")[2] for match in _CALLBACK.finditer(code)):
-        body = _body(name, code)
-        found = next(_waits_in(body, code), None) if body else None
+    for body in dict.fromkeys(_callbacks(code)):
+        found = next(_waits_in(body, code), None)
         if found is not None:
             at, message, fix = found
             line = code.count("\n", 0, at) + 1
-            message = message.format(name=name, line=line)
+            name = body.name or f"line {code.count(NEW_LINE, 0, body.start) + 1}"
+            called = f"`{name}`" if body.name else f"on {name}"
             yield PythonSlip(
                 file=path,
                 line=line,
                 kind="callback-waits",
-                message=message,
+                message=message.format(name=called, line=line),
                 fix=fix.format(line=line),
                 name=name,
             )
@@ -89,7 +91,7 @@ def _waiting(path: str, code: str) -> Iterator[PythonSlip]:
 def _unspun(path: str, code: str) -> Iterator[PythonSlip]:
     """Yield the loop of a node that subscribes, or offers a service, and never lets ROS call anything."""
     loop = _LOOP.search(code)
-    if loop is None or not _CALLBACK.search(code) or _SPINS.search(code):
+    if loop is None or not _LISTENS.search(code) or _SPINS.search(code):
         return
     line = code.count("\n", 0, loop.start()) + 1
     message = f"the loop on line {line} never calls ros::spinOnce(), so that no callback is ever called"
@@ -97,9 +99,44 @@ def _unspun(path: str, code: str) -> Iterator[PythonSlip]:
     yield PythonSlip(file=path, line=line, kind="callback-waits", message=message, fix=fix)
 
 
+def _callbacks(code: str) -> Iterator[_Body]:
+    """Yield the bodies of what messages and requests call: functions, methods, what `bind` is given, lambdas."""
+    for call in _LISTENS.finditer(code):
+        # the name of the topic and the length of the queue come first; what comes behind the callback is its object
+        for start, end in [*_arguments(code, call.end())][1:]:
+            given = code[start:end]
+            named = _NAMED.fullmatch(given) or _BOUND.search(given)
+            if found := _LAMBDA.search(given):
+                at = start + found.end()
+                yield _Body("", at, _closing(code, at))
+            elif named and (body := _body(named["name"].rpartition("::")[2], code)):
+                yield body
+            else:
+                continue
+            break
+
+
+def _arguments(code: str, start: int) -> Iterator[tuple[int, int]]:
+    """Yield where each argument of a call begins and ends, whose bracket is the one before `start`."""
+    depth, begin = 0, start
+    for match in re.compile(r"[][(){},]").finditer(code, start):
+        if match[0] == "," and not depth:
+            yield begin, match.start()
+            begin = match.end()
+        elif match[0] in "([{":
+            depth += 1
+        elif match[0] in ")]}":
+            depth -= 1
+        if depth < 0:
+            yield begin, match.start()
+            return
+
+
 def _body(name: str, code: str) -> _Body | None:
-    """Return the body of the function of that name; None where the source has none."""
-    head = re.search(rf"\b(?:\w+::)*{re.escape(name)}\s*\([^;{{}}]*\)\s*(?:const\s*)?{{", code)
+    """Return the body of the function, or of the lambda, of that name; None where the source has none."""
+    word = re.escape(name)
+    head = re.search(rf"\b(?:\w+::)*{word}\s*\([^;{{}}]*\)\s*(?:const\s*)?{{", code)
+    head = head or re.search(rf"\b{word}\s*=\s*{_LAMBDA.pattern}", code)
     return _Body(name, head.end(), _closing(code, head.end())) if head else None
 
 
@@ -121,14 +158,14 @@ def _waits_in(body: _Body, code: str) -> Iterator[tuple[int, str, str]]:
         if not _LEAVES.search(code, match.end(), end):
             yield (
                 match.start(),
-                "the loop in the callback `{name}`, line {line}, never ends",
+                "the loop in the callback {name}, line {line}, never ends",
                 "take the loop out of it",
             )
     for match in _SPIN.finditer(code, body.start, body.end):
-        yield match.start(), "the callback `{name}` calls spin() on line {line}", "move line {line} out of it"
+        yield match.start(), "the callback {name} calls spin() on line {line}", "move line {line} out of it"
     for match in _SLEEP.finditer(code, body.start, body.end):
         if _seconds(match) >= SHORT_S:
-            yield match.start(), "the callback `{name}` sleeps on line {line}", "delete line {line}"
+            yield match.start(), "the callback {name} sleeps on line {line}", "delete line {line}"
 
 
 def _seconds(match: re.Match[str]) -> float:

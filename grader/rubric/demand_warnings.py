@@ -51,6 +51,7 @@ def demand_warnings(rubric: dict[str, Any], criteria: Criteria, scenarios: Scena
     yield from _late(as_map(rubric.get("late")))
     yield from _waited_for_nothing(criteria, scenarios)
     yield from _without_its_node(rubric, scenarios)
+    yield from _silent_anyway(criteria)
     yield from _launched_nodes(criteria, scenarios)
     yield from _other_transforms(criteria, scenarios)
     for index, criterion in criteria:
@@ -119,6 +120,28 @@ def _easy(at: KeyPath, check: str, given: dict[str, Any], scenario: dict[str, An
                 (*at, "within_s"),
                 f"the run's window is {lasting_s:g} s: the time of the first message passes for all",
             )
+
+
+def _silent_anyway(criteria: Criteria) -> Iterator[Fault]:
+    """Yield silence that is asked of a node, without a criterion that has to see it publish on this topic."""
+    known = {str(one.get("id")): one for _, one in criteria}
+    for index, criterion in criteria:
+        given = as_map(criterion.get("with"))
+        topic = as_map(given.get("effect")).get("topic")
+        if criterion.get("check") != "reacts" or given.get("never") is not True:
+            continue
+        needed = [name for _, name in as_texts(criterion.get("requires"))]
+        for name in needed:
+            needed += [n for _, n in as_texts(known.get(name, {}).get("requires")) if n not in needed]
+        if not any(_sees(known.get(name, {}), topic) for name in needed):
+            fault = f"a node that never publishes on {topic} passes: let it require a criterion that sees it publish"
+            yield ("criteria", index, "with", "never"), f"{fault} there"
+
+
+def _sees(criterion: dict[str, Any], topic: object) -> bool:
+    """Return whether a criterion wants messages of the student's on the topic."""
+    given = as_map(criterion.get("with"))
+    return topic in {given.get("topic"), as_map(given.get("effect")).get("topic")} and not given.get("never")
 
 
 def _impossible(at: KeyPath, check: str, given: dict[str, Any]) -> Iterator[Fault]:

@@ -424,7 +424,7 @@ def _other_effects(
     before: list[tuple[str, str, dict[str, Any]]] = []
     for index, criterion in criteria:
         given, name = as_map(criterion.get("with")), str(criterion.get("scenario"))
-        if criterion.get("check") != "reacts":
+        if criterion.get("check") != "reacts" or given.get("never") is True:
             continue
         for run, earlier, other in before:
             causes, effects = ([as_map(g.get(key)) for g in (given, other)] for key in ("cause", "effect"))
@@ -555,7 +555,8 @@ def _demanded(
         return
     parts: list[tuple[KeyPath, dict[str, Any]]] = [((), given)]
     if check == "reacts":
-        parts = [((key,), as_map(given.get(key))) for key in ("cause", "effect")]
+        wanted = ("cause",) if given.get("never") is True else ("cause", "effect")
+        parts = [((key,), as_map(given.get(key))) for key in wanted]
     for part, asked in parts:
         if part != ("cause",) or _sent_on(str(asked.get("topic")), scenario) == []:
             is_cause = part == ("cause",)

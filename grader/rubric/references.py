@@ -308,6 +308,7 @@ def _forgotten_topics(criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fa
             given = as_map(other.get("with"))
             topic = str(as_map(given.get("effect")).get("topic") or given.get("topic"))
             is_asked = str(other.get("check")) in ASKED_OF_STUDENT and given.get("of", "student") == "student"
+            is_asked = is_asked and given.get("never") is not True
             if not is_asked or other.get("scenario") != criterion.get("scenario") or topic in SYSTEM_TOPICS:
                 continue
             is_allowed = any(fnmatchcase(topic, one) for one in allowed)

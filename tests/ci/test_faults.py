@@ -62,3 +62,26 @@ def test_systems_that_know_neither_outputs_nor_summaries(job, monkeypatch):
     monkeypatch.delenv("GITHUB_STEP_SUMMARY")
     monkeypatch.setenv("GRADER_STATIC", "true")
     assert run(["ci", "github"]) == 0
+
+
+ONLY_RUN = """\
+schema: grader.rubric/1
+id: only-run
+title: Nothing of the files
+version: "1"
+package: lab1
+scenarios:
+  talks: {title: The talker, start: [{name: talker, script: scripts/talker.py}], until: {alive_s: 2}}
+criteria:
+  - {id: node, title: It is a node, points: 100, check: node-lives, scenario: talks, with: {process: talker, min_s: 1}}
+"""
+
+
+def test_a_lab_of_which_the_files_alone_show_nothing(job, tmp_path, monkeypatch, capsys):
+    (tmp_path / "only-run.yaml").write_text(ONLY_RUN)
+    monkeypatch.setenv("GRADER_LAB", str(tmp_path / "only-run.yaml"))
+    monkeypatch.setenv("GRADER_STATIC", "true")
+    assert run(["ci", "github"]) == 3
+    ((_, told, text),) = heard(capsys.readouterr().out)
+    assert told["title"] == "Not graded"
+    assert text.startswith("no criterion of this lab can be judged from the files alone, and nothing was run")

@@ -44,10 +44,40 @@ def _told(line: str, given: str = "hear") -> list[str]:
         ("ros::spin();", "the callback `hear` calls spin() on line 5"),
     ],
 )
-@pytest.mark.parametrize("given", ["hear", "&Node::hear, this"])
+@pytest.mark.parametrize(
+    "given",
+    [
+        "hear",
+        "&Node::hear, this",
+        "boost::bind(&Node::hear, this, boost::placeholders::_1)",
+        "boost::bind(&hear, _1, boost::ref(queue))",
+        "std::bind(&Node::hear, this, std::placeholders::_1)",
+        "hear, ros::TransportHints().tcpNoDelay()",
+    ],
+)
 def test_a_callback_that_waits(line: str, told: str, given: str) -> None:
     (found,) = _told(line, given)
     assert found.startswith(f"5: {told}; ")
+
+
+LAMBDA = """\
+  auto kept = [this](const std_msgs::Float32::ConstPtr& m) { ros::Duration(2).sleep(); };
+  ros::Subscriber first = node.subscribe<std_msgs::Float32>("/first", 10, kept);
+  ros::Subscriber second = node.subscribe<std_msgs::Float32>(
+      "/second", 10, [&mean, this](const std_msgs::Float32::ConstPtr& m) -> void {
+        hear(m, count);
+        while (true) mean.publish(m);
+      });
+  ros::Subscriber third = node.subscribe<std_msgs::Float32>("/third", 10, [](auto m) { print(m, 5); });
+  void print() { ros::spin(); }
+"""
+
+
+def test_a_lambda_that_waits() -> None:
+    assert [f"{one.line}: {one.message}" for one in slips_of("src/node.cpp", LAMBDA)] == [
+        "1: the callback `kept` sleeps on line 1",
+        "6: the loop in the callback on line 4, line 6, never ends",
+    ]
 
 
 @pytest.mark.parametrize(

@@ -93,6 +93,12 @@ TEMPLATE = """\
 LEVELS = "a:\n  b:\n    x: 1\n  y: 2\n  c:\n    z: 3\n"
 
 
+CONSTRUCTOR = """\
+Node::Node() : n_(1)
+{
+  ros::Subscriber sub = nh_.subscribe("scan", 10, &Node::heard, this);
+%s}
+"""
 OTHER = "rospy.Publisher('numeric_chatter2', Int8, queue_size=10)"
 
 
@@ -345,6 +351,22 @@ CASES = {
         {"src/a.cpp": CPP_NODE.replace("  return 0;\n", "  // ros::spin();\n")}, ["missing-call"], "src/a.cpp",
         after={"src/a.cpp": "  // ros::spin();\n  ros::spin();\n}\n"},
     ),
+    "subscriber-local-in-cpp": Case(
+        {"src/a.cpp": CONSTRUCTOR % ""}, ["missing-call"],
+        "line 3 of src/a.cpp: sub is a variable of the function Node, and the subscription ends with it",
+        after={"src/a.cpp": "  static ros::Subscriber sub = nh_.subscribe"},
+    ),
+    "subscriber-copied-in-cpp": Case({"src/a.cpp": CONSTRUCTOR % "  sub_ = sub;\n"}, []),
+    "subscriber-kept-by-a-loop-in-cpp": Case({"src/a.cpp": CONSTRUCTOR % "  ros::spin();\n"}, []),
+    "subscriber-dropped-in-a-constructor": Case(
+        {"src/a.cpp": (CONSTRUCTOR % "").replace("ros::Subscriber sub = ", "")}, ["missing-call"],
+        "what subscribe(…) returns is dropped, and with it the subscription",
+        after={"src/a.cpp": "  static ros::Subscriber sub = nh_.subscribe"},
+    ),
+    "topic-on-the-second-line-in-cpp": Case(
+        {"src/a.cpp": 'void f(Q& q) {\n  q.s = nh.subscribe<std_msgs::Int8>(\n      "/numeric_chater", 10, f);\n}\n'},
+        ["topic-name"], "line 3 of src/a.cpp: the topic /numeric_chater should be /numeric_chatter",
+        after={"src/a.cpp": '      "/numeric_chatter", 10, f);\n'}),
     "subscriber-dropped-in-cpp": Case(
         {"src/a.cpp": CPP_NODE.replace("auto sub = ros::NodeHandle()", "nh").replace("  return 0", "  ros::spin()")},
         ["missing-call"], "line 4 of src/a.cpp: what subscribe(…) returns is dropped, and with it the subscription",
@@ -471,6 +493,28 @@ CASES = {
         {"config/my.yaml": 'details:\n  name: "Ada"\n  names: 3\n',
          **swapped(TALKER, ("publish(1)", "publish(all['names'] + all['name'])"),
                    ("    rate =", "    all = rospy.get_param('details')\n    rate ="))}, []),
+    "yaml-tab": Case({"config/my.yaml": "a:\n  b:\n    x: 1\n\ty: 2\n  c:\n    z: 3\n"}, ["yaml-syntax"],
+                     "config/my.yaml line 4: begin the line with 4 spaces", wanted=NESTED,
+                     after={"config/my.yaml": "    x: 1\n    y: 2\n"}),
+    "yaml-tabs": Case({"config/my.yaml": "a:\n\tb:\n\t\tx: 1\n\t\ty: 2\n\tc:\n\t\tz: 3\n"}, ["yaml-syntax"],
+                      "line 2 of config/my.yaml is indented with a tab", wanted=NESTED,
+                      after={"config/my.yaml": "  b:\n    x: 1\n"}),
+    "yaml-quote": Case({"config/my.yaml": 'a:\n  x: "1  # one\n  y: 2\n'}, ["yaml-syntax"],
+                       'line 2 of config/my.yaml opens " and does not close it', wanted=NESTED,
+                       after={"config/my.yaml": '  x: "1"  # one\n'}),
+    "yaml-column": Case({"config/my.yaml": "a:\n  b:\n    x: 1\n    y: 2\n   c:\n    z: 3\n"}, ["yaml-syntax"],
+                        "line 5 of config/my.yaml does not line up", wanted=NESTED,
+                        after={"config/my.yaml": "\n  c:\n    z: 3\n"}),
+    "yaml-two-lines": Case({"config/my.yaml": "a:\n  b\n    x: 1\n    y:2\n"}, ["yaml-syntax", "yaml-syntax"],
+                           "line 2 of config/my.yaml has no `:` after its name", wanted=NESTED,
+                           after={"config/my.yaml": "  b:\n    x: 1\n    y: 2\n"}),
+    "yaml-loaded-by-a-launch-file": Case(
+        {"config/a.yaml": "x 1\n",
+         **swapped(LAUNCHED, ("</launch>", '<rosparam command="load" file="$(find lab)/config/a.yaml"/>\n</launch>'))},
+        ["yaml-syntax"], "line 1 of config/a.yaml has no `:`", after={"config/a.yaml": "x: 1\n"}),
+    "yaml-that-nothing-names": Case({"config/other.yaml": "x 1\ny 2\n"}, []),
+    "yaml-of-another-kind": Case({"config/my.yaml": "a: {b: [1, 2\n"}, [], wanted=NESTED),
+    "yaml-that-is-right": Case({"config/my.yaml": "a:\n  b:\n    x: 1  # it's\n"}, [], wanted=NESTED),
     "key-with-two-colons": Case(
         {"config/my.yaml": 'details:\n  name:: "Ada"\n'}, ["parameter-name"], "the key name: should be name",
         wanted=asking(files=("config/my.yaml",)), after={"config/my.yaml": '  name: "Ada"\n'}),

@@ -53,6 +53,10 @@ def _explain_undeclared(found: re.Match[str], _package: PackageFacts, lines: Seq
     name, near = found[1], found[2]
     if re.fullmatch(r"_\d", name) and any("boost::bind" in line for line in lines):
         return _no_placeholder(name)
+    if re.fullmatch(r"_\d", name) and any("std::bind" in line for line in lines):
+        return Explained(
+            found.string, f"write std::placeholders::{name}, and #include <functional> at the top"
+        )
     if name in STANDARD:
         return Explained(found.string, f"write std::{name}, and #include <{STANDARD[name]}> at the top")
     declare = f"declare {name} above that line, or include the header that does"
@@ -99,6 +103,31 @@ def _no_placeholder(name: str) -> Explained:
         f"{ON_THE_MACHINE}build it with ROS Noetic's own Boost; boost::placeholders::{name} works with both"
     )
     return Explained(why, hint, of_machine=True)
+
+
+def _explain_subscription(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    """roscpp takes the message's type from a function, and of a lambda or of what `bind` makes it has to be told."""
+    given = found[1]
+    why = "subscribe(…) does not take this callback"
+    if "lambda" in given or "bind" in given.lower():
+        kind = "a lambda" if "lambda" in given else "what bind(…) makes"
+        return Explained(
+            f"{why}: {kind} does not tell it the message's type",
+            "write the type behind subscribe: nh.subscribe<std_msgs::String>(…), with your own type",
+        )
+    if method := re.search(r"\((\w+)::\*\)", given):
+        return Explained(
+            f"{why}: a method of {method[1]} needs its object",
+            f"give the object behind the method: `this` in a method of {method[1]}, elsewhere the address of one",
+        )
+    return Explained(found.string, FIRST_ERROR_HINT)
+
+
+def _no_address(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    method = re.sub(r"\(.*", "", found[1]).split()[-1]
+    return Explained(
+        found.string, f"write &{method} where you give it to another function, without brackets behind it"
+    )
 
 
 def _no_type(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -161,6 +190,8 @@ CPP_ERRORS: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"expected initializer before '([^']+)'", _no_semicolon_above),
     (r"expected '}' at end of input", _no_brace),
     (r"'([^']+)' was not declared in this scope(?:; did you mean '([^']+)')?", _explain_undeclared),
+    (r"no matching function for call to '(?:ros::)?NodeHandle::subscribe(.*)", _explain_subscription),
+    (r"invalid use of non-static member function '([^']+)'", _no_address),
     (r"'([^']+)::(\w+)' has not been declared", _no_type),
     (r"'(\w+)' does not name a (?:template )?type", _standard_type),
     (r"'__s_get\w+' is not a member of '([^']+)'", _no_message),

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_traceback, process_tracebacks, syntax_hint
 from grader.checks.support.launch_slips import PROGRAMS_OF, at_its_lines, node_slip, own_script, owner_of
+from grader.checks.support.parameters import explain_yaml
 from grader.checks.support.processes import early_end, lives, observed_until_ns
 from grader.checks.support.scripts import paths_by_name, programs, shebang_obstacles
 from grader.checks.support.text import INIT, near_names, shown
@@ -36,6 +37,7 @@ _REQUIRED = re.compile(r"REQUIRED process (\[[^\s\[\]]+-\d+\]) has died")
 NO_PACKAGE = r"Resource not found: (\S+)"
 NO_FILE = r"file does not exist \[([^\[\]\n]+)\]"
 BAD_FILE = r"error loading <rosparam> tag"
+_NO_YAML = re.compile(r"file (\S+) contains invalid YAML")
 IGNORE = "CATKIN_IGNORE"
 YAML = {".yaml", ".yml"}
 _NO_LAUNCH_FILE = "is neither a launch file in package"
@@ -162,11 +164,26 @@ def refusal(run: Run, package: PackageFacts) -> Absence | None:
             if pattern == NO_FILE and (meant := _file_meant(package, words[0])):
                 fix = f"write $(find {package.name})/{meant}"
             said = f"roslaunch starts nothing: {why.format(*words)}"
+            if pattern == BAD_FILE and (unread := _unread_yaml(text, package)):
+                return unread
             if pattern == NO_PACKAGE and near_names(words[0], [package.name]):
                 return Absence(f"{said}: this one is called {package.name}", f"write $(find {package.name})")
             cited = _declared(words[0], package) if pattern == _UNSET.pattern else ()
             return Absence(said, fix, citations=cited, refused=pattern, about="".join(words[:1]))
     return None
+
+
+def _unread_yaml(text: str, package: PackageFacts) -> Absence | None:
+    """Return why a file that <rosparam> loads is not YAML, with its line."""
+    found, words = _NO_YAML.search(text), explain_yaml(text.splitlines())
+    if found is None or words is None:
+        return None
+    path = paths_by_name(package).get(PurePosixPath(found[1]).name, "")
+    cited = (FileCitation(file=path, line=words.line),) if path else ()
+    said = (
+        f"roslaunch starts nothing: {shown(path or PurePosixPath(found[1]).name)} does not load: {words.why}"
+    )
+    return Absence(said, words.hint, citations=cited, refused=BAD_FILE)
 
 
 def _declared(name: str, package: PackageFacts) -> tuple[FileCitation, ...]:

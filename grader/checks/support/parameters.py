@@ -23,6 +23,7 @@ from grader.evidence.run import Run
 from grader.model.package import LaunchNode, LaunchParam, PackageFacts
 from grader.model.verdict import EvidenceCitation, Verdict
 from grader.wording import plural, there_is
+from grader.yaml_fixes import YAML_LINES_MAX, slip_of_yaml
 
 UNNAMED = "/unnamed"
 """What rospy calls a node before `init_node`."""
@@ -37,7 +38,6 @@ SYSTEM = (
 NOT_IN_FILE = "not in the file"
 PRINTED_INDENT = 4
 _BETWEEN_PARTS = re.compile(r"[,;]?\s*\n\s*|[,;]\s+")
-YAML_LINES_MAX = 2_000
 _YAML_KEY = re.compile(r"^( *)[\"']?([A-Za-z]\w{0,99})[\"']?\s*:(?:\s|$)")
 _PLACE = re.compile(r"line (\d+), column (\d+)")
 _IN_LINE = "line {line} has a tab after a name or a value, which YAML does not accept"
@@ -370,41 +370,13 @@ def _is_within(lines: Sequence[str]) -> bool:
     return False
 
 
-_GOES_ON = ("|", ">", "{", "[", ",")
-"""So ends a line whose value is in the lines below it."""
-_NO_SPACE = re.compile(r"""(?P<key>\s*(?:- )?["']?[A-Za-z_][\w-]*["']?):(?P<value>[^\s:/\\].*)""")
-_NO_COLON = re.compile(
-    r"""(?P<key>\s*(?:- )?[A-Za-z_][\w-]*)(?:\s*(?P<sign>[=;,.])\s*|\s+)(?P<value>["'\w].*)"""
-)
-_KEY_ALONE = re.compile(r"(?P<key>\s*[A-Za-z_][\w-]*)\s*")
-_OPEN_QUOTE = re.compile(
-    r"""(?P<key>\s*(?:- )?[A-Za-z_][\w-]*): +(?P<value>(?P<quote>["'])(?:(?!(?P=quote)).)*)"""
-)
-_QUOTE_TWICE = re.compile(
-    r"""(?P<key>\s*(?:- )?[A-Za-z_][\w-]*): +(?:(?P<quote>["'])(?P=quote)(?P<value>[^"']+)(?P=quote)"""
-    r"""|(?P<quote2>["'])(?P<value2>[^"']+)(?P=quote2){2})"""
-)
-_KEY_AND_MORE = re.compile(r"(?P<key>\s*[A-Za-z_][\w-]*)(?P<more>::|[;,.=])")
-_COLON_INSIDE = re.compile(
-    r"""(?P<key>\s*(?:- )?[A-Za-z_][\w-]*): +(?P<value>[^\s"'\[{|>&*!#][^"]*:\s[^"]*)"""
-)
-
-
 def explain_yaml_line(text: str, until: int) -> Words | None:
     """Return what keeps the first lines of a file, up to `until`, from being `name: value`; None where they look right.
     What YAML's parser names is often a line further down."""
-    lines = text.splitlines()[: min(until, YAML_LINES_MAX)]
-    for number, line in enumerate(lines, start=1):
-        code = re.sub(r"\s+#.*", "", line).rstrip()
-        if not code.strip() or code.lstrip().startswith("#"):
-            continue
-        if code.endswith(_GOES_ON):
-            return None
-        below = next((one for one in lines[number:] if one.strip()), "")
-        if found := _slip_of_line(code, is_above_block=_indent(below) > _indent(code)):
-            why, right = found
-            return Words(f"line {number} {why}", f"line {number}: write `{right}`", number)
-    return None
+    found = slip_of_yaml(text, until)
+    return found and Words(
+        f"line {found.number} {found.why}", f"line {found.number}: write `{found.right}`", found.number
+    )
 
 
 def explain_yaml_column(text: str, line: int) -> Words | None:
@@ -421,37 +393,3 @@ def explain_yaml_column(text: str, line: int) -> Words | None:
     spaces = plural(other.indent, "space")
     why = f"line {odd.line} does not line up with line {other.line}: names of one level begin in the same column"
     return Words(why, f"begin line {odd.line} with {spaces}, as line {other.line} does", odd.line)
-
-
-def _indent(line: str) -> int:
-    return len(line) - len(line.lstrip())
-
-
-def _slip_of_line(code: str, *, is_above_block: bool) -> tuple[str, str] | None:
-    """Return what a line of a map lacks, and the line as it should be."""
-    return _slip_of_key(code, is_above_block=is_above_block) or _slip_of_value(code)
-
-
-def _slip_of_key(code: str, *, is_above_block: bool) -> tuple[str, str] | None:
-    if found := _NO_SPACE.fullmatch(code):
-        return "has no space after its `:`", f"{found['key'].strip()}: {found['value']}"
-    if is_above_block and (found := _KEY_ALONE.fullmatch(code)):
-        return "has no `:` after its name", f"{found['key'].strip()}:"
-    if ":" not in code and (found := _NO_COLON.fullmatch(code)):
-        lacks = f"has `{found['sign']}` in place of `:`" if found["sign"] else "has no `:` after its name"
-        return lacks, f"{found['key'].strip()}: {found['value']}"
-    if is_above_block and (found := _KEY_AND_MORE.fullmatch(code)):
-        return f"has `{found['more']}` in place of `:` after its name", f"{found['key'].strip()}:"
-    return None
-
-
-def _slip_of_value(code: str) -> tuple[str, str] | None:
-    if found := _QUOTE_TWICE.fullmatch(code):
-        quote, value = found["quote"] or found["quote2"], found["value"] or found["value2"]
-        return f"has {quote} twice", f"{found['key'].strip()}: {quote}{value}{quote}"
-    if found := _OPEN_QUOTE.fullmatch(code):
-        lacks = f"opens {found['quote']} and does not close it"
-        return lacks, f"{found['key'].strip()}: {found['value']}{found['quote']}"
-    if found := _COLON_INSIDE.fullmatch(code):
-        return "has a `:` in its value", f'{found["key"].strip()}: "{found["value"]}"'
-    return None

@@ -42,6 +42,7 @@ from grader.package.repairs.names import (
     wanted_of,
 )
 from grader.package.repairs.python import repair_python
+from grader.package.repairs.yaml_files import repair_yaml_files
 
 __all__ = [
     "DEFAULT_SHARES",
@@ -83,6 +84,7 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
         names[path] = names_in_cpp(files.text(path) or "")
     for script in names:
         repair_script_names(files, script, names[script], wanted)
+    repair_yaml_files(files, package, wanted)
     repair_yaml_names(files, package, names, wanted)
     for script in names:
         repair_script_keys(files, package, script, names[script], wanted)

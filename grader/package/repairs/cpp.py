@@ -18,10 +18,65 @@ KEPT = {"subscribe": ("ros::Subscriber", "sub"), "advertiseService": ("ros::Serv
 """What a call returns, and a name for it: without one it is gone at once."""
 
 
+_LOCAL = re.compile(
+    r"^(?P<indent>[ \t]*)(?:const\s+)?(?:ros::(?:Subscriber|ServiceServer)|auto)\s+(?P<name>\w+)\s*=\s*"
+    r"[\w.>-]+(?:\.|->)(?P<call>subscribe|advertiseService)\b",
+    re.MULTILINE,
+)
+_FUNCTION = re.compile(r"\b(?P<name>~?\w+)\s*\([^;{}]*\)\s*(?:const\s*)?(?::[^;{}]*)?$")
+_BLOCK = frozenset({"if", "while", "for", "switch", "catch"})
+
+
 def repair_cpp(files: Files, path: str) -> None:
-    """Find both in a source."""
+    """Find all of it in a source."""
     _keep_subscribers(files, path)
+    _keep_locals(files, path)
     _repair_spin(files, path)
+
+
+def _keep_locals(files: Files, path: str) -> None:
+    """Keep a subscriber that is a variable of a constructor, or of another function that ends before the node does."""
+    text = files.text(path) or ""
+    code = _COMMENT.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), text)
+    lines = text.split("\n")
+    for found in _LOCAL.finditer(code):
+        function = _function_around(code, found.start())
+        body = code[found.end() : _end_of(code, found.end())]
+        used = re.search(rf"\b{found['name']}\b|\b(?:spin|ok|while|waitForShutdown)\b", body)
+        if function in ("", "main") or used:
+            continue
+        number = code.count("\n", 0, found.start()) + 1
+        line = lines[number - 1]
+        lines[number - 1] = f"{found['indent']}static {line.lstrip()}"
+        what = "subscription" if found["call"] == "subscribe" else "service"
+        message = f"line {number} of {path}: {found['name']} is a variable of the function {function}"
+        message += f", and the {what} ends with it"
+        fix = f"make {found['name']} a member of the class, or write `static` before it"
+        files.change("missing-call", path, "\n".join(lines), message, fix)
+
+
+def _function_around(code: str, at: int) -> str:
+    """Return the name of the function in whose body a place is, not in a loop or an `if` of it; "" for none."""
+    depth = 0
+    for brace in reversed([*re.finditer(r"[{}]", code[:at])]):
+        depth += 1 if brace[0] == "}" else -1
+        if depth < 0:
+            head = _FUNCTION.search(code, max(0, brace.start() - HEAD_CHARS_MAX), brace.start())
+            return head["name"] if head and head["name"] not in _BLOCK else ""
+    return ""
+
+
+def _end_of(code: str, at: int) -> int:
+    """Return where the block ends in which a place is."""
+    depth = 0
+    for brace in re.compile(r"[{}]").finditer(code, at):
+        depth += 1 if brace[0] == "{" else -1
+        if depth < 0:
+            return brace.start()
+    return len(code)
+
+
+HEAD_CHARS_MAX = 500
 
 
 def _keep_subscribers(files: Files, path: str) -> None:

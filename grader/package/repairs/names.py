@@ -342,17 +342,21 @@ _NAMED_IN_CPP = re.compile(
 
 def names_in_cpp(text: str) -> tuple[Name, ...]:
     """Return the texts in a source of C++ that name its node and its topics; what stands in a comment is none."""
+    # a call may be spread over several lines
+    code = "\n".join(
+        " " * len(line) if len(line) > CPP_CHARS_MAX or line.lstrip().startswith(("//", "*")) else line
+        for line in text.split("\n")
+    )
     return tuple(
         Name(
             role=ROLES_OF_CPP[found["call"]],
             value=found["name"],
-            line=number,
-            start=found.start("name"),
-            end=found.end("name"),
+            line=code.count("\n", 0, found.start("name")) + 1,
+            start=found.start("name") - begin,
+            end=found.end("name") - begin,
         )
-        for number, line in enumerate(text.split("\n"), 1)
-        if len(line) <= CPP_CHARS_MAX and not line.lstrip().startswith(("//", "*"))
-        for found in _NAMED_IN_CPP.finditer(line)
+        for found in _NAMED_IN_CPP.finditer(code)
+        for begin in (code.rfind("\n", 0, found.start("name")) + 1,)
     )
 
 

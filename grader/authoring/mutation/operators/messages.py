@@ -322,6 +322,7 @@ def _callbacks(*types: str) -> Finder:
 
 any_callback = _callbacks()
 integer_callback = _callbacks(*INTEGER_TYPES)
+signed_callback = _callbacks(*(name for name in INTEGER_TYPES if not name.startswith("U")))
 
 
 @operator("listener-silent", each=any_callback, fits="every subscriber whose callback prints or logs")
@@ -353,12 +354,12 @@ def listener_drops_zero(heard: Hearing) -> list[TextEdit]:
 
 
 @operator(
-    "listener-drops-negative",
-    each=integer_callback,
-    fits="every subscriber of integers whose callback reads the message's data",
+    "listener-drops-sign",
+    each=signed_callback,
+    fits="every subscriber of integers that may be negative, whose callback reads the message's data",
 )
-def listener_drops_negative(heard: Hearing) -> list[TextEdit]:
-    """Prints a number without its sign."""
+def listener_drops_sign(heard: Hearing) -> list[TextEdit]:
+    """Prints each number without its sign."""
     return heard.replace_data(f"abs({heard.message}.data)")
 
 

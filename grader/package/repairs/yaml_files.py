@@ -1,0 +1,149 @@
+"""What keeps a parameter file from being read as YAML: lines that are not `name: value`, or in a wrong column."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import PurePosixPath
+from typing import NamedTuple
+
+import yaml
+
+from grader.model.package import PackageFacts
+from grader.package.repairs.editing import Files
+from grader.package.repairs.names import Wanted
+from grader.wording import plural
+from grader.yaml_fixes import YAML_LINES_MAX, slip_of_yaml
+
+SUFFIXES = (".yaml", ".yml")
+LINES_MAX = 4
+"""So many lines of a file are repaired."""
+COLUMNS_MAX = 6
+
+
+class _Repaired(NamedTuple):
+    text: str
+    why: str
+    fix: str = ""
+
+
+def repair_yaml_files(files: Files, package: PackageFacts, wanted: Wanted) -> None:
+    """Find such lines in the files that the lab names, and in those that a launch file names."""
+    named = {PurePosixPath(file).name for file in wanted.files}
+    launches = [files.text(launch.path) or "" for launch in package.launch_files]
+    for path in (file.path for file in package.files if file.path.endswith(SUFFIXES)):
+        name = PurePosixPath(path).name
+        if name in named or any(name in text for text in launches):
+            _repair_file(files, path, wanted)
+
+
+def _repair_file(files: Files, path: str, wanted: Wanted) -> None:
+    text = files.text(path)
+    if text is None or text.count("\n") > YAML_LINES_MAX:
+        return
+    steps: list[_Repaired] = []
+    while (at := _fault_in(text)) is not None:
+        steps += [one] if (one := _without_fault(text, at, wanted)) else []
+        if one is None or len(steps) > LINES_MAX:
+            return
+        text = one.text
+    for one in steps:
+        files.change("yaml-syntax", path, one.text, one.why.format(path=path), one.fix)
+
+
+def _without_fault(text: str, at: int, wanted: Wanted) -> _Repaired | None:
+    """Return the text without its first fault, that was noticed at line `at`; None where no line is plainly wrong."""
+    lines = text.split("\n")
+    tabbed = next((n for n, line in enumerate(lines, 1) if "\t" in _blanks(line)), None)
+    if tabbed is not None and tabbed <= at:
+        why = f"line {tabbed} of {{path}} is indented with a tab, which YAML does not accept"
+        return _best(
+            [_Repaired(one, why, _begin(one, lines, tabbed)) for one in _untabbed(lines, tabbed)], wanted
+        )
+    if slip := slip_of_yaml(text, at):
+        comment = re.search(r"\s+#.*", lines[slip.number - 1])
+        changed = f"{_blanks(lines[slip.number - 1])}{slip.right}{comment[0] if comment else ''}"
+        repaired = "\n".join([*lines[: slip.number - 1], changed, *lines[slip.number :]])
+        return _Repaired(repaired, f"line {slip.number} of {{path}} {slip.why}", f"write `{slip.right}`")
+    moved = [
+        _Repaired(
+            one,
+            f"line {number} of {{path}} does not line up with the lines beside it",
+            _begin(one, lines, number),
+        )
+        for number in (at, at - 1)
+        for one in _moved(lines, number)
+    ]
+    return _best(moved, wanted)
+
+
+def _untabbed(lines: list[str], number: int) -> Iterator[str]:
+    """Yield the text with the line in the column of a line beside it, and with as many spaces for each tab."""
+    yield from _moved(lines, number)
+    for spaces in (2, 4):
+        yield "\n".join(_blanks(line).replace("\t", " " * spaces) + line.lstrip() for line in lines)
+
+
+def _begin(text: str, lines: list[str], number: int) -> str:
+    """Return how to change the lines' beginnings: that of one, or of all."""
+    changed = text.split("\n")
+    if sum(one != other for one, other in zip(changed, lines, strict=True)) > 1:
+        return "indent with spaces only, two per level"
+    return f"begin the line with {plural(len(_blanks(changed[number - 1])), 'space')}"
+
+
+def _moved(lines: list[str], number: int) -> Iterator[str]:
+    """Yield the text with the line in the columns of the other lines, that of the nearest line above it first."""
+    if not 0 < number <= len(lines):
+        return
+    others = [line for line in (*reversed(lines[: number - 1]), *lines[number:]) if line.strip()]
+    for blanks in [*dict.fromkeys(map(_blanks, others))][:COLUMNS_MAX]:
+        changed = blanks + lines[number - 1].lstrip()
+        if "\t" not in blanks and changed != lines[number - 1]:
+            yield "\n".join([*lines[: number - 1], changed, *lines[number:]])
+
+
+def _best(candidates: list[_Repaired], wanted: Wanted) -> _Repaired | None:
+    """Return the one that can be read with the most of the lab's parameters in it, and then in the fewest columns."""
+    readable = [one for one in candidates if _fault_in(one.text) is None]
+    names = {tuple(name.strip("/").split("/")) for name in wanted.params}
+
+    def quality(one: _Repaired) -> tuple[int, int]:
+        return len(names & _paths(one.text)), -len({len(_blanks(line)) for line in one.text.split("\n")})
+
+    return max(readable, key=quality, default=None)
+
+
+def _blanks(line: str) -> str:
+    return line[: len(line) - len(line.lstrip())]
+
+
+def _fault_in(text: str) -> int | None:
+    """Return the line, from 1, where YAML's parser stops; None where it reads all."""
+    try:
+        if isinstance(yaml.compose(text, Loader=yaml.SafeLoader), yaml.ScalarNode):
+            return text.count("\n") + 1  # a file without a single `name: value`
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        return mark.line + 1 if mark else 1
+    except (yaml.YAMLError, RecursionError):
+        return 0
+    return None
+
+
+def _paths(text: str) -> set[tuple[str, ...]]:
+    """Return the names in the file, each with those that it lies below."""
+    found: set[tuple[str, ...]] = set()
+
+    def collect(node: yaml.Node | None, above: tuple[str, ...]) -> None:
+        if isinstance(node, yaml.MappingNode) and len(above) < YAML_DEPTH:
+            for key, value in node.value:
+                found.add((*above, str(key.value)))
+                collect(value, (*above, str(key.value)))
+
+    collect(yaml.compose(text, Loader=yaml.SafeLoader), ())
+    return found
+
+
+YAML_DEPTH = 10
+"""Names lie no deeper in a student's file."""
