@@ -48,7 +48,8 @@ from grader.checks.support.topics import (
     topics_with,
 )
 from grader.evidence.run import Run
-from grader.model.package import PackageFacts, PythonSlip
+from grader.model.package import PackageFacts
+from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
 from grader.wording import join_words, plural, significant

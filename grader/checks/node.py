@@ -36,7 +36,8 @@ from grader.checks.support.processes import (
 from grader.checks.support.text import ANONYMOUS, INIT, LOOP, both
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
-from grader.model.package import PackageFacts, PythonSlip
+from grader.model.package import PackageFacts
+from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
 from grader.wording import join_words, plural, seconds

@@ -36,7 +36,8 @@ from grader.checks.support.topics import (
 )
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
-from grader.model.package import PackageFacts, PythonSlip, SlipKind
+from grader.model.package import PackageFacts
+from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.verdict import Status, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import hertz, join_words, plural, seconds, significant
 

@@ -38,7 +38,8 @@ from grader.installable import NOTHING_TO_DO, PYTHON_2
 from grader.judging.as_handed_in import text_as_handed_in
 from grader.judging.cited_lines import LINE_CHARS, LINES_READ
 from grader.judging.facts import SOURCES, Facts, names_started, scripts_of, sources_of
-from grader.model.package import PackageFacts, PythonSlip
+from grader.model.package import PackageFacts
+from grader.model.python_slip import PythonSlip
 from grader.model.repair import Repair
 from grader.model.verdict import Verdict
 from grader.rubric.model import Criterion, Rubric

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
-from grader.model.package import Fault, PythonSlip
+from grader.model.package import Fault
+from grader.model.python_slip import PythonSlip
 from grader.package.reading import SOURCE_LIMIT_BYTES, printable, read_markup
 
 SUFFIXES = frozenset({".cpp", ".cc", ".cxx"})

@@ -14,7 +14,8 @@ from typing import TypeVar
 from pydantic import Field
 
 from grader.limited_child import ChildLimits, run_limited
-from grader.model.package import Fault, PythonSlip, SlipKind
+from grader.model.package import Fault
+from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.record import Record
 from grader.package.reading import printable
 from grader.syntax_fixes import (

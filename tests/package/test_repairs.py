@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from grader.model.message_definitions import parse_definition
-from grader.model.package import PythonSlip, SlipKind
+from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.repair import BY_HAND, DEFAULT_SHARES, KINDS, advice_on
 from grader.model.submission import chmod_hint
 from grader.package.repairs import NotRepairable, Wanted, apply_repair, find_repairs

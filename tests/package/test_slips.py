@@ -9,7 +9,7 @@ from typing import get_args
 
 import pytest
 
-from grader.model.package import PythonSlip, SlipKind
+from grader.model.python_slip import PythonSlip, SlipKind
 from grader.package.python import check_syntax
 
 pytestmark = pytest.mark.usefixtures("without_processes")

@@ -78,7 +78,7 @@ def dotted(node):
 
 
 def slip(line, kind, message, fix="", name=""):
-    """Return what `PythonSlip` (grader/model/package.py) says of a line of the script."""
+    """Return what `PythonSlip` (grader/model/python_slip.py) says of a line of the script."""
     texts = {"message": message, "fix": fix, "name": name}
     return {"line": line, "kind": kind, **{key: text[:TEXT_LIMIT] for key, text in texts.items()}}
 

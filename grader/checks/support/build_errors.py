@@ -13,6 +13,8 @@ from grader.checks.support.cpp_errors import (
     CPP_ERRORS,
     CPP_SUFFIXES,
     call_below,
+    missing_header,
+    missing_link,
     other_namespace,
     programs_without,
 )
@@ -515,25 +517,6 @@ def _unwaited(package: PackageFacts, text: str, what: str, targets: str, lines: 
     return Explained(why, "; ".join(fixes[:FIXES_MAX]) or other)
 
 
-def _missing_header(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    """A header of no ROS package: a file of the student's own, or a library's, which are included by their folder."""
-    header = found[1]
-    near = near_names(posixpath.basename(header), [posixpath.basename(f.path) for f in package.files])
-    if near or "/" not in header or header.partition("/")[0] == package.name:
-        fix = f"write {near[0]} in the #include" if near else f"push {header}, or correct the #include"
-        return Explained(f"there is no header {header}", fix)
-    why = f"it needs the header {header} of a library that this grading machine lacks"
-    own = "a header of the student's own has to be pushed"
-    hint = f"{ON_THE_MACHINE}install the library of {header}, then grade again; {own}"
-    return Explained(why, hint, of_machine=True)
-
-
-def _missing_link(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    why = f"it is linked with the library {found[1]}, which this grading machine lacks"
-    hint = f"{ON_THE_MACHINE}install the library {found[1]}, then grade again"
-    return Explained(why, hint, of_machine=True)
-
-
 def _unknown_command(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     name = found[1]
     if right := meant_command(name.lower()):
@@ -594,8 +577,8 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"catkin_package\(\) DEPENDS on the catkin package '([^']+)' which must", _run_dependency),
     (r"catkin_package\(\) DEPENDS on (?:the catkin package )?'([^']+)'", _depends),
     (r"(?<![\w+/.-])(\w+)/(\w+)\.h: No such file or directory", _header_race),
-    (r"cannot find -l(\S+?)(?::|$)", _missing_link),
-    (r"([\w+./-]+): No such file or directory", _missing_header),
+    (r"cannot find -l(\S+?)(?::|$)", missing_link),
+    (r"([\w+./-]+): No such file or directory", missing_header),
     (r"'(\w+)' has not been declared", _half_written),
     *CPP_ERRORS,
 )

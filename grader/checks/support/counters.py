@@ -16,7 +16,8 @@ from grader.checks.support.processes import OnTopic, lives, observed_until_ns, s
 from grader.checks.support.text import loop_rate
 from grader.checks.support.topics import losses, whole_until_ns
 from grader.evidence.run import Channel, Run, once_for_each_run
-from grader.model.package import PackageFacts, PythonSlip, SlipKind
+from grader.model.package import PackageFacts
+from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.record import Record
 from grader.model.verdict import Status, Verdict, failed, grade_again, inconclusive, passed, unjudged
 from grader.wording import plural, significant

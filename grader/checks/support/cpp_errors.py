@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import posixpath
 import re
 from collections.abc import Callable, Sequence
 
@@ -203,3 +204,22 @@ CPP_ERRORS: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r'dependencies to non-existent target "([^"]+)"', _missing_target),
     (r'link libraries for target "([^"]+)" which is not built', _missing_target),
 )
+
+
+def missing_header(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    """A header of no ROS package: a file of the student's own, or a library's, which are included by their folder."""
+    header = found[1]
+    near = near_names(posixpath.basename(header), [posixpath.basename(f.path) for f in package.files])
+    if near or "/" not in header or header.partition("/")[0] == package.name:
+        fix = f"write {near[0]} in the #include" if near else f"push {header}, or correct the #include"
+        return Explained(f"there is no header {header}", fix)
+    why = f"it needs the header {header} of a library that this grading machine lacks"
+    own = "a header of the student's own has to be pushed"
+    hint = f"{ON_THE_MACHINE}install the library of {header}, then grade again; {own}"
+    return Explained(why, hint, of_machine=True)
+
+
+def missing_link(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    why = f"it is linked with the library {found[1]}, which this grading machine lacks"
+    hint = f"{ON_THE_MACHINE}install the library {found[1]}, then grade again"
+    return Explained(why, hint, of_machine=True)

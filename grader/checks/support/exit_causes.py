@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import ast
 import builtins
 import re
 import signal
 from collections.abc import Callable, Collection, Sequence
-from contextlib import suppress
 from typing import NamedTuple
 
 from grader.checks.registry import Check
@@ -19,11 +17,11 @@ from grader.checks.support.exceptions import (
     explain_exception,
     explain_formatting,
     explain_number_of_values,
+    explain_operand,
 )
 from grader.checks.support.missing_names import (
     IMPORT_ERRORS,
     broken_import,
-    fields_of,
     hiding_file,
     imported_line,
     is_module,
@@ -51,9 +49,10 @@ from grader.installable import (
     ON_THE_MACHINE,
     install_hint,
 )
-from grader.model.package import Fault, PackageFacts, PythonSlip
+from grader.model.package import Fault, PackageFacts
+from grader.model.python_slip import PythonSlip
 from grader.model.verdict import Citations, FileCitation, Verdict, machine_lacks
-from grader.syntax_fixes import COMMENTED_OUT, corrected, parsed, without_brace
+from grader.syntax_fixes import COMMENTED_OUT, corrected, without_brace
 from grader.wording import join_words, seconds
 
 OTHER_NAMES_SHOWN = 3
@@ -100,9 +99,6 @@ CAUSES = {
 _NUMBER_WANTED = re.compile(r"must be (?:an integer|unsigned integer|float) type")
 _ILLEGAL_NAME = re.compile(
     r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "
-)
-_ADDED = re.compile(
-    r"can only concatenate str \(not \"(\w+)\"\) to str|unsupported operand type\(s\) for \+=?: '(\w+)' and '(\w+)'"
 )
 _NUMBER_ASKED = re.compile(r"\b(?:int|float)\(\s*(?:raw_)?input\(")
 _ARITY = re.compile(r"([\w.]+)\(\) (?:takes|missing) ")
@@ -342,7 +338,7 @@ def _misplaced(found: Traceback) -> tuple[str, str] | None:
 
 def _by_script(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
     """Return what the sides of a sum are, or what other lines of the script are to blame for."""
-    sum_ = _operand(found, package) if found.kind == "TypeError" else None
+    sum_ = explain_operand(found, package) if found.kind == "TypeError" else None
     return sum_ or (None if _misplaced(found) else _by_other_lines(found, place, package))
 
 
@@ -557,45 +553,6 @@ def _signal_name(number: int) -> str:
         return f"signal {number} ({signal.Signals(number).name})"
     except ValueError:
         return f"signal {number}"
-
-
-def _operand(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
-    """A text or a message and something else are added: which of both does not fit, where Python marks the place."""
-    if not (match := _ADDED.search(found.message)):
-        return None
-    of_text = bool(match[1]) or "str" in match.groups()
-    left = match[3] == "str" or (not of_text and bool(fields_of(package, match[2])))
-    kind, is_right = (match[1], True) if match[1] else (match[2], False) if left else (match[3], True)
-    other = _other_side(found.own_frames[-1], is_right=is_right)
-    if fields := fields_of(package, kind):
-        value = f"{other or 'msg'}.{fields[0]}"
-        value = value if kind == "String" or not of_text else f"str({value})"
-        return (
-            f"{other or 'one side'} is the whole message ({kind})",
-            f"write `{value}` instead of `{other or 'msg'}`",
-        )
-    if not of_text:
-        return None
-    if other:
-        return f"{other} is not a string", f"write `str({other})` instead of `{other}`"
-    return (
-        f"{'an' if kind[0] in 'aeiou' else 'a'} {kind} is not a string",
-        "wrap it in `str(…)` before you add it to a string",
-    )
-
-
-def _other_side(frame: Frame, *, is_right: bool) -> str:
-    """Return the side of a sum that is not text: of the one that Python marks, or of the line's only one."""
-    source = frame.source[slice(*frame.marked)] if frame.marked else frame.source
-    with suppress(SyntaxError, ValueError, RecursionError):
-        nodes = list(ast.walk(parsed(source)))
-        sums = [n for n in nodes if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Add)]
-        if sums and (frame.marked or len(sums) == 1):
-            return shown(ast.unparse(sums[0].right if is_right else sums[0].left))
-        more = next((n for n in nodes if isinstance(n, ast.AugAssign)), None)
-        if more is not None:
-            return shown(ast.unparse(more.value if is_right else more.target))
-    return ""
 
 
 def _of_machine(found: Traceback, lacking: str, place: FileCitation | None, package: PackageFacts) -> Ending:

@@ -15,7 +15,8 @@ from grader.checks.support.launch_slips import own_script
 from grader.checks.support.topics import nodes_on, topics_with
 from grader.evidence.events import GraphEvent
 from grader.evidence.run import Run
-from grader.model.package import LaunchFile, LaunchLine, LaunchNode, PackageFacts, PythonSlip
+from grader.model.package import LaunchFile, LaunchLine, LaunchNode, PackageFacts
+from grader.model.python_slip import PythonSlip
 from grader.model.verdict import FileCitation, Verdict, failed
 from grader.wording import join_words
 

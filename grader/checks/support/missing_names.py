@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from grader.checks.support.console_output import Traceback
 from grader.checks.support.exceptions import SLIPS
+from grader.checks.support.rospy_calls import fields_of
 from grader.checks.support.scripts import OF_FILES, SYNTAX, cmake_calls, is_product, path_in_package
 from grader.checks.support.text import near_names, shown
 from grader.installable import (
@@ -26,7 +27,8 @@ from grader.installable import (
     nearest_module,
     noetic_messages,
 )
-from grader.model.package import PackageFacts, PythonSlip
+from grader.model.package import PackageFacts
+from grader.model.python_slip import PythonSlip
 from grader.model.verdict import FileCitation
 from grader.syntax_fixes import parsed
 from grader.wording import closest, join_words
@@ -348,18 +350,6 @@ def _line_with(source: str, wrong: str, right: str) -> str:
     """Return the advice to write the line with another attribute, where it has the wrong one once."""
     line, count = re.subn(rf"\.{wrong}\b", f".{right}", source)
     return f"write `{shown(line)}`" if count == 1 else f"write {right} instead of {wrong}"
-
-
-def fields_of(package: PackageFacts, name: str) -> tuple[str, ...]:
-    """Return the fields of a message type, of the student's own or of ROS's, by the name of its class."""
-    for own in (package, *package.also):
-        for one in own.interfaces:
-            stem = one.path.rpartition("/")[2].partition(".")[0]
-            part = name[len(stem) :].lower()
-            fields = tuple(field.name for field in one.fields if field.part == part)
-            if name.startswith(stem) and fields:
-                return fields
-    return next((fields for types in noetic_messages().values() if (fields := types.get(name, ()))), ())
 
 
 class NameSlip(NamedTuple):

@@ -17,7 +17,8 @@ from grader.checks.registry import Refers
 from grader.checks.support.text import ANONYMOUS, init
 from grader.evidence.events import ProcessEvent
 from grader.evidence.run import Run, once_for_each_run
-from grader.model.package import PackageFacts, PythonSlip, SlipKind
+from grader.model.package import PackageFacts
+from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, unjudged
 from grader.wording import join_words, seconds, shorten

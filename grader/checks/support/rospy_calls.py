@@ -9,6 +9,7 @@ from contextlib import suppress
 
 from grader.checks.support.console_output import Frame, Traceback
 from grader.checks.support.text import shown
+from grader.installable import noetic_messages
 from grader.model.package import PackageFacts
 from grader.syntax_fixes import parsed
 
@@ -331,3 +332,15 @@ def without_message(found: Traceback) -> tuple[str, str] | None:
     said = shown(caller.source.partition("#")[0].strip())
     why = f"line {caller.line} calls it with a value in place of a message: `{said}`"
     return why, f"delete that call: ROS calls `{call[1]}` with each message"
+
+
+def fields_of(package: PackageFacts, name: str) -> tuple[str, ...]:
+    """Return the fields of a message type, of the student's own or of ROS's, by the name of its class."""
+    for own in (package, *package.also):
+        for one in own.interfaces:
+            stem = one.path.rpartition("/")[2].partition(".")[0]
+            part = name[len(stem) :].lower()
+            fields = tuple(field.name for field in one.fields if field.part == part)
+            if name.startswith(stem) and fields:
+                return fields
+    return next((fields for types in noetic_messages().values() if (fields := types.get(name, ()))), ())

@@ -35,7 +35,8 @@ from grader.checks.support.text import (
 )
 from grader.evidence.events import MISFIT, UNHEARD
 from grader.evidence.run import Channel, Run
-from grader.model.package import LaunchNode, PackageFacts, PythonSlip, SlipKind
+from grader.model.package import LaunchNode, PackageFacts
+from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.record import Record
 from grader.model.verdict import (
     EvidenceCitation,

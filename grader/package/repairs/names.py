@@ -8,7 +8,8 @@ from pathlib import PurePosixPath
 from typing import Any, Literal
 
 from grader.model.message_definitions import parse_definition
-from grader.model.package import InterfaceField, PackageFacts, SlipKind
+from grader.model.package import InterfaceField, PackageFacts
+from grader.model.python_slip import SlipKind
 from grader.model.record import Record
 from grader.model.repair import RepairKind, as_code
 from grader.package.repairs.editing import Files

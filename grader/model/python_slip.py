@@ -1,0 +1,99 @@
+"""What is remarkable in a student's Python, line by line: slips, and what its lines say that checks compare."""
+
+from __future__ import annotations
+
+import re
+from typing import Literal
+
+from grader.model.record import Record
+from grader.model.verdict import Placed
+
+SlipKind = Literal[
+    "not-called", "input", "no-clock", "misspelt", "rate-parameter", "rate-number", "reset-value", "reset-limit",
+    "set-in-loop", "reset-early", "never-called", "main-guard", "never-reached", "spin-in-loop", "loop-left",
+    "sleep-outside", "sleep-twice", "callback-called", "callback-missing", "callback-values", "callback-waits",
+    "defined-twice", "subscribed-again",
+    "clock-value", "queue-size", "deaf", "node-name", "no-init", "commented-out", "publisher", "publisher-type",
+    "subscriber", "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes",
+    "prints", "argument-text", "unused-import", "lacking-import", "unregistered", "not-started", "start-value",
+    "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed", "printed-in-part",
+    "published-in-part", "never-published",
+]  # fmt: skip
+
+
+class PythonSlip(Placed, Record):
+    """What is remarkable in a Python file. For a file that does not compile, only names, types and rates are known; for
+    one of C++, only `callback-waits` and `degrees`.
+
+    `fix` says what to do where that is always the same. Slips, of which most show only when the node runs; `message`
+    says what is wrong on that line, and `name` is the function or variable that both are about:
+
+    - `not-called`: `rate.sleep` or `rospy.is_shutdown` without brackets.
+    - `misspelt`: a name that the file does not define, next to one that it does.
+    - `undefined`: why a name has no value where it is read.
+    - `object`: why an object of a class lacks an attribute where it is read, or that the class is used in its place.
+    - `outside-method`: a call in a class, but outside its methods, that uses an unknown name.
+    - `defined-twice`: a callback that a second function of its name hides, or an imported name that a class hides.
+    - `no-effect`, `compared`: a statement such as `++i`, or `i == 0`.
+    - `commented-out`: a ROS call in a comment; `name` is `sleep`, or `pub = Publisher`.
+    - `input`: the node asks for input, and nodes get none; `name` is `once` where no loop does it again, and `paused`
+      in a loop that sleeps.
+    - `no-init`: a script with topics, or that does more than define names, never calls `init_node`.
+    - `never-called`: a function that makes a node, publishes or waits, and that nothing calls.
+    - `main-guard`: `__name__` is compared with another word than `__main__`.
+    - `never-reached`: an endless loop before the first `publish(…)`.
+    - `spin-in-loop`: a loop that publishes and waits in `spin()`.
+    - `loop-left`: a loop that ends in its first turn, or after a number of them, or a callback that ends the node.
+    - `sleep-outside`, `sleep-twice`: a loop whose `sleep()` is outside it, or that waits twice in each turn.
+    - `publish-twice`: a loop that publishes on one topic more than once in each turn.
+    - `deaf`: why the node goes on after Ctrl-C.
+    - `callback-called`, `callback-values`, `callback-missing`: a callback that is called where it should only be named,
+      that takes another number of values than ROS passes, or that does not exist.
+    - `callback-waits`: a topic's or service's callback that sleeps, or never ends.
+    - `not-printed`: why a topic's callback prints nothing of any message; `name` is the topic as it is written there.
+    - `printed-in-part`: why it prints some messages only, or something else than their values; `name` as above.
+    - `subscribed-again`: a `Subscriber(…)` that a loop makes in each turn.
+    - `unregistered`: a `Publisher` or `Subscriber` that is taken off its topic.
+    - `not-started`: an action server that waits for a `start()` that no line calls.
+    - `queue-size`: a queue size that is a text, with which rospy sends nothing.
+    - `set-in-loop`, `reset-early`: a counter that is set in each turn of its loop, or goes back before one is added.
+    - `no-clock`: the file publishes and counts, and nothing that it sends contains the time, except at most the value
+      from which it counts on; a slip only if its messages have to contain the time.
+    - `clock-value`: the values of the topic `message` are read from a clock, or made up at random (`name`: `random`),
+      and nothing is counted.
+    - `never-published`: a publisher of the topic `name` that nothing in the script uses.
+    - `published-in-part`: a loop that counts in each turn, and publishes on the topic `name` only in some.
+    - `wrong-value`: a value that is none: a comparison with NaN, the sine of an angle in degrees, a service's answer
+      that is made and not returned (`name`: `nan`, `degrees`, `return`).
+
+    No slips, but what a line says, for checks that compare it with what the lab asks; `message` is a name, a number or
+    a text:
+
+    - `node-name`, `publisher`, `subscriber`: where the script names its node, or a topic. `name` is the variable that
+      gets the publisher, or `anonymous`; a node's name that stands in a variable has a `fix`, that line with `{}` in
+      its place.
+    - `publisher-type`, `subscriber-type`: the message type on that line.
+    - `publishes`, `prints`: a text that is published or printed by the call `name` (`loginfo`), with `{}` for a value
+      in it and `{data}` for that of a message.
+    - `rate-number`, `rate-parameter`: a loop or a timer whose rate is a number, in Hz, or a parameter.
+    - `start-value`, `added-first`: where a counter, `name`, gets its first number, `message`, and where a loop adds one
+      to it before it publishes (`fix`: which lines to move).
+    - `reset-value`, `reset-limit`: where a counter goes back, to the number `message`, or when it reaches it.
+    - `sets-parameter`: where it sets a parameter.
+    - `argument-text`: where an argument of the command line is kept as a text; `fix` is the line with a number in its
+      place.
+    - `unused-import`, `lacking-import`: an import of the module `message` whose names nothing in the script uses, or
+      that Python did not find where the files were read (`fix`: the name of a module in it, as `lab_msgs.msg`).
+    """
+
+    file: str
+    line: int
+    kind: SlipKind
+    message: str
+    fix: str = ""
+    name: str = ""
+
+    @property
+    def is_endless(self) -> bool:
+        """Whether it is a callback that never ends, or that is never called, and not one that only sleeps."""
+        return self.kind == "callback-waits" and bool(re.search(r"never (?:ends|calls)", self.message))
