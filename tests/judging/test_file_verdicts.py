@@ -14,7 +14,7 @@ from grader.model.submission import SourcePackage
 from grader.model.verdict import Status, passed
 from grader.package import read_package
 from tests.fixture_runs import loaded, source_of
-from tests.judging.rubrics import EXECUTABLE, NODE, rubric
+from tests.judging.rubrics import CMAKE_CHECK, EXECUTABLE, NODE, rubric
 from tests.package.trees import CMAKE, MANIFEST, make_package
 from tests.package.trees import NODE as SCRIPT
 
@@ -31,7 +31,6 @@ SAMPLES = [
     ("eyantra-ros-basics", "ok-cpp-nodes"),
 ]
 MANIFEST_CHECK = {"id": "manifest", "check": "manifest", "with": {"name": "lab1"}}
-CMAKE_CHECK = {"id": "cmake", "check": "cmake", "with": {"name": "lab1"}}
 DEPENDENCIES = {
     "id": "dependencies",
     "check": "dependencies",
