@@ -218,7 +218,7 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
         measured=f"scripts: {join_words(sorted(scripts))}" if scripts else "no Python script in the package",
         hint=hint,
         citations=tuple(FileCitation(file=p) for p in (near or meant)[:3]),
-    ).lost_by(kind, path)
+    ).lost_by(kind, path, meant=next(iter(meant), ""))
 
 
 def _where_named(package: PackageFacts, path: str) -> str:

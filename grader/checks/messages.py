@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
@@ -328,7 +329,8 @@ def _outside(
     message = (
         f"{params.field} of {params.topic} is not {params.words} {count}: it {seen}, {after} after the first"
     )
-    return failed(message, hint=f"make sure that {params.field} is {params.words} before you publish it")
+    verdict = failed(message, hint=f"make sure that {params.field} is {params.words} before you publish it")
+    return verdict.of_value(nan=True) if wrong and math.isnan(wrong[0]) else verdict
 
 
 def _share(readings: Sequence[Reading], outside: Sequence[Reading]) -> str:
@@ -425,7 +427,9 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
     elif not any(r.values for r in found):
         verdict = no_field(found[0], channels)
     elif len(wrong) == len(asked) if params.when == "any" else wrong:
-        verdict = _other_value(wrong, found, run, params)
+        each = (differences(value, params.value, params.tolerance) for value in wrong[0].values)
+        nan = any(one.nan for one in chain.from_iterable(each))
+        verdict = _other_value(wrong, found, run, params).of_value(nan=nan)
     else:
         count = f"all of {plural(len(found), 'message')}" if params.when == "every" else which
         verdict = passed(f"{params.field} of {params.topic} is {params.words} in {count}")

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from grader.checks.registry import Refers, check
-from grader.checks.support.clocks import NO_EXCUSE, Lateness, excused, lateness
+from grader.checks.support.clocks import Lateness, excused, lateness
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.fields import value_text
 from grader.checks.support.parameters import params_on_server, resolved_param, where_given
@@ -154,7 +154,7 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     )
     citations = (cite(run, params.topic, found.times_ns[0], found.times_ns[-1]),)
     measured = described(found, *params.bounds_ns)
-    if verdict.status is Status.INCONCLUSIVE or NO_EXCUSE in verdict.message:
+    if verdict.status is Status.INCONCLUSIVE or verdict.own_load:
         measured += _lateness(found, run)
     return verdict.about(expected=expected, measured=measured, citations=citations)
 

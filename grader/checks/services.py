@@ -161,7 +161,8 @@ def _fault(
     message = (
         f"{params.service}, called with {fields_text(one.request)}, answers {join_words(map(str, found))}"
     )
-    return failed(message, hint=f"see what the callback computes: {_by_hand(params.service, one)}")
+    verdict = failed(message, hint=f"see what the callback computes: {_by_hand(params.service, one)}")
+    return verdict.of_value(nan=any(one.nan for one in found))
 
 
 def _by_hand(service: str, one: Exchange) -> str:
@@ -312,7 +313,8 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
         return _undivided(package, kind, one) or failed(message, hint=hint)
     if "returned None" in one.detail:
         hint = f"end the callback with return {kind}Response(…)"
-        return failed(f"{asked} fails: its callback returns nothing", hint=hint)
+        verdict = failed(f"{asked} fails: its callback returns nothing", hint=hint)
+        return verdict.model_copy(update={"wrong": "nothing"})
     if "returned invalid value" in one.detail or "wrong number of values" in one.detail:
         message = f"{asked} fails: its callback returns something that is not a {kind}Response ({shown(one.detail)})"
         return failed(

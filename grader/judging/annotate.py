@@ -8,6 +8,7 @@ wants of it, and with advice on what no criterion asks for, but stops a student 
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple, TypeVar
@@ -22,7 +23,7 @@ from grader.installable import noetic_messages
 from grader.judging.facts import SOURCES, Facts, language_of
 from grader.model.package import LaunchFile, PackageFacts
 from grader.model.result import CriterionResult
-from grader.model.verdict import FileCitation, Status, Verdict
+from grader.model.verdict import FileCitation, Status, Verdict, cited_lines
 from grader.rubric.model import Criterion, Rubric
 from grader.wording import significant
 
@@ -157,6 +158,22 @@ def with_own_name(result: CriterionResult, rubric: Rubric, package: PackageFacts
     named = rf"(\b(?:rosrun|roslaunch|roscd|rospack find) ){re.escape(rubric.package)}\b"
     shown = re.sub(named, lambda found: f"{found[1]}{package.name}", result.reproduce)
     return result.model_copy(update={"reproduce": shown})
+
+
+def compile_command(verdict: Verdict, main: PackageFacts | None) -> str:
+    """Return the command that shows a script's fault of grammar, where the verdict is lost by that line; "" for any
+    other verdict."""
+    if main is None or not verdict.status.is_lost:
+        return ""
+    faults = (
+        fault.place.below(main.way_to(package))
+        for package in (main, *main.also)
+        for file in package.files
+        if (fault := file.python_fault) is not None and fault.kind in SYNTAX
+    )
+    cited = cited_lines(verdict.citations)
+    file = next((one.file for one in faults if (one.file, one.line) in cited), "")
+    return f"python3 -m py_compile {shlex.quote(file)}" if file else ""
 
 
 def fill_slots(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdict:

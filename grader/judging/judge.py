@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from graphlib import TopologicalSorter
@@ -21,7 +20,7 @@ from grader.checks.support.exit_causes import explain_by_exception
 from grader.checks.support.launch import explain_by_refused_launch
 from grader.checks.support.parameters import explain_by_misplaced_parameter, explain_by_unread_parameter
 from grader.checks.support.processes import plain_type
-from grader.checks.support.scripts import SYNTAX, without_git
+from grader.checks.support.scripts import without_git
 from grader.checks.support.text import near_names, texts_in
 from grader.checks.support.topics import (
     SYSTEM_TOPICS,
@@ -36,6 +35,7 @@ from grader.evidence.run import Run
 from grader.judging.annotate import (
     add_advice,
     choose_hint_language,
+    compile_command,
     fill_slots,
     lab_names,
     with_lab_names,
@@ -65,7 +65,7 @@ from grader.judging.repeats_and_repairs import (
 from grader.judging.summary import leave_out, name_unchanged_files, round_half_up
 from grader.model.package import PackageFacts
 from grader.model.result import CriterionResult, EarlyVerdict, Repaired
-from grader.model.verdict import FileCitation, Status, Verdict, cited_lines, inconclusive, share_text
+from grader.model.verdict import Status, Verdict, cited_lines, inconclusive, share_text
 from grader.rubric.made_up import Value, tell_made_up, values_of, with_recorded_values
 from grader.rubric.model import Criterion, Rubric
 
@@ -142,11 +142,19 @@ def judge_all_runs(
         for c in rubric.criteria
     }
     names = lab_names(rubric, {i for i, v in shown.items() if v.status.is_lost}, facts.package)
+    package = facts.package
+    told = {i: with_lab_names(verdict, names) for i, verdict in shown.items()}
     results = tuple(
-        result_of(c, with_lab_names(shown[c.id], names), rubric.digits, uses.get(c.id), values_of(rubric, c))
+        result_of(
+            c,
+            told[c.id],
+            rubric.digits,
+            repaired=uses.get(c.id),
+            made_up=values_of(rubric, c),
+            package=package,
+        )
         for c in rubric.criteria
     )
-    package = facts.package
     if package is not None:
         named = (name_unchanged_files(result, rubric, package, handed_out) for result in results)
         results = add_advice([with_own_name(one, rubric, package) for one in named], package, rubric)
@@ -446,8 +454,10 @@ def result_of(
     criterion: Criterion,
     verdict: Verdict,
     digits: int,
+    *,
     repaired: Repaired | None = None,
     made_up: Mapping[str, Value] = MappingProxyType({}),
+    package: PackageFacts | None = None,
 ) -> CriterionResult:
     """Return the report's line of a criterion, with the points of its verdict."""
     earned = repaired is not None and not repaired.charged and verdict.score >= repaired.share
@@ -467,21 +477,13 @@ def result_of(
         expected=verdict.expected,
         measured=verdict.measured,
         hint=verdict.hint or (criterion.hint if lost else ""),
-        reproduce=_compile_command(verdict) or criterion.reproduce,
+        reproduce=compile_command(verdict, package) or criterion.reproduce,
         citations=verdict.citations,
         blocked_by=verdict.blocked_by,
         mistake=verdict.mistake if verdict.status.is_lost else None,
         repaired=repaired,
         made_up=dict(made_up),
     )
-
-
-def _compile_command(verdict: Verdict) -> str:
-    """Return the command that shows a fault of a script's grammar; "" for any other verdict."""
-    told = verdict.status.is_lost and any(kind in verdict.message for kind in SYNTAX)
-    cited = (one.file for one in verdict.citations if isinstance(one, FileCitation))
-    file = next((file for file in cited if told and file.endswith(".py")), "")
-    return f"python3 -m py_compile {shlex.quote(file)}" if file else ""
 
 
 def _points(criterion: Criterion, verdict: Verdict) -> float:
@@ -561,7 +563,7 @@ class _Judging:
             verdict = self._requirements.apply(criterion, verdict)
         if not verdict.status.is_open:
             self._requirements.verdicts[name] = verdict
-            result = result_of(criterion, verdict, self._rubric.digits)
+            result = result_of(criterion, verdict, self._rubric.digits, package=self._package)
             self.results[name] = EarlyVerdict(criterion=result, final=final)
 
     def _facts(self, asked: set[str]) -> Facts:

@@ -9,10 +9,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
+from typing import NamedTuple
 
 from grader.checks.messages import code_of
 from grader.checks.support.console_output import probes_on
-from grader.checks.support.exit_causes import syntax_hint
+from grader.checks.support.exit_causes import MAIN, syntax_hint
 from grader.checks.support.launch import NOT_STARTED, refusal, unset_arg_fixes
 from grader.checks.support.launch_connections import find_renaming
 from grader.checks.support.launch_slips import find_launch, later_fixes, refusals
@@ -41,15 +42,13 @@ from grader.judging.facts import SOURCES, Facts, names_started, scripts_of, sour
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.repair import Repair
-from grader.model.verdict import Verdict
+from grader.model.verdict import Verdict, cited_lines
 from grader.rubric.model import Criterion, Rubric
 from grader.wording import join_words, numbers_text, significant
 
 NAMES_SHOWN = 3
 ASKS = re.compile(r"[^#'\"]*\b(?:raw_)?input\s*\(")
 """A line that calls `input()`."""
-OF_LINE = re.compile(r"on line \d+, write (?P<code>`while .*?`)")
-"""A fix that says how its slip's own line is written."""
 SLEEPS_FOR = re.compile(r"[^#'\"]*\brospy\.sleep\(\s*\)")
 LOOPS = re.compile(r"\s*while\b.*:")
 PLAIN_NUMBER = re.compile(r"\s*(\w+)\s*=\s*[\d.]+\s*(?:#|$)")
@@ -59,6 +58,25 @@ OF_TOPICS = ("hears", "topic-type")
 """Checks that say by themselves that a node is on another topic, and not of which type."""
 RATE_SHARE = 0.05
 """By so much a rate that a script asks for may differ from the right one."""
+
+
+class Fix(NamedTuple):
+    """How a fault is fixed. A hint that has all of `said`, or this very `text`, has it already; in place of `general`,
+    the same advice without its line, comes the text. `types` are the one that the lab wants, and the script's."""
+
+    text: str
+    said: tuple[str, ...] = ()
+    general: str = ""
+    types: tuple[str, str] | None = None
+
+    def as_handed_in(self, repairs: Sequence[Repair]) -> Fix:
+        """Return it with the lines that the package had before these repairs."""
+        text, *said = (text_as_handed_in(one, repairs) for one in (self.text, *self.said))
+        return self._replace(text=text, said=tuple(said))
+
+    def is_in(self, hint: str) -> bool:
+        """Return whether the hint has it."""
+        return self.text in hint or (self.said != () and all(one in hint for one in self.said))
 
 
 def add_later_faults(
@@ -71,9 +89,8 @@ def add_later_faults(
 ) -> dict[str, Verdict]:
     """Return the verdicts; where there was nothing to judge of a node, the hint goes on with what its source shows of
     the criteria that were not reached. `facts` may be those of a copy with these `repairs` of `handed_in`."""
-    later: dict[str, list[str]] = {}
-    retyped: dict[str, tuple[str, str]] = {}
-    moved = dict(filter(None, map(_moved_script, verdicts.values())))
+    later: dict[str, list[Fix]] = {}
+    moved = {v.meant: v.mistake.name for v in verdicts.values() if v.mistake and v.meant.endswith(".py")}
     for criterion in rubric.criteria:
         verdict = verdicts[criterion.id]
         package = facts.package_of(criterion)
@@ -85,31 +102,21 @@ def add_later_faults(
             continue
         told = later.setdefault(verdict.blocked_by or criterion.id, [])
         if verdict.blocked_by and criterion.check == "launch-xml":
-            told += [f"for {criterion.id}, {one}" for one in _later_in_file(criterion, package)]
+            told += [Fix(f"for {criterion.id}, {one}") for one in _later_in_file(criterion, package)]
         elif verdict.blocked_by and criterion.check == "launch-runs":
             own = _of_its_file(criterion, verdicts, rubric)
             for one in _later_in_launch(criterion, package, facts):
-                later.setdefault(own or verdict.blocked_by, []).append(
-                    one if own else f"for {criterion.id}, {one}"
-                )
+                fix = Fix(one if own else f"for {criterion.id}, {one}")
+                later.setdefault(own or verdict.blocked_by, []).append(fix)
         elif criterion.check in OF_LAUNCHES and (
             file := find_launch(package, str(criterion.parameters["launch"]))
         ):
-            told += unset_arg_fixes(file, verdict.hint)
+            told += map(Fix, unset_arg_fixes(file, verdict.hint))
         elif verdict.unjudged or verdict.of_machine or criterion.check in OF_TOPICS:
             own_later = Later(criterion, verdict, package, facts, moved)
             told += own_later.syntax(handed_in or package)
-            told += [text_as_handed_in(one, repairs) for one in own_later.faults()]
-            retyped |= {text_as_handed_in(one, repairs): types for one, types in own_later.retyped.items()}
-    return {name: _with_later(verdict, later.get(name, ()), retyped) for name, verdict in verdicts.items()}
-
-
-def _moved_script(verdict: Verdict) -> tuple[str, str] | None:
-    """Return the only script that is told to become the one that is missing, and the path of that one."""
-    if verdict.mistake is None or verdict.mistake.kind != "file-elsewhere":
-        return None
-    moved = re.findall(rf"\bmv (\S+\.py) {re.escape(verdict.mistake.name)}(?![^\s;])", verdict.hint)
-    return (moved[0], verdict.mistake.name) if len(moved) == 1 else None
+            told += [one.as_handed_in(repairs) for one in own_later.faults()]
+    return {name: _with_later(verdict, later.get(name, ())) for name, verdict in verdicts.items()}
 
 
 def _of_its_file(launched: Criterion, verdicts: Mapping[str, Verdict], rubric: Rubric) -> str | None:
@@ -119,43 +126,27 @@ def _of_its_file(launched: Criterion, verdicts: Mapping[str, Verdict], rubric: R
     return next((i for i in of_file if verdicts[i].status.is_lost and not verdicts[i].blocked_by), None)
 
 
-def _imports_again(fix: str, hint: str) -> bool:
-    """Return whether it is an import that the hint has already, in other words."""
-    code = re.findall(r"`((?:import|from) [^`]+)`", fix)
-    return bool(code) and fix.endswith("at the top") and all(f"`{one}`" in hint for one in code)
-
-
-def _is_said(fix: str, hint: str) -> bool:
-    """Return whether the hint has a further fix already: in the same words, with its line in front, or by giving the
-    method another name that nothing calls."""
-    line = re.match(r"write (`.+`) on (line \d+)\b", fix)
-    uncalled = re.match(r"call `(?:.*\.)?(\w+)\(\)`, which nothing", fix)
-    before = line is not None and f"on {line[2]}, write {line[1]}" in hint
-    renamed = uncalled is not None and f"instead of `{uncalled[1]}`" in hint
-    return fix.removeprefix("publish ") in hint or before or renamed
-
-
-def _with_later(verdict: Verdict, later: Iterable[str], retyped: Mapping[str, tuple[str, str]]) -> Verdict:
+def _with_later(verdict: Verdict, later: Iterable[Fix]) -> Verdict:
     hint, said = verdict.hint, in_language(verdict.hint, "python")
-    new = [one for one in dict.fromkeys(later) if not _is_said(one, said)]
-    told = [one for one in new if not _imports_again(one, hint)]
+    told = [one for one in dict.fromkeys(later) if not one.is_in(said)]
     if not told or not hint:
         return verdict
-    for one in list(told):  # the same advice, with its line
-        general = f"{one.partition(' on line ')[0]}, {IN_OWN_WORDS}"
-        told = [other for other in told if other != one or general not in hint]
-        hint = hint.replace(general, one)
+    for one in list(told):
+        if one.general and one.general in hint:
+            told.remove(one)
+            hint = hint.replace(one.general, one.text)
     if not told:
         return verdict.model_copy(update={"hint": hint})
     # what is not wanted is not imported first
-    for wanted, other in (retyped[one] for one in told if one in retyped):
+    for wanted, other in (one.types for one in told if one.types):
         package, _, name = wanted.partition("/")
         hint = re.sub(rf"from \w+\.msg import {other}\b", f"from {package}.msg import {name}", hint)
+    texts = [one.text for one in told]
     if verdict.of_machine:
         hint = hint.replace(NOTHING_TO_DO, "For the rest, ", 1)
-        hint = f"{join_words(told)}. {hint[:1].upper()}{hint[1:]}"
+        hint = f"{join_words(texts)}. {hint[:1].upper()}{hint[1:]}"
         return verdict.model_copy(update={"hint": hint})
-    return verdict.model_copy(update={"hint": f"{hint}; then {join_words(told, most=len(told))}"})
+    return verdict.model_copy(update={"hint": f"{hint}; then {join_words(texts, most=len(texts))}"})
 
 
 class Later:
@@ -184,10 +175,8 @@ class Later:
         self._moved = later
         self._ran = not verdict.cause and not later
         """Names are told already then, and only what is behind them is not."""
-        self.retyped: dict[str, tuple[str, str]] = {}
-        """Of faults of a type: the one that the lab wants, and the one that the script has."""
 
-    def faults(self) -> Iterator[str]:
+    def faults(self) -> Iterator[Fix]:
         """Yield how each is repaired."""
         by_check = {
             "rate": self._rate, "node-name": self._node_name, "hears": self._heard, "topic-type": self._published,
@@ -206,14 +195,14 @@ class Later:
             for kind, line, text in texts_of_cpp(text[:LINE_CHARS] for text in lines):
                 yield PythonSlip(file=path, line=line, kind=kind, message=text)
 
-    def syntax(self, package: PackageFacts) -> Iterator[str]:
+    def syntax(self, package: PackageFacts) -> Iterator[Fix]:
         """Yield what keeps a script from running that has to be moved first."""
         for file in package.files if not self._ran else ():
             fault = file.python_fault if file.path in self._moved else None
             if fault is not None and fault.kind in SYNTAX:
-                yield f"in {file.path}, {syntax_hint(fault)}"
+                yield Fix(f"in {file.path}, {syntax_hint(fault)}")
 
-    def _names(self) -> Iterator[str]:
+    def _names(self) -> Iterator[Fix]:
         """Names that are not there, of which an `except` is not reached, and functions that nothing calls."""
         told: set[tuple[str, int]] = set()
         given: set[tuple[str, str, int]] = set()
@@ -222,27 +211,30 @@ class Later:
             if (one := name_slip(slip, self._package)) is not None and not caught:
                 told.add((slip.file, slip.line))
                 place = (slip.file, one.name, self._function_at(slip))
-                yield from () if place in given else (one.fix,)
+                if place not in given:
+                    yield Fix(one.fix, tuple(f"`{line}`" for line in one.imports))
                 given |= {place} if one.fix.startswith("above line ") else set()
         for file, line in sorted(self._asked() - told):
-            yield f"write a value in the code where line {line} of {file} asks for input"
+            yield Fix(f"write a value in the code where line {line} of {file} asks for input")
         yield from self._left_over()
 
-    def _left_over(self) -> Iterator[str]:
+    def _left_over(self) -> Iterator[Fix]:
         """Modules of Python 2 behind one that the machine lacks, and slips that are told as they are."""
         for slip in self._of("lacking-import"):
             if slip.message in PYTHON_2 and slip.message not in self._verdict.message:
-                yield f"write {PYTHON_2[slip.message]} instead of {slip.message} on {_line(slip)}"
+                yield Fix(f"write {PYTHON_2[slip.message]} instead of {slip.message} on {_line(slip)}")
         meant = {one.fix.partition(" instead of ")[0] for one in self._of("misspelt")}
+        renamed = {(slip.file, slip.line): slip.fix for slip in self._of("object")}
         for slip in self._of("never-called"):
             if f"write {slip.name}" not in meant:  # else what calls it has its name wrong
                 passed = slip.fix.startswith("pass it")
-                yield slip.fix if passed else f"call `{slip.name}()`, which nothing in {slip.file} calls"
+                whole = slip.fix if passed else f"call `{slip.name}()`, which nothing in {slip.file} calls"
+                yield Fix(renamed.get((slip.file, slip.line), whole))
         for slip in self._of("main-guard"):
-            yield f"write `if __name__ == '__main__':` on {_line(slip)}"
+            yield Fix(f"write {MAIN} on {_line(slip)}", (f"on {_line(slip)}, write {MAIN}",))
         for slip in self._of("loop-left"):
-            if named := OF_LINE.fullmatch(slip.fix):
-                yield f"write {named['code']} on {_line(slip)}"
+            if slip.name:
+                yield Fix(f"write `while not {slip.name}():` on {_line(slip)}", (slip.fix,))
 
     def _function_at(self, slip: PythonSlip) -> int:
         """Return the line of the last `def` above the slip: what gives a name its value there is of use below it."""
@@ -254,18 +246,17 @@ class Later:
         return lines[slip.line - 1] if slip.line <= len(lines) else ""
 
     def _asked(self) -> set[tuple[str, int]]:
-        """Return where the scripts ask for input; nothing where that is known already."""
-        if "input" in f"{self._verdict.message} {self._verdict.hint}":
-            return set()
+        """Return where the scripts ask for input; nothing where the verdict is about one of these lines."""
         files = [one for one in map(self._package.file, self._paths) if one is not None and one.python_fault]
-        return {(slip.file, slip.line) for slip in self._of("input")} | {
+        asked = {(slip.file, slip.line) for slip in self._of("input")} | {
             (one.path, number)
             for one in files
             for number, line in enumerate(self._build.file_lines(one.path) if self._build else (), 1)
             if ASKS.match(line[:LINE_CHARS])
         }
+        return set() if asked & cited_lines(self._verdict.citations) else asked
 
-    def _rate(self) -> Iterator[str]:
+    def _rate(self) -> Iterator[Fix]:
         hz, numbers = float(str(self._wanted["rate_hz"])), self._of("rate-number")
         pauses = [one for one in numbers if one.name]
         if len(pauses) == 1 and self._lacks_words(".sleep()"):  # no Rate is ever slept by
@@ -273,44 +264,48 @@ class Later:
         if len({(one.file, one.message) for one in numbers}) == 1 and is_other_rate(numbers[0], hz):
             word, ask = ("lines", "ask") if len(numbers) > 1 else ("line", "asks")
             where = f"{word} {numbers_text(sorted(one.line for one in numbers))} of {numbers[0].file}"
-            yield f"make it {significant(hz)} Hz on {where}, which {ask} for {numbers[0].message} Hz"
+            yield Fix(f"make it {significant(hz)} Hz on {where}, which {ask} for {numbers[0].message} Hz")
         for slip in self._of("not-called"):
             if "sleep" in slip.name:
-                yield f"on {_line(slip)}, {slip.fix}"
+                yield Fix(f"on {_line(slip)}, {slip.fix}")
         for path in sorted(self._paths) if not self._ran else ():
             lines = [line[:LINE_CHARS] for line in self._build.file_lines(path)] if self._build else []
             yield from self._rate_of_lines(path, lines, significant(hz))
 
-    def _rate_of_lines(self, path: str, lines: Sequence[str], hz: str) -> Iterator[str]:
+    def _rate_of_lines(self, path: str, lines: Sequence[str], hz: str) -> Iterator[Fix]:
         """Yield what keeps the loop of a script that never ran from sleeping."""
         rate = next((found[1] for line in lines if (found := MAKES_RATE.match(line))), "")
         for number, line in enumerate(lines, 1):
             if rate and SLEEPS_FOR.match(line):
-                yield f"write `{rate}.sleep()` on line {number} of {path}: rospy.sleep() needs a time"
+                yield Fix(f"write `{rate}.sleep()` on line {number} of {path}: rospy.sleep() needs a time")
             plain = PLAIN_NUMBER.match(line)
             if plain and any(re.search(rf"\b{plain[1]}\.sleep\(", one) for one in lines):
-                yield f"write `{plain[1]} = rospy.Rate({hz})` on line {number} of {path}: only a Rate can sleep"
+                yield Fix(
+                    f"write `{plain[1]} = rospy.Rate({hz})` on line {number} of {path}: only a Rate can sleep"
+                )
         for number in _spins_in_loops(lines):
-            yield f"delete `rospy.spin()` on line {number} of {path}, at which the loop stands still"
+            yield Fix(f"delete `rospy.spin()` on line {number} of {path}, at which the loop stands still")
         if not self._lacks_words("sleep") or not any(LOOPS.match(line) for line in lines):
             return
         if rate:
-            yield f"call `{rate}.sleep()` each time around the loop of {path}"
+            yield Fix(f"call `{rate}.sleep()` each time around the loop of {path}")
         elif self._lacks_words("Timer("):
-            yield f"let the loop of {path} wait: `rate = rospy.Rate({hz})` above it, `rate.sleep()` in it"
+            yield Fix(
+                f"let the loop of {path} wait: `rate = rospy.Rate({hz})` above it, `rate.sleep()` in it"
+            )
 
-    def _node_name(self) -> Iterator[str]:
+    def _node_name(self) -> Iterator[Fix]:
         own, names = self._of_process(self._of("node-name")), list(texts_in(self._wanted.get("names")))
         plain = self._wanted.get("anonymous") == "forbidden"
         for slip in self._of("commented-out") if plain and not own and not self._ran else ():
             if slip.name == "init_node" and "anonymous=True" in self._text_of(slip).replace(" ", ""):
-                yield f"remove anonymous=True from {_line(slip)}"
+                yield Fix(f"remove anonymous=True from {_line(slip)}")
         if self._ran or len(own) != 1 or not names or f"init_node('{names[0]}'" in self._verdict.hint:
             return
         if own[0].message.lstrip("/") not in names:
-            yield f"name the node {names[0]} on {_line(own[0])}, not {own[0].message}"
+            yield Fix(f"name the node {names[0]} on {_line(own[0])}, not {own[0].message}")
         if own[0].name == "anonymous" and plain and not own[0].fix:
-            yield f"remove anonymous=True from {_line(own[0])}"
+            yield Fix(f"remove anonymous=True from {_line(own[0])}")
 
     def _of_process(self, slips: list[PythonSlip]) -> list[PythonSlip]:
         """Return those of the script that the criterion's own process runs, where it names one of several."""
@@ -321,38 +316,40 @@ class Later:
             s for s in slips if names is None or s.file in self._moved or PurePosixPath(s.file).name in names
         ]
 
-    def _copied(self) -> Iterator[str]:
+    def _copied(self) -> Iterator[Fix]:
         started = [one.script for one in self._rubric.scenarios[self._criterion.scenario or ""].start]
         twice = {PurePosixPath(one).name for one in started if one and started.count(one) > 1}
         for slip in self._of("node-name"):
             if PurePosixPath(slip.file).name in twice and not slip.name and not slip.fix:
-                yield f"write anonymous=True on {_line(slip)}, since two of it run at once"
+                yield Fix(f"write anonymous=True on {_line(slip)}, since two of it run at once")
 
     def _topics_of_others(self) -> set[str]:
         """Topics of the same run that other criteria ask for."""
         of_run = (c for c in self._rubric.criteria if c.scenario == self._criterion.scenario)
         return {str(c.parameters["topic"]) for c in of_run if "topic" in c.parameters} - {self._topic}
 
-    def _published(self) -> Iterator[str]:
+    def _published(self) -> Iterator[Fix]:
         published, kind = self._of("publisher"), str(self._wanted.get("type", ""))
         lines = [one.line for one in published if f"/{one.message.lstrip('/')}" == self._topic]
         if len(published) == 1 and not lines and not self._ran:
             other = published[0]
             if f"/{other.message.lstrip('/')}" in self._topics_of_others():
-                yield f"add a publisher of {kind} on {self._topic}: {other.file} has only the one of {other.message}"
+                yield Fix(
+                    f"add a publisher of {kind} on {self._topic}: {other.file} has only the one of {other.message}"
+                )
                 return
-            yield f"publish on {self._topic} on {_line(published[0])}, not on {published[0].message}"
+            yield Fix(f"publish on {self._topic} on {_line(published[0])}, not on {published[0].message}")
         own = [one for one in self._of("publisher-type") if one.message == kind.rpartition("/")[2]]
         named = self._ran and {one.line for one in own} & {one.line for one in published}
         if len(published) > 1 and not lines and not named:
             names = join_words(f"{one.message} (line {one.line})" for one in published[:NAMES_SHOWN])
-            yield f"publish {kind} on {self._topic}: {published[0].file} publishes on {names}"
+            yield Fix(f"publish {kind} on {self._topic}: {published[0].file} publishes on {names}")
         types = [one for one in self._of("publisher-type") if one.line in lines or len(published) <= 1]
         types = types if not (self._ran and lines) else []
         if len(types) == 1 and types[0].message != kind.rpartition("/")[2]:
             yield self._retype("publish", kind, types[0])
 
-    def _heard(self) -> Iterator[str]:
+    def _heard(self) -> Iterator[Fix]:
         scenario = self._rubric.scenarios.get(self._criterion.scenario or "")
         probes = scenario.probes if scenario is not None else ()
         sent = [probe.type for probe in probes if probe.topic == self._topic]
@@ -362,41 +359,42 @@ class Later:
         own = sent[0].rpartition("/")[2] if sent else ""
         elsewhere = len(heard) == 1 and f"/{heard[0].message.lstrip('/')}" != self._topic
         if elsewhere and not self._ran:
-            yield f"subscribe to {self._topic} on {_line(heard[0])}, not to {heard[0].message}"
+            yield Fix(f"subscribe to {self._topic} on {_line(heard[0])}, not to {heard[0].message}")
         others = [one for one in heard if f"/{one.message.lstrip('/')}" != self._topic]
         if sent and len(others) == len(heard) > 1 and not self._ran:
             names = join_words(f"{one.message} (line {one.line})" for one in heard[:NAMES_SHOWN])
-            yield f"subscribe to {self._topic} with {sent[0]}: {heard[0].file} subscribes to {names}"
+            yield Fix(f"subscribe to {self._topic} with {sent[0]}: {heard[0].file} subscribes to {names}")
         other = sent and len(types) == 1 and types[0].message != own
         told = heard and self._ran  # of a node on its topic, what ROS refused says it
         if other and (elsewhere or (not told and f"/{types[0].message}" not in self._verdict.message)):
             yield self._retype("subscribe with", sent[0], types[0])
         template, said = str(self._wanted.get("template", VALUE)), self._of("prints")
         if len(heard) > 1 and ", callback)" in self._verdict.hint and self._lacks_words("def callback("):
-            yield f"write `def callback(msg):` above it, which prints '{in_words(template)}'"
+            yield Fix(f"write `def callback(msg):` above it, which prints '{in_words(template)}'")
             return
         said = [one for one in said if SAID_DATA in one.message]
         unheard = not self._ran or not (isinstance(self._run, Run) and probes_on(self._run, self._topic))
         if not unheard or template == VALUE or any(says(one.message, template) for one in said):
             return
         if len(said) == 1 >= len({one.line for one in heard}):  # else it may be another callback
-            yield f"print '{in_words(template)}' on {_line(said[0])}, not '{in_source(said[0].message)}'"
+            wanted = f"print '{in_words(template)}'"
+            there = f"on {_line(said[0])}, not '{in_source(said[0].message)}'"
+            yield Fix(f"{wanted} {there}", general=f"{wanted}, {IN_OWN_WORDS}")
         elif self._lacks_words(template.partition(VALUE)[0]):
-            yield f"print '{in_words(template)}'"
+            yield Fix(f"print '{in_words(template)}'")
         elif other and not said and len(self._of("prints")) == 1:  # a field that the right type does not have
             only = self._of("prints")[0]
             says_it = " ".join(template.partition(VALUE)[0].split()) in " ".join(only.message.split())
             what = "the `data` of the message" if says_it else f"'{in_words(template)}'"
-            yield f"print {what} on {_line(only)}"
+            yield Fix(f"print {what} on {_line(only)}", general=f"print {what}, {IN_OWN_WORDS}")
 
-    def _retype(self, verb: str, wanted: str, slip: PythonSlip) -> str:
+    def _retype(self, verb: str, wanted: str, slip: PythonSlip) -> Fix:
         lines = self._build.file_lines(slip.file) if self._build is not None else []
         making = re.compile(rf"^[^#]*(?<![\w.]){slip.message}\(")
         others = [n for n, text in enumerate(lines, 1) if n != slip.line and making.search(text)]
         more = f" (made on line{'s' if len(others) > 1 else ''} {numbers_text(others)})" if others else ""
-        fault = f"{verb} {wanted} on {_line(slip)}, not {slip.message}{more}"
-        self.retyped[fault] = wanted, slip.message
-        return fault
+        text = f"{verb} {wanted} on {_line(slip)}, not {slip.message}{more}"
+        return Fix(text, types=(wanted, slip.message))
 
     def _lacks_words(self, words: str) -> bool:
         """Return whether the words stand in no line of the sources, which are known."""
@@ -409,7 +407,7 @@ class Later:
             words.strip().casefold() in " ".join(line.split()).casefold() for line in lines
         )
 
-    def _message(self) -> Iterator[str]:
+    def _message(self) -> Iterator[Fix]:
         template = str(self._wanted.get("template", ""))
         said = list({one.message: one for one in self._of("publishes")}.values())
         code = in_language(code_of(template), "python")
@@ -417,25 +415,25 @@ class Later:
             types = {one.message for one in self._of("publisher-type")}
             no_text = bool(types) and "String" not in types
             if not said and (no_text or self._lacks_words(template.partition(SECONDS)[0])):
-                yield f"publish `{code}`"
+                yield Fix(f"publish `{code}`", (f"`{code}`",))
             return
         text = said[0].message
         if text in {SAID_VALUE, SAID_DATA} and self._lacks_words(template.partition(SECONDS)[0]):
-            yield f"publish `{code}` on {_line(said[0])}"
+            yield Fix(f"publish `{code}` on {_line(said[0])}")
         sample = template.replace(SECONDS, "1234567890.25")
         if len(self._of("publisher")) > 1:  # it may be another topic's
             if not could_say(text, sample):
-                yield f"publish `{code}`"
+                yield Fix(f"publish `{code}`", (f"`{code}`",))
         elif not could_say(text, sample):
             words = in_words(template) if said[0].file.endswith(tuple(SOURCES)) else code
-            yield f"publish `{words}` on {_line(said[0])}, not '{in_source(text)}'"
+            yield Fix(f"publish `{words}` on {_line(said[0])}, not '{in_source(text)}'")
         elif SECONDS in template and self._of("no-clock"):
-            yield f"publish the time on {_line(said[0])}, `{code}`: the script only counts"
+            yield Fix(f"publish the time on {_line(said[0])}, `{code}`: the script only counts")
 
-    def _logged(self) -> Iterator[str]:
+    def _logged(self) -> Iterator[Fix]:
         text, said = str(self._wanted.get("text", "")), self._of("prints")
         if len(said) == 1 and "{" not in said[0].message and text not in said[0].message:
-            yield f"log {text!r} on {_line(said[0])}, not {said[0].message!r}"
+            yield Fix(f"log {text!r} on {_line(said[0])}, not {said[0].message!r}")
 
 
 def _later_in_file(criterion: Criterion, package: PackageFacts) -> Iterator[str]:

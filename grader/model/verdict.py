@@ -140,12 +140,13 @@ class Verdict(Record):
     explains it. `timing` marks a loss that one run's timing could have made: it counts only if it is seen twice.
     `of_machine`: it is open until the machine has what it lacks, and grading again before changes nothing. `cause` is
     what a process ended of, in words that are the same in every verdict that rests on it. `blocked_by` is the criterion
-    that explains the absence, `right` what earned a part of the points, `mistake` the kind of what was done wrong.
-    `said` is what a node printed, logged or published in place of what was asked, `sought` names: the lines of both are
-    cited.
-    `callbacks`: a callback came too `late` to what was sent, or never; or it is about what came `before` any callback
-    could keep the node waiting. `excused`: what would be lost if the machine had not been late. `dropped`: so much came
-    on its topics that the recorder dropped some.
+    that explains the absence, `right` what earned a part of the points, `mistake` the kind of what was done wrong,
+    `meant` the file that is told to become the one that is missing. `said` is what a node printed, logged or published
+    in place of what was asked, `sought` names: the lines of both are cited. `wrong`: a value is another one, or NaN is
+    in its place, or a service's callback returns nothing. `callbacks`: a callback came too `late` to what was sent, or
+    never; or it is about what came `before` any callback could keep the node waiting. `excused`: what would be lost if
+    the machine had not been late; `own_load`: it was late by the run's own doing. `dropped`: so much came on its topics
+    that the recorder dropped some.
     """
 
     status: Status
@@ -164,10 +165,13 @@ class Verdict(Record):
     blocked_by: str = ""
     right: str = ""
     mistake: Mistake | None = None
+    meant: str = ""
     said: str = ""
     sought: tuple[Sought, ...] = ()
+    wrong: Literal["", "value", "nan", "nothing"] = ""
     callbacks: Literal["", "late", "before"] = ""
     excused: str = ""
+    own_load: bool = False
     dropped: bool = False
 
     def about(
@@ -207,9 +211,9 @@ class Verdict(Record):
             return self
         return self.model_copy(update={"status": Status.PARTIAL, "score": share, "right": right})
 
-    def lost_by(self, kind: MistakeKind, name: str) -> Verdict:
-        """Return the verdict with the kind of mistake that it is lost by."""
-        return self.model_copy(update={"mistake": Mistake(kind=kind, name=name)})
+    def lost_by(self, kind: MistakeKind, name: str, meant: str = "") -> Verdict:
+        """Return the verdict with the kind of mistake that it is lost by, and the file that is meant to be `name`."""
+        return self.model_copy(update={"mistake": Mistake(kind=kind, name=name), "meant": meant})
 
     def seeking(self, kind: SoughtKind, *names: str) -> Verdict:
         """Return the verdict with these names too to cite the lines of."""
@@ -223,6 +227,10 @@ class Verdict(Record):
     def sought_name(self, kind: SoughtKind) -> str:
         """Return the first name of this kind to cite the lines of; "" where none is sought."""
         return next(iter(self.sought_names(kind)), "")
+
+    def of_value(self, *, nan: bool) -> Verdict:
+        """Return the verdict marked as one on a wrong value; `nan`: it is NaN, or should be."""
+        return self.model_copy(update={"wrong": "nan" if nan else "value"})
 
     def late(self) -> Verdict:
         """Return the verdict marked as one that shows a callback which came too late, or never."""

@@ -94,8 +94,6 @@ def _told_once(losses: list[Loss]) -> tuple[Loss, ...]:
 
 
 INSTALL = "cmake-install"
-CANNOT = "cannot be run"
-"""Words of the messages of such scripts."""
 NOT_STARTED = ("not-executable", "cannot-be-run")
 """The mistakes in a script that the build would make up for if CMakeLists.txt installed it."""
 
@@ -128,9 +126,11 @@ def _joined(criterion: CriterionResult, scripts: Sequence[CriterionResult]) -> C
     paths = [one.name for one in found]
     if criterion.check == INSTALL:
         reasons: dict[str, list[str]] = {}
-        for path, one in zip(paths, scripts, strict=True):
-            reasons.setdefault(one.message.partition("; ")[0].removeprefix(f"{path} "), []).append(path)
-        why = [f"{join_words(of)} {reason}" for reason, of in reasons.items() if CANNOT in reason]
+        for one in scripts:
+            if one.mistake and one.mistake.kind == "cannot-be-run":
+                path = one.mistake.name
+                reasons.setdefault(one.message.partition("; ")[0].removeprefix(f"{path} "), []).append(path)
+        why = [f"{join_words(of)} {reason}" for reason, of in reasons.items()]
         then = f"makes {join_words(paths)} executable"
         if why:
             then = f"makes {'programs' if len(paths) > 1 else 'a program'} of {join_words(paths)}"

@@ -29,6 +29,7 @@ def rubric(*criteria: dict[str, Any], **keys: Any) -> Rubric:
     return Rubric.model_validate(data)
 
 
+CMAKE_CHECK = {"id": "cmake", "check": "cmake", "with": {"name": "lab1"}}
 EXECUTABLE = {"id": "executable", "check": "executable", "with": {"path": "src/numeric_talker.py"}}
 NODE = {
     "id": "node",

@@ -15,7 +15,7 @@ from grader.model.submission import SourcePackage
 from grader.model.verdict import Status, passed
 from grader.package import read_package
 from tests.fixture_runs import loaded, source_of
-from tests.judging.rubrics import EXECUTABLE, NODE, rubric
+from tests.judging.rubrics import CMAKE_CHECK, EXECUTABLE, NODE, rubric
 from tests.package.trees import CMAKE, MANIFEST, make_package
 from tests.package.trees import NODE as SCRIPT
 
@@ -32,7 +32,6 @@ SAMPLES = [
     ("eyantra-ros-basics", "ok-cpp-nodes"),
 ]
 MANIFEST_CHECK = {"id": "manifest", "check": "manifest", "with": {"name": "lab1"}}
-CMAKE_CHECK = {"id": "cmake", "check": "cmake", "with": {"name": "lab1"}}
 DEPENDENCIES = {
     "id": "dependencies",
     "check": "dependencies",
@@ -130,6 +129,7 @@ def test_what_does_not_parse_is_told_before_anything_runs(tmp_path) -> None:
     assert "src/numeric_talker.py line 2: SyntaxError" in talker.message
     assert "launch/lab1.launch, line 1 is not well-formed" in launch.message
     assert talker.citations[0].column == 1
+    assert talker.reproduce == "python3 -m py_compile src/numeric_talker.py"
 
 
 def test_a_launch_file_whose_nodes_do_not_parse_connects_none(tmp_path) -> None:
@@ -143,6 +143,7 @@ def test_a_launch_file_whose_nodes_do_not_parse_connects_none(tmp_path) -> None:
     assert (launch.criterion.status, launch.final) == (Status.FAIL, False)
     assert "starts src/talker.py, line 2: SyntaxError" in launch.criterion.message
     assert launch.criterion.hint == "line 2: write `while True:`"
+    assert launch.criterion.reproduce == "python3 -m py_compile src/talker.py"
 
 
 def test_what_rests_on_something_unsettled_is_unsettled(tmp_path) -> None:

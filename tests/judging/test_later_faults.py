@@ -145,6 +145,17 @@ CASES: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str,
          slip("misspelt", "did you mean herd?", 9, name="heard", fix="write herd instead of heard"),
          slip("rate-number", "2", 4)],
         "; then on line 9, write herd instead of heard and make it 10 Hz"),
+    "a method that nothing calls because it is to be __init__": (
+        "node", DIES, TALKER,
+        [slip("never-called", "nothing calls `init()`", name="Node().init"),
+         slip("object", "", name="__init__", fix="on line 5, write `__init__` instead of `init`")],
+        "; then on line 5, write `__init__` instead of `init`"),
+    "a loop that lacks its not": (
+        "node", DIES, TALKER, [slip("loop-left", "", name="rospy.is_shutdown", fix="on line 5, write …")],
+        f"; then write `while not rospy.is_shutdown():` on line 5 of {FILE}"),
+    "a guard with another word": (
+        "node", DIES, TALKER, [slip("main-guard", "")],
+        f"; then write `if __name__ == '__main__':` on line 5 of {FILE}"),
     "rate.sleep without brackets behind it": (
         "node", DIES, TALKER, [slip("not-called", "", name="rate.sleep", fix="write `rate.sleep()`")],
         f"; then on line 5 of {FILE}, write `rate.sleep()`"),
@@ -249,15 +260,15 @@ def test_a_text_that_takes_the_place_of_input_is_told_once() -> None:
 
 
 def test_a_question_in_a_script_that_does_not_compile_is_named() -> None:
-    fault = {"file": FILE, "line": 4, "kind": "TabError", "message": "inconsistent use of tabs"}
+    fault = {"file": FILE, "line": 5, "kind": "TabError", "message": "inconsistent use of tabs"}
     own = [{**one, "python_fault": fault} if one["path"] == FILE else one for one in PACKAGE["files"]]
-    source = "# input()\nwhile True:\n    word = raw_input('?')\n\tprint(word)\n"
+    source = "# input()\n\nwhile True:\n    word = raw_input('?')\n\tprint(word)\n"
     runs = {
         "runs": {"talker": DIES, "package": {"attachments": {FILE: source}}},
         "package": {**PACKAGE, "files": own},
     }
     found = {c.id: c.hint for c in judge(rubric(*TALKER), build_runs(runs))}
-    told = f"then write a value in the code where line 3 of {FILE} asks for input"
+    told = f"then write a value in the code where line 4 of {FILE} asks for input"
     assert any(told in hint for hint in found.values())
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import ast
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from grader.model.repair import advice_on
 from grader.package.repairs import Repair, Wanted, apply_repair, find_repairs
 from tests.package.trees import facts_of
 
@@ -82,3 +85,36 @@ def swapped(name: str, *pairs: tuple[str, str]) -> dict[str, str | bytes | None]
         assert old in text
         text = text.replace(old, new)
     return {name: text}
+
+
+def asking(**more: object) -> Wanted:
+    """Return what is wanted of the correct package, and more."""
+    return WANTED.model_copy(update=more)
+
+
+@dataclass(frozen=True)
+class Case:
+    """`changes` to the correct package, the kinds of repair found, a part of their words, and of the repaired files."""
+
+    changes: dict[str, str | bytes | None]
+    kinds: list[str]
+    says: str = ""
+    wanted: Wanted = WANTED
+    after: dict[str, str] = field(default_factory=dict)
+
+
+def check(case: Case, tmp_path: Path) -> None:
+    """The mistake is found, and what is repaired has none."""
+    folder = package(tmp_path, case.changes)
+    for script in (folder / "src").iterdir():
+        script.chmod(0o755)
+    found = repair_all(folder, case.wanted)
+    assert [repair.kind for repair in found] == case.kinds
+    said = [*(one.message for one in found), "; ".join(part for one in found for part in advice_on([one]))]
+    assert case.says in "\n".join(said)
+    assert all(repair.fix and not repair.message.endswith(".") for repair in found)
+    assert find_repairs(folder, facts_of(folder), case.wanted) == ()
+    assert all(ast.parse(path.read_bytes()) for path in folder.rglob("*.py"))
+    assert (folder / TALKER).stat().st_mode & 0o777 == 0o755
+    for path, part in case.after.items():
+        assert part.encode() in (folder / path).read_bytes()

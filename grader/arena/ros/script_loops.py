@@ -120,8 +120,9 @@ def stopped_loops(tree):
             message = (
                 "the loop on line %d runs only when the node should end: a `not` is missing" % loop.lineno
             )
-            fix = "on line %d, write `while not %s():`" % (loop.lineno, dotted(loop.test.func))
-            yield slip(loop.lineno, "loop-left", message, fix=fix)
+            asks = dotted(loop.test.func)
+            fix = "on line %d, write `while not %s():`" % (loop.lineno, asks)
+            yield slip(loop.lineno, "loop-left", message, fix=fix, name=asks)
         if not isinstance(loop, (ast.While, ast.For)) or not calls_in(loop, "publish"):
             continue
         for spin in calls_in(loop, "spin")[:1]:

@@ -61,7 +61,7 @@ def check_all(root, names):
     warnings.simplefilter("ignore")
     left = ALL_SLIPS_LIMIT
     for name in names:
-        report = check(root, name)
+        report = check(root, name, with_slips=left > 0)
         report["slips"] = report["slips"][:left]
         left -= len(report["slips"])
         yield report
@@ -79,7 +79,7 @@ def set_limits():
             resource.setrlimit(limit, (value, value))
 
 
-def check(root, name):
+def check(root, name, with_slips=True):
     report = {"file": name, "faults": [], "slips": []}
     try:
         with open(os.path.join(root, name), "rb") as file:
@@ -97,7 +97,7 @@ def check(root, name):
         compile(data, os.path.basename(name), "exec", dont_inherit=True)
     except (SyntaxError, ValueError, OverflowError, RecursionError, MemoryError) as error:
         report["faults"].append(syntax_fault(error, data))
-        report["slips"] = slips_of_the_rest(data.decode("utf-8", "replace"))
+        report["slips"] = slips_of_the_rest(data.decode("utf-8", "replace")) if with_slips else []
         return report
     with contextlib.suppress(
         RecursionError, MemoryError
@@ -108,7 +108,8 @@ def check(root, name):
             report["faults"].append(syntax_fault(error, data))
             return report
         text = data.decode("utf-8", "replace")
-        report["slips"] = [*slips(tree), *argument_texts(text), *commented_calls(text)]
+        if with_slips:
+            report["slips"] = [*slips(tree), *argument_texts(text), *commented_calls(text)]
     return report
 
 

@@ -265,7 +265,7 @@ def excused(verdict: Verdict, run: Run, from_ns: int, to_ns: int, why: Callable[
         still_open = inconclusive(message, hint=hint, measured=verdict.measured)
         return still_open.model_copy(update={"excused": verdict.message})
     if why(whole):
-        return verdict.model_copy(update={"message": f"{verdict.message}; {NO_EXCUSE}"})
+        return verdict.model_copy(update={"message": f"{verdict.message}; {NO_EXCUSE}", "own_load": True})
     return verdict
 
 

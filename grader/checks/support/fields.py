@@ -146,10 +146,11 @@ UNITS = (
 
 
 class Difference(NamedTuple):
-    """`path` is the field as one writes it (`pose.x`, `names[2]`), empty for the whole."""
+    """`path` is the field as one writes it (`pose.x`, `names[2]`), empty for the whole. `nan`: one of both is NaN."""
 
     path: str
     why: str
+    nan: bool = False
 
     def __str__(self) -> str:
         return f"{self.path}: {self.why}" if self.path else self.why
@@ -165,7 +166,8 @@ def differences(got: object, wanted: object, tolerance: float, path: str = "") -
         yield from _in_items(list(got) if isinstance(got, bytes) else got, wanted, tolerance, path)
     elif not _equal(got, wanted, tolerance):
         why = f"{value_text(got)}, not {value_text(wanted)}{_kinds(got, wanted)}"
-        yield Difference(path, f"{why}{unit_slip(got, wanted)}")
+        nan = any(isinstance(one, float) and math.isnan(one) for one in (got, wanted))
+        yield Difference(path, f"{why}{unit_slip(got, wanted)}", nan)
 
 
 def _in_fields(

@@ -192,7 +192,7 @@ def unimported_module(found: Traceback, package: PackageFacts) -> str:
     """Return a module that the script which imports one that is not there uses, and does not import; "" for none."""
     file = found.own_frames[-1].file if found.own_frames else ""
     slips = (s for s in package.slips if s.kind == "undefined" and file.endswith(f"/{s.file}"))
-    return next((s.name for s in slips if s.fix == f"write `import {s.name}` at the top"), "")
+    return next((s.name for s in slips if s.fix == IMPORT % s.name), "")
 
 
 def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
@@ -352,13 +352,18 @@ def _line_with(source: str, wrong: str, right: str) -> str:
     return f"write `{shown(line)}`" if count == 1 else f"write {right} instead of {wrong}"
 
 
+IMPORT = "write `import %s` at the top"
+"""The fix of a module's name that is not there, as `arena/ros/script_names.py` writes it."""
+
+
 class NameSlip(NamedTuple):
-    """A name that is not there: why, and what to do."""
+    """A name that is not there: why, and what to do; `imports` are the lines of which one brings it."""
 
     name: str
     line: int
     why: str
     fix: str
+    imports: tuple[str, ...] = ()
 
 
 def name_slip(slip: PythonSlip, package: PackageFacts) -> NameSlip | None:
@@ -379,11 +384,15 @@ def name_slip(slip: PythonSlip, package: PackageFacts) -> NameSlip | None:
     made = [
         f"{p.name}.{i.module}" for p in (package, *package.also) for i in p.interfaces if name in i.classes
     ]
-    having = made or having
-    if name[:1].isupper() and having and "<package>" in fix:
-        lines = join_words([f"`from {module} import {name}`" for module in having], "or")
-        why, fix = f"{name} is not imported", f"write {lines} at the top"
-    return NameSlip(name, slip.line, why, fix)
+    lines = tuple(f"from {module} import {name}" for module in made or having)
+    if name[:1].isupper() and lines and "<package>" in fix:
+        why, fix = (
+            f"{name} is not imported",
+            f"write {join_words([f'`{one}`' for one in lines], 'or')} at the top",
+        )
+        return NameSlip(name, slip.line, why, fix, lines)
+    is_module = fix == IMPORT % name
+    return NameSlip(name, slip.line, why, fix, (f"import {name}",) if is_module else ())
 
 
 def lacking_too(place: FileCitation | None, package: PackageFacts) -> tuple[str, ...]:

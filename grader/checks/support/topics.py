@@ -402,8 +402,8 @@ def is_unexplained(check: Check, verdict: Verdict) -> bool:
     return check.of_callbacks and verdict.status.is_lost and not verdict.cause
 
 
-SEEN_AS = {"nan": r"\bnan\b", "degrees": r" is wrong in | answers ", "return": r"returns nothing"}
-"""How a value that is none shows in a verdict, by the name of its slip."""
+SEEN_AS = {"nan": "nan", "degrees": "value", "return": "nothing"}
+"""How a verdict says that a value is `wrong`, by the name of the slip that makes it so."""
 
 
 def explain_by_wrong_value(
@@ -414,7 +414,7 @@ def explain_by_wrong_value(
         return verdict
     files = _files_that_run(package, run)
     found = (s for s in package.slips if s.kind == "wrong-value" and s.file in files)
-    slip = next((s for s in found if re.search(SEEN_AS[s.name], verdict.message)), None)
+    slip = next((s for s in found if SEEN_AS[s.name] == verdict.wrong), None)
     if slip is None:
         return verdict
     why = f"line {slip.line} of {slip.file}: {slip.message}"

@@ -1,0 +1,454 @@
+"""Mistakes in what builds and launches the nodes, in one table: CMake, the manifest, launch files and messages."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from grader.model.message_definitions import parse_definition
+from grader.package.repairs import Wanted
+from tests.package.repairing import (
+    CMAKE,
+    CMAKELISTS,
+    LAUNCH,
+    LAUNCHED,
+    MANIFEST,
+    SCRIPT,
+    TALKER,
+    XML,
+    Case,
+    asking,
+    check,
+    swapped,
+)
+
+pytestmark = pytest.mark.usefixtures("without_processes")
+
+INSTALL = """
+catkin_install_python(
+  PROGRAMS
+    scripts/other.py
+  DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+"""
+INSTALLS = Wanted(package="lab", installed=(TALKER, "src/listener.py"))
+INSTALLED = {"src/listener.py": SCRIPT, "scripts/other.py": SCRIPT}
+TWO_NODES = LAUNCH.replace("</launch>", LAUNCH.splitlines()[1].replace("talker", "listener") + "\n</launch>")
+OWN = {"msg/Level.msg": "float64 level\n", "src/level.py": "from lab.msg import Level\n"}
+OWN_CMAKE = CMAKE.replace("rospy)\n", "message_generation rospy)\nadd_message_files(FILES Level.msg)\n")
+RUN_OWN = {**OWN, TALKER: SCRIPT.replace("import Int8\n", "import Int8\nfrom lab.msg import Level\n")}
+SERVICE = {**OWN, "srv/Two.srv": "int64 a\n---\n", "src/level.py": "from lab.srv import Two\n"}
+SERVICE_CMAKE = CMAKE.replace(
+    "rospy)\n", "message_generation rospy)\nadd_service_files(FILES Two.srv)\ngenerate_messages()\n"
+)
+ACTION_CMAKE = CMAKE.replace(
+    "rospy)\n",
+    """message_generation actionlib_msgs rospy)
+add_action_files(FILES Go.action)
+generate_messages(DEPENDENCIES actionlib_msgs std_msgs)
+""",
+)
+GO_FIELDS = tuple(parse_definition("int32 n\n---\nbool there\n---\nint32 left\n", ".action"))
+CPP_NODE = """\
+void callback(const Int8& msg) { for (int i = 0; i < 3; ++i) use(msg); }
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "a");
+  auto sub = ros::NodeHandle().subscribe("scan", 10, callback);
+  return 0;
+}
+"""
+TEMPLATE = """\
+# add_message_files(
+#   FILES
+#   Message1.msg
+# )
+# generate_messages(
+#   DEPENDENCIES
+#   std_msgs
+# )"""
+LEVELS = "a:\n  b:\n    x: 1\n  y: 2\n  c:\n    z: 3\n"
+STARTED = asking(launch_files=("activity1.launch",), started=(("activity1.launch", "talker.py"),))
+NESTED = asking(files=("config/my.yaml",), params=("/a/b/x", "/a/b/y", "/a/c/z"))
+CONSTRUCTOR = """\
+Node::Node() : n_(1)
+{
+  ros::Subscriber sub = nh_.subscribe("scan", 10, &Node::heard, this);
+%s}
+"""
+
+CASES = {
+    "topic-in-cpp": Case(
+        {"src/a.cpp": '// advertise<Int8>("/other", 1)\npub = nh.advertise<std_msgs::Int8>("/men", 1);\n'},
+        ["topic-name"], "line 2 of src/a.cpp: the topic /men should be /mean", asking(topics=("/mean",)),
+        {"src/a.cpp": 'advertise<std_msgs::Int8>("/mean", 1);'},
+    ),
+    "service-in-cpp": Case(
+        {"src/a.cpp": 'ros::ServiceServer server = nh.advertiseService("estimat", answer);\n'},
+        ["service-name"], "line 1 of src/a.cpp: the service estimat should be /estimate",
+        asking(servers=("/estimate",)), {"src/a.cpp": 'advertiseService("estimate", answer);'},
+    ),
+    "program-named-otherwise": Case(
+        {"src/mean.cpp": "int main() {}\n",
+         CMAKELISTS: f"{CMAKE}add_executable(mean_node src/mean.cpp)\ntarget_link_libraries(mean_node x)\n"},
+        ["build-line"], "the program is called mean_node, and the lab wants mean", asking(scripts=("mean",)),
+        {CMAKELISTS: "add_executable(mean src/mean.cpp)\ntarget_link_libraries(mean x)\n"},
+    ),
+    "no-spin-in-cpp": Case(
+        {"src/a.cpp": CPP_NODE}, ["missing-call"], "src/a.cpp: below line 4 add `ros::spin();`",
+        after={"src/a.cpp": CPP_NODE.replace("  return", "  ros::spin();\n  return")},
+    ),
+    "no-spin-and-no-return-in-cpp": Case(
+        {"src/a.cpp": CPP_NODE.replace("  return 0;\n", "  // ros::spin();\n")}, ["missing-call"], "src/a.cpp",
+        after={"src/a.cpp": "  // ros::spin();\n  ros::spin();\n}\n"},
+    ),
+    "subscriber-dropped-in-cpp": Case(
+        {"src/a.cpp": CPP_NODE.replace("auto sub = ros::NodeHandle()", "nh").replace("  return 0", "  ros::spin()")},
+        ["missing-call"], "line 4 of src/a.cpp: what subscribe(…) returns is dropped, and with it the subscription",
+        after={"src/a.cpp": '  ros::Subscriber sub = nh.subscribe("scan", 10, callback);\n'},
+    ),
+    "loop-in-cpp": Case({"src/a.cpp": CPP_NODE.replace("  return", "  while (true) ros::spinOnce();\n  return")}, []),
+    "include": Case(swapped(CMAKELISTS, ("catkin_package()", "catkin_package(\n  INCLUDE_DIRS include\n)")),
+                ["build-line"], "line 4 of CMakeLists.txt: catkin_package(…) names the folder include/"),
+    "type": Case(swapped(LAUNCHED, ("talker.py", "talker")), ["launch-type"], 'type="talker" should be'),
+    "tag-open": Case(swapped(LAUNCHED, ("/>", ">")), ["launch-syntax"], "is still open where"),
+    "no-quotes": Case(swapped(LAUNCHED, ('"talker.py"', "talker.py")), ["launch-syntax"], "has no quotes around it"),
+    "tag-open-and-type": Case(swapped(LAUNCHED, ("/>", ">"), ("talker.py", "talker")),
+                          ["launch-syntax", "launch-type"], 'type="talker" should be'),
+    "pkg": Case(swapped(LAUNCHED, ('pkg="lab"', 'pkg="laab"')), ["package-name"], 'pkg="laab" should be'),
+    "manifest-name": Case(swapped(XML, (">lab<", ">lab_<")), ["package-name"], "the package is called lab_"),
+    "own-name": Case({XML: MANIFEST.replace(">lab<", ">mine<"), CMAKELISTS: CMAKE.replace("lab", "mine")},
+                 ["package-name"], "the package is called mine, not lab"),
+    "folder-launched": Case({XML: MANIFEST.replace(">lab<", ">our_lab<"),
+                         CMAKELISTS: CMAKE.replace("lab", "our_lab")},
+                        ["package-name"], "the package is called our_lab, not lab"),
+    "no-buildtool": Case(swapped(XML, ("  <buildtool_depend>catkin</buildtool_depend>\n", "")),
+                     ["manifest-line"], "does not name catkin"),
+    "no-depend": Case(swapped(XML, ("  <depend>rospy</depend>\n", "")), ["manifest-line"], "does not name rospy"),
+    "open-tag": Case(swapped(XML, ("x</description>", "x")), ["manifest-line"], "`<description>` on line 4 is still"),
+    "no-find": Case(swapped(CMAKELISTS, ("find_package", "# find_package")), ["build-line"], "not call find_package"),
+    "no-catkin-package": Case(swapped(CMAKELISTS, ("catkin_package()\n", "")), ["build-line"], "catkin_package()"),
+    "command": Case(swapped(CMAKELISTS, ("catkin_package", "catkin_pakage")), ["build-line"], "no command catkin_p"),
+    "project": Case(swapped(CMAKELISTS, ("project(lab)", "project(xyz)")), ["build-line"], "project(xyz)"),
+    "no-project": Case(swapped(CMAKELISTS, ("project(lab)\n", "")), ["build-line"], "does not call project(…)"),
+    "modules-in-find-package": Case(
+        {CMAKELISTS: CMAKE.replace("rospy)", "mediapipe rospy numpy serial)")}, ["build-line"],
+        "line 3 of CMakeLists.txt: find_package(…) names mediapipe and numpy, and no package of ROS is called so",
+        after={CMAKELISTS: " rospy  serial)"},
+    ),
+    "late-project": Case(
+        {CMAKELISTS: CMAKE.replace("project(lab)\n", "") + "project(lab)\n"},
+        ["build-line"],
+        "project(…) is called after catkin_package(…)",
+    ),
+    "open-bracket": Case(swapped(CMAKELISTS, ("catkin_package()", "catkin_package(")), ["build-line"], "is never"),
+    "cmake-name": Case({CMAKELISTS: None, "CMakelists.txt": CMAKE}, ["file-name"], "should be called CMakeLists.txt"),
+    "installed-below-programs": Case(
+        {CMAKELISTS: CMAKE + INSTALL, **INSTALLED}, ["build-line"],
+        "CMakeLists.txt line 7: write src/listener.py src/talker.py after PROGRAMS", INSTALLS,
+        {CMAKELISTS: "scripts/other.py"},
+    ),
+    "installed-in-place-of-what-is-not-there": Case(
+        {CMAKELISTS: CMAKE + INSTALL.replace("scripts/other.py", "bin/hello"), **INSTALLED}, ["build-line"],
+        "CMakeLists.txt line 8: write src/listener.py src/talker.py in place of bin/hello", INSTALLS,
+    ),
+    "installed-in-another-place": Case(
+        {CMAKELISTS: CMAKE + INSTALL.replace("_BIN_", "_SHARE_"), **INSTALLED}, ["build-line"],
+        "write catkin_install_python(PROGRAMS src/listener.py src/talker.py DESTINATION ${CATKIN_PACKAGE_BIN_DEST",
+        INSTALLS, {CMAKELISTS: INSTALL.replace("_BIN_", "_SHARE_")},
+    ),
+    "installed-no-dollar": Case(
+        {CMAKELISTS: CMAKE + INSTALL.replace("$", "").replace("scripts/other.py", "src/talker.py src/listener.py"),
+         **INSTALLED},
+        ["build-line"], "CMakeLists.txt line 9: write `DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION}", INSTALLS,
+    ),
+    "installed-misspelt": Case(
+        {CMAKELISTS: CMAKE + INSTALL.replace("scripts/other.py", "src/talker src/listener"), **INSTALLED},
+        ["build-line"],
+        "CMakeLists.txt line 8: write `src/talker.py src/listener.py`",
+        INSTALLS,
+    ),
+    "line-ends-that-do-no-harm": Case(
+        {CMAKELISTS: CMAKE.replace("(lab)", "(xyz)").replace("\n", "\r\n")}, ["build-line"],
+        after={CMAKELISTS: CMAKE.replace("\n", "\r\n")},
+    ),
+    "name-where-it-is-written": Case(
+        {**swapped(LAUNCHED, ("talker.py", "talkr.py")), TALKER: None, "src/talkr.py": SCRIPT,
+         CMAKELISTS: CMAKE + "catkin_install_python(PROGRAMS src/talkr.py DESTINATION x)\n"},
+        ["file-name"],
+        "git mv src/talkr.py src/talker.py, and write talker.py in CMakeLists.txt and launch/lab.launch",
+        after={CMAKELISTS: "PROGRAMS src/talker.py", LAUNCHED: LAUNCH},
+    ),
+    "key-of-a-map": Case(swapped(TALKER, ("publish(1)", "publish(rospy.get_param('details')['Name'])")),
+                         ["parameter-name"], "the parameter Name should be name",
+                         after={TALKER: "['name']"}),
+    "key-beside-the-right-one": Case(swapped(TALKER, ("publish(1)", "publish(all['Name'] + all['name'])"),
+                                             ("    rate =", "    all = rospy.get_param('details')\n    rate =")), []),
+    "key-that-no-file-has": Case(
+        {"config/my.yaml": 'details:\n  name: "Ada"\n',
+         **swapped(TALKER, ("publish(1)", "publish(all['namme'] + all['name'])"),
+                   ("    rate =", "    all = rospy.get_param('details')\n    rate ="))},
+        ["parameter-name"], "the parameter namme should be name", after={TALKER: "all['name'] + all['name']"},
+    ),
+    "key-of-a-file": Case(
+        {"config/my.yaml": 'details:\n  name: "Ada"\n  names: 3\n',
+         **swapped(TALKER, ("publish(1)", "publish(all['names'] + all['name'])"),
+                   ("    rate =", "    all = rospy.get_param('details')\n    rate ="))}, []),
+    "key-with-two-colons": Case(
+        {"config/my.yaml": 'details:\n  name:: "Ada"\n'}, ["parameter-name"], "the key name: should be name",
+        wanted=asking(files=("config/my.yaml",)), after={"config/my.yaml": '  name: "Ada"\n'}),
+    "own-package-misspelt": Case(
+        {**OWN, **swapped(TALKER, ("import Int8\n", "import Int8\nfrom alb.msg import Level\n")), CMAKELISTS: OWN_CMAKE,
+         XML: MANIFEST.replace("rospy</depend>", "rospy</depend><build_depend>message_generation</build_depend>")},
+        ["build-line", "missing-import"], "there is no package alb", after={TALKER: "from lab.msg import Level"}),
+    "exported-by-a-slip-of-its-name": Case(
+        {CMAKELISTS: CMAKE.replace("catkin_package()", "catkin_package(CATKIN_DEPENDS Rospy)")}, ["build-line"],
+        "write rospy instead of Rospy", after={CMAKELISTS: "CATKIN_DEPENDS rospy)", XML: MANIFEST}),
+    "component-by-a-slip-of-its-name": Case(
+        {**RUN_OWN, CMAKELISTS: OWN_CMAKE.replace("message_generation", "messaeg_generation").replace(
+            "catkin_package", "generate_messages()\ncatkin_package")}, ["build-line"],
+        "write message_generation instead of messaeg_generation",
+        after={CMAKELISTS: "COMPONENTS message_generation rospy)"}),
+    "installs-what-is-not-there": Case(
+        {CMAKELISTS: CMAKE + "catkin_install_python(PROGRAMS src/talker.py bin/hello DESTINATION x)\n"}, ["build-line"],
+        "add bin/hello and push it, or remove it from that call",
+        after={CMAKELISTS: CMAKE + "catkin_install_python(PROGRAMS src/talker.py DESTINATION x)\n"}),
+    "installs-nothing-that-is-there": Case(
+        {CMAKELISTS: CMAKE + "catkin_install_python(PROGRAMS bin/hello DESTINATION x)\n"}, ["build-line"],
+        "add bin/hello and push it", after={CMAKELISTS: CMAKE}),
+    "program-without-its-source": Case(
+        {CMAKELISTS: CMAKE + "add_executable(other src/other.cpp)\ntarget_link_libraries(other x)\n"}, ["build-line"],
+        "add src/other.cpp and push it, or delete what is built from it: the calls on lines 5 and 6",
+        after={CMAKELISTS: CMAKE}),
+    "installs-what-the-lab-asks-for-and-is-not-there": Case(
+        {CMAKELISTS: CMAKE + "catkin_install_python(PROGRAMS src/listener.py DESTINATION x)\n"}, [],
+        wanted=asking(scripts=(TALKER, "src/listener.py"))),
+    "script-with-two-slashes": Case(
+        {CMAKELISTS: CMAKE + "catkin_install_python(PROGRAMS src//talker.py DESTINATION "
+         "${CATKIN_PACKAGE_BIN_DESTINATION})\n"}, [], wanted=asking(installed=(TALKER,))),
+    "find": Case(swapped(LAUNCHED, ("</launch>", '  <rosparam file="$(find labb)/a.yaml"/>\n</launch>')),
+                 ["package-name"], "$(find labb) should be $(find lab)", after={LAUNCHED: "$(find lab)/a.yaml"}),
+    "find-of-another": Case(swapped(LAUNCHED, ("</launch>", '<rosparam file="$(find rospy)/a.yaml"/>\n</launch>')), []),
+    "key-where-it-is-written-and-read": Case(
+        {"config/my.yaml": 'details:\n  Name: "Ada"\n',
+         **swapped(TALKER, ("    rate = ", "    name = rospy.get_param('details')['Name']\n    rate = "))},
+        ["parameter-name", "parameter-name"], wanted=asking(files=("config/my.yaml",)),
+        after={"config/my.yaml": 'details:\n  name: "Ada"\n', TALKER: "['name']"},
+    ),
+    "key-one-level-too-far-left": Case(
+        {"config/my.yaml": LEVELS}, ["parameter-name"], wanted=NESTED,
+        after={"config/my.yaml": LEVELS.replace("\n  y", "\n    y")},
+    ),
+    "key-of-which-level": Case(
+        {"config/my.yaml": "a:\n  b:\n    x: 1\n  c:\n    z: 3\n  y: 2\n"}, [], wanted=NESTED,
+        after={"config/my.yaml": "\n  y"},
+    ),
+    "key-at-its-level": Case({"config/my.yaml": LEVELS.replace("\n  y", "\n    y")}, [], wanted=NESTED),
+    "bracket-in-the-middle": Case(
+        swapped(CMAKELISTS, ("catkin_package()", "catkin_package(\n\ninclude_directories(${catkin_INCLUDE_DIRS})")),
+        ["build-line"],
+        "write `catkin_package()`",
+    ),
+    "no-destination": Case(
+        swapped(CMAKELISTS, ("catkin_package()", "catkin_package()\ncatkin_install_python(PROGRAMS src/talker.py)")),
+        ["build-line"],
+        "catkin_install_python(…) has no DESTINATION",
+        wanted=asking(installed=(TALKER,)),
+    ),
+    "no-version": Case(
+        {XML: re.sub(r"<version>.*</version>\n?", "", MANIFEST)}, ["manifest-line"], "add `<version>0.0.0</version>`"
+    ),
+    "launch-not-opened": Case(
+        {LAUNCHED: LAUNCH.replace("<launch>\n", "")}, ["launch-syntax"], "`<launch>` is missing"
+    ),
+    "launch-file-by-what-it-starts": Case(
+        {LAUNCHED: None, "src/trial.launch": LAUNCH}, ["file-name"], wanted=STARTED,
+        after={"src/activity1.launch": LAUNCH},
+    ),
+    "launch-file-and-its-type": Case(
+        {LAUNCHED: None, "src/trial.launch": LAUNCH.replace("talker.py", "talker")}, ["file-name", "launch-type"],
+        wanted=STARTED, after={"src/activity1.launch": LAUNCH},
+    ),
+    "launch-file-of-a-misspelt-script": Case(
+        {TALKER: None, "src/talkr.py": SCRIPT, LAUNCHED: None,
+         "src/trial.launch": LAUNCH.replace("talker.py", "talkr.py")},
+        ["file-name", "file-name"], wanted=STARTED, after={"src/activity1.launch": LAUNCH},
+    ),
+    "launch-file-of-something-else": Case(
+        {LAUNCHED: None, "src/trial.launch": LAUNCH.replace("talker.py", "signals.py")}, [], wanted=STARTED,
+    ),
+    "which-of-two-launch-files": Case({"launch/first.launch": LAUNCH}, [], wanted=STARTED),
+    "package-twice-in-a-renamed-launch-file": Case(
+        {LAUNCHED: None, "launch/la_b.launch": TWO_NODES.replace('pkg="lab"', 'pkg="laab"')},
+        ["file-name", "package-name"], 'write pkg="lab" instead of pkg="laab"', asking(launch_files=("lab.launch",)),
+        {LAUNCHED: TWO_NODES},
+    ),
+    "two-nodes-of-nearly-one-name": Case(
+        {LAUNCHED: TWO_NODES.replace('"talker"', '"talker1"').replace('"listener"', '"talker2"')},
+        ["node-name"], 'name="talker1" should be name="talker"', after={LAUNCHED: 'name="talker2"'},
+    ),
+    "half-a-comment": Case(
+        {CMAKELISTS: CMAKE.replace("catkin_package()", "# catkin_package(\n)")}, ["build-line"],
+        "remove the `#` on line 4", after={CMAKELISTS: "\ncatkin_package(\n)"},
+    ),
+    "program-without-libraries": Case(
+        {CMAKELISTS: CMAKE + "add_executable(mean src/mean.cpp)\n", "src/mean.cpp": "int main() {}\n"}, ["build-line"],
+        "below line 5 add `target_link_libraries(mean ${catkin_LIBRARIES})`",
+    ),
+    "run-dependency": Case(
+        {CMAKELISTS: CMAKE.replace("package()", "package(CATKIN_DEPENDS rospy message_runtime)")}, ["manifest-line"],
+        "names message_runtime", after={XML: "  <exec_depend>message_runtime</exec_depend>"},
+    ),
+    "own-message": Case(
+        {**RUN_OWN, CMAKELISTS: CMAKE}, ["build-line"] * 3, "write message_generation after COMPONENTS",
+        after={CMAKELISTS: OWN_CMAKE.replace("\ncatkin_p", "\ngenerate_messages()\ncatkin_p")},
+    ),
+    "own-message-that-nothing-uses": Case({**SERVICE, CMAKELISTS: SERVICE_CMAKE}, [], ""),
+    "own-message-in-a-service": Case(
+        {**SERVICE, "srv/Two.srv": "Level[] a\n---\n", CMAKELISTS: SERVICE_CMAKE}, ["build-line"],
+        "add `add_message_files(FILES Level.msg)`",
+    ),
+    "own-message-of-the-template": Case(
+        {**RUN_OWN, CMAKELISTS: CMAKE.replace("catkin_p", f"{TEMPLATE}\ncatkin_p")}, ["build-line"] * 3,
+        "lines 8 to 11; CMakeLists.txt: in place of lines 4 to 7 write add_message_files(FILES Level.msg)",
+    ),
+    "own-message-of-another-exercise": Case({**OWN, CMAKELISTS: CMAKE}, []),
+    "own-message-of-another-exercise-beside-one-that-is-made": Case(
+        {**RUN_OWN, "msg/Tilt.msg": "float64 tilt\n", "src/tilt.py": "from lab.msg import Tilt\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")}, [],
+    ),
+    "own-message-beside-one-that-is-made": Case(
+        {**RUN_OWN, "msg/Tilt.msg": "float64 tilt\n", "msg/Level.msg": "Tilt[] level\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")},
+        ["build-line"], "write Tilt.msg after FILES",
+    ),
+    "own-message-of-another-exercise-that-the-build-asks-for": Case(
+        {**OWN, CMAKELISTS: f"{CMAKE}add_dependencies(talker lab_generate_messages_cpp)\n"}, ["build-line"] * 3,
+    ),
+    "own-message-after-package": Case(
+        {**OWN, CMAKELISTS: OWN_CMAKE + "generate_messages(\n)\n"}, ["build-line"],
+        "move generate_messages(…), from line 6, above catkin_package(…)",
+    ),
+    "own-message-named-otherwise": Case(
+        {**OWN, CMAKELISTS: OWN_CMAKE.replace("Level", "level").replace("catkin_p", "generate_messages()\ncatkin_p")},
+        ["build-line"], "write Level.msg instead of level.msg",
+    ),
+    "own-message-of-another": Case(
+        {**OWN, "msg/Level.msg": "Header header\ngeometry_msgs/Point at\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES std_msgs)\ncatkin_p")},
+        ["build-line"] * 2, "write geometry_msgs after DEPENDENCIES",
+        after={CMAKELISTS: "DEPENDENCIES geometry_msgs std"},
+    ),
+    "messages-of-no-definition": Case(
+        {CMAKELISTS: CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES std_msgs)\ncatkin_p")}, ["build-line"],
+        "delete line 4, generate_messages(…)", after={CMAKELISTS: "rospy)\ncatkin_package()"},
+    ),
+    "program-that-does-not-wait-for-its-header": Case(
+        {**OWN, "src/mean.cpp": '#include "lab/Level.h"\nint main() {}\n',
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")
+         + "add_executable(mean src/mean.cpp)\ntarget_link_libraries(mean ${catkin_LIBRARIES})\n"},
+        ["build-line"],
+        "below the add_executable(…) on line 7, write add_dependencies(mean ${${PROJECT_NAME}_EXPORTED_TARGETS})",
+        after={CMAKELISTS: ".cpp)\nadd_dependencies(mean ${${PROJECT_NAME}_EXPORTED_TARGETS})\ntarget"},
+    ),
+    "own-action-without-its-messages": Case(
+        {"src/go.py": "from lab.msg import GoAction\n", "action/Go.action": "int32 n\n---\nint32 n\n---\nint32 n\n",
+         CMAKELISTS: ACTION_CMAKE.replace("actionlib_msgs std", "std")},
+        ["build-line"], "write actionlib_msgs after DEPENDENCIES",
+    ),
+    "own-action-in-another-order": Case(
+        {"src/go.py": "from lab.msg import GoAction\n",
+         "action/Go.action": "int32 n  # how far\n---\nint32 left\n---\nbool there\n",
+         CMAKELISTS: ACTION_CMAKE},
+        ["build-line"], "result and feedback have changed places",
+        asking(definitions=(("action/Go.action", GO_FIELDS),)),
+        {"action/Go.action": "int32 n  # how far\n---\nbool there\n---\nint32 left\n"},
+    ),
+    "own-message-of-no-type": Case(
+        {**OWN, "msg/Level.msg": "Float64 level\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")},
+        ["build-line"], "write `float64 level`",
+    ),
+    "manifest-of-rosbuild": Case(
+        swapped(TALKER, ("import rospy\n", "import rospy\nimport roslib; roslib.load_manifest('old_lab')\n")),
+        ["missing-import"], "delete line 3", after={TALKER: "import rospy\n\nfrom"},
+    ),
+    "manifest-of-rosbuild-that-is-there": Case(
+        swapped(TALKER, ("import rospy\n", "import rospy\nimport roslib; roslib.load_manifest('lab')\n")), [],
+    ),
+    "cmake-of-a-workspace": Case({CMAKELISTS: "project(Project)\nfind_package(catkin)\ncatkin_workspace()\n"}, []),
+    "project-and-package-of-other-names": Case(
+        {CMAKELISTS: CMAKE.replace("project(lab)", "project(other)"), XML: MANIFEST.replace(">lab<", ">lessons<"),
+         LAUNCHED: LAUNCH.replace('"lab"', '"lessons"')},
+        ["build-line"], "write project(lab) here, and <name>lab</name> in package.xml",
+    ),
+    "own-message-of-no-use": Case({"msg/Level.msg": "float64 level\n"}, []),
+    "comment-that-ends-otherwise": Case(
+        {LAUNCHED: LAUNCH.replace("<launch>\n", "<launch>\n  <!-- the talker --!>\n")}, ["launch-syntax"],
+        "a comment ends with `-->`", after={LAUNCHED: "  <!-- the talker -->\n"},
+    ),
+    "subscriber-local-in-cpp": Case(
+        {"src/a.cpp": CONSTRUCTOR % ""}, ["missing-call"],
+        "line 3 of src/a.cpp: sub is a variable of the function Node, and the subscription ends with it",
+        after={"src/a.cpp": "  static ros::Subscriber sub = nh_.subscribe"},
+    ),
+    "subscriber-copied-in-cpp": Case({"src/a.cpp": CONSTRUCTOR % "  sub_ = sub;\n"}, []),
+    "subscriber-kept-by-a-loop-in-cpp": Case({"src/a.cpp": CONSTRUCTOR % "  ros::spin();\n"}, []),
+    "subscriber-dropped-in-a-constructor": Case(
+        {"src/a.cpp": (CONSTRUCTOR % "").replace("ros::Subscriber sub = ", "")}, ["missing-call"],
+        "what subscribe(…) returns is dropped, and with it the subscription",
+        after={"src/a.cpp": "  static ros::Subscriber sub = nh_.subscribe"},
+    ),
+    "topic-on-the-second-line-in-cpp": Case(
+        {"src/a.cpp": 'void f(Q& q) {\n  q.s = nh.subscribe<std_msgs::Int8>(\n      "/numeric_chater", 10, f);\n}\n'},
+        ["topic-name"], "line 3 of src/a.cpp: the topic /numeric_chater should be /numeric_chatter",
+        after={"src/a.cpp": '      "/numeric_chatter", 10, f);\n'}),
+    "installed-beside-one-that-lies-elsewhere": Case(
+        {CMAKELISTS: CMAKE + INSTALL.replace("scripts/other.py", "scripts/a.py"), **INSTALLED,
+         "scripts/old/a.py": INSTALLED["scripts/other.py"]}, ["build-line", "build-line"],
+        "CMakeLists.txt line 7: write src/listener.py src/talker.py after PROGRAMS", INSTALLS,
+    ),
+    "yaml-tab": Case({"config/my.yaml": "a:\n  b:\n    x: 1\n\ty: 2\n  c:\n    z: 3\n"}, ["yaml-syntax"],
+                     "config/my.yaml line 4: begin the line with 4 spaces", wanted=NESTED,
+                     after={"config/my.yaml": "    x: 1\n    y: 2\n"}),
+    "yaml-tabs": Case({"config/my.yaml": "a:\n\tb:\n\t\tx: 1\n\t\ty: 2\n\tc:\n\t\tz: 3\n"}, ["yaml-syntax"],
+                      "line 2 of config/my.yaml is indented with a tab", wanted=NESTED,
+                      after={"config/my.yaml": "  b:\n    x: 1\n"}),
+    "yaml-quote": Case({"config/my.yaml": 'a:\n  x: "1  # one\n  y: 2\n'}, ["yaml-syntax"],
+                       'line 2 of config/my.yaml opens " and does not close it', wanted=NESTED,
+                       after={"config/my.yaml": '  x: "1"  # one\n'}),
+    "yaml-column": Case({"config/my.yaml": "a:\n  b:\n    x: 1\n    y: 2\n   c:\n    z: 3\n"}, ["yaml-syntax"],
+                        "line 5 of config/my.yaml does not line up", wanted=NESTED,
+                        after={"config/my.yaml": "\n  c:\n    z: 3\n"}),
+    "yaml-two-lines": Case({"config/my.yaml": "a:\n  b\n    x: 1\n    y:2\n"}, ["yaml-syntax", "yaml-syntax"],
+                           "line 2 of config/my.yaml has no `:` after its name", wanted=NESTED,
+                           after={"config/my.yaml": "  b:\n    x: 1\n    y: 2\n"}),
+    "yaml-loaded-by-a-launch-file": Case(
+        {"config/a.yaml": "x 1\n",
+         **swapped(LAUNCHED, ("</launch>", '<rosparam command="load" file="$(find lab)/config/a.yaml"/>\n</launch>'))},
+        ["yaml-syntax"], "line 1 of config/a.yaml has no `:`", after={"config/a.yaml": "x: 1\n"}),
+    "yaml-that-nothing-names": Case({"config/other.yaml": "x 1\ny 2\n"}, []),
+    "yaml-of-another-kind": Case({"config/my.yaml": "a: {b: [1, 2\n"}, [], wanted=NESTED),
+    "yaml-that-is-right": Case({"config/my.yaml": "a:\n  b:\n    x: 1  # it's\n"}, [], wanted=NESTED),
+    "own-service-behind-generation": Case(
+        {**SERVICE, CMAKELISTS: CMAKE.replace(
+            "rospy)\n", "message_generation rospy)\ngenerate_messages()\nadd_service_files(\n  FILES Two.srv)\n")},
+        ["build-line"], "move add_service_files(…), from line 5, above generate_messages(…)",
+        after={CMAKELISTS: "add_service_files(\n  FILES Two.srv)\n\ngenerate_messages()\ncatkin_package()"},
+    ),
+    "own-service-called-a-message": Case(
+        {**SERVICE, CMAKELISTS: SERVICE_CMAKE.replace("service_files", "message_files")},
+        ["build-line"], "write add_service_files instead of add_message_files",
+        after={CMAKELISTS: "add_service_files(FILES Two.srv)"},
+    ),
+    "own-service-with-two-dashes": Case(
+        {**SERVICE, "srv/Two.srv": "int64 a\n--\nint64 b\n", CMAKELISTS: SERVICE_CMAKE},
+        ["build-line"], "line 2 does not divide its parts: that takes three of `-`",
+        after={"srv/Two.srv": "int64 a\n---\nint64 b\n"},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_mistake_in_a_package_is_found_and_repaired(name: str, tmp_path: Path) -> None:
+    check(CASES[name], tmp_path)
