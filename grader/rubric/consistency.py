@@ -26,7 +26,7 @@ from grader.rubric.step_faults import (
     slash,
     step_faults,
 )
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
+from grader.rubric.yaml_lines import Fault, KeyPath, as_list, as_map, as_maps, as_texts, packages_in
 from grader.wording import did_you_mean, join_words
 
 TOTAL_POINTS = 100
@@ -397,7 +397,7 @@ def _probes(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
 
 def _contents(at: KeyPath, probe: dict[str, Any], kind: str) -> Iterator[Fault]:
     """Yield the faults of what is sent: it has to fit the type."""
-    values = list(enumerate(_items(probe.get("values"))))
+    values = list(enumerate(as_list(probe.get("values"))))
     if values or (kind != STRING and kind not in INTEGERS):
         yield from _misfits(at, kind, values)
     if probe.get("text") and kind != STRING:
@@ -406,7 +406,7 @@ def _contents(at: KeyPath, probe: dict[str, Any], kind: str) -> Iterator[Fault]:
         if probe.get(key) and kind not in INTEGERS:
             yield (*at, key), f"is not for {kind}"
     low, high = INTEGERS.get(kind, (-math.inf, math.inf))
-    for position, value in enumerate(_items(probe.get("among"))):
+    for position, value in enumerate(as_list(probe.get("among"))):
         if isinstance(value, int) and not low <= value <= high:
             yield (*at, "among", position), f"an {kind.partition('/')[2]} holds {low} to {high}, not {value}"
 
@@ -429,10 +429,6 @@ def _misfits(at: KeyPath, kind: str, values: list[tuple[int, Any]]) -> Iterator[
         fields = value if isinstance(value, dict) else {"data": value}
         if wrong := misfit(lambda fields=fields: encode(kind, fields)):  # type: ignore[misc]
             yield (*at, "values", position), wrong
-
-
-def _items(value: object) -> list[Any]:
-    return value if isinstance(value, list) else []
 
 
 def _until(path: KeyPath, until: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:

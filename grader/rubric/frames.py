@@ -10,7 +10,7 @@ from typing import Any
 from grader.checks.support.fields import is_number
 from grader.rubric.message_fields import POSES, types_of
 from grader.rubric.step_faults import given_steps
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, own_packages
 
 FRAME_KEYS = frozenset({"frame_id", "child_frame_id"})
 ANGLES = frozenset({"rotation_deg", "rpy_deg", "heading_deg"})
@@ -55,11 +55,6 @@ def _run_of(criterion: dict[str, Any], scenarios: dict[str, Any]) -> dict[str, A
     return as_map(scenarios.get(str(criterion.get("scenario"))))
 
 
-def _own_packages(rubric: dict[str, Any]) -> set[str]:
-    """Return the packages whose messages may have angles in any unit."""
-    return {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
-
-
 def _sent_turns(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
     """Yield angles in degrees in what a scenario sends, in messages and requests of ROS's own types."""
     sent = [((*path, "probes", n), one) for n, one in as_maps(scenario.get("probes"))]
@@ -67,7 +62,7 @@ def _sent_turns(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, Any])
     for index, step in as_maps(scenario.get("steps")):
         sent += [((*path, "steps", index, key), as_map(step.get(key))) for key in ("publish", "call")]
     for at, one in sent:
-        if str(one.get("type")).partition("/")[0] in _own_packages(rubric):
+        if str(one.get("type")).partition("/")[0] in own_packages(rubric):
             continue
         for key in ("value", "values", "request"):
             yield from _turns((*at, key), one.get(key))
@@ -91,7 +86,7 @@ def _judged_turns(
     """Yield angles in degrees that a criterion asks for in a field of one of ROS's own types."""
     field, topic = str(given.get("field")), str(given.get("topic"))
     types = [str(kind) for kind in types_of(topic, rubric, scenario)]
-    own = [kind for kind in types if kind.partition("/")[0] in _own_packages(rubric)]
+    own = [kind for kind in types if kind.partition("/")[0] in own_packages(rubric)]
     is_turn = field.startswith("angular.") or field.partition(".")[0].partition("[")[0] in IN_RADIANS
     if is_turn and not own and (types or field.startswith("angular.")):
         for key in ("value", "values", "min", "max"):
@@ -121,7 +116,7 @@ def _no_pose(
     if not isinstance(topic, str):
         return
     types = {str(kind) for kind in types_of(topic, rubric, scenario)}
-    known = {kind for kind in types if kind.partition("/")[0] not in _own_packages(rubric)}
+    known = {kind for kind in types if kind.partition("/")[0] not in own_packages(rubric)}
     if known and known.isdisjoint(POSES):
         yield (*path, "pose_of"), f"{topic} carries {min(known)}, which has no pose"
     for index, step in as_maps(scenario.get("steps")):

@@ -16,12 +16,12 @@ from grader.checks.support.fields import Reading, is_number
 from grader.evidence.message_values import ANGLES, FORMS
 from grader.rubric.definitions import PATH_PARTS
 from grader.rubric.durations import Asked, late_faults, longest_s, often_faults, within_faults
-from grader.rubric.room import room_faults, start_faults
+from grader.rubric.room import pair, room_faults, start_faults
 from grader.rubric.scenario import Scenario, Until
 from grader.rubric.simulators import FIELD_M, PROGRAMS, TRUE_POSE, robot_of
 from grader.rubric.started import starts_of
 from grader.rubric.step_faults import given_steps
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps
+from grader.rubric.yaml_lines import Fault, KeyPath, as_list, as_map, as_maps
 from grader.wording import plural
 
 WRAPS = {"minimum": 0, "maximum": 127, "wraps": 2}
@@ -144,13 +144,9 @@ def _sent_on(topic: str, scenario: dict[str, Any]) -> list[Any] | None:
     values = [
         value
         for one in sent
-        for value in (*_items(one.get("values")), *([one["value"]] if "value" in one else []))
+        for value in (*as_list(one.get("values")), *([one["value"]] if "value" in one else []))
     ]
     return [value if isinstance(value, dict) else {"data": value} for value in values]
-
-
-def _items(value: object) -> list[Any]:
-    return value if isinstance(value, list) else []
 
 
 def _values_at(value: object, parts: Sequence[str]) -> list[Any] | None:
@@ -170,7 +166,7 @@ def _values_at(value: object, parts: Sequence[str]) -> list[Any] | None:
     if part[0] != "[":
         inside = value.get(part, {} if parts[1:] else 0) if isinstance(value, dict) else None
         return None if inside is None else _values_at(inside, parts[1:])
-    items = _items(value)
+    items = as_list(value)
     if part == "[*]":
         each = [_values_at(item, parts[1:]) for item in items]
         return None if None in each else [one for found in each for one in found or ()]
@@ -302,7 +298,7 @@ def _too_far(about: Asked, others: Sequence[dict[str, Any]]) -> Iterator[Fault]:
     if about.check == "ends-at":
         yield from _goal_faults(about, others, robot, farthest_m, limit)
         return
-    way = [spot for point in _items(given.get("points")) if (spot := _spot(point))]
+    way = [spot for point in as_list(given.get("points")) if (spot := _spot(point))]
     relative = given.get("relative", True)
     length_m = sum(math.dist(a, b) for a, b in pairwise(way))
     if length_m - 2 * tolerance_m * len(way) > farthest_m:
@@ -336,7 +332,7 @@ def _goal_faults(
         start = asked[number - 2] if number > 1 else start
         meant = asked[number - 1]
         if meant is not None and math.dist(meant, goal) > tolerance_m:
-            yield at, f"message {number} on {given['asked_on']} asks for {_pair(meant)}, not {_pair(goal)}"
+            yield at, f"message {number} on {given['asked_on']} asks for {pair(meant)}, not {pair(goal)}"
             return
     if robot.field_m is not None and not _is_inside(goal, robot.field_m, tolerance_m):
         yield at, _outside(*goal)
@@ -348,10 +344,10 @@ def _goal_faults(
     if away_m > farthest_m:
         yield at, f"it cannot come so far: {limit}"
     else:
-        yield from _too_soon(about, robot, away_m, f"{away_m:.3g} m from {_pair(start or goal)}")
+        yield from _too_soon(about, robot, away_m, f"{away_m:.3g} m from {pair(start or goal)}")
     for one in others if not given.get("relative") else ():
         kept = as_map(one.get("with"))
-        corners = [_spot(corner) for corner in _items(kept.get("box"))]
+        corners = [_spot(corner) for corner in as_list(kept.get("box"))]
         same = one.get("check") == "stays-within" and kept.get("topic") == given.get("topic")
         known = len(corners) == 2 and None not in corners and not kept.get("relative")
         if same and known and not _is_between(goal, corners, tolerance_m):
@@ -401,7 +397,7 @@ def _not_last(about: Asked, others: Sequence[dict[str, Any]], goal: tuple[float,
     if any(math.dist(spot, goal) <= about.given["tolerance_m"] for spot in last.values() if spot):
         return ""
     topic, spot = next(iter(last.items()))
-    asks = f"the last message on {topic} asks for {_pair(spot or goal)}"
+    asks = f"the last message on {topic} asks for {pair(spot or goal)}"
     return f"without asked_on this is where the run ends, and {asks}: write asked_on: {topic}, with number"
 
 
@@ -410,10 +406,6 @@ def _is_between(spot: tuple[float, float], corners: Sequence[Any], tolerance_m: 
         min(a, b) - tolerance_m <= one <= max(a, b) + tolerance_m
         for one, a, b in zip(spot, *corners, strict=True)
     )
-
-
-def _pair(spot: tuple[float, float]) -> str:
-    return f"({spot[0]:g}, {spot[1]:g})"
 
 
 def _other_effects(
@@ -575,7 +567,7 @@ def _demands(check: str, asked: dict[str, Any]) -> Iterator[_Demand]:
     elif check not in {"field-bounds", "reacts"} or asked.get("items") == "any":
         return
     if is_number(tolerance) and "field" in asked:
-        for one in _items(asked.get("values")) if "values" in asked else [value]:
+        for one in as_list(asked.get("values")) if "values" in asked else [value]:
             if is_number(one):
                 yield _Demand(one - tolerance, one + tolerance, every, when=when)
             elif isinstance(one, str | bool):

@@ -51,13 +51,13 @@ def start_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
     closed = [line for line in _lines(robot) if line[0] == line[-1] and line not in _boxes(robot)]
     rooms = [line for line in closed if any(_is_inside(box[0], line) for box in _boxes(robot))]
     if rooms and not any(_is_inside(place, line) for line in rooms):
-        yield where, f"the robot starts at {_pair(place)}, outside of the room that the walls make"
+        yield where, f"the robot starts at {pair(place)}, outside of the room that the walls make"
     elif boxes:
-        inside = f"in the box from {_pair(boxes[0][0])} to {_pair(boxes[0][2])}"
-        yield where, f"the robot starts at {_pair(place)}, {inside}"
+        inside = f"in the box from {pair(boxes[0][0])} to {pair(boxes[0][2])}"
+        yield where, f"the robot starts at {pair(place)}, {inside}"
     elif away_m < radius_m:
         touches = f"{away_m:.2g} m from a wall, which it touches before it has moved"
-        yield where, f"the robot starts at {_pair(place)}, {touches}"
+        yield where, f"the robot starts at {pair(place)}, {touches}"
 
 
 def _start(robot: dict[str, Any]) -> Spot | None:
@@ -103,7 +103,8 @@ def _is_inside(spot: Spot, line: Sequence[Spot]) -> bool:
     return crossed % 2 == 1
 
 
-def _pair(spot: Spot) -> str:
+def pair(spot: Spot) -> str:
+    """Return a place as it is written: `(1, 2.5)`."""
     return f"({spot[0]:g}, {spot[1]:g})"
 
 
@@ -150,5 +151,5 @@ def _outside(about: Asked, lines: list[list[Spot]], start: Spot, goal: Spot) -> 
         away_m = min(_distance(goal, *ends) for ends in pairwise(line))
         is_apart = line[0] == line[-1] and _is_inside(start, line) != _is_inside(goal, line)
         if is_apart and away_m > tolerance_m:
-            yield (*about.path, "goal"), f"walls are between the start, {_pair(start)}, and {_pair(goal)}"
+            yield (*about.path, "goal"), f"walls are between the start, {pair(start)}, and {pair(goal)}"
             return

@@ -11,7 +11,7 @@ from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.installable import noetic_messages
 from grader.rubric.message_fields import type_judged, types_of
 from grader.rubric.simulators import TRUE_POSE
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, own_packages
 from grader.wording import is_one_edit
 
 ONE_NAME = re.compile(
@@ -193,11 +193,7 @@ def _is_known_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
             kinds.append(
                 type_judged(about, rubric) if path[0] == "criteria" else str(about.get("type") or "")
             )
-    return any(kind and kind.partition("/")[0] not in _own_packages(rubric) for kind in kinds)
-
-
-def _own_packages(rubric: dict[str, Any]) -> set[str]:
-    return {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
+    return any(kind and kind.partition("/")[0] not in own_packages(rubric) for kind in kinds)
 
 
 def _is_own_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
@@ -213,7 +209,7 @@ def _is_own_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
             field for types in noetic_messages().values() for fields in types.values() for field in fields
         }
         return not of_ros.issuperset(re.findall(r"[^\W\d]\w*", str(given.get("field"))))
-    return any(str(kind).partition("/")[0] in _own_packages(rubric) for kind in kinds)
+    return any(str(kind).partition("/")[0] in own_packages(rubric) for kind in kinds)
 
 
 def texts_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, str]]:

@@ -130,6 +130,11 @@ def packages_in(rubric: dict[str, Any]) -> list[str]:
     return [given] if isinstance(given, str) else [name for _, name in as_texts(given)]
 
 
+def own_packages(rubric: dict[str, Any]) -> set[str]:
+    """Return the packages that students hand in, and those that the course brings."""
+    return {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
+
+
 def texts_at(path: Path, name: str, key: str) -> tuple[str, ...]:
     """Return the text, or the list of texts, that a file has at one key of its first level, read no further; none where
     it has nothing there.
@@ -373,6 +378,10 @@ def _other_base(written: str) -> str:
     if re.fullmatch(r"[-+]?0[0-7_]+", written):
         return f"as its first digit is 0: write {written.lstrip('-+0') or 0}"
     return "in minutes and seconds: write it without a colon, or in quotes" if ":" in written else ""
+
+
+def as_list(value: object) -> list[Any]:
+    return value if isinstance(value, list) else []
 
 
 def as_map(value: object) -> dict[str, Any]:
