@@ -129,3 +129,17 @@ def test_values_made_up_at_random_are_not_counted(value: str, random: bool, tmp_
     (tmp_path / "a.py").write_text(text, encoding="utf-8")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "clock-value"]
     assert [s.name for s in slips] == (["random"] if random else [])
+
+
+def test_a_message_that_is_kept_and_printed_in_a_loop(tmp_path: Path) -> None:
+    text = "def cb(m):\n    global latest\n    latest = m.data\nwhile not rospy.is_shutdown():\n    print(latest)\n"
+    ((kind, message, fix),) = said(text, tmp_path)
+    assert (kind, fix) == ("printed-in-part", "print `m.data` in the callback `cb`")
+    assert "line 5 prints in a loop what `latest` holds by then" in message
+
+
+def test_a_callback_of_many_conditions_is_read_once(tmp_path: Path) -> None:
+    """Each `if` doubles the number of ways through a function: they are not gone through one by one."""
+    ifs = "".join(f"    if m.data == {n}:\n        x = {n}\n" for n in range(60))
+    assert said(f"def cb(m):\n{ifs}    print(m.data)", tmp_path) == []
+    assert [kind for kind, _, _ in said(f"def cb(m):\n{ifs}", tmp_path)] == ["not-printed"]

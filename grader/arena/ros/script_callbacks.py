@@ -135,6 +135,8 @@ CHANGES = {
     "type", "upper", "lower", "title", "capitalize", "swapcase", "split", "partition", "replace", "zfill",
 }  # fmt: skip
 """Calls whose result is not the value that they are given."""
+HARMLESS = CONVERSIONS | CHANGES | {"publish"}
+"""Calls that may be given the message, and print nothing."""
 WITH_DATA = {
     "String", "Bool", "Int8", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64", "Float32", "Float64",
 }  # fmt: skip
@@ -162,8 +164,8 @@ def unprinted_messages(tree):
             continue
         kinds, topics = argument(node, 1, "data_class"), argument(node, 0, "name")
         plain = kinds and dotted(kinds[0]).rpartition(".")[2] in WITH_DATA
-        callback = Printing(own, taken[0], taken[0] + (".data" if plain else ""), set(functions))
-        found = callback.found(level)
+        callback = Printing(own, taken[0], taken[0] + (".data" if plain else ""), functions)
+        found = callback.found(tree, level)
         if found:
             line, kind, message, fix = found
             yield slip(line, kind, message, fix=fix, name=text_of(topics[0]) if topics else "")
@@ -199,15 +201,16 @@ class Printing:
 
     def holds(self, node):
         """Return whether an expression holds something of the message, and whether that is not the value itself."""
-        name = dotted(node) if isinstance(node, (ast.Name, ast.Attribute)) else ""
-        for known, (since, changed) in self.known.items() if name else ():
-            if (name == known or name.startswith(known + ".")) and since < place(node):
+        parts = dotted(node).split(".") if isinstance(node, (ast.Name, ast.Attribute)) else []
+        for count in range(1, len(parts) + 1):
+            since, changed = self.known.get(".".join(parts[:count]), (place(node), False))
+            if since < place(node):
                 return True, changed
         found = [self.holds(child) for child in ast.iter_child_nodes(node)]
         of_message = [changed for holds, changed in found if holds]
         return bool(of_message), bool(of_message) and (all(of_message) or changes(node, found))
 
-    def found(self, level):
+    def found(self, tree, level):
         """Return line, kind, message and fix of what is wrong; None where nothing is, or it cannot be told."""
         if self.is_elsewhere():
             return None
@@ -215,7 +218,7 @@ class Printing:
         if told:
             return self.in_part(told)
         if not self.prints:
-            return None if self.shared else self.silent(level)
+            return self.kept(tree) if self.shared else self.silent(level)
         return self.another()
 
     def of_message(self, call):
@@ -225,7 +228,7 @@ class Printing:
         """Whether something else than this function may print the message."""
         for n in self.nodes:
             name = called_name(n)
-            known = is_print(n) or name.startswith("logdebug") or name in CONVERSIONS | CHANGES | {"publish"}
+            known = is_print(n) or name.startswith("logdebug") or name in HARMLESS
             if isinstance(n, (ast.For, ast.While)) and any(is_print(one) for one in ast.walk(n)):
                 return True
             if name in self.functions or isinstance(n, (ast.FunctionDef, ast.Lambda, ast.Yield)):
@@ -233,6 +236,20 @@ class Printing:
             if name and not known and self.of_message(n):
                 return True
         return False
+
+    def kept(self, tree):
+        """What the callback keeps, and a loop elsewhere prints: what the variable holds by then."""
+        for loop in walk(tree):
+            for call in ast.walk(loop) if isinstance(loop, ast.While) else ():
+                names = {dotted(n) for n in ast.walk(call) if isinstance(n, (ast.Name, ast.Attribute))}
+                kept = names.intersection(self.shared) if is_print(call) else ()
+                if kept:
+                    message = (
+                        "line %d prints in a loop what `%s` holds by then, and not each message when it comes"
+                    )
+                    fix = "print `%s` in %s" % (self.value, self.name)
+                    return call.lineno, "printed-in-part", message % (call.lineno, min(kept)), fix
+        return None
 
     def silent(self, level):
         debug = [n for n in self.nodes if called_name(n).startswith("logdebug")]
@@ -293,28 +310,20 @@ class Printing:
             return line, kind, message, "on line %d, print `%s` as it is" % (line, self.value)
         return None
 
-    def whether(self, body):
-        """Return whether these lines always print the message, or never, or the `if` that decides."""
-        for at, one in enumerate(body):
-            if isinstance(one, ast.If) and not calls_in(one.test, "is_shutdown"):
-                return self.decided(one, body[at + 1 :])
-            inside = NEVER
-            if isinstance(one, (ast.Try, ast.With, ast.If)):
-                inside = self.whether(one.body)
+    def whether(self, body, after=NEVER):
+        """Return whether these lines, and what comes `after` them, print the message always or never, or else the `if`
+        that decides. From the end, so that each line is looked at once, however many ways lead to it."""
+        for one in reversed(body):
+            if isinstance(one, LEAVES):
+                after = NEVER
+            elif isinstance(one, ast.If) and not calls_in(one.test, "is_shutdown"):
+                ways = {self.whether(one.body, after), self.whether(one.orelse, after)}
+                after = ways.pop() if len(ways) == 1 else UNKNOWN if UNKNOWN in ways else one
+            elif isinstance(one, (ast.Try, ast.With, ast.If)):
+                after = self.whether(one.body, after)
             elif any(is_print(n) and self.of_message(n) for n in ast.walk(one)):
-                inside = ALWAYS if isinstance(one, ast.Expr) and is_print(one.value) else UNKNOWN
-            if inside != NEVER or isinstance(one, LEAVES):
-                return inside
-        return NEVER
-
-    def decided(self, one, rest):
-        ways = [
-            self.whether(way if way and isinstance(way[-1], LEAVES) else way + rest)
-            for way in (one.body, one.orelse)
-        ]
-        if UNKNOWN in ways:
-            return UNKNOWN
-        return ways[0] if ways[0] == ways[1] else one
+                after = ALWAYS if isinstance(one, ast.Expr) and is_print(one.value) else UNKNOWN
+        return after
 
 
 def under_condition(one, prints):

@@ -241,6 +241,8 @@ RANDOM = {
     "getrandbits",
     "urandom",
 }
+IFS_LIMIT = 20
+"""Of a loop."""
 CLOCK_METHODS = {"to_sec", "to_nsec"}
 
 
@@ -271,10 +273,10 @@ def values_left_out(tree):
     """Loops that count in each turn, and publish only in some: an `if` asks for what is counted."""
     source = Source(tree)
     for loop in walk(tree):
-        for one in loop.body if isinstance(loop, (ast.While, ast.For)) else ():
-            sent = (
-                [n for part in one.body for n in calls_in(part, "publish")] if isinstance(one, ast.If) else []
-            )
+        body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
+        deciding = [one for one in body if isinstance(one, ast.If) and calls_in(one, "publish")][:IFS_LIMIT]
+        for one in deciding:
+            sent = [n for part in one.body for n in calls_in(part, "publish")]
             inside = set(ast.walk(one))
             counted = {dotted(t) for n in ast.walk(loop) if n not in inside for t in increments(n)}
             others = {ast.dump(n.func) for n in calls_in(loop, "publish") if n not in sent}
