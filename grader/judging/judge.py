@@ -113,30 +113,10 @@ def judge_all_runs(
     if repeated:
         again = judge_facts(rubric, try_facts(rubric, {**first, **repeated}), checks)
         verdicts = drop_unrepeated_losses(rubric, verdicts, again, repeated.keys())
-    uses: dict[str, Repaired] = {}
     if repaired:
-        of_copy = try_facts(rubric, {**first, **repaired})
-        on_copy, repairs = judge_facts(rubric, of_copy, checks), repairs_of(rubric, repaired)
-        needed = needs_build(of_copy.package)
-        built = not needed or was_built(first) or not was_built(repaired)
-        verdicts, uses = apply_repaired_copy(
-            rubric,
-            verdicts,
-            on_copy,
-            repairs,
-            built=built,
-            builds=was_built(first),
-            launched=launched_in(of_copy.package),
-        )
-        as_it_is = add_later_faults(
-            verdicts, rubric, facts
-        )  # what no repair helps still has all of its faults
-        behind = add_later_faults(verdicts, rubric, of_copy, handed_in=facts.package, repairs=repairs)
-        verdicts = {
-            i: behind[i] if i in uses or not v.of_machine else as_it_is[i] for i, v in verdicts.items()
-        }
+        verdicts, uses = _with_repaired_copy(facts, checks, verdicts, first, repaired)
     else:
-        verdicts = add_later_faults(verdicts, rubric, facts)
+        verdicts, uses = add_later_faults(verdicts, rubric, facts), {}
     shown = {
         c.id: _without_git(_with_cited_lines(verdicts[c.id], c, facts, uses.get(c.id)), facts.package)
         for c in rubric.criteria
@@ -161,6 +141,33 @@ def judge_all_runs(
     late = {i for i, v in shown.items() if v.status is Status.INCONCLUSIVE and not v.of_machine}
     undecided = frozenset(c.scenario for c in rubric.criteria if c.id in late and c.scenario)
     return Judgement(leave_out(rubric, results), doubtful, undecided)
+
+
+def _with_repaired_copy(
+    facts: Facts,
+    checks: Mapping[str, Check],
+    verdicts: Mapping[str, Verdict],
+    first: Mapping[str, Run],
+    repaired: Mapping[str, Run],
+) -> tuple[dict[str, Verdict], dict[str, Repaired]]:
+    """Return the verdicts with what the runs of a repaired copy say besides, and the repairs that criteria rest on."""
+    rubric = facts.rubric
+    of_copy = try_facts(rubric, {**first, **repaired})
+    on_copy, repairs = judge_facts(rubric, of_copy, checks), repairs_of(rubric, repaired)
+    verdicts, uses = apply_repaired_copy(
+        rubric,
+        verdicts,
+        on_copy,
+        repairs,
+        built=not needs_build(of_copy.package) or was_built(first) or not was_built(repaired),
+        builds=was_built(first),
+        launched=launched_in(of_copy.package),
+    )
+    # what no repair helps still has all of its faults
+    as_it_is = add_later_faults(verdicts, rubric, facts)
+    behind = add_later_faults(verdicts, rubric, of_copy, handed_in=facts.package, repairs=repairs)
+    told = {i: behind[i] if i in uses or not v.of_machine else as_it_is[i] for i, v in verdicts.items()}
+    return told, uses
 
 
 def _facts_as_recorded(rubric: Rubric, runs: Mapping[str, Run], first: Mapping[str, Run]) -> Facts:

@@ -85,7 +85,7 @@ def wrong_callback(own, call, functions, bound, values):
 def made_response(own, call, kept):
     """Return where to make the response that a service's function takes as its last argument, as in ROS 2."""
     lost = [one.arg for one in own.args.args if one.arg not in kept]
-    used = {n.id for one in own.body for n in walk(one) if isinstance(n, ast.Name)}
+    used = {n.id for one in own.body for n in ast.walk(one) if isinstance(n, ast.Name)}
     if called_name(call) != "Service" or len(lost) != 1 or lost[0] not in used or len(call.args) < 2:
         return ""
     return ", and `%s = %sResponse()` as its first line" % (lost[0], dotted(call.args[1]))
@@ -127,15 +127,14 @@ def ending_callbacks(tree):
 
 LOGS = ("loginfo", "logwarn", "logerr", "logfatal")
 STREAMS = ("sys.stdout.write", "sys.stderr.write", "stdout.write", "stderr.write")
-CONVERSIONS = {
-    "str", "repr", "int", "float", "format", "type", "len", "isinstance", "get_caller_id", "get_name", "get_time",
-}  # fmt: skip
 CHANGES = {
     "abs", "round", "min", "max", "len", "bool", "ord", "chr", "hex", "bin", "sum", "sorted", "reversed", "sqrt",
     "type", "upper", "lower", "title", "capitalize", "swapcase", "split", "partition", "replace", "zfill",
 }  # fmt: skip
 """Calls whose result is not the value that they are given."""
-HARMLESS = CONVERSIONS | CHANGES | {"publish"}
+HARMLESS = CHANGES | {
+    "str", "repr", "int", "float", "format", "isinstance", "get_caller_id", "get_name", "get_time", "publish",
+}  # fmt: skip
 """Calls that may be given the message, and print nothing."""
 WITH_DATA = {
     "String", "Bool", "Int8", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64", "Float32", "Float64",
@@ -173,7 +172,8 @@ def unprinted_messages(tree):
 
 class Printing:
     """What a callback prints. `value` is how the message's value is written in it; `known` has for each name that holds
-    something of the message where it got it, and whether that is something else than the value itself."""
+    something of the message where it got it, and whether that is something else than the value itself. Other functions
+    can read those of `shared`."""
 
     def __init__(self, own, message, value, functions):
         self.own, self.value, self.functions = own, value, functions
@@ -240,9 +240,9 @@ class Printing:
     def kept(self, tree):
         """What the callback keeps, and a loop elsewhere prints: what the variable holds by then."""
         for loop in walk(tree):
-            for call in ast.walk(loop) if isinstance(loop, ast.While) else ():
+            for call in filter(is_print, ast.walk(loop) if isinstance(loop, ast.While) else ()):
                 names = {dotted(n) for n in ast.walk(call) if isinstance(n, (ast.Name, ast.Attribute))}
-                kept = names.intersection(self.shared) if is_print(call) else ()
+                kept = names.intersection(self.shared)
                 if kept:
                     message = (
                         "line %d prints in a loop what `%s` holds by then, and not each message when it comes"
@@ -252,6 +252,7 @@ class Printing:
         return None
 
     def silent(self, level):
+        """A callback that prints nothing that is shown; `level` says whether the node sets what is."""
         debug = [n for n in self.nodes if called_name(n).startswith("logdebug")]
         if debug and level:
             return None
@@ -269,6 +270,7 @@ class Printing:
         return line, "not-printed", "%s on line %d prints nothing" % (self.name, line), fix
 
     def another(self):
+        """A callback whose prints hold nothing of the message."""
         call = self.prints[0]
         read = [n for one in call.args for n in ast.walk(one) if isinstance(n, (ast.Name, ast.Attribute))]
         called = {id(part) for n in ast.walk(call) if isinstance(n, ast.Call) for part in ast.walk(n.func)}
