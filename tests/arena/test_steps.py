@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import pytest
@@ -103,12 +104,11 @@ def test_messages_that_change_and_what_is_waited_for(tmp_path: Path, clock: str)
     ]
     (begun_s, first), (over_s, last) = beats[0], beats[-1]
     faster = (last["secs"] - first["secs"] + (last["nsecs"] - first["nsecs"]) / 1e9) / (over_s - begun_s)
-    assert faster > 3 if clock == "warped" else 0.9 < faster < 1.1
+    assert faster > 3 if clock == "warped" else 0.5 < faster < 2
     published = [(t, e.value) for t, e in seen.actors if e.action == "publish" and e.topic == "/speed"]
     assert [value for _, value in published] == pytest.approx([n / 19 for n in range(20)])
     if clock == "real":
-        gaps_s = [(b - a) / 1e9 for (a, _), (b, _) in pairwise(published)]
-        assert sum(gaps_s) / len(gaps_s) == pytest.approx(0.1, rel=0.1)
+        assert median(b - a for (a, _), (b, _) in pairwise(published)) == pytest.approx(0.1e9, rel=0.2)
     assert [detail for _, _, detail in _did(seen, "wait")] == [
         "20 messages came", "the node came", "1 s have passed", "1 message did not come within 0.2 s",
     ]  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from statistics import median
 
 import pytest
 
@@ -57,10 +58,11 @@ def test_talker_and_listener_are_connected_under_the_launch_files_names(launched
     (channel,) = launched.student_channels("/chatter")
     assert (channel.callerid, channel.type) == ("/talker", "std_msgs/String")
     texts = channel.data
-    assert 20 <= len(texts) <= 32
+    assert 10 <= len(texts) <= 32
     seconds = [float(text.removeprefix("hello world ")) for text in texts]
-    assert all(later > earlier for earlier, later in itertools.pairwise(seconds))
-    assert (seconds[-1] - seconds[0]) / (len(seconds) - 1) == pytest.approx(0.1, rel=0.05)
+    gaps_s = [later - earlier for earlier, later in itertools.pairwise(seconds)]
+    assert min(gaps_s) > 0
+    assert median(gaps_s) == pytest.approx(0.1, rel=0.2)
     told = [line.partition(": /listenerI heard ")[2] for line in printed(launched, "all")]
     heard = [text for text in told if text]
     assert set(heard) <= set(texts)
