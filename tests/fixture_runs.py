@@ -126,9 +126,11 @@ def fixture_names(lab: str) -> list[str]:
 
 
 def shorter_round(lab: str) -> list[str]:
-    """Return the packages that `make test` grades. Those of the labs miss every criterion between them: those of
-    `TOGETHER`, and of what they leave each time the one that misses most. Of an example it is
-    only the first of these. `make test-all` grades every package by itself."""
+    """Return the faulty packages that `make test` grades. They miss every criterion of a lab between them: those of
+    `TOGETHER`, and of what these leave each time the one that misses most. Of an example it grades only the
+    correct package. `make test-all` grades every package by itself."""
+    if is_example(lab):
+        return []
     names, chosen = fixture_names(lab), [*TOGETHER.get(lab, ())]
     left = {criterion.id for criterion in rubric_of(lab).criteria} - {
         i for name in chosen for i in missed(lab, name)
@@ -139,7 +141,7 @@ def shorter_round(lab: str) -> list[str]:
             break
         chosen.append(best)
         left -= missed(lab, best)
-    return chosen[:1] if is_example(lab) else chosen
+    return chosen
 
 
 def is_example(lab: str) -> bool:
