@@ -34,6 +34,7 @@ def _modes(folder: Path) -> tuple[set[int], set[int]]:
     return {_mode(p) for p in found if p.is_dir()}, {_mode(p) for p in found if p.is_file()}
 
 
+@pytest.mark.full
 def test_a_batch_and_all_that_is_written_later(tmp_path: Path) -> None:
     handed_in(tmp_path / "in", ["ada"])
     handed_in(tmp_path / "in", ["cem"], WRONG_NAME)

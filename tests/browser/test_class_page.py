@@ -64,6 +64,7 @@ def test_it_is_accessible_and_fits(visit, axe, written, size, dark) -> None:
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
+@pytest.mark.full
 def test_it_is_valid_html(validate, tmp_path) -> None:
     run, rows = made_up_run(20, "interrupted", faults=FAULTS), made_up_rows(20, missing=3)
     for anonymous in (False, True):

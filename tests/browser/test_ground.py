@@ -25,6 +25,7 @@ def written(tmp_path):
     return write
 
 
+@pytest.mark.full
 def test_a_quiet_page_is_clean(visit, axe, validate, written) -> None:
     path = written("<p>Nothing to see.</p>")
     page = visit(path, size=PHONE, dark=True)

@@ -33,6 +33,7 @@ def test_a_package_without_mistakes_passes(runner):
     assert (seen.points, seen.of, seen.failed) == (20, 20, "")
 
 
+@pytest.mark.full
 def test_an_attempt_too_many_is_not_graded(runner):
     handed_in(runner.workspace)
     runner.more["GITHUB_RUN_NUMBER"] = "2"
@@ -280,6 +281,7 @@ criteria:
 """
 
 
+@pytest.mark.full
 def test_a_rubric_of_the_students_own_is_no_plain_pass_and_a_pinned_one_is_the_courses(runner):
     package = handed_in(runner.workspace)
     (package / "src" / "numeric_talker.py").unlink()

@@ -137,6 +137,7 @@ def test_no_key_is_where_others_can_read_it(client: Any, temporary: Path, keys: 
     assert left == []
 
 
+@pytest.mark.full
 def test_no_process_imports_from_a_folder_that_another_user_made(client: Any, temporary: Path) -> None:
     paths = [*_paths(), *(path for found in client.run(_paths).values() for path in found)]
     inside = [Path(path).relative_to(temporary) for path in paths if Path(path).is_relative_to(temporary)]

@@ -74,6 +74,7 @@ def test_a_branch_beside_the_students(published: Path, ada: Path) -> None:
     assert "85 of 100 points" in git(ada, "log", "--format=%s", "feedback")
 
 
+@pytest.mark.full
 def test_changes_are_commits_behind_each_other(published: Path, ada: Path) -> None:
     to_ada(published)
     first = git(ada, "rev-parse", "feedback")

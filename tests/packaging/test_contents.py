@@ -76,6 +76,7 @@ def _shared() -> str:
     return f"ros_lab_grader-{__version__}.data/data/"
 
 
+@pytest.mark.full
 def test_the_wheel_holds_every_file_of_ours_and_no_other(wheel: ZipFile):
     names = {name for name in wheel.namelist() if name.startswith("grader/")}
     assert names == {in_wheel(name) for name in ours()} | set(SETUP.values())

@@ -62,6 +62,7 @@ def test_save_and_go_on_to_the_end(page, out) -> None:
     assert rows(page.text("/?c=style&show=decided")) == ["ada", "dana", "eve"]
 
 
+@pytest.mark.full
 def test_many_reports_are_written_by_other_processes(page, review, out, monkeypatch) -> None:
     monkeypatch.setattr("grader.classes.review.session.FEW", 0)
     form = page.form("ada", "style", "/s/ada/?c=style")

@@ -48,6 +48,7 @@ def _claim(folder: str, name: str) -> None:
     share_of(Path(folder), name, "3", None)
 
 
+@pytest.mark.full
 def test_markers_who_begin_at_once_have_different_shares(tmp_path) -> None:
     names = ["ann", "bob"]
     context = multiprocessing.get_context("spawn")

@@ -123,6 +123,7 @@ def test_no_program_is_said(tmp_path) -> None:
     assert one.reason == "holds no program in Python or C++"
 
 
+@pytest.mark.full
 def test_a_class_with_too_much_code_is_compared_as_far_as_there_is_room(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(matching, "PRINTS_MAX", 700)
     folders = class_of(tmp_path, {name: {"a.py": GOOD} for name in ("ann", "ben", "cem")})
