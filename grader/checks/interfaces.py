@@ -128,11 +128,7 @@ def _fixes(faults: list[_Fault]) -> Iterator[str]:
 
 
 def _words(fields: Iterator[InterfaceField] | list[InterfaceField] | tuple[InterfaceField, ...]) -> str:
-    return shown(", ".join(f"{one.type} {_name(one)}{_value(one)}".strip() for one in fields))
-
-
-def _name(one: InterfaceField) -> str:
-    return f"{one.part}.{one.name}" if one.part else one.name
+    return shown(", ".join(f"{one.type} {one.path}{_value(one)}".strip() for one in fields))
 
 
 def _value(one: InterfaceField) -> str:
@@ -172,7 +168,7 @@ def _faults(
         yield from _differs(one, there.get((one.part, one.name)), others, package.name)
     if params.text:
         for one in others.values():
-            yield _Fault(f"{shown(_name(one))} (line {one.line}) is not asked for", one.line, "take it out")
+            yield _Fault(f"{shown(one.path)} (line {one.line}) is not asked for", one.line, "take it out")
     if (params.text or params.ordered) and asked <= there.keys():
         yield from _other_order(wanted, there)
 
@@ -202,7 +198,7 @@ def _differs(
     others: Mapping[tuple[str, str], InterfaceField],
     package: str,
 ) -> Iterator[_Fault]:
-    name, line = _name(wanted), f"{wanted.type} {wanted.name}{_value(wanted)}".strip()
+    name, line = wanted.path, f"{wanted.type} {wanted.name}{_value(wanted)}".strip()
     if found is None:
         near = closest(wanted.name, [one.name for one in others.values() if one.part == wanted.part])
         other = others.get((wanted.part, near))

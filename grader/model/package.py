@@ -392,6 +392,11 @@ class InterfaceField(Record):
     line: int
     value: str | None = None
 
+    @property
+    def path(self) -> str:
+        """Its name, behind that of its part: `request.a`, and `range_m` of a message."""
+        return f"{self.part}.{self.name}" if self.part else self.name
+
 
 class Interface(Record):
     """One definition of the package's own. `fault` says why it is none."""

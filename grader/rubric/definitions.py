@@ -16,7 +16,6 @@ from grader.evidence.decode import full_definition
 from grader.evidence.definitions import Field, Types, parse
 from grader.evidence.message_values import ANGLES, FORMS, MessageType
 from grader.model.message_definitions import DIVIDER, PARTS
-from grader.model.package import InterfaceField
 from grader.ros_packages import ros_packages
 from grader.rubric.yaml_lines import KeyPath, as_map, as_maps, packages_in
 from grader.wording import closest, did_you_mean, is_one_edit, join_words
@@ -265,7 +264,3 @@ def services_in(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, str, dict[s
     for index, step in as_maps(scenario.get("steps")):
         if "call" in step:
             yield ("steps", index, "call"), "request", as_map(step["call"])
-
-
-def name_in(one: InterfaceField) -> str:
-    return f"{one.part}.{one.name}" if one.part else one.name

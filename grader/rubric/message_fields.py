@@ -26,7 +26,6 @@ from grader.rubric.definitions import (
     Shape,
     instead_of,
     limits_of,
-    name_in,
     no_value,
     own_texts,
     services_in,
@@ -103,7 +102,7 @@ def _no_types(rubric: dict[str, Any], known: Definitions) -> Iterator[Fault]:
         messages = known.messages_of(package)
         for one in parse_interface(own.text.encode(), f"definition{suffix}").fields:
             kind = one.type.partition("[")[0]
-            at = path if own.whole else (*path, name_in(one))
+            at = path if own.whole else (*path, one.path)
             if "/" in kind:
                 fault = ros_packages().type_fault(kind, "msg", own_packages) if own.whole else ""
             elif kind.islower() or kind in {*BUILT_IN, *FULL_NAMES, *messages}:
@@ -426,7 +425,7 @@ def _other_definitions(
     if own is None or not own.whole or not all(known.shape(type_, part) for part in PARTS[file.suffix]):
         return
     try:
-        found = {name_in(one): one.type for one in parse_definition(own.text, file.suffix)}
+        found = {one.path: one.type for one in parse_definition(own.text, file.suffix)}
     except ValueError:  # said where it stands
         return
     for name, kind in as_map(given.get("fields")).items():
