@@ -29,6 +29,7 @@ from grader.model.record import Record
 from grader.model.submission import SourcePackage, Submission
 from grader.package.manifest import read_manifest
 from grader.package.reading import printable
+from grader.package.repairs.files import to_utf8
 
 CATKIN_IGNORE = "CATKIN_IGNORE"
 IGNORED = {".git", "build", "devel", "install", "__pycache__"}
@@ -37,6 +38,7 @@ ABSOLUTE_PYTHON = re.compile(r"/(\w+/)*python3?")
 BROWSER_PATH = re.compile(
     rb"(?<![\w./-])/(?:usr/|usr/local/|snap/)?bin/(" + "|".join(BROWSERS).encode() + rb")(?![\w./-])"
 )
+OTHER_ENCODINGS = ("utf-16", "unknown-8bit")
 LARGE_BYTES = 4 << 20
 MANIFEST = """<package format="2"><name>{}</name><version>0.0.0</version><description>A repair</description>
 <maintainer email="student@example.org">student</maintainer><license>TODO</license>
@@ -213,10 +215,14 @@ def _repair(path: Path, facts: SourceFile | None) -> Iterator[str]:
     if facts.executable is False:
         yield "executable bit"
     path.chmod(0o755)
-    shebang = facts.shebang
+    shebang, data = facts.shebang, path.read_bytes()
+    if facts.encoding in OTHER_ENCODINGS and not facts.binary:
+        yield "encoding"
+        data = to_utf8(data)
+        path.write_bytes(data)
     if shebang is not None and not shebang.crlf and shebang.found is not False:
         return
-    text = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
+    text = data.removeprefix(b"\xef\xbb\xbf")
     if shebang is not None:
         yield "line ending of the shebang" if shebang.crlf else f"shebang ({shebang.text})"
         text = text.partition(b"\n")[2]

@@ -138,6 +138,8 @@ def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: Ex
 
 def _syntax_verdict(file: SourceFile, fault: Fault, obstacles: list[Obstacle]) -> Verdict:
     where = f"line {fault.line}" if fault.line else "cannot be parsed"
+    if fault.line is None and fault.kind == "SyntaxError" and not (file.bom and file.shebang_problem):
+        obstacles = []  # the whole file is no script, so nothing of it is told by itself
     others = f"; it also {' and '.join(o.why for o in obstacles)}" if obstacles else ""
     hint = syntax_hint(fault)
     why = (fault.cause or fault.message) if fault.fix and fault.fix in hint else fault.explanation

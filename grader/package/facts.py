@@ -143,7 +143,9 @@ def _text_facts(
     binary = b"\0" in data and not utf16
     suffix = PurePosixPath(path).suffix.lower()
     python = suffix == ".py" or is_near_python(data)
-    shebang, fault, problem = read_shebang(data, interpreters)
+    # of UTF-16, the first line that it has once it is saved as UTF-8
+    text = data.decode("utf-16", "replace").encode() if utf16 else data
+    shebang, fault, problem = read_shebang(text, interpreters)
     if not (suffix in _SCRIPTS or ((executable or shebang is not None or python) and not binary)):
         fault, problem = "", ""
     return {

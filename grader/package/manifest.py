@@ -94,10 +94,10 @@ def read_manifest(folder: Path) -> tuple[Manifest | None, Fault | None]:
 def _missing(folder: Path, fault: Fault) -> Fault:
     if fault.kind != "Missing":
         return fault
-    similar = next((p.name for p in sorted(folder.glob("*")) if p.name.lower() == MANIFEST), None)
-    if similar is None or similar == MANIFEST:
+    names = [p.name for p in sorted(folder.glob("*")) if p.name.lower() in (MANIFEST, f"{MANIFEST}.txt")]
+    if not names or MANIFEST in names:
         return fault
-    cause = f"the file is called `{similar}`; catkin wants `{MANIFEST}` in lower case"
+    cause = f"the file is called `{names[0]}`; catkin wants `{MANIFEST}`"
     return fault.model_copy(update={"cause": cause})
 
 
@@ -109,7 +109,8 @@ def parse_manifest(data: bytes) -> tuple[Manifest | None, Fault | None]:
         data.decode("utf-8")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        cause = f"`package.xml` is not saved as UTF-8 (line {line})"
+        wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
+        cause = "it is saved as UTF-16" if wide else "it is not saved as UTF-8"
         return None, _fault(line, "UnicodeDecodeError", error.reason, cause, "save it as UTF-8")
     # catkin reads the file as UTF-8, whatever its first line says
     root, fault = parse_xml(data, MANIFEST, root="package", encoding="utf-8")

@@ -85,8 +85,8 @@ def test_what_catkin_refuses_is_a_fault(old, new, line, cause):
     [
         (b"", "XMLSyntaxError", "empty"),
         (b" \n", "XMLSyntaxError", "empty"),
-        (MANIFEST.replace("Ada", "Adél").encode("latin-1"), "UnicodeDecodeError", "line 6"),
-        (MANIFEST.encode("utf-16"), "UnicodeDecodeError", "UTF-8"),
+        (MANIFEST.replace("Ada", "Adél").encode("latin-1"), "UnicodeDecodeError", "not saved as UTF-8"),
+        (MANIFEST.encode("utf-16"), "UnicodeDecodeError", "UTF-16"),
         (b"<launch/>", "InvalidPackage", "<package>"),
         (b"\0" * 20, "XMLSyntaxError", ""),
         (b"<package>" + b"x" * 5_000_000, "XMLSyntaxError", "never closed"),

@@ -46,6 +46,18 @@ REFUSED_LIMIT = 20
 OF_NAMES = ("node-name", "publisher", "publisher-type", "subscriber", "subscriber-type", "rate-number")
 MARKER = re.compile(r"(<<<<<<<|=======|>>>>>>>|\|\|\|\|\|\|\|)( |$)")
 CPP = re.compile(rb"^#include\s*[<\"].*?^(int|void)\s+\w+\s*\(", re.MULTILINE | re.DOTALL)
+NO_SCRIPTS = (
+    (re.compile(rb"\xff\xfe|\xfe\xff"), "the file is UTF-16"),
+    (
+        re.compile(rb"\s*<(?:!doctype\s+html|html|head|body)\b", re.IGNORECASE),
+        "a web page in a file for Python",
+    ),
+    (re.compile(rb"\s*\{.{0,200}\"(?:cells|nbformat)\"\s*:", re.DOTALL), "a notebook in a file for Python"),
+    (re.compile(rb"\{\\rtf|PK\x03\x04|\xd0\xcf\x11\xe0"), "a document in a file for Python"),
+    (re.compile(rb"%PDF-"), "a PDF in a file for Python"),
+)
+"""How files begin that were saved under a script's name."""
+NUMBERED_LINES = 5
 ENCODINGS = (SyntaxError, LookupError, UnicodeDecodeError)
 
 
@@ -89,7 +101,7 @@ def check(root, name, with_slips=True):
         return report
     if len(data) > SIZE_LIMIT_BYTES:
         return report
-    problem = undecodable(data)
+    problem = no_script(data) or undecodable(data)
     if problem:
         report["faults"].append(problem)
         return report
@@ -215,10 +227,16 @@ def fault(kind, line, column, message, *, text="", opened=None, mixed=False):
     }
 
 
+def no_script(data):
+    """Return the fault of a file that is something else as a whole."""
+    for begins, message in NO_SCRIPTS:
+        if begins.match(data):
+            return fault("SyntaxError", None, None, message)
+    return None
+
+
 def undecodable(data):
     """Return the fault of a file whose bytes are not text. `compile` forgives them in comments, running does not."""
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return fault("SyntaxError", 1, None, "the file is UTF-16")
     if b"\0" in data:
         line = data.count(b"\n", 0, data.index(b"\0")) + 1
         return fault("ValueError", line, None, "source code cannot contain null bytes")
@@ -239,10 +257,21 @@ def undecodable(data):
     return None
 
 
+def has_numbers(data):
+    """Return whether the first lines begin with their numbers, as a page or an editor shows them."""
+    lines = data.split(b"\n", NUMBERED_LINES)[:NUMBERED_LINES]
+    numbers = [re.match(rb"\s*(\d+)\b", line) for line in lines]
+    return len(lines) == NUMBERED_LINES and all(
+        number and int(number[1][:9]) == at for at, number in enumerate(numbers, 1)
+    )
+
+
 def syntax_fault(error, data):
     cpp = CPP.search(data)
     if cpp is not None:
         return fault("SyntaxError", data.count(b"\n", 0, cpp.start()) + 1, None, "C++ in a file for Python")
+    if has_numbers(data):
+        return fault("SyntaxError", None, None, "line numbers in the text")
     encoding, _ = tokenize.detect_encoding(io.BytesIO(data).readline)
     lines = io.StringIO(data.decode(encoding), newline=None).read().split("\n")
     line = getattr(error, "lineno", None)

@@ -418,7 +418,7 @@ def _no_cmake_lists(_found: re.Match[str], package: PackageFacts, _lines: Sequen
 def misspelt_cmake_lists(package: PackageFacts) -> str:
     """Return the file that is called almost `CMakeLists.txt`, "" where there is none."""
     names = [f.path for f in package.files if "/" not in f.path]
-    slips = ("cmakelists.txt", "cmakelist.txt", "cmakelists")
+    slips = ("cmakelists.txt", "cmakelist.txt", "cmakelists", "cmakelists.txt.txt")
     return next((n for n in names if n.casefold() in slips and n != "CMakeLists.txt"), "")
 
 

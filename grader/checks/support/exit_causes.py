@@ -299,7 +299,7 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
         return _of_broken_machine(found, broken, place)
     source = package.file(place.file) if place and found.kind in SYNTAX else None
     fault = source.python_fault if source else None
-    place = fault.place if fault else place
+    place = fault.place if fault and fault.line else place
     wrong = _callback(found, place, package) if found.kind == "TypeError" else None
     hiding = hiding_file(found, package)
     unbuilt = None if hiding else unmade(found, package)

@@ -219,7 +219,9 @@ def shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
     elif file.shebang_fault == "empty-file":
         yield Obstacle("is empty", f"write the node in {file.path}, with {RIGHT_SHEBANG} as its first line")
     elif file.bom:
-        why = file.shebang_problem or "an invisible byte order mark (BOM) comes first"
+        wide = file.encoding == "utf-16"
+        mark = "it is saved as UTF-16" if wide else "an invisible byte order mark (BOM) comes first"
+        why = file.shebang_problem or mark
         fix = f"in the editor, save {file.path} as UTF-8 without BOM"
         first = "" if file.shebang_fault == "byte-order-mark" else f", with {RIGHT_SHEBANG} as its first line"
         yield Obstacle(f"cannot be run: {why}", f"{fix}{first}")

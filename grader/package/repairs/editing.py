@@ -149,7 +149,7 @@ def repair_xml(files: Files, file: str, root: str, kind: RepairKind) -> bool:
         strange = find_strange(before, root) if fault is None else None
         line, old, new = changed_lines(before, after)
         why = fault.explanation if fault is not None else strange.why if strange is not None else ""
-        taken = " ".join(one.strip() for one in old.split("\n") if one not in new.split("\n"))
+        taken = " ".join(one.strip() for one in old.split("\n") if one not in new.split("\n")).strip()
         fix = f"write `{added_lines(old, new)}`" if added_lines(old, new) else f"delete `{taken}`"
         fix = fix if taken or added_lines(old, new) else "delete the blank lines above the first tag"
         if fault is not None and re.match(r"(delete|write|make) line \d", fault.fix):

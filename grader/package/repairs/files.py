@@ -241,7 +241,7 @@ def _is_slip(path: str, name: str) -> bool:
     """One letter or capitals; of a script or launch file, the suffix may be missing, and is else right."""
     given, right = PurePosixPath(path), PurePosixPath(name)
     if name in (MANIFEST, CMAKE):
-        return given.name == path and is_near(path, name)
+        return given.name == path and (is_near(path, name) or path == f"{name}.txt")
     return (
         is_near(given.name, name)
         or given.name == f"{name}.txt"

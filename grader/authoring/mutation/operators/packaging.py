@@ -277,6 +277,12 @@ def byte_order_mark(data: bytes) -> bytes:
     return b"\xef\xbb\xbf" + data
 
 
+@operator("utf-16", each=_contents, fits="every script")
+def utf_16(data: bytes) -> bytes:
+    """Saves the script as UTF-16, as some editors of Windows do."""
+    return data.decode("utf-8", "replace").encode("utf-16")
+
+
 @operator("no-shebang", each=_contents, fits="every script")
 def no_shebang(data: bytes) -> bytes:
     """Leaves out the shebang."""
