@@ -135,12 +135,19 @@ def _with_later(verdict: Verdict, later: Iterable[Fix]) -> Verdict:
         if one.general and one.general in hint:
             told.remove(one)
             hint = hint.replace(one.general, one.text)
+    # what is not wanted is not imported first
+    for one, (wanted, other) in [(one, one.types) for one in told if one.types]:
+        package, _, name = wanted.partition("/")
+        undefined = rf"above (line \d+), define {other} or import it \([^)]*\)"
+        imported = f"from {package}.msg import {name}"
+        if re.search(undefined, hint):
+            told.remove(one)
+            hint = re.sub(
+                undefined, rf"on \1, write {name} instead of {other}, with `{imported}` at the top", hint
+            )
+        hint = re.sub(rf"from \w+\.msg import {other}\b", imported, hint)
     if not told:
         return verdict.model_copy(update={"hint": hint})
-    # what is not wanted is not imported first
-    for wanted, other in (one.types for one in told if one.types):
-        package, _, name = wanted.partition("/")
-        hint = re.sub(rf"from \w+\.msg import {other}\b", f"from {package}.msg import {name}", hint)
     texts = [one.text for one in told]
     if verdict.of_machine:
         hint = hint.replace(NOTHING_TO_DO, "For the rest, ", 1)
@@ -214,8 +221,15 @@ class Later:
                 if place not in given:
                     yield Fix(one.fix, tuple(f"`{line}`" for line in one.imports))
                 given |= {place} if one.fix.startswith("above line ") else set()
-        for file, line in sorted(self._asked() - told):
-            yield Fix(f"write a value in the code where line {line} of {file} asks for input")
+        asked = self._asked() - told
+        for file in sorted({path for path, _ in asked}):
+            lines = sorted(number for path, number in asked if path == file)
+            where = (
+                f"line {lines[0]} of {file} asks"
+                if len(lines) == 1
+                else f"lines {numbers_text(lines)} of {file} ask"
+            )
+            yield Fix(f"write a value in the code where {where} for input")
         yield from self._left_over()
 
     def _left_over(self) -> Iterator[Fix]:
@@ -290,8 +304,10 @@ class Later:
         if rate:
             yield Fix(f"call `{rate}.sleep()` each time around the loop of {path}")
         elif self._lacks_words("Timer("):
+            made = f"`rate = rospy.Rate({hz})`"
             yield Fix(
-                f"let the loop of {path} wait: `rate = rospy.Rate({hz})` above it, `rate.sleep()` in it"
+                f"let the loop of {path} wait: {made} above it, `rate.sleep()` in it",
+                (made, "`rate.sleep()`"),
             )
 
     def _node_name(self) -> Iterator[Fix]:

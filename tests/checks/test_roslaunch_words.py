@@ -36,6 +36,18 @@ def node(name: str, namespace: str = "/") -> LaunchNode:
             "cc.yaml",
         ),
         (["Resource not found: pubsub_exampl", "ROS path [0]=/tmp"], "no package pubsub_exampl"),
+        (
+            [
+                'Resource not found: The following package was not found in <arg default="$(find robt)/a"/>: robt'
+            ],
+            "no package robt",
+        ),
+        (
+            [
+                'Resource not found: The following package was not found in <arg default="$(find xacro)/a"/>: xacro'
+            ],
+            "it needs the package xacro, which this grading machine lacks",
+        ),
         (["RLException: [/w/launch/arg.launch] requires the 'nm' arg to be set"], 'name="nm"'),
         (["RLException: Invalid <node> tag: output must be one of 'log', 'screen'. "], "lower case"),
         (
