@@ -259,6 +259,25 @@ def test_words_that_stand_nowhere_in_the_source_are_named() -> None:
         assert "then" not in hint_of("node", DIES, criteria, source=f"{LACKS}say('{words}')\n")
 
 
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [("Int8", f"; then write String instead of Int8 on lines 2 and 4 of {FILE}"), ("Header", "")],
+)
+def test_other_lines_that_make_a_wrong_type_are_named(kind: str, told: str) -> None:
+    run = {"processes": [STARTED], "topics": [{"topic": "/chatter", "type": f"std_msgs/{kind}", "count": 61}]}
+    source = f"# {kind}()\nmsg = {kind}()\npub = Publisher('chatter', {kind})\npub.publish({kind}(1))\n"
+    slips = [slip("publisher", "chatter", 3), slip("publisher-type", kind, 3)]
+    hint = hint_of("chatter", run, [NODE | ROOT, CHATTER], *slips, source=source)
+    assert hint.endswith(f"rospy.Publisher('/chatter', String, queue_size=10){told}")
+
+
+def test_what_a_callback_does_besides_comes_after_the_print() -> None:
+    heard = [NODE | ROOT, HEARS | {"requires": ["node"]}]
+    slips = [slip("subscriber", "chatter"), slip("subscriber-type", "Int32")]
+    hint = hint_of("node", DIES, heard, *slips, source=LACKS)
+    assert hint.endswith("not Int32 and print 'I heard <message>' first in the callback")
+
+
 @pytest.mark.parametrize("call", ["input()", "int(input(…))"])
 def test_a_text_that_takes_the_place_of_input_is_told_once(call: str) -> None:
     asks = [f'  File "/ws/src/lab1/{FILE}", line 3, in <module>', f"    said = {call}"]
