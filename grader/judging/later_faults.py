@@ -365,10 +365,9 @@ class Later:
             names = join_words(f"{one.message} (line {one.line})" for one in published[:NAMES_SHOWN])
             yield Fix(f"publish {kind} on {self._topic}: {published[0].file} publishes on {names}")
         types = [one for one in self._of("publisher-type") if one.line in lines or len(published) <= 1]
-        if self._ran:
+        if self._ran and lines:
             yield from self._made_elsewhere(kind, types)
-        types = types if not (self._ran and lines) else []
-        if len(types) == 1 and types[0].message != kind.rpartition("/")[2]:
+        elif len(types) == 1 and types[0].message != kind.rpartition("/")[2]:
             yield self._retype("publish", kind, types[0])
 
     def _heard(self) -> Iterator[Fix]:
