@@ -101,9 +101,10 @@ def _delete_empty(files: Files, package: PackageFacts) -> None:
 
 
 def _delete(files: Files, call: Command, why: str) -> None:
+    """Delete a call; its lines stay, empty, so that the numbers of those below it are the ones handed in."""
     text, span = cmake_text(files), call.span
     first, last = (text.count("\n", 0, at) for at in (span.start, span.stop))
-    changed = text[: span.start] + text[span.stop :].lstrip("\n")
+    changed = text[: span.start] + "\n" * (last - first) + text[span.stop :]
     fix = f"delete {lines_text(first, last)}, {call.identifier}(…)"
     files.change("build-line", CMAKE, changed, f"line {call.line} of {CMAKE}: {why}", fix)
 
