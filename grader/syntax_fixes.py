@@ -410,7 +410,7 @@ def _with_bracket(line: str, message: str, column: int | None) -> Iterator[str]:
         )
         filled = _GLUED.sub(r"\1(\2)", code)
         opened = _OPENED.sub(lambda found: f"{_log_call(found[1])}(", code, count=1)
-        yield from (_together(one, comment, texts) for one in (asked, filled, called, opened) if one != code)
+        yield from (_together(one, comment, texts) for one in (asked, filled, opened, called) if one != code)
         yield shorter
     wrong = re.search(r"'(.)' does not match opening parenthesis '(.)'", message)
     opener = line.rfind(wrong[2], 0, at) if wrong and wrong[2] in "{[" else 0

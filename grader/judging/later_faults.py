@@ -60,6 +60,10 @@ RATE_SHARE = 0.05
 """By so much a rate that a script asks for may differ from the right one."""
 
 
+OF_DATA = re.compile(r"String|Bool|Byte|Char|U?Int\d+|Float\d+")
+"""Types of std_msgs with one plain value, `data`."""
+
+
 class Fix(NamedTuple):
     """How a fault is fixed. A hint that has all of `said`, or this very `text`, has it already; in place of `general`,
     the same advice without its line, comes the text. `types` are the one that the lab wants, and the script's."""
@@ -135,12 +139,19 @@ def _with_later(verdict: Verdict, later: Iterable[Fix]) -> Verdict:
         if one.general and one.general in hint:
             told.remove(one)
             hint = hint.replace(one.general, one.text)
+    # what is not wanted is not imported first
+    for one, (wanted, other) in [(one, one.types) for one in told if one.types]:
+        package, _, name = wanted.partition("/")
+        undefined = rf"above (line \d+), define {other} or import it \([^)]*\)"
+        imported = f"from {package}.msg import {name}"
+        if re.search(undefined, hint):
+            told.remove(one)
+            hint = re.sub(
+                undefined, rf"on \1, write {name} instead of {other}, with `{imported}` at the top", hint
+            )
+        hint = re.sub(rf"from \w+\.msg import {other}\b", imported, hint)
     if not told:
         return verdict.model_copy(update={"hint": hint})
-    # what is not wanted is not imported first
-    for wanted, other in (one.types for one in told if one.types):
-        package, _, name = wanted.partition("/")
-        hint = re.sub(rf"from \w+\.msg import {other}\b", f"from {package}.msg import {name}", hint)
     texts = [one.text for one in told]
     if verdict.of_machine:
         hint = hint.replace(NOTHING_TO_DO, "For the rest, ", 1)
@@ -214,8 +225,15 @@ class Later:
                 if place not in given:
                     yield Fix(one.fix, tuple(f"`{line}`" for line in one.imports))
                 given |= {place} if one.fix.startswith("above line ") else set()
-        for file, line in sorted(self._asked() - told):
-            yield Fix(f"write a value in the code where line {line} of {file} asks for input")
+        asked = self._asked() - told
+        for file in sorted({path for path, _ in asked}):
+            lines = sorted(number for path, number in asked if path == file)
+            where = (
+                f"line {lines[0]} of {file} asks"
+                if len(lines) == 1
+                else f"lines {numbers_text(lines)} of {file} ask"
+            )
+            yield Fix(f"write a value in the code where {where} for input")
         yield from self._left_over()
 
     def _left_over(self) -> Iterator[Fix]:
@@ -290,8 +308,10 @@ class Later:
         if rate:
             yield Fix(f"call `{rate}.sleep()` each time around the loop of {path}")
         elif self._lacks_words("Timer("):
+            made = f"`rate = rospy.Rate({hz})`"
             yield Fix(
-                f"let the loop of {path} wait: `rate = rospy.Rate({hz})` above it, `rate.sleep()` in it"
+                f"let the loop of {path} wait: {made} above it, `rate.sleep()` in it",
+                (made, "`rate.sleep()`"),
             )
 
     def _node_name(self) -> Iterator[Fix]:
@@ -345,8 +365,9 @@ class Later:
             names = join_words(f"{one.message} (line {one.line})" for one in published[:NAMES_SHOWN])
             yield Fix(f"publish {kind} on {self._topic}: {published[0].file} publishes on {names}")
         types = [one for one in self._of("publisher-type") if one.line in lines or len(published) <= 1]
-        types = types if not (self._ran and lines) else []
-        if len(types) == 1 and types[0].message != kind.rpartition("/")[2]:
+        if self._ran and lines:
+            yield from self._made_elsewhere(kind, types)
+        elif len(types) == 1 and types[0].message != kind.rpartition("/")[2]:
             yield self._retype("publish", kind, types[0])
 
     def _heard(self) -> Iterator[Fix]:
@@ -381,17 +402,32 @@ class Later:
             there = f"on {_line(said[0])}, not '{in_source(said[0].message)}'"
             yield Fix(f"{wanted} {there}", general=f"{wanted}, {IN_OWN_WORDS}")
         elif self._lacks_words(template.partition(VALUE)[0]):
-            yield Fix(f"print '{in_words(template)}'")
+            # what else the callback does with a message may fail with the right type
+            yield Fix(f"print '{in_words(template)}'{' first in the callback' if other else ''}")
         elif other and not said and len(self._of("prints")) == 1:  # a field that the right type does not have
             only = self._of("prints")[0]
             says_it = " ".join(template.partition(VALUE)[0].split()) in " ".join(only.message.split())
             what = "the `data` of the message" if says_it else f"'{in_words(template)}'"
             yield Fix(f"print {what} on {_line(only)}", general=f"print {what}, {IN_OWN_WORDS}")
 
-    def _retype(self, verb: str, wanted: str, slip: PythonSlip) -> Fix:
+    def _made_elsewhere(self, wanted: str, types: Iterable[PythonSlip]) -> Iterator[Fix]:
+        """Yield the other lines that make messages of the wrong type, where both types have the one field `data`."""
+        package, _, name = wanted.partition("/")
+        for slip in types:
+            told = f"{package}/{slip.message} on" in self._verdict.message and OF_DATA.fullmatch(slip.message)
+            others = self._making(slip) if told and OF_DATA.fullmatch(name) else ()
+            if others:
+                where = f"line{'s' if len(others) > 1 else ''} {numbers_text(others)} of {slip.file}"
+                yield Fix(f"write {name} instead of {slip.message} on {where}")
+
+    def _making(self, slip: PythonSlip) -> list[int]:
+        """Return the other lines that make a message of the slip's type."""
         lines = self._build.file_lines(slip.file) if self._build is not None else []
         making = re.compile(rf"^[^#]*(?<![\w.]){slip.message}\(")
-        others = [n for n, text in enumerate(lines, 1) if n != slip.line and making.search(text)]
+        return [n for n, text in enumerate(lines, 1) if n != slip.line and making.search(text)]
+
+    def _retype(self, verb: str, wanted: str, slip: PythonSlip) -> Fix:
+        others = self._making(slip)
         more = f" (made on line{'s' if len(others) > 1 else ''} {numbers_text(others)})" if others else ""
         text = f"{verb} {wanted} on {_line(slip)}, not {slip.message}{more}"
         return Fix(text, types=(wanted, slip.message))

@@ -71,6 +71,8 @@ class _Names:
         for node in (n for n in nodes_in(tree) if isinstance(n, ast.Attribute)):
             if isinstance(node.value, ast.Name) and node.value.id != "rospy":
                 self._members.setdefault(node.value.id, set(ALL_MEMBERS)).add(node.attr)
+        calls = [n for n in nodes_in(tree) if isinstance(n, ast.Call) and last_name(n.func) in KEYWORDS]
+        self._types = {ast.unparse(n) for one in calls for n in one.args if isinstance(n, ast.Attribute)}
 
     def members_of(self, owner: str) -> Collection[str]:
         """Return what may stand behind a name and a dot."""
@@ -93,7 +95,8 @@ class _Names:
 
     def has_comma(self, first: tokenize.TokenInfo, second: tokenize.TokenInfo) -> bool:
         """Return whether a comma is meant by the dot between two words."""
-        is_class = first.string[:1].isupper() and first.string in self.known
+        is_type = f"{first.string}.{second.string}" in self._types and first.string[:1].isupper()
+        is_class = is_type and first.string in self.known
         is_named = second.type == tokenize.NAME and second.string in self.bound - self.own
         return is_named and (first.type == tokenize.STRING or is_class)
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from grader.checks.launch_files import value_given
-from grader.checks.support.launch import died, finished, is_exact, name_pattern, refusal
+from grader.checks.support.launch import died, finished, is_exact, name_pattern, refusal, why_died
 from grader.checks.support.parameters import explain_yaml, explain_yaml_line
 from grader.evidence.run import Run
 from grader.judging.facts import NO_PACKAGE
 from grader.model.package import LaunchNode
+from tests.package.trees import facts_of
 from tests.support.timeline import build_runs
 
 RED = "\x1b[31m{}\x1b[0m"
@@ -36,6 +39,18 @@ def node(name: str, namespace: str = "/") -> LaunchNode:
             "cc.yaml",
         ),
         (["Resource not found: pubsub_exampl", "ROS path [0]=/tmp"], "no package pubsub_exampl"),
+        (
+            [
+                'Resource not found: The following package was not found in <arg default="$(find robt)/a"/>: robt'
+            ],
+            "no package robt",
+        ),
+        (
+            [
+                'Resource not found: The following package was not found in <arg default="$(find xacro)/a"/>: xacro'
+            ],
+            "it needs the package xacro, which this grading machine lacks",
+        ),
         (["RLException: [/w/launch/arg.launch] requires the 'nm' arg to be set"], 'name="nm"'),
         (["RLException: Invalid <node> tag: output must be one of 'log', 'screen'. "], "lower case"),
         (
@@ -150,3 +165,21 @@ def test_the_line_of_a_yaml_file_that_lacks_something(text: str, told: str) -> N
 )
 def test_a_line_of_a_shell_that_is_not_given_the_variable(line: str, right: str) -> None:
     assert value_given(line, "URL") == right
+
+
+def test_a_node_that_lacks_what_the_build_makes_has_not_been_built(tmp_path: Path) -> None:
+    (tmp_path / "package.xml").write_text("<package><name>lab</name></package>")
+    (tmp_path / "CMakeLists.txt").write_text("generate_messages()\n")
+    (tmp_path / "msg").mkdir()
+    (tmp_path / "msg/Reading.msg").write_text("int8 value\n")
+    run = printed(
+        "Traceback (most recent call last):",
+        '  File "/ws/src/lab/node.py", line 1, in <module>',
+        "    from lab.msg import Reading",
+        "ModuleNotFoundError: No module named 'lab'",
+        "[a-2] process has died [pid 7, exit code 1, cmd /ws/src/lab/node.py __name:=a].",
+    )
+    found = why_died(facts_of(tmp_path), run, node("a"))
+    assert found is not None
+    assert found.unbuilt
+    assert found.verdict("it died").unbuilt

@@ -58,6 +58,10 @@ LOGS = {
     "requires": ["node"],
 }
 UNDEFINED = {"name": "countmsg", "fix": "above line 3, create the message: `countmsg = Int32()`"}
+NO_TYPE = {
+    "name": "countmsg",
+    "fix": "above line 3, define countmsg or import it (a message: `from <package>.msg import countmsg`)",
+}
 ROOT = {"requires": []}
 
 
@@ -132,6 +136,12 @@ CASES: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str,
     "a question behind it": (
         "node", DIES, TALKER, [slip("input", "`input()` waits", 6)],
         f"; then write a value in the code where line 6 of {FILE} asks for input"),
+    "questions behind it": (
+        "node", DIES, TALKER, [slip("input", "`input()` waits", 6), slip("input", "`input()` waits", 8)],
+        f"; then write a value in the code where lines 6 and 8 of {FILE} ask for input"),
+    "a type that nothing defines, where the lab has one": (
+        "node", DIES, TALKER, [slip("undefined", "", 3, **NO_TYPE), slip("publisher-type", "countmsg", 3)],
+        "on line 3, write String instead of countmsg, with `from std_msgs.msg import String` at the top"),
     "a function that nothing calls": (
         "node", DIES, TALKER, [slip("never-called", "nothing calls `talk()`", name="talk")],
         f"; then call `talk()`, which nothing in {FILE} calls"),
@@ -249,14 +259,37 @@ def test_words_that_stand_nowhere_in_the_source_are_named() -> None:
         assert "then" not in hint_of("node", DIES, criteria, source=f"{LACKS}say('{words}')\n")
 
 
-def test_a_text_that_takes_the_place_of_input_is_told_once() -> None:
-    asks = [f'  File "/ws/src/lab1/{FILE}", line 3, in <module>', "    said = input()"]
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [("Int8", f"; then write String instead of Int8 on lines 2 and 4 of {FILE}"), ("Header", "")],
+)
+def test_other_lines_that_make_a_wrong_type_are_named(kind: str, told: str) -> None:
+    run = {"processes": [STARTED], "topics": [{"topic": "/chatter", "type": f"std_msgs/{kind}", "count": 61}]}
+    source = f"# {kind}()\nmsg = {kind}()\npub = Publisher('chatter', {kind})\npub.publish({kind}(1))\n"
+    slips = [slip("publisher", "chatter", 3), slip("publisher-type", kind, 3)]
+    hint = hint_of("chatter", run, [NODE | ROOT, CHATTER], *slips, source=source)
+    assert hint.endswith(f"rospy.Publisher('/chatter', String, queue_size=10){told}")
+
+
+def test_what_a_callback_does_besides_comes_after_the_print() -> None:
+    heard = [NODE | ROOT, HEARS | {"requires": ["node"]}]
+    slips = [slip("subscriber", "chatter"), slip("subscriber-type", "Int32")]
+    hint = hint_of("node", DIES, heard, *slips, source=LACKS)
+    assert hint.endswith("not Int32 and print 'I heard <message>' first in the callback")
+
+
+@pytest.mark.parametrize("call", ["input()", "int(input(…))"])
+def test_a_text_that_takes_the_place_of_input_is_told_once(call: str) -> None:
+    asks = [f'  File "/ws/src/lab1/{FILE}", line 3, in <module>', f"    said = {call}"]
     lines = ["Traceback (most recent call last):", *asks, "EOFError: EOF when reading a line"]
     hint = hint_of(
-        "node", {**DIES, "console": [{**DIES["console"][0], "lines": lines}]}, TALKER, source=LACKS
+        "node",
+        {**DIES, "console": [{**DIES["console"][0], "lines": lines}]},
+        TALKER,
+        source=f"{LACKS}while True:\n",
     )
-    assert hint.startswith('write `"hello world %s" % rospy.get_time()` in place of `input()`')
-    assert hint.count("hello world") == 1
+    assert hint.startswith(f'write `"hello world %s" % rospy.get_time()` in place of `{call}`')
+    assert hint.count("hello world") == hint.count("`rate.sleep()`") == 1
 
 
 def test_a_question_in_a_script_that_does_not_compile_is_named() -> None:

@@ -425,10 +425,26 @@ def test_the_correct_package_has_no_slip(tmp_path: Path) -> None:
     assert repair_all(package(tmp_path, dict(FILES)), WANTED) == ()
 
 
-@pytest.mark.parametrize("wrong", ["'I heard {}',format(msg.data)", "'I heard {}'.ormat(msg.data)"])
-def test_a_slip_of_format_is_named_and_undone(wrong: str, tmp_path: Path) -> None:
-    right = FILES[LISTENER].replace("'I heard %s', msg.data", "'I heard {}'.format(msg.data)")
-    changed = FILES[LISTENER].replace("'I heard %s', msg.data", wrong)
-    folder = package(tmp_path, {**FILES, LISTENER: changed})
+def test_the_name_of_a_message_class_may_be_a_parameter(tmp_path: Path) -> None:
+    """Nothing is missing between `String` and `data`, though both are names of the script."""
+    own = FILES[LISTENER].replace("(msg)", "(String)")
+    own = own.replace(
+        "    rospy.loginfo('I heard %s', msg.data)", "    data = String.data\n    rospy.loginfo(data)"
+    )
+    assert repair_all(package(tmp_path, {**FILES, LISTENER: own}), WANTED) == ()
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("loginfo('I heard {}'.format(msg.data))", "loginfo('I heard {}',format(msg.data))"),
+        ("loginfo('I heard {}'.format(msg.data))", "loginfo('I heard {}'.ormat(msg.data))"),
+        ("loginfo(rospy.get_name() + '%s', msg.data)", "loginforospy.get_name() + '%s', msg.data)"),
+        ("loginfo(rospy.get_name() + '%s', msg.data)", "logwinforospy.get_name() + '%s', msg.data)"),
+    ],
+)
+def test_a_slip_of_a_call_is_named_and_undone(right: str, wrong: str, tmp_path: Path) -> None:
+    old = "loginfo('I heard %s', msg.data)"
+    folder = package(tmp_path, {**FILES, LISTENER: FILES[LISTENER].replace(old, wrong)})
     assert [repair.line for repair in repair_all(folder, WANTED)] == [7]
-    assert (folder / LISTENER).read_text() == right
+    assert (folder / LISTENER).read_text() == FILES[LISTENER].replace(old, right)

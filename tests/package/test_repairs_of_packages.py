@@ -325,6 +325,12 @@ CASES = {
     "own-message-of-another-exercise-that-the-build-asks-for": Case(
         {**OWN, CMAKELISTS: f"{CMAKE}add_dependencies(talker lab_generate_messages_cpp)\n"}, ["build-line"] * 3,
     ),
+    "own-message-and-services-of-no-file": Case(
+        {**RUN_OWN, CMAKELISTS: OWN_CMAKE.replace(
+            "catkin_p", "add_service_files(\n  FILES\n)\ngenerate_messages()\ncatkin_p")}, ["build-line"],
+        "delete lines 5 to 7, add_service_files(…)",
+        after={CMAKELISTS: OWN_CMAKE.replace("catkin_p", "\n\n\ngenerate_messages()\ncatkin_p")},
+    ),
     "own-message-after-package": Case(
         {**OWN, CMAKELISTS: OWN_CMAKE + "generate_messages(\n)\n"}, ["build-line"],
         "move generate_messages(…), from line 6, above catkin_package(…)",
@@ -341,7 +347,7 @@ CASES = {
     ),
     "messages-of-no-definition": Case(
         {CMAKELISTS: CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES std_msgs)\ncatkin_p")}, ["build-line"],
-        "delete line 4, generate_messages(…)", after={CMAKELISTS: "rospy)\ncatkin_package()"},
+        "delete line 4, generate_messages(…)", after={CMAKELISTS: "rospy)\n\ncatkin_package()"},
     ),
     "program-that-does-not-wait-for-its-header": Case(
         {**OWN, "src/mean.cpp": '#include "lab/Level.h"\nint main() {}\n',

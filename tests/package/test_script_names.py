@@ -132,6 +132,14 @@ OBJECTS = {
     "other-method": (f"class A:\n{MADE.replace('__init__', 'setup')}{PAIR}",
                      "give `self.pub` its value in `__init__`, or call `self.setup(…)` there"),
     "nowhere": (f"class A:\n{PAIR}", "in `__init__`, write `self.pub = …`, with the value that it should have"),
+    "nowhere-called": (f"class A:\n{PAIR.replace('pub.publish', 'send')}", "write `def send(self, …):` in the class A"),
+    "nowhere-given": (f"class A:\n{PAIR.replace('self.pub.publish(1)', 'Subscriber(1, 2, self.hear)')}",
+                      "write `def hear(self, …):` in the class A"),
+    "given-from-outside": ((f"class A:\n{PAIR.replace('self.pub.publish(1)', 'Subscriber(1, 2, callback=self.hear)')}"
+                           "def hear(msg):\n    pass\n"), "on line 3, write `hear` instead of `self.hear`"),
+    "outside-the-class": ((f"class A:\n{PAIR.replace('self.pub.publish(1)', 'Timer(1, self.hear)')}"
+                          "def hear(self, event):\n    pass\n"),
+                          "indent `def hear` on line 4 like the other methods of A, and its lines below it"),
     "class": (f"class A:\n{MADE}{PAIR}A.go()\n", "on line 6, write `A().go()`"),
     "class-named": (f"class A:\n{MADE}{PAIR}a = A\na.go()\n", "on line 6, write `a = A()`"),
     "class-with-values": (f"class A:\n{MADE.replace('self)', 'self, n)')}{PAIR}A.go()\n",

@@ -428,6 +428,8 @@ GIVEN_BY_NAME = {"queue_size": "10", "anonymous": "True", "latch": "True"}
 """Arguments of rospy's functions that are written with their name, and a value that most labs give them."""
 
 
+CALL_BACK = ("Subscriber", "Service", "Timer")
+"""What is given a function that rospy calls."""
 MADE = {"publish": "rospy.Publisher('…', …, queue_size=10)", "sleep": "rospy.Rate(…)"}
 """What a variable has to be given by the method that is called of it."""
 
@@ -461,7 +463,7 @@ def what_to_write(node, used, tree):
         return line, "define %s or import it (a message: `from <package>.msg import %s`)" % (name, name)
     if isinstance(used, ast.Call):
         return line, "define it with `def %s(…):`, or import it" % name
-    if any(called_name(n) in ("Subscriber", "Service", "Timer") for n in takers):
+    if any(called_name(n) in CALL_BACK for n in takers):
         return line, "define it with `def %s(…):`" % name
     if inner in MADE:
         loops = [n.lineno for n in walk(tree) if isinstance(n, (ast.While, ast.For)) and node in ast.walk(n)]

@@ -8,6 +8,7 @@ import ast
 import difflib
 
 from script_names import (
+    CALL_BACK,
     TEXT_LIMIT,
     argument,
     bound_names,
@@ -111,8 +112,30 @@ def never_given(own, name, line):
     if near:
         fix = "on line %d, write `self.%s` instead of `self.%s`" % (line, near[0], name)
         return "did you mean self.%s?" % near[0], fix
+    if name in called_methods(own.tree):
+        return never_defined(own, name, line)
     why = "nothing in the file gives `self.%s` a value" % name
     return why, "in `__init__`, write `self.%s = …`, with the value that it should have" % name
+
+
+def called_methods(tree):
+    """Return what is called of `self`, here or by rospy, which was given it to call."""
+    calls = [n for n in walk(tree) if isinstance(n, ast.Call)]
+    given = [arg for n in calls if called_name(n) in CALL_BACK for arg in n.args[1:]]
+    given += [k.value for n in calls if called_name(n) in CALL_BACK for k in n.keywords]
+    names = [dotted(n) for n in [n.func for n in calls] + given]
+    return {name[len("self.") :] for name in names if name.startswith("self.")}
+
+
+def never_defined(own, name, line):
+    """Return why a class has no such method, and what to do."""
+    why = "the class %s has no method `%s`" % (own.name, name)
+    for outside in (n for n in walk(own.tree) if isinstance(n, ast.FunctionDef) and n.name == name):
+        if [one.arg for one in outside.args.args[:1]] == ["self"]:
+            fix = "indent `def %s` on line %d like the other methods of %s, and its lines below it"
+            return why, fix % (name, outside.lineno, own.name)
+        return why, "on line %d, write `%s` instead of `self.%s`" % (line, name, name)
+    return why, "write `def %s(self, …):` in the class %s" % (name, own.name)
 
 
 def classes_as_objects(classes, tree):

@@ -429,7 +429,8 @@ def _asks_for_input(
         lines = join_words(map(str, asking))
         return CAUSES["EOFError"][0], f"write values in the code in place of each `input()`: lines {lines}"
     if found.kind == "EOFError" and (number := _NUMBER_ASKED.search(source)):
-        return CAUSES["EOFError"][0], f"write a number in the code in place of `{number[0]}…))`"
+        value = "a number in the code" if "once" in asks.values() else VALUE_SLOT
+        return CAUSES["EOFError"][0], f"write {value} in place of `{number[0]}…))`"
     if found.kind == "EOFError" and asks and "once" in asks.values():
         return CAUSES["EOFError"][0], "write a value in the code in place of `input()`"
     if found.kind != "EOFError" or place is None or place.file not in rated:

@@ -15,6 +15,7 @@ from grader.checks.support.processes import early_end, lives, observed_until_ns
 from grader.checks.support.scripts import paths_by_name, programs, shebang_obstacles
 from grader.checks.support.text import INIT, near_names, shown
 from grader.evidence.run import Run
+from grader.installable import install_hint, known_packages
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.submission import chmod_hint
 from grader.model.verdict import FileCitation, Verdict, failed, grade_again, joined, machine_lacks, unjudged
@@ -34,7 +35,7 @@ _STARTED = re.compile(r"process\[([^\s\[\]]+)-\d+\]: started with pid")
 _DIED = re.compile(r"\[([^\s\[\]]+)-\d+\] process has died \[pid \d+, exit code (-?\d+)")
 _FINISHED = re.compile(r"\[([^\s\[\]]+)-\d+\] process has finished cleanly")
 _REQUIRED = re.compile(r"REQUIRED process (\[[^\s\[\]]+-\d+\]) has died")
-NO_PACKAGE = r"Resource not found: (\S+)"
+NO_PACKAGE = r"Resource not found: (?:The following package was not found in .*: )?(\S+)"
 NO_FILE = r"file does not exist \[([^\[\]\n]+)\]"
 BAD_FILE = r"error loading <rosparam> tag"
 _NO_YAML = re.compile(r"file (\S+) contains invalid YAML")
@@ -166,11 +167,22 @@ def refusal(run: Run, package: PackageFacts) -> Absence | None:
             said = f"roslaunch starts nothing: {why.format(*words)}"
             if pattern == BAD_FILE and (unread := _unread_yaml(text, package)):
                 return unread
-            if pattern == NO_PACKAGE and near_names(words[0], [package.name]):
-                return Absence(f"{said}: this one is called {package.name}", f"write $(find {package.name})")
+            if pattern == NO_PACKAGE and (lacking := _lacks_package(words[0], said, text, package)):
+                return lacking
             cited = _declared(words[0], package) if pattern == _UNSET.pattern else ()
             return Absence(said, fix, citations=cited, refused=pattern, about="".join(words[:1]))
     return None
+
+
+def _lacks_package(name: str, said: str, text: str, package: PackageFacts) -> Absence | None:
+    """Return what is known of a package that roslaunch does not find: a slip of this one's name, or ROS's own."""
+    if near_names(name, [package.name]):
+        return Absence(f"{said}: this one is called {package.name}", f"write $(find {package.name})")
+    if name not in known_packages():
+        return None
+    why = f"roslaunch starts nothing: it needs the package {name}, which this grading machine lacks"
+    hint = install_hint(name, text.splitlines())
+    return Absence(why, hint, of_machine=True, refused=NO_PACKAGE, about=name)
 
 
 def _unread_yaml(text: str, package: PackageFacts) -> Absence | None:
@@ -315,7 +327,7 @@ def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | Non
         owner = owner_of(package, node) or package
         end = explain_traceback(found[-1], owner)
         cited = tuple(one.below(package.way_to(owner)) for one in end.citations)
-        return Absence(f"it died: {end.cause}", end.hint, True, cited, end.of_machine)
+        return Absence(f"it died: {end.cause}", end.hint, True, cited, end.of_machine, end.unbuilt)
     if script is not None and script.python_fault is not None:
         fault = script.python_fault
         why = f"it died: {fault.kind}: {fault.explanation}"

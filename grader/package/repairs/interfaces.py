@@ -43,6 +43,7 @@ def make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Col
 
     One that only other scripts than those that are run would use is not added to those that the file names already.
     """
+    _delete_empty(files, package)
     code = [f.path for f in package.files if is_own(f.path) and (f.python or f.path.endswith(CPP))]
     used = _used_kinds(files, package, name, code)
     made = {c: _definitions(package, folder) for c, folder in INTERFACE_FOLDERS.items() if folder in used}
@@ -83,11 +84,29 @@ def _delete_generation(files: Files, package: PackageFacts) -> None:
     known = {GENERATION, "genmsg"}.intersection(named) or any("$" in word for word in named)
     if len(calls) != 1 or not of_catkin or known or folders & {*INTERFACE_FOLDERS.values()}:
         return
-    text, span = cmake_text(files), calls[0].span
+    _delete(files, calls[0], f"{GENERATE}(…) is called, and there are no messages to make")
+
+
+def _delete_empty(files: Files, package: PackageFacts) -> None:
+    """Delete calls that name no file and ask for a folder that is not there."""
+    for name, folder in INTERFACE_FOLDERS.items():
+        there = any(file.path.startswith(f"{folder}/") for file in package.files)
+        for call in reversed(calls_of(files, name)) if not there else ():
+            if [token.value for token in words_of(call)] in ([], ["FILES"]):
+                _delete(
+                    files,
+                    call,
+                    f"{name}(…) names no file, and needs the folder {folder}/, which is not there",
+                )
+
+
+def _delete(files: Files, call: Command, why: str) -> None:
+    """Delete a call; its lines stay, empty, so that the numbers of those below it are the ones handed in."""
+    text, span = cmake_text(files), call.span
     first, last = (text.count("\n", 0, at) for at in (span.start, span.stop))
-    message = f"line {calls[0].line} of {CMAKE}: {GENERATE}(…) is called, and there are no messages to make"
-    fix = f"delete {lines_text(first, last)}, {GENERATE}(…)"
-    files.change("build-line", CMAKE, text[: span.start] + text[span.stop :].lstrip("\n"), message, fix)
+    changed = text[: span.start] + "\n" * (last - first) + text[span.stop :]
+    fix = f"delete {lines_text(first, last)}, {call.identifier}(…)"
+    files.change("build-line", CMAKE, changed, f"line {call.line} of {CMAKE}: {why}", fix)
 
 
 def _wait_for_headers(files: Files, package: PackageFacts, name: str) -> None:
