@@ -17,6 +17,7 @@ from grader.checks.support.geometry import (
     Pose,
     Spot,
     Track,
+    commands_of,
     followed,
     length_m,
     off_m,
@@ -25,7 +26,6 @@ from grader.checks.support.geometry import (
     stands,
     top_speeds,
     track,
-    turns_of,
 )
 from grader.checks.support.processes import GlobalName
 from grader.checks.support.topics import Sender, cite, nothing_sent
@@ -160,7 +160,7 @@ def _strays_late(course: Course, way: Way) -> bool:
 def _in_degrees(run: Run) -> Words | None:
     """A turn so fast that degrees are meant where radians are asked for."""
     # All topics: poses may be judged, and the velocities that led to them are on another one.
-    turns = ((c, turn) for c in run.student_channels() for turn in turns_of(c))
+    turns = ((c, one.turn) for c in run.student_channels() for _, one in commands_of(c))
     channel, fastest = max(turns, key=lambda one: abs(one[1]), default=(None, 0.0))
     if channel is None or abs(fastest) < DEGREES_FROM:
         return None

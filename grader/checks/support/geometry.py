@@ -281,10 +281,11 @@ def _command(time_s: float, message: Any) -> Command | None:  # noqa: ANN401 - a
     return Command(time_s, linear["x"], linear["y"], angular["z"])
 
 
-def turns_of(channel: Channel) -> list[float]:
-    """Return the angular.z of each velocity that was sent on a topic; none for messages of another kind."""
-    commands = (_command(0.0, message) for message in channel.values) if "Twist" in channel.type else ()
-    return [one.turn for one in commands if one is not None and math.isfinite(one.turn)]
+def commands_of(channel: Channel) -> list[tuple[int, Command]]:
+    """Return when (ns) each velocity was sent on a topic, and what it was; none for messages of another kind."""
+    pairs = zip(channel.times_ns, channel.values, strict=True) if "Twist" in channel.type else ()
+    commands = ((time_ns, _command(0.0, message)) for time_ns, message in pairs)
+    return [(t, one) for t, one in commands if one is not None and _finite(one.forward, one.left, one.turn)]
 
 
 def _finite(*values: float) -> bool:

@@ -358,7 +358,10 @@ def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | N
     why = f"roslaunch finds no program {node.type} in the package {node.pkg}"
     if near := near_names(str(node.type), PROGRAMS_OF.get(str(node.pkg), ())):
         return Absence(f"{why}; it has {near[0]}", f'write type="{near[0]}"')
-    return Absence(why, "type is the file's name, with .py for a script, and the file needs chmod +x")
+    hint = "type is the file's name, with .py for a script, and the file needs chmod +x"
+    if owner is None:
+        hint = f"write the name of one of its programs: `rosrun {node.pkg}` and Tab, twice, shows them"
+    return Absence(why, hint)
 
 
 def _silent(run: Run, node: LaunchNode) -> Absence | None:
