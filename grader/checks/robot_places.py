@@ -10,11 +10,12 @@ from typing import Annotated, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
-from grader.checks.robot_path import metres, spot, unreadable
+from grader.checks.robot_path import DRIVE, metres, never_moves, spot, unreadable
 from grader.checks.support.clocks import LATE_MS, Lateness, excused, no_clock, run_seconds
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.geometry import (
     MOVED_M,
+    TURNING_RAD,
     Area,
     Band,
     Point,
@@ -30,6 +31,7 @@ from grader.checks.support.geometry import (
     shown_walls,
     stands,
     track,
+    turned_rad,
 )
 from grader.checks.support.processes import GlobalName, named_at, observed_until_ns
 from grader.checks.support.text import subscriber
@@ -51,13 +53,10 @@ ROUNDING = 1e-9
 SAME_M = 0.005
 NEARLY = 1.25
 """A loss by no more than this factor is one that a single run's timing could have made."""
-DRIVE = "publish a velocity that is not 0, again and again for as long as it should drive"
 STEER = (
     "the angle to turn by is math.atan2(dy, dx) minus the heading, both in radians, brought between -pi and pi: "
     "math.remainder(angle, 2 * math.pi)"
 )
-TURNING_RAD = 0.1
-"""A robot that turns by less in the last STILL_S stands still."""
 STRAIGHT = 2.0
 """A way that is longer by this factor than it brings the robot nearer is not a slow one, but a wrong one."""
 
@@ -249,7 +248,7 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
         turn = f"{'it drives away' if nearer_m < 0 else driven}: {STEER}"
         strays = length_m(judged) > STRAIGHT * nearer_m
         return failed(message, hint=turn if strays else "drive faster, or take a shorter way")
-    if _turned_rad(judged) > TURNING_RAD:
+    if turned_rad(judged, STILL_S) > TURNING_RAD:
         return failed(f"{at}, and turns on the spot", hint=STEER)
     hint = f"stop only where the distance is less than {significant(params.tolerance_m)} m"
     return failed(at, hint=hint)
@@ -257,7 +256,7 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
 
 def _never_moves(message: str, judged: Sequence[Pose], asked: Stretch, run: Run) -> Verdict:
     """Return the loss of a robot that stays where it is: it turns there, is told to stop, or is told nothing."""
-    if _turned_rad(judged) > TURNING_RAD:
+    if turned_rad(judged, STILL_S) > TURNING_RAD:
         return unjudged(f"{message}, and turns on the spot", hint=STEER)
     to_s = run_seconds(run)
     sent = [
@@ -273,12 +272,6 @@ def _never_moves(message: str, judged: Sequence[Pose], asked: Stretch, run: Run)
         "look at the condition that stops it: the distance is math.hypot(dx, dy), which is never less than 0"
     )
     return unjudged(message, hint=hint)
-
-
-def _turned_rad(path: Sequence[Pose]) -> float:
-    """Return by how much it turned at the end, to either side."""
-    recent = [pose for pose in path if pose.time_s >= path[-1].time_s - STILL_S]
-    return sum(abs(math.remainder(b.heading - a.heading, math.tau)) for a, b in pairwise(recent))
 
 
 def _fell_silent(
@@ -445,7 +438,7 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
     inside = share_inside(path, out)
     figures = f"{inside:.0%} of the time inside, {metres(max(out))} outside at most, {metres(long_m)} long"
     if stands(path) and (params.least_m or not any(out)):
-        return unjudged("it never moves", measured=figures, hint=DRIVE)
+        return never_moves(path, figures)
     if inside < params.share - ROUNDING or (params.share == 1 and any(out)):
         verdict = _outside(path, out, region, inside, params)
     elif long_m < params.least_m:

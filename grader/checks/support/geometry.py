@@ -30,6 +30,8 @@ Polyline = tuple[Point, ...]
 """Straight from point to point."""
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 Spot = tuple[Coordinate, Coordinate]
+TURNING_RAD = 0.1
+"""A robot that turns by less stands still."""
 FASTEST = 1e6
 MOVED_M = 0.01
 
@@ -128,6 +130,12 @@ def relative(path: Sequence[Pose]) -> list[Pose]:
 def stands(path: Sequence[Pose]) -> bool:
     """Return whether it never left its place."""
     return all(math.dist(p.point, path[0].point) <= MOVED_M for p in path)
+
+
+def turned_rad(path: Sequence[Pose], last_s: float = math.inf) -> float:
+    """Return by how much it turned in the last seconds, to either side."""
+    recent = [pose for pose in path if pose.time_s >= path[-1].time_s - last_s]
+    return sum(abs(math.remainder(b.heading - a.heading, math.tau)) for a, b in pairwise(recent))
 
 
 def set_off_s(path: Sequence[Pose]) -> float:
