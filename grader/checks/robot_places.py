@@ -46,6 +46,8 @@ STALLED_MS = 1000.0
 """In the time of the run, which may be faster than the wall's."""
 STILL_S = 0.5
 """A robot's speed at the end is that of so long a time."""
+TURNS_S = 3.0
+"""A robot that turns for so long, and does not drive, finds no way."""
 SLOW_M_S = 0.02
 SILENT_S, GAPS = 1.5, 5.0
 """Positions have ended where none came for so long, and for so many of their gaps, before the run's end."""
@@ -443,7 +445,12 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
         verdict = _outside(path, out, region, inside, params)
     elif long_m < params.least_m:
         message = f"its path is {metres(long_m)} long; {significant(params.least_m)} m are asked for"
-        verdict = failed(message, hint="keep driving while the way is clear")
+        hint = "keep driving while the way is clear"
+        recent = [pose for pose in path if pose.time_s >= path[-1].time_s - TURNS_S]
+        if stands(recent) and turned_rad(recent) > TURNING_RAD:
+            message += f", and it turns on the spot at {spot(path[-1].point)} in the end"
+            hint = "drive on where the way is clear: look at the ranges in front alone, by their angles in radians"
+        verdict = failed(message, hint=hint)
     else:
         always = f"for {inside:.0%} of the time" if any(out) else "all the time"
         return passed(f"it is {region.words} {always}", measured=figures)
