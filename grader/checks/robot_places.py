@@ -246,9 +246,11 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
     if speed_m_s > SLOW_M_S:
         message = f"{at}, and is still on its way at {speed_m_s:.2f} m/s"
         nearer_m = math.dist(judged[0].point, params.goal) - math.dist(last.point, params.goal)
+        around, strays = turned_rad(judged) / math.tau, length_m(judged) > STRAIGHT * nearer_m
         driven = f"it drives {metres(length_m(judged))} and is {metres(max(0.0, nearer_m))} nearer"
+        driven = driven if strays else f"it turns around {around:.1f} times on its way"
         turn = f"{'it drives away' if nearer_m < 0 else driven}: {STEER}"
-        strays = length_m(judged) > STRAIGHT * nearer_m
+        strays = strays or around > 1
         return failed(message, hint=turn if strays else "drive faster, or take a shorter way")
     if turned_rad(judged, STILL_S) > TURNING_RAD:
         return failed(f"{at}, and turns on the spot", hint=STEER)

@@ -41,12 +41,7 @@ def add_advice(
     visible = {c.id for c in rubric.criteria if c.visibility == "visible"}
     good = [c for c in results if c.status is Status.PASS and c.id in visible]
     host = next((c for check in OF_FILES for c in good if c.check == check), None)
-    points = [
-        point.text if one.name == package.name else f"{one.name}: {point.text}"
-        for one in package.views()
-        for point in _points(one)
-        if not _is_told(point, results)
-    ][:POINTS_MAX]
+    points = [point.text for point in _points(package) if not _is_told(point, results)][:POINTS_MAX]
     if host is None or not points:
         return tuple(results)
     told = host.model_copy(update={"hint": "; ".join(filter(None, (host.hint, *points)))})
