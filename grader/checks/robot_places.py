@@ -56,8 +56,8 @@ SAME_M = 0.005
 NEARLY = 1.25
 """A loss by no more than this factor is one that a single run's timing could have made."""
 STEER = (
-    "the angle to turn by is math.atan2(dy, dx) minus the heading, both in radians, brought between -pi and pi: "
-    "math.remainder(angle, 2 * math.pi)"
+    "the angle to turn by, towards a point, is math.atan2(dy, dx) minus the heading, both in radians, brought between "
+    "-pi and pi: math.remainder(angle, 2 * math.pi)"
 )
 STRAIGHT = 2.0
 """A way that is longer by this factor than it brings the robot nearer is not a slow one, but a wrong one."""
