@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import PurePosixPath
 from typing import Annotated
 
@@ -128,7 +129,7 @@ class FileLeftParams(Record):
         return None
 
 
-@check("file-left", params=FileLeftParams)
+@check("file-left", params=FileLeftParams, of_callbacks=True)
 def file_left(package: PackageFacts, run: Run, params: FileLeftParams) -> Verdict:
     """The run leaves a file, with what has to be in it.
 
@@ -190,7 +191,10 @@ def _not_left(files: Sequence[LeftFile], package: PackageFacts, run: Run, params
     names = [PurePosixPath(path).name for path in paths]
     alike = [one for one in names if PurePosixPath(one).suffix == PurePosixPath(name).suffix != ""]
     if near := near_names(name, names) or alike:
-        return failed(f"{params.file} was not written; {_list_paths(near)} was", hint=f"name the file {name}")
+        hint = f"name the file {name}"
+        if any(re.search(r"_\d{4}(-\d\d){5}\.bag$", one) for one in near):
+            hint = f"write `-O {name}` in the call of `rosbag record`: `-o`, and a call without both, add the time"
+        return failed(f"{params.file} was not written; {_list_paths(near)} was", hint=hint)
     what = f"{params.file} was not written"
     if end := explain_early_end(package, run):
         return end.verdict(unjudged, f"{what}: the program ended before ({end.cause})")
@@ -224,6 +228,8 @@ def _wrong_topic(
     count = sum(len(channel.messages) for channel in found)
     if not count:
         hint = f"rosbag record {topic} …: name the topic as rostopic list shows it"
+        if not any(c.topic == topic and c.messages for c in run.channels):
+            hint = f"publish on {topic}: nothing came on it while it was recorded"
         return failed(f"{path} holds no message on {topic}", hint=hint).if_repeated()
     types = {plain_type(channel.type) for channel in found}
     if wanted.type is not None and types != {wanted.type}:
@@ -280,8 +286,18 @@ def _out_of_bounds(
             if not right:
                 message = f"row {number} of {path}: {name} is {shown(text) or 'empty'}"
                 hint = f"it should be {bounds_text(bounds.min, bounds.max)}"
+                if fitting := [
+                    one for one in names if one != name and _all_within(rows, names.index(one), bounds)
+                ]:
+                    hint += f", as each value of the column {shown(fitting[0])} is: keep to the order of the names"
                 return failed(message, hint=hint)
     return None
+
+
+def _all_within(rows: Sequence[Sequence[str]], column: int, bounds: ColumnBounds) -> bool:
+    with suppress(ValueError, IndexError):
+        return all(is_within(float(row[column]), bounds.min, bounds.max) for row in rows)
+    return False
 
 
 def _map(file: LeftFile) -> Verdict | None:

@@ -20,6 +20,7 @@ from grader.checks.support.fields import (
     bounds_text,
     differences,
     has_hole,
+    is_number,
     is_within,
     no_field,
     readings,
@@ -506,10 +507,52 @@ def _other_value(
     if params.when == "last" and sent and found[-1].time_ns < min(sent.values()):
         topics = join_words(sorted(filter(None, sent)))
         message, hint = f"{message}; none came after {topics}", f"publish again in the callback of {topics}"
+    elif params.when == "last" and (number := _was_right(found, why, params)):
+        message += f", and was right in message {number} of {len(found)}"
+        hint = (
+            f"change {params.field} where it has to change, and keep the rest as it was in the message before"
+        )
+    elif params.when == "last" and (topic := _repeated(found, run, params)):
+        message += f": each value is the one that came on {topic}"
+        hint = "keep what was there before from callback to callback: `self.… = 0` in `__init__`, `+=` in the callback"
+    elif params.when == "first" and _in_vain(run, params.topic, first.time_ns):
+        topics = join_words(sorted(filter(None, sent))) or "that"
+        message += f", which came only after {topics}"
+        hint = f"publish once on {params.topic} before you wait for any message, as soon as the publisher is made"
     verdict = failed(message, hint=hint)
     return (
         verdict.if_repeated() if params.when == "last" else verdict.model_copy(update={"callbacks": "before"})
     )
+
+
+def _was_right(found: Sequence[Reading], why: str, params: FieldEqualsParams) -> int:
+    """Return the number of an earlier message that had the right value in the place of a list that is wrong now; 0
+    where none had."""
+    place = why.partition(": ")[0]
+    if not place.startswith("["):
+        return 0
+    for number, one in enumerate(found[:-1], 1):
+        places = [d.path for value in one.values for d in differences(value, params.value, params.tolerance)]
+        if places and place not in places and "" not in places:
+            return number
+    return 0
+
+
+def _repeated(found: Sequence[Reading], run: Run, params: FieldEqualsParams) -> str:
+    """Return the topic on which the grader sent the same numbers, but for their signs; "" for none."""
+    came = [abs(value) for one in found for value in one.values if is_number(value)]
+    for channel in run.channels:
+        values = (v for one in readings([channel], params.field, numbers=False) for v in one.values)
+        sent = [abs(value) for value in values if is_number(value)]
+        if channel.by_grader and channel.topic != params.topic and len(set(sent)) > 1 and sent == came:
+            return channel.topic
+    return ""
+
+
+def _in_vain(run: Run, topic: str, before_ns: int) -> bool:
+    """Return whether the scenario had waited for a message on the topic, and none had come."""
+    waits = ((t, e.detail) for t, e in run.actors if e.action == "wait" and e.topic == topic)
+    return any(t < before_ns and "did not come" in detail for t, detail in waits)
 
 
 def _values(asked: Sequence[Reading]) -> str:

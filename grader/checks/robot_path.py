@@ -11,12 +11,15 @@ from pydantic import Field, model_validator
 
 from grader.checks.registry import check
 from grader.checks.support.clocks import excused, lateness, no_clock
+from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.geometry import (
+    TURNING_RAD,
     Course,
     Point,
     Pose,
     Spot,
     Track,
+    commands_of,
     followed,
     length_m,
     off_m,
@@ -25,14 +28,14 @@ from grader.checks.support.geometry import (
     stands,
     top_speeds,
     track,
-    turns_of,
+    turned_rad,
 )
 from grader.checks.support.processes import GlobalName
 from grader.checks.support.topics import Sender, cite, nothing_sent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, passed, unjudged
+from grader.model.verdict import Status, Verdict, failed, passed, unjudged
 from grader.wording import join_words, significant
 
 LATE_MS = 25.0
@@ -40,6 +43,7 @@ LATE_P95_MS = 5.0
 LATE_TURNS = 4
 """Each turn may be late: at 1.6 rad/s, 25 ms in each of four are 0.16 rad, and 0.3 m beside a line of 2 m."""
 ORIGIN = (0.0, 0.0)
+DRIVE = "publish a velocity that is not 0, again and again for as long as it should drive"
 DEGREES_FROM = 20.0
 """Radians a second that no robot of a lab turns with, and that small angles in degrees come to."""
 
@@ -105,6 +109,10 @@ def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
         verdict = no_clock(run) or nothing_sent(package, run, params.topic, params.of or "student")
     else:
         verdict = unreadable(found, params.topic) or _judge_track(found, run, params)
+        end = explain_early_end(package, run) if verdict.status is Status.FAIL else None
+        if end is not None and not end.by_itself:
+            kind = unjudged if verdict.unjudged else failed
+            verdict = end.verdict(kind, f"{verdict.message}; the node ended: {end.cause}", verdict.measured)
     return verdict.about(
         expected=f"a way through {join_words(map(spot, params.points))}, within {metres(params.tolerance_m)}",
         measured=verdict.measured or "no path",
@@ -131,8 +139,7 @@ def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
         count = f"{len(params.points)} points" if len(params.points) > 1 else "its point"
         return passed(f"the path passes {count} within {significant(params.tolerance_m)} m", measured=figures)
     if stands(taken):
-        hint = "publish a velocity that is not 0, again and again for as long as it should drive"
-        return unjudged("it never moves", measured=figures, hint=hint)
+        return never_moves(taken, figures)
     words = _in_degrees(run) or what_is_wrong(taken, params.way, course, mirror=params.relative)
     verdict = failed(words.message, hint=words.hint, measured=figures)
     nearly = followed(taken, params.way.points, 2 * params.tolerance_m + _drift_m(run, taken, params.way))
@@ -140,6 +147,14 @@ def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
         return verdict
     # a robot that only just strays may have strayed with a machine that was late itself
     return excused(verdict, run, run.start_ns, run.end_ns, lambda late: late.reason(LATE_MS, LATE_P95_MS))
+
+
+def never_moves(path: Sequence[Pose], figures: str) -> Verdict:
+    """Return the loss of a robot that stays where it is, and turns there at most."""
+    if turned_rad(path) > TURNING_RAD:
+        hint = f"{DRIVE}: linear.x, and not only angular.z"
+        return unjudged("it turns, and never leaves its place", measured=figures, hint=hint)
+    return unjudged("it never moves", measured=figures, hint=DRIVE)
 
 
 def _drift_m(run: Run, path: Sequence[Pose], way: Way) -> float:
@@ -160,7 +175,7 @@ def _strays_late(course: Course, way: Way) -> bool:
 def _in_degrees(run: Run) -> Words | None:
     """A turn so fast that degrees are meant where radians are asked for."""
     # All topics: poses may be judged, and the velocities that led to them are on another one.
-    turns = ((c, turn) for c in run.student_channels() for turn in turns_of(c))
+    turns = ((c, one.turn) for c in run.student_channels() for _, one in commands_of(c))
     channel, fastest = max(turns, key=lambda one: abs(one[1]), default=(None, 0.0))
     if channel is None or abs(fastest) < DEGREES_FROM:
         return None

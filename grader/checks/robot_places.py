@@ -10,11 +10,12 @@ from typing import Annotated, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
-from grader.checks.robot_path import metres, spot, unreadable
+from grader.checks.robot_path import DRIVE, metres, never_moves, spot, unreadable
 from grader.checks.support.clocks import LATE_MS, Lateness, excused, no_clock, run_seconds
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.geometry import (
     MOVED_M,
+    TURNING_RAD,
     Area,
     Band,
     Point,
@@ -23,12 +24,14 @@ from grader.checks.support.geometry import (
     Region,
     Spot,
     Track,
+    commands_of,
     length_m,
     relative,
     set_off_s,
     shown_walls,
     stands,
     track,
+    turned_rad,
 )
 from grader.checks.support.processes import GlobalName, named_at, observed_until_ns
 from grader.checks.support.text import subscriber
@@ -37,12 +40,14 @@ from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Status, Verdict, failed, grade_again, inconclusive, passed, unjudged
-from grader.wording import join_words, significant
+from grader.wording import join_words, plural, significant
 
 STALLED_MS = 1000.0
 """In the time of the run, which may be faster than the wall's."""
 STILL_S = 0.5
 """A robot's speed at the end is that of so long a time."""
+TURNS_S = 3.0
+"""A robot that turns for so long, and does not drive, finds no way."""
 SLOW_M_S = 0.02
 SILENT_S, GAPS = 1.5, 5.0
 """Positions have ended where none came for so long, and for so many of their gaps, before the run's end."""
@@ -50,7 +55,12 @@ ROUNDING = 1e-9
 SAME_M = 0.005
 NEARLY = 1.25
 """A loss by no more than this factor is one that a single run's timing could have made."""
-DRIVE = "publish a velocity that is not 0, again and again for as long as it should drive"
+STEER = (
+    "the angle to turn by, towards a point, is math.atan2(dy, dx) minus the heading, both in radians, brought between "
+    "-pi and pi: math.remainder(angle, 2 * math.pi)"
+)
+STRAIGHT = 2.0
+"""A way that is longer by this factor than it brings the robot nearer is not a slow one, but a wrong one."""
 
 
 class Place(Record):
@@ -143,7 +153,7 @@ def ends_at(package: PackageFacts, run: Run, params: EndsAtParams) -> Verdict:
     verdict = _unreadable(found, package, run, params) or _not_asked(asked, run, params)
     if verdict is None and found is not None and asked is not None:
         judged = path_to_judge(found, asked, params)
-        verdict = _judge_arrival(judged, asked, params) if judged else _too_late(asked, params)
+        verdict = _judge_arrival(judged, asked, run, params) if judged else _too_late(asked, params)
         verdict = _fell_silent(package, run, judged, asked, params) or verdict
         verdict = _excused_end(verdict, judged, run, params) if judged else verdict
     assert verdict is not None  # noqa: S101 - one of them always is
@@ -196,12 +206,12 @@ def _too_late(asked: Stretch, params: EndsAtParams) -> Verdict:
     return grade_again(message)
 
 
-def _judge_arrival(judged: Sequence[Pose], asked: Stretch, params: EndsAtParams) -> Verdict:
+def _judge_arrival(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtParams) -> Verdict:
     last = judged[-1]
     apart_m = math.dist(last.point, params.goal)
     figures = f"{metres(apart_m)} from the goal, at {spot(last.point)}"
     if not params.is_there(last):
-        return _elsewhere(judged, asked, params).about(measured=figures)
+        return _elsewhere(judged, asked, run, params).about(measured=figures)
     outside = [index for index, pose in enumerate(judged) if not params.is_there(pose)]
     came_s = judged[outside[-1] + 1 if outside else 0].time_s - asked.began_s(judged)
     figures += f", after {came_s:.1f} s"
@@ -214,7 +224,7 @@ def _judge_arrival(judged: Sequence[Pose], asked: Stretch, params: EndsAtParams)
     return passed(f"it ends {metres(apart_m)} from {spot(params.goal)}", measured=figures)
 
 
-def _elsewhere(judged: Sequence[Pose], asked: Stretch, params: EndsAtParams) -> Verdict:
+def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtParams) -> Verdict:
     """Return how it misses the goal, by the likeliest cause."""
     last = judged[-1]
     at = f"it ends at {spot(last.point)}, {metres(math.dist(last.point, params.goal))} from {spot(params.goal)}"
@@ -227,7 +237,7 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, params: EndsAtParams) -> 
         never = (
             f"it never moves, and stays {metres(math.dist(last.point, params.goal))} from {spot(params.goal)}"
         )
-        return unjudged(never, hint=DRIVE)
+        return _never_moves(never, judged, asked, run)
     there = next((pose for pose in judged if params.is_near(pose)), None)
     if there is not None:
         message = f"it is there after {there.time_s - asked.began_s(judged):.1f} s, but keeps moving: {at}"
@@ -235,11 +245,37 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, params: EndsAtParams) -> 
     speed_m_s = _speed_m_s(judged)
     if speed_m_s > SLOW_M_S:
         message = f"{at}, and is still on its way at {speed_m_s:.2f} m/s"
-        away = math.dist(last.point, params.goal) > math.dist(judged[0].point, params.goal)
-        turn = "it drives away: the angle to the goal is math.atan2(dy, dx) minus the heading, between -pi and pi"
-        return failed(message, hint=turn if away else "drive faster, or take a shorter way")
+        nearer_m = math.dist(judged[0].point, params.goal) - math.dist(last.point, params.goal)
+        around, strays = turned_rad(judged) / math.tau, length_m(judged) > STRAIGHT * nearer_m
+        driven = f"it drives {metres(length_m(judged))} and is {metres(max(0.0, nearer_m))} nearer"
+        driven = driven if strays else f"it turns around {around:.1f} times on its way"
+        turn = f"{'it drives away' if nearer_m < 0 else driven}: {STEER}"
+        strays = strays or around > 1
+        return failed(message, hint=turn if strays else "drive faster, or take a shorter way")
+    if turned_rad(judged, STILL_S) > TURNING_RAD:
+        return failed(f"{at}, and turns on the spot", hint=STEER)
     hint = f"stop only where the distance is less than {significant(params.tolerance_m)} m"
     return failed(at, hint=hint)
+
+
+def _never_moves(message: str, judged: Sequence[Pose], asked: Stretch, run: Run) -> Verdict:
+    """Return the loss of a robot that stays where it is: it turns there, is told to stop, or is told nothing."""
+    if turned_rad(judged, STILL_S) > TURNING_RAD:
+        return unjudged(f"{message}, and turns on the spot", hint=STEER)
+    to_s = run_seconds(run)
+    sent = [
+        command
+        for c in run.student_channels()
+        for t, command in commands_of(c)
+        if to_s is not None and asked.from_s <= to_s(t) <= asked.to_s
+    ]
+    if not sent or any(command.speed or command.turn for command in sent):
+        return unjudged(message, hint=DRIVE)
+    message += f": {plural(len(sent), 'velocity', 'velocities')} came, and {'all are' if len(sent) > 1 else 'it is'} 0"
+    hint = (
+        "look at the condition that stops it: the distance is math.hypot(dx, dy), which is never less than 0"
+    )
+    return unjudged(message, hint=hint)
 
 
 def _fell_silent(
@@ -406,12 +442,17 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
     inside = share_inside(path, out)
     figures = f"{inside:.0%} of the time inside, {metres(max(out))} outside at most, {metres(long_m)} long"
     if stands(path) and (params.least_m or not any(out)):
-        return unjudged("it never moves", measured=figures, hint=DRIVE)
+        return never_moves(path, figures)
     if inside < params.share - ROUNDING or (params.share == 1 and any(out)):
         verdict = _outside(path, out, region, inside, params)
     elif long_m < params.least_m:
         message = f"its path is {metres(long_m)} long; {significant(params.least_m)} m are asked for"
-        verdict = failed(message, hint="keep driving while the way is clear")
+        hint = "keep driving while the way is clear"
+        recent = [pose for pose in path if pose.time_s >= path[-1].time_s - TURNS_S]
+        if stands(recent) and turned_rad(recent) > TURNING_RAD:
+            message += f", and it turns on the spot at {spot(path[-1].point)} in the end"
+            hint = "drive on where the way is clear: look at the ranges in front alone, by their angles in radians"
+        verdict = failed(message, hint=hint)
     else:
         always = f"for {inside:.0%} of the time" if any(out) else "all the time"
         return passed(f"it is {region.words} {always}", measured=figures)

@@ -221,7 +221,7 @@ def latched(package: PackageFacts, run: Run, params: LatchedParams) -> Verdict:
     elif plain:
         hint = publisher(params.topic, "…, latch=True, queue_size=1", "1, true")
         cited = named_at(package, run, "publisher", params.topic)
-        hint = f"on line {cited[0].line}, add `latch=True` to `rospy.Publisher(…)`" if cited else hint
+        hint = f"let `rospy.Publisher(…)` on line {cited[0].line} have `latch=True`" if cited else hint
         message = f"{join_words(plain)} publishes on {params.topic} without latching"
         verdict = failed(message, hint=hint, citations=cited)
     else:

@@ -290,9 +290,12 @@ def _judge_tests(outcome: SessionOutcome, params: PytestParams) -> Verdict:
 def _score_tests(counted: list[TestOutcome], score: float) -> Verdict:
     lost = [t for t in counted if t.outcome == "failed"]
     passing = f"{len(counted) - len(lost)} of {len(counted)} tests pass"
-    hint = "; ".join(f"{t.name}: {t.message}" for t in lost[:HINTS])
-    if len(lost) > HINTS:
-        hint += f"; and {len(lost) - HINTS} more"
+    what_to_do = dict.fromkeys(t.hint for t in lost if t.hint)
+    untold = [t for t in lost if not t.hint]
+    each = [*what_to_do, *(f"{t.name}: {t.message}" for t in untold)]
+    hint = "; ".join(each[:HINTS])
+    if len(each) > HINTS:
+        hint += f"; and {len(each) - HINTS} more"
     if score >= 1:
         return passed(passing, hint=hint)
     message = f"{passing}; failed: {lost[0].title.rstrip('.') or lost[0].name} ({lost[0].message})"
@@ -315,7 +318,8 @@ def _sub_score(test: TestOutcome) -> str:
 class TestOutcome(Record):
     """One test. `open`: a run that it asks for was not recorded. `message` is one line, empty where it passed.
 
-    `file` and `line` are the student's where an exception came from, `late` says that a function took too long.
+    `hint` says what to do, where that is known. `file` and `line` are the student's where an exception came from,
+    `late` says that a function took too long.
     """
 
     __test__ = False
@@ -325,6 +329,7 @@ class TestOutcome(Record):
     outcome: Outcome
     message: str
     points: float
+    hint: str = ""
     file: str = ""
     line: int | None = None
     late: bool = False

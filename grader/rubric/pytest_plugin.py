@@ -23,12 +23,14 @@ import pytest
 
 from grader.checks import Evidence, PackageFacts, Run, inconclusive
 from grader.checks.registry import NoSuchScenario, NotRecorded
+from grader.checks.support.console_output import Frame, Traceback
+from grader.checks.support.exit_causes import MAIN, explain_traceback
 from grader.installable import exists_somewhere, install_hint
 from grader.model.verdict import Status, machine_lacks
 from grader.rubric.pytest_check import Outcome, SessionOutcome, TestOutcome
 from grader.wording import shorten
 
-MESSAGE_CHARS = 200
+MESSAGE_CHARS = 300
 SAYING = (AssertionError, NotRecorded, pytest.fail.Exception, pytest.skip.Exception)
 """What a test says of the student's work; any other exception is a fault of the test."""
 _ADDRESS = re.compile(r"\b0x[0-9a-fA-F]{6,}\b")
@@ -88,6 +90,7 @@ class _Notes:
 
     def __init__(self, path: Path, config: pytest.Config) -> None:
         self._path = path
+        self._evidence = config.stash[_EVIDENCE]
         self._folder = str(path.parent)
         self._rootdir = str(config.rootpath)
         self._tests: dict[str, TestOutcome] = {}
@@ -136,18 +139,31 @@ class _Notes:
         message = "" if outcome == "passed" else self._message(error, report)
         name = item.name
         own = error if isinstance(error, StudentError) else StudentError("")
+        cause, hint = self._explanation(own)
         noted = self._tests.get(item.nodeid)
         if noted is None or noted.outcome == "passed":
             self._tests[item.nodeid] = TestOutcome(
                 name=name,
                 title=title,
                 outcome=outcome,
-                message=message,
+                message=self._short(f"{own.call} raises {cause}") if cause else message,
                 points=self._points(item),
+                hint=hint,
                 file=own.file,
                 line=own.line or None,
                 late=own.late,
             )
+
+    def _explanation(self, error: StudentError) -> tuple[str, str]:
+        """Return the cause and the hint of what a student's function raised; neither while a run is recorded."""
+        try:
+            package = self._evidence.package
+        except NotRecorded:
+            return "", ""
+        if error.raised is None:
+            return "", error.hint
+        ending = explain_traceback(error.raised, package)
+        return ending.cause, error.hint or ending.hint
 
     def _points(self, item: pytest.Item) -> float:
         marker = item.get_closest_marker("points")
@@ -192,11 +208,22 @@ Ask = Callable[[Answer], Answer]
 
 
 class StudentError(AssertionError):
-    """A student's function did not give back a value. `file` and `line` are the last of theirs that took part."""
+    """A student's function did not give back a value. `raised` has the last line of theirs that took part in an
+    exception, `call` what raised it, and `hint` what to do, where the exception does not tell."""
 
-    def __init__(self, message: str, *, file: str = "", line: int = 0, late: bool = False) -> None:
+    def __init__(
+        self,
+        message: str,
+        *,
+        hint: str = "",
+        call: str = "",
+        raised: Traceback | None = None,
+        late: bool = False,
+    ) -> None:
         super().__init__(message)
-        self.file, self.line, self.late = file, line, late
+        self.hint, self.call, self.raised, self.late = hint, call, raised, late
+        own = raised.frames[-1] if raised is not None and raised.frames else Frame("", 0)
+        self.file, self.line = own.file, own.line
 
 
 class StudentFile:
@@ -237,9 +264,12 @@ def _value(answer: Answer, shown: str) -> object:
     if "raised" in answer:
         raise _student_error(answer, shown)
     if "other" in answer:
-        raise StudentError(
-            f"{shown} gives back a {answer['other']}, not numbers, text, lists, tuples or dicts"
-        )
+        kind = str(answer["other"])
+        returned = getattr(builtins, kind, None)
+        if isinstance(returned, type) and issubclass(returned, BaseException):
+            message = f"{shown} gives back a {kind}, and does not raise it"
+            raise StudentError(message, hint=f"write `raise {kind}(…)`, not `return`")
+        raise StudentError(f"{shown} gives back a {kind}, not numbers, text, lists, tuples or dicts")
     fault = FAULTS.get(str(answer.get("fault")), "its answer cannot be read")
     message = str(answer["missing"]) if "missing" in answer else f"{shown}: {fault}"
     raise StudentError(message, late=answer.get("fault") == "late")
@@ -253,16 +283,24 @@ def _student_error(answer: Answer, shown: str) -> StudentError:
     if answer["raised"] == "ModuleNotFoundError" and module and exists_somewhere(module[1], ()):
         hint = install_hint(module[1], module=True)
         raise NotRecorded(machine_lacks(f"{module[1]} is not installed", hint=hint))
+    frames = (Frame(file, line, str(answer.get("source", ""))),) if file else ()
+    raised = Traceback(str(answer["raised"]), str(answer.get("message", "")), frames, 0, 0)
+    shown = f"import of {answer['imports']}" if "imports" in answer else shown
+    asks = "imports" in answer and raised.kind == "EOFError"
+    hint = (
+        f"put what the file does by itself below {MAIN}: who imports it wants its functions" if asks else ""
+    )
     place = f" ({file}:{line})" if file else ""
-    message = f"{shown} raises {answer['raised']}: {answer.get('message', '')}{place}"
+    message = f"{shown} raises {raised.text}{place}"
+    about: dict[str, Any] = {"hint": hint, "call": shown, "raised": raised}
     base = getattr(builtins, str(answer.get("builtin")), None)
     if isinstance(base, type) and issubclass(base, Exception):
         try:
             kind: type[StudentError] = type(base.__name__, (StudentError, base), {})
-            return kind(message, file=file, line=line)
+            return kind(message, **about)
         except TypeError:  # its layout is another one
             pass
-    return StudentError(message, file=file, line=line)
+    return StudentError(message, **about)
 
 
 def ask_arena(connection: socket.socket) -> Ask:

@@ -1,6 +1,6 @@
 """The tests that the example unit-tests runs on src/kinematics.py."""
 
-from math import cos, hypot, pi, sin
+from math import cos, pi, radians, sin
 
 import pytest
 
@@ -13,21 +13,40 @@ def hand(shoulder, elbow):
     return x, 0.5 * sin(shoulder) + 0.3 * sin(shoulder + elbow)
 
 
-@pytest.mark.parametrize("angles", [(0, 0), (pi / 2, 0), (0, pi / 2), (0.4, -1.1)])
+def rounded(found):
+    """Return numbers in brackets as the messages show them, and all else as it is."""
+    return f"({', '.join(f'{n:.3f}' for n in found)})" if has_numbers(found) else found
+
+
+def has_numbers(found):
+    """Return whether it is two numbers."""
+    return (
+        isinstance(found, list | tuple) and len(found) == 2 and all(isinstance(n, int | float) for n in found)
+    )
+
+
+@pytest.mark.parametrize("angles", [(0, 0), (pi / 2, 0), (2.5, pi / 2), (0.4, -1.1)])
 def test_forward(student, angles):
     """forward returns where the hand is."""
     found, right = student(FILE).forward(*angles), hand(*angles)
+    call = f"forward({angles[0]:.3g}, {angles[1]:.3g})"
+    taken = found == pytest.approx(hand(*map(radians, angles)), abs=1e-6)
     assert found == pytest.approx(right, abs=1e-6), (
-        f"forward({angles[0]:.3g}, {angles[1]:.3g}) should return ({right[0]:.3f}, {right[1]:.3f})"
+        f"{call} should return ({right[0]:.3f}, {right[1]:.3f}), and returned {rounded(found)}"
+        f"{': it takes its angles for degrees' if taken else ''}"
     )
 
 
 @pytest.mark.parametrize("place", [(0.7, 0), (0, 0.6), (-0.3, 0.4)])
 def test_inverse(student, place):
     """inverse returns angles that bring the hand to the place."""
-    found = hand(*student(FILE).inverse(*place))
-    away = hypot(found[0] - place[0], found[1] - place[1])
-    assert away < 1e-6, f"inverse{place} brings the hand to {found[0]:.3f}, {found[1]:.3f}"
+    angles = student(FILE).inverse(*place)
+    assert has_numbers(angles), f"inverse{place} returned {angles}, not two angles"
+    found, meant = hand(*angles), hand(*map(radians, angles))
+    assert found == pytest.approx(place, abs=1e-6), (
+        f"inverse{place} brings the hand to {rounded(found)}"
+        f"{': its angles are in degrees' if meant == pytest.approx(place, abs=1e-6) else ''}"
+    )
 
 
 def test_inverse_out_of_reach(student):
@@ -40,6 +59,7 @@ def test_inverse_out_of_reach(student):
 def test_wrap(student, angle):
     """wrap returns the same angle between -pi and pi."""
     found = student(FILE).wrap(angle)
+    assert isinstance(found, int | float), f"wrap({angle:.3f}) returned {found}, not an angle"
     assert -pi < found <= pi, f"wrap({angle:.3f}) returned {found:.3f}, which is not between -pi and pi"
     assert cos(found - angle) == pytest.approx(1), (
         f"wrap({angle:.3f}) returned {found:.3f}, which is another angle"

@@ -338,6 +338,16 @@ def test_a_class_that_the_build_makes_is_imported_from_its_module(tmp_path, sour
          "on line 4, write `a, b = map(float, sys.argv[1:3])`"),
         ("ask(a, b)", "genpy.message.SerializationError: field value must be an integer type",
          "on line 4, write `a, b = map(int, sys.argv[1:3])`"),
+        ("reading > 30", "TypeError: '>' not supported between instances of 'Reading' and 'int'",
+         "take the field that you mean: `reading.…`"),
+        ("abs(reading)", "TypeError: bad operand type for abs(): 'Reading'", "take one of its fields"),
+        ("math.floor(point.x / 2)", "ValueError: cannot convert float NaN to integer",
+         "go on to this line only if `math.isfinite(point.x)`"),
+        ("int(point.y)", "OverflowError: cannot convert float infinity to integer",
+         "go on to this line only if `math.isfinite(point.y)`"),
+        ("r ^ 2 - 1.0", "TypeError: unsupported operand type(s) for ^: 'float' and 'int'", "write `r ** 2 - 1.0`"),
+        ("open('/home/anna/a.csv', 'w')", "FileNotFoundError: [Errno 2] No such file or directory: '/home/anna/a.csv'",
+         "`import os`, and open `os.path.expanduser('~/a.csv')`"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_with_messages_is_told_with_their_fields(tmp_path, source, error, hint):

@@ -112,6 +112,7 @@ def test_a_statement_that_changes_nothing(tmp_path, code, fix):
 
 PAIR = "    def go(self):\n        self.pub.publish(1)\n"
 MADE = "    def __init__(self):\n        self.pub = 1\n"
+SET = "    def set(self):\n        self.pub = 1\n"
 OBJECTS = {
     "good": (f"class A:\n{MADE}{PAIR}a = A()\na.go()\nA.go(a)\n", ""),
     "inherited": (f"class A(B):\n{PAIR}A().go()\n", ""),
@@ -122,7 +123,9 @@ OBJECTS = {
     "int": (f"class A:\n{MADE.replace('init', 'int')}{PAIR}A().go()\n",
             "on line 2, write `__init__` instead of `__int__`"),
     "init": (f"class A:\n{MADE.replace('__', '')}{PAIR}A().go()\n", "on line 2, write `__init__` instead of `init`"),
-    "init-called": (f"class A:\n{MADE.replace('__', '')}{PAIR}a = A()\na.init()\na.go()\n", ""),
+    "init-called": (f"class A:\n{MADE.replace('__', '')}{PAIR}a = A()\na.init()\na.go()\n",
+                    "give `self.pub` its value in `__init__`, before anything can ask for it"),
+    "setup-called-at-first": (f"class A:\n{MADE.replace('self.pub = 1', 'self.set()')}{SET}{PAIR}A().go()\n", ""),
     "init-outside": (f"class A:\n{PAIR}def __init__(self):\n    self.pub = 1\n",
                      "indent `def __init__` on line 4 like the other methods of A, and its lines below it"),
     "without-self": (f"class A:\n{MADE.replace('self.pub', 'pub')}{PAIR}",

@@ -101,7 +101,10 @@ def answer(folder, request, modules):
             path = find(folder, name)
             if path is None:
                 return {"missing": "the package has no " + name}
-            modules[name] = load(path)
+            try:
+                modules[name] = load(path)
+            except BaseException as error:  # noqa: BLE001 - as below
+                return dict(describe(error, folder), imports=name)
         called = getattr(modules[name], function, None)
         if not callable(called):
             return {"missing": "{} has no function {}".format(name, function)}
@@ -134,17 +137,20 @@ def load(path):
 
 def describe(error, folder):
     """Return what was raised, and the last line of the package's own that took part."""
-    frames = [(frame.filename, frame.lineno) for frame in traceback.extract_tb(error.__traceback__)]
+    frames = [(f.filename, f.lineno, f.line or "") for f in traceback.extract_tb(error.__traceback__)]
     if isinstance(error, SyntaxError) and error.filename:
-        frames.append((error.filename, error.lineno))
-    own = [(os.path.relpath(file, folder), line) for file, line in frames if file.startswith(folder + os.sep)]
+        frames.append((error.filename, error.lineno, (error.text or "").strip()))
+    own = [frame for frame in frames if frame[0].startswith(folder + os.sep)]
     builtin = next(base.__name__ for base in type(error).__mro__ if base.__module__ == "builtins")
     try:
         message = str(error).strip().split("\n")[0]
     except Exception:  # noqa: BLE001 - their own class
         message = ""
     about = {"raised": type(error).__name__, "builtin": builtin, "message": message[:MESSAGE_CHARS]}
-    return dict(about, file=own[-1][0], line=own[-1][1]) if own else about
+    if not own:
+        return about
+    file, line, source = own[-1]
+    return dict(about, file=os.path.relpath(file, folder), line=line, source=source[:MESSAGE_CHARS])
 
 
 def encode(value):

@@ -82,6 +82,9 @@ def lacking_attributes(own):
     if astray:
         yield slip(astray[0].lineno, "object", astray[1], fix=astray[2], name="__init__")
     inside = set(ast.walk(astray[0])) if astray else set()
+    at_first = (
+        {called_name(n) for n in ast.walk(own.methods["__init__"])} if "__init__" in own.methods else set()
+    )
     for node, method in own.reads:
         name, stores = node.attr, own.stores.get(node.attr, [])
         givers = [m.name if m is not None else "__init__" for _, m in stores]
@@ -95,6 +98,11 @@ def lacking_attributes(own):
         elif not own.called.union(["__init__", method.name]).intersection(givers):
             message = "only `%s(…)` gives `self.%s` a value, and it was not called before" % (givers[0], name)
             fix = "give `self.%s` its value in `__init__`, or call `self.%s(…)` there" % (name, givers[0])
+            yield slip(node.lineno, "object", message, fix=fix, name=name)
+        elif not at_first.union(["__init__", method.name]).intersection(givers):
+            message = "line %d of `%s(…)` gives `self.%s` a value, and had not been reached"
+            fix = "give `self.%s` its value in `__init__`, before anything can ask for it" % name
+            message %= (stores[0][0].lineno, givers[0], name)
             yield slip(node.lineno, "object", message, fix=fix, name=name)
 
 

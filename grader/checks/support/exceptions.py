@@ -50,6 +50,7 @@ _COMMAND = re.compile(r"Command '(?:\[')?(.+?)(?:'\])?' returned non-zero exit s
 _CALLED = re.compile(r"'(\w+)' object is not callable")
 _WHOLE = re.compile(
     r"\bnot '?([A-Z]\w*)'?$|^object of type '([A-Z]\w*)'|^type ([A-Z]\w*) doesn't|^'([A-Z]\w*)' object is"
+    r"|^bad operand type for \S+ '([A-Z]\w*)'$"
 )
 """What Python says of a whole message where one of its values is meant."""
 _WANTS_NUMBER = re.compile(r"(?:real number|a number) is required, not (\w+)|must be real number, not (\w+)")
@@ -156,7 +157,7 @@ def _key(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning:
 
 
 def _value(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
-    if meaning := explain_ros_call(message, source):
+    if meaning := explain_ros_call(message, source) or _not_finite(message, source):
         return meaning
     if found := _UNPACKED.search(message):
         came = f"; {found[3]} came" if found[3] else ""
@@ -168,6 +169,20 @@ def _value(message: str, source: str, _marked: tuple[int, int] | None) -> Meanin
         hint = "convert only what is a number, and print text as it is"
         return f"{shown(found[1])} is text, not a number", hint
     return None
+
+
+def _not_finite(message: str, source: str) -> Meaning | None:
+    """Of `math.floor(point.x / width)`, or `int(…)`, where something in it is infinite or not a number."""
+    if message not in ("cannot convert float NaN to integer", "cannot convert float infinity to integer"):
+        return None
+    whole = calls_in_line(source, "int", "round", "floor", "ceil")
+    inner = whole[0].args[0] if len(whole) == 1 and whole[0].args else None
+    value = inner.left if isinstance(inner, ast.BinOp) else inner
+    checked = "…" if value is None else shown(ast.unparse(value))
+    return (
+        f"a value in this line is {'NaN' if 'NaN' in message else 'infinite'}, which no whole number is",
+        f"go on to this line only if `math.isfinite({checked})`: NaN is equal to nothing, so `==` never finds it",
+    )
 
 
 def _program(source: str) -> Meaning:
@@ -332,7 +347,10 @@ def _operands(left: str, right: str, source: str) -> Meaning | None:
             return f"`{shown(name)}` is the whole message ({message})", rewritten(
                 source, (sides[0], f"{name}.data")
             )
-        return f"one side is the whole message ({message})", "take its field: `msg.data`"
+        field = f"`{shown(name)}.…`" if name else "`msg.…`"
+        return f"one side is the whole message ({message})", f"take the field that you mean: {field}"
+    if "^" in source and {left, right} <= {"int", "float"}:
+        return "`^` is no power in Python", f"write `{shown(source.replace('^', '**'))}`"
     if "str" in (left, right):
         return "one side is a string", "turn the text into a number first: `float(…)`"
     return None
@@ -392,13 +410,15 @@ def _zero(_message: str, source: str, _marked: tuple[int, int] | None) -> Meanin
     return rate or ("it divides by zero", "check that the divisor is not 0 before you divide")
 
 
-def _file(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+def _file(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
     found = _NO_FILE.search(message)
     if found is None or found[1].startswith("/dev/"):
         return None
     path = found[1]
     here = f"os.path.join(os.path.dirname(os.path.abspath(__file__)), '{shown(path.rpartition('/')[2])}')"
     if path.startswith(("/", "~")):
+        if any(_is_to_write(call) for call in calls_in_line(source, "open")):
+            return "no other machine has this path", _below_home(path)
         return (
             "no other machine has this path",
             f"keep the file beside the script, `import os`, and open `{here}`",
@@ -414,11 +434,22 @@ def _unwritable(message: str, _source: str, _marked: tuple[int, int] | None) -> 
     found = _NOT_WRITABLE.search(message)
     if found is None or found[1].startswith("/dev/"):
         return None
-    path = f"os.path.expanduser('~/{shown(found[1].rpartition('/')[2])}')"
-    return (
-        "a node may not write to this place",
-        f"delete this line if the lab does not ask for a file, or `import os`, and open `{path}`",
+    hint = f"delete this line if the lab does not ask for a file, or {_below_home(found[1])}"
+    return "a node may not write to this place", hint
+
+
+def _is_to_write(call: ast.Call) -> bool:
+    mode = (
+        call.args[1]
+        if len(call.args) > 1
+        else next((k.value for k in call.keywords if k.arg == "mode"), None)
     )
+    return isinstance(mode, ast.Constant) and bool(re.search(r"[wax]", str(mode.value)))
+
+
+def _below_home(path: str) -> str:
+    """Return how a file is written that the node makes itself."""
+    return f"`import os`, and open `os.path.expanduser('~/{shown(path.rpartition('/')[2])}')`"
 
 
 def _command(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
@@ -446,6 +477,7 @@ _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | Non
     "IndexError": _index,
     "KeyError": _key,
     "ValueError": _value,
+    "OverflowError": lambda message, source, _: _not_finite(message, source),
     "TypeError": _type,
     "UnboundLocalError": _local,
     "AttributeError": _attribute,

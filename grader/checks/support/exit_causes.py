@@ -19,6 +19,7 @@ from grader.checks.support.exceptions import (
     explain_number_of_values,
     explain_operand,
 )
+from grader.checks.support.launch_slips import PROGRAMS_OF, programs_hint
 from grader.checks.support.missing_names import (
     IMPORT_ERRORS,
     broken_import,
@@ -41,7 +42,7 @@ from grader.checks.support.rospy_calls import (
     wrong_class,
 )
 from grader.checks.support.scripts import OF_INTERFACES, SYNTAX, path_in_package
-from grader.checks.support.text import LOOP, RATE_SLOT, SPIN, VALUE_SLOT, shown
+from grader.checks.support.text import LOOP, RATE_SLOT, SPIN, VALUE_SLOT, near_names, shown
 from grader.evidence.events import STOPPED
 from grader.evidence.run import Run
 from grader.installable import (
@@ -182,6 +183,7 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
     return Ending(f"it exited with code {code}{words}", RUN_IT)
 
 
+NO_PROGRAM = re.compile(r"cannot launch node of type \[([^/\]]+)/([^\]]+)\]: Cannot locate node")
 MAKES_NODES = {
     "init_node": "node-name",
     "Publisher": "publisher",
@@ -195,6 +197,10 @@ MAKES_NODES = {
 def _ran_to_the_end(printed: Sequence[str]) -> Ending:
     """Explain it by what was printed last, where an `except` may have printed it."""
     last = printed[-1] if printed else ""
+    if found := next(filter(None, map(NO_PROGRAM.search, printed)), None):
+        cause = f"roslaunch finds no program {shown(found[2])} in the package {shown(found[1])}"
+        near = near_names(found[2], PROGRAMS_OF.get(found[1], ()))
+        return Ending(cause, f'write type="{near[0]}"' if near else programs_hint(found[1]))
     hint = f"a node has to stay alive: `{SPIN}`, or a loop `{LOOP}`"
     if not PRINTED_ERROR.search(last):
         return Ending("its script ran to the end", hint, by_itself=True)

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from typing import Annotated, Any, NamedTuple, TypeGuard
 
 from pydantic import AfterValidator
@@ -19,7 +21,7 @@ from grader.checks.support.text import shown
 from grader.evidence.run import Channel
 from grader.model.message_definitions import NOT_FINITE
 from grader.model.verdict import Verdict, grade_again, unjudged
-from grader.wording import plural, significant
+from grader.wording import join_words, plural, significant
 
 ROUNDING = 1e-6
 _STEP = r"[A-Za-z]\w*(?:\[(?:\d+|\*)\])*"
@@ -130,6 +132,8 @@ def is_within(value: float, low: float | None, high: float | None) -> bool:
 
 
 FLOAT32 = 1e-6
+MOVED_MIN = 3
+"""Of a list of two numbers, both are told."""
 SQUARED_MIN = 2
 """The square of smaller numbers is too near to twice or half of them, or to themselves."""
 SLIP = 5e-3
@@ -191,8 +195,33 @@ def _in_items(
     if not isinstance(got, list | tuple) or len(got) != len(wanted):
         yield Difference(path, f"{value_text(got)}, not {value_text(wanted)}")
         return
-    for index, (one, value) in enumerate(zip(got, wanted, strict=True)):
-        yield from differences(one, value, tolerance, f"{path}[{index}]")
+    each = (
+        differences(one, value, tolerance, f"{path}[{index}]")
+        for index, (one, value) in enumerate(zip(got, wanted, strict=True))
+    )
+    first = next(found := chain.from_iterable(each), None)
+    if first is None:
+        return
+    if moved := _moved(got, wanted):
+        yield Difference(path, moved)
+    else:
+        yield first
+        yield from found
+
+
+def _moved(got: Sequence[object], wanted: Sequence[object]) -> str:
+    """Return where the rarest of a list's numbers is, and where it should be, if each number is there as often as it
+    should be; "" for any other list."""
+    if len(got) < MOVED_MIN or not all(map(is_number, (*got, *wanted))) or Counter(got) != Counter(wanted):
+        return ""
+    for number, _ in reversed(Counter(wanted).most_common()):
+        here, there = (
+            join_words(f"[{index}]" for index, one in enumerate(values) if one == number)
+            for values in (got, wanted)
+        )
+        if here != there:
+            return f"in another order: {value_text(number)} is at {here}, not at {there}"
+    return ""
 
 
 def _equal(got: object, wanted: object, tolerance: float) -> bool:

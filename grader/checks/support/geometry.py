@@ -30,6 +30,8 @@ Polyline = tuple[Point, ...]
 """Straight from point to point."""
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 Spot = tuple[Coordinate, Coordinate]
+TURNING_RAD = 0.1
+"""A robot that turns by less stands still."""
 FASTEST = 1e6
 MOVED_M = 0.01
 
@@ -128,6 +130,12 @@ def relative(path: Sequence[Pose]) -> list[Pose]:
 def stands(path: Sequence[Pose]) -> bool:
     """Return whether it never left its place."""
     return all(math.dist(p.point, path[0].point) <= MOVED_M for p in path)
+
+
+def turned_rad(path: Sequence[Pose], last_s: float = math.inf) -> float:
+    """Return by how much it turned in the last seconds, to either side."""
+    recent = [pose for pose in path if pose.time_s >= path[-1].time_s - last_s]
+    return sum(abs(math.remainder(b.heading - a.heading, math.tau)) for a, b in pairwise(recent))
 
 
 def set_off_s(path: Sequence[Pose]) -> float:
@@ -281,10 +289,11 @@ def _command(time_s: float, message: Any) -> Command | None:  # noqa: ANN401 - a
     return Command(time_s, linear["x"], linear["y"], angular["z"])
 
 
-def turns_of(channel: Channel) -> list[float]:
-    """Return the angular.z of each velocity that was sent on a topic; none for messages of another kind."""
-    commands = (_command(0.0, message) for message in channel.values) if "Twist" in channel.type else ()
-    return [one.turn for one in commands if one is not None and math.isfinite(one.turn)]
+def commands_of(channel: Channel) -> list[tuple[int, Command]]:
+    """Return when (ns) each velocity was sent on a topic, and what it was; none for messages of another kind."""
+    pairs = zip(channel.times_ns, channel.values, strict=True) if "Twist" in channel.type else ()
+    commands = ((time_ns, _command(0.0, message)) for time_ns, message in pairs)
+    return [(t, one) for t, one in commands if one is not None and _finite(one.forward, one.left, one.turn)]
 
 
 def _finite(*values: float) -> bool:

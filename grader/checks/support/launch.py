@@ -9,7 +9,14 @@ from typing import NamedTuple
 
 from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_traceback, process_tracebacks, syntax_hint
-from grader.checks.support.launch_slips import PROGRAMS_OF, at_its_lines, node_slip, own_script, owner_of
+from grader.checks.support.launch_slips import (
+    PROGRAMS_OF,
+    at_its_lines,
+    node_slip,
+    own_script,
+    owner_of,
+    programs_hint,
+)
 from grader.checks.support.parameters import explain_yaml
 from grader.checks.support.processes import early_end, lives, observed_until_ns
 from grader.checks.support.scripts import paths_by_name, programs, shebang_obstacles
@@ -370,7 +377,10 @@ def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | N
     why = f"roslaunch finds no program {node.type} in the package {node.pkg}"
     if near := near_names(str(node.type), PROGRAMS_OF.get(str(node.pkg), ())):
         return Absence(f"{why}; it has {near[0]}", f'write type="{near[0]}"')
-    return Absence(why, "type is the file's name, with .py for a script, and the file needs chmod +x")
+    hint = "type is the file's name, with .py for a script, and the file needs chmod +x"
+    if owner is None:
+        hint = programs_hint(str(node.pkg))
+    return Absence(why, hint)
 
 
 def _silent(run: Run, node: LaunchNode) -> Absence | None:

@@ -65,6 +65,11 @@ PROGRAMS_OF = {
 """What tutorials start of ROS's own packages."""
 
 
+def programs_hint(package: str) -> str:
+    """Return how to find what a package has to start."""
+    return f"write the name of one of its programs: `rosrun {shown(package)}` and Tab, twice, shows them"
+
+
 def find_launch(package: PackageFacts, name: str) -> LaunchFile | None:
     """Return the launch file of that name in any folder, one in `launch/` first."""
     found = [f for f in package.launch_files if PurePosixPath(f.path).name == name]
