@@ -268,6 +268,9 @@ class Later:
         for slip in self._of("not-called"):
             if "sleep" in slip.name:
                 yield Fix(f"on {_line(slip)}, {slip.fix}")
+        for slip in self._of("loop-left") if not self._ran else ():
+            if not slip.name:
+                yield Fix(f"{slip.fix}, since {slip.message}", (slip.fix,))
         for path in sorted(self._paths) if not self._ran else ():
             lines = [line[:LINE_CHARS] for line in self._build.file_lines(path)] if self._build else []
             yield from self._rate_of_lines(path, lines, significant(hz))

@@ -144,6 +144,23 @@ def stopped_loops(tree):
             yield slip(left.lineno, "loop-left", message, fix=fix)
 
 
+def published_before(tree):
+    """The only `publish(…)` of a file, where it stands above a loop that does nothing but wait."""
+    published = calls_in(tree, "publish")
+    for node in walk(tree) if len(published) == 1 else ():
+        above = None
+        for one in node.body if isinstance(getattr(node, "body", None), list) else ():
+            called = {called_name(n) for n in ast.walk(one) if isinstance(n, ast.Call)}
+            waits = isinstance(one, ast.While) and is_endless(one) and "sleep" in called
+            if isinstance(one, ast.Expr) and one.value is published[0]:
+                above = one.lineno
+            elif above and waits and called <= {"sleep", "is_shutdown"}:
+                message = "the publish(…) on line %d is above the loop on line %d, and runs once"
+                fix = "move line %d into that loop, above line %d, with the same spaces or tabs before it"
+                message, fix = message % (above, one.lineno), fix % (above, one.body[0].lineno)
+                yield slip(above, "loop-left", message, fix=fix)
+
+
 def is_counted(loop):
     """Whether it is `for … in range(…)`, or `while … and count < 10:`."""
     if isinstance(loop, ast.For):

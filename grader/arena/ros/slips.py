@@ -30,6 +30,7 @@ from script_loops import (
     is_shutdown,
     loop_rates,
     never_reached,
+    published_before,
     publishes_twice,
     sleepless_loops,
     sleeps_twice,
@@ -77,9 +78,9 @@ def slips(tree):
             fix = "delete line %d, which makes a number of it" % line if line else ""
             found.append(slip(node.lineno, "input", message, fix=fix, name=how_often(node, tree)))
     finders = (
-        misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops, sleeps_twice,
-        publishes_twice, callbacks, waiting_callbacks, queue_sizes, graph_names, object_slips, said_texts, deaf_loops,
-        clock_values, counter_slips, counter_starts, without_effect, assigned_late, hidden_names, subscribed_again,
+        misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, published_before, sleepless_loops,
+        sleeps_twice, publishes_twice, callbacks, waiting_callbacks, queue_sizes, graph_names, object_slips, said_texts,
+        deaf_loops, clock_values, counter_slips, counter_starts, without_effect, assigned_late, hidden_names, subscribed_again,
         imports, taken_off, unstarted_servers, wrong_values, unprinted_messages, values_left_out,
         unused_publishers,
     )  # fmt: skip
