@@ -114,6 +114,8 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (node(LOOP + "        p.publish(1)\n        break\n") + CALLED, [("loop-left", 6, "at the break on line 6")]),
         ("def heard(msg):\n    rospy.signal_shutdown('x')\nrospy.Subscriber('x', A, heard)\nrospy.spin()\n",
          [("loop-left", 2, "the callback `heard` ends the node on line 2, at the first message")]),
+        ("p = rospy.Publisher('a', A, 10)\n", [("queue-size", 1, "is no queue size")]),
+        ("p = rospy.Publisher('a', A, Listener(), queue_size=10)\n", []),
         (node("    p.publish(1)\n" + LOOP + "        rate.sleep()\n") + CALLED,
          [("loop-left", 4, "move line 4 into that loop, above line 6")]),
         (node("    p.publish(1)\n" + LOOP + "        work()\n        rate.sleep()\n") + CALLED, []),

@@ -226,14 +226,15 @@ def hidden_names(tree):
 
 
 def queue_sizes(tree):
-    """Publishers whose `queue_size` is a string: rospy takes it, and sends nothing."""
+    """Publishers whose `queue_size` is a string, or a number without its name: rospy takes it, and sends nothing."""
     for node in walk(tree):
+        third = node.args[2] if is_call(node, "Publisher") and len(node.args) == 3 else None
+        if isinstance(third, ast.Constant) and type(third.value) is int and third.value:
+            message = "the third value of `Publisher(…)` is no queue size, which it takes by its name"
+            fix = "write `queue_size=%d` instead of `%d`" % (third.value, third.value)
+            yield slip(third.lineno, "queue-size", message, fix=fix)
         for one in node.keywords if is_call(node, "Publisher") else ():
-            if (
-                one.arg == "queue_size"
-                and isinstance(one.value, ast.Constant)
-                and isinstance(one.value.value, str)
-            ):
-                size = one.value.value[:TEXT_LIMIT]
-                fix = "write `queue_size=%s`, without quotes" % (size or "10")
+            value = getattr(one.value, "value", None)
+            if one.arg == "queue_size" and isinstance(value, str):
+                fix = "write `queue_size=%s`, without quotes" % (value[:TEXT_LIMIT] or "10")
                 yield slip(one.value.lineno, "queue-size", "`queue_size` is a string", fix=fix)

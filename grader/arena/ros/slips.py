@@ -80,8 +80,8 @@ def slips(tree):
     finders = (
         misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, published_before, sleepless_loops,
         sleeps_twice, publishes_twice, callbacks, waiting_callbacks, queue_sizes, graph_names, object_slips, said_texts,
-        deaf_loops, clock_values, counter_slips, counter_starts, without_effect, assigned_late, hidden_names, subscribed_again,
-        imports, taken_off, unstarted_servers, wrong_values, unprinted_messages, values_left_out,
+        deaf_loops, clock_values, counter_slips, counter_starts, without_effect, assigned_late, hidden_names,
+        subscribed_again, imports, taken_off, unstarted_servers, wrong_values, unprinted_messages, values_left_out,
         unused_publishers,
     )  # fmt: skip
     for find in finders:
