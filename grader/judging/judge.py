@@ -18,6 +18,7 @@ from grader.checks.build import explain_by_build
 from grader.checks.registry import NotRecorded
 from grader.checks.support.exit_causes import explain_by_exception
 from grader.checks.support.launch import explain_by_refused_launch
+from grader.checks.support.launch_connections import explain_by_late_remap
 from grader.checks.support.parameters import explain_by_misplaced_parameter, explain_by_unread_parameter
 from grader.checks.support.processes import plain_type
 from grader.checks.support.scripts import without_git
@@ -248,6 +249,7 @@ def _with_made_up(rubric: Rubric, criterion: Criterion, verdict: Verdict) -> Ver
 
 EXPLANATIONS = (
     explain_by_refused_launch,
+    explain_by_late_remap,
     explain_by_exception,
     explain_by_unheard_topic,
     explain_by_unread_parameter,

@@ -54,7 +54,7 @@ MODULES = frozenset({"math", "os", "random", "rospy", "sys", "time"})
 
 
 def without_suffixes(text: str, types: list[str]) -> Iterator[Step]:
-    """`import helper.py` for `import helper`, wherever the code has it; then what else is wrong with imports."""
+    """`import talker.py` for `import talker`, wherever the code has it; then what else is wrong with imports."""
     named = [n for n in nodes_in(tree_of(text)) if isinstance(n, ast.Import | ast.ImportFrom | ast.Attribute)]
     places = {name: n.lineno for n in reversed(named) if (name := _file_of(n))}
     for name, line in sorted(places.items(), key=lambda one: one[1]):
@@ -70,7 +70,7 @@ def without_suffixes(text: str, types: list[str]) -> Iterator[Step]:
 
 
 def _file_of(node: ast.AST) -> str:
-    """Return what an import names with the `.py` of its file, `helper.py`; "" of any other."""
+    """Return what an import names with the `.py` of its file, `talker.py`; "" of any other."""
     names = [one.name for one in node.names] if isinstance(node, ast.Import) else []
     names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
     return next((name for name in names if name.endswith(".py")), "")

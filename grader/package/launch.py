@@ -142,6 +142,7 @@ def _record(path: str, parsed: _Parsed, own: tuple[str, ...], find: Find) -> Lau
         unknown_tags=tuple(_unknown(parsed.element)),
         switched_off=tuple(loaded.switched_off),
         unset_args=tuple(loaded.unset_args.values()),
+        late_remaps=tuple(loaded.late_remaps),
         commented=tuple(islice(_commented(parsed.element), _COMMENTED_MAX)),
     )
 

@@ -60,7 +60,7 @@ def loop_rate(call, timed, value, number):
         pause, fix = dotted(call.func) if timed == "sleep" else "", ""
         if is_call(value, "Duration"):
             pause, fix = dotted(value.func), "its second number counts nanoseconds, so it is %.9g s" % number
-        yield slip(value.lineno, "rate-number", hz, fix=fix, name=pause)
+        yield slip(call.lineno, "rate-number", hz, fix=fix, name=pause)
 
 
 def nanoseconds_apart(call):
