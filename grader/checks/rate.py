@@ -17,6 +17,7 @@ from grader.checks.support.fields import value_text
 from grader.checks.support.parameters import params_on_server, resolved_param, where_given
 from grader.checks.support.processes import (
     OnTopic,
+    copied_topic,
     is_written_as,
     life_of,
     observed_until_ns,
@@ -29,7 +30,6 @@ from grader.checks.support.topics import (
     Sender,
     call_in_comment,
     cite,
-    copied_topic,
     nothing_sent,
     sent_by,
     whole_until_ns,

@@ -272,8 +272,9 @@ class LaunchLine(Placed, Record):
 
 class LateRemap(LaunchLine):
     """A `<remap>` to the name `to` with no `<node>` behind it, and so without effect: its place is above the tag on
-    the line `above`."""
+    the line `above`. `namespace` is that of its group."""
 
+    namespace: str
     to: str
     above: int
 

@@ -141,10 +141,9 @@ class _Loader:
         tags = [one for one in parent if isinstance(one.tag, str) and wanted(one, scope)]
         starting = [place for place, one in enumerate(tags) if one.tag in STARTING]
         for one in (one for one in tags[starting[-1] :] if one.tag == "remap") if starting else ():
-            line, above = _line(one, scope, scope.get(one, "from")), line_of(tags[starting[0]]) or 0
-            self.loaded.late_remaps.append(
-                LateRemap(**line.model_dump(), to=_remap(one, scope)[1], above=above)
-            )
+            said = _line(one, scope, scope.get(one, "from")).model_dump()
+            said |= {"namespace": scope.namespace, "to": _remap(one, scope)[1]}
+            self.loaded.late_remaps.append(LateRemap(**said, above=line_of(tags[starting[0]]) or 0))
 
     def _note_off(self, element: etree._Element) -> None:
         """Note the nodes that are left out, by the `if` or `unless` of the tag that leaves them out."""

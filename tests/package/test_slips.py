@@ -114,6 +114,8 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (node(LOOP + "        p.publish(1)\n        break\n") + CALLED, [("loop-left", 6, "at the break on line 6")]),
         ("def heard(msg):\n    rospy.signal_shutdown('x')\nrospy.Subscriber('x', A, heard)\nrospy.spin()\n",
          [("loop-left", 2, "the callback `heard` ends the node on line 2, at the first message")]),
+        ("class A:\n    def go(self):\n        def stop(self):\n            pass\nA().stop()\n",
+         [("object", 5, "`stop` on line 3 is inside of `go`: begin line 3 with the same spaces or tabs as line 2")]),
         ("p = rospy.Publisher('a', A, 10)\n", [("queue-size", 1, "is no queue size")]),
         ("p = rospy.Publisher('a', A, Listener(), queue_size=10)\n", []),
         (node("    p.publish(1)\n" + LOOP + "        rate.sleep()\n") + CALLED,

@@ -204,6 +204,7 @@ def explain_by_late_remap(
     said = f"{verdict.message} {verdict.expected}"
     for late in (one for file in package.launch_files for one in file.late_remaps):
         ends = [topic for topic in had if f"/{topic}".endswith(f"/{late.value}")]
+        ends = [topic for topic in ends if topic.startswith(late.namespace)]
         spaces = {topic.removesuffix(late.value.lstrip("/")) for topic in ends}
         meant = {_whole(late.to, space) for space in spaces if space.endswith("/")}
         if any(topic not in had and re.search(rf"{re.escape(topic)}(?![\w/])", said) for topic in meant):

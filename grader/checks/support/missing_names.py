@@ -43,7 +43,7 @@ _IN_MODULE = re.compile(r"No module named '(\w+\.(?:msg|srv))\.(\w+)'")
 _KEYWORD = re.compile(r"got an unexpected keyword argument '(\w+)'")
 NO_MODULE = re.compile(r"No module named '(\w+)'$")
 _OF_MESSAGES = re.compile(r"No module named '(\w+)\.(\w+)'(?:$|; '\1' is not a package)")
-_HIDDEN = re.compile(r"'(\w+)\.[\w.]+'; '\1' is not a package|partially initialized module '(\w+)'")
+_HIDDEN = re.compile(r"'(\w+)\.(?!py')[\w.]+'; '\1' is not a package|partially initialized module '(\w+)'")
 KEYWORDS = (
     "anonymous", "log_level", "disable_signals", "argv", "queue_size", "latch", "tcp_nodelay", "headers", "callback",
     "callback_args", "buff_size", "subscriber_listener", "data_class", "oneshot", "timeout", "default",
