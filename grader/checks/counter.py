@@ -299,8 +299,8 @@ def _wrong(count: Count, found: Wrong, run: Run, params: StepParams) -> Verdict 
 def _of_clock(verdict: Verdict, count: Count, run: Run, package: PackageFacts, params: OnTopic) -> Verdict:
     """Return that neither a clock nor chance is a counter, where the script has its values from them. A clock may even
     have passed: it skips only when it is late. Nor is what several publishers send."""
-    if verdict.status.is_lost and (mixed := by_copies(package, run, params.topic, failed)):
-        return mixed
+    if mixed := by_copies(package, run, params.topic, failed):
+        return mixed if verdict.status.is_lost else verdict
     slip = next(
         (
             s

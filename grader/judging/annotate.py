@@ -214,4 +214,6 @@ def name_other_lines(verdict: Verdict, facts: Facts) -> Verdict:
     if not others:
         return verdict
     where = f"line{'s' if len(others) > 1 else ''} {numbers_text(others)}"
-    return verdict.model_copy(update={"hint": f"{verdict.hint}; on {where}, the same"})
+    return verdict.model_copy(
+        update={"hint": f"{verdict.hint}, and correct `{found['field']}` on {where} too"}
+    )

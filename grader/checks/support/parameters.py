@@ -273,11 +273,11 @@ def explain_by_overwritten_parameter(
     """Return a lost mark with the line that sets a parameter which the run or the launch file gives another value."""
     if not is_unexplained(check, verdict) or package is None or not isinstance(run, Run):
         return verdict
-    given = {name: one.value for name, one in params_given(run).items()}
+    given, nodes = {name: one.value for name, one in params_given(run).items()}, run.student_nodes()
     for _, event in run.params:
         name = absolute_name(event.name)
         param = where_given(package, name)
-        own = run.is_student_node(event.caller_id) and event.action == "set"
+        own = event.caller_id in nodes and event.action == "set"
         if not own and (name in given or param is not None):
             given[name] = event.value
         elif own and name in given and given[name] != event.value:

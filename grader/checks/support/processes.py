@@ -176,11 +176,19 @@ def copied_topic(
 
 
 def by_copies(package: PackageFacts, run: Run, topic: str, of_node: Callable[..., Verdict]) -> Verdict | None:
-    """Return that several lines of a script publish on a topic which one of them is for; None where one does."""
+    """Return that a script publishes on a topic with several types, of which one is for it; None where none does."""
     copied = copied_topic(package, run, "publisher", topic)
+    named = {
+        s.place for s in run_slips(package, run, "publisher") if s.message.strip("/") == topic.strip("/")
+    }
+    if (
+        not copied
+        or len({s.message for s in run_slips(package, run, "publisher-type") if s.place in named}) < 2
+    ):
+        return None
     hint = f"give the one of {copied} that is for another topic that topic's name"
-    why = f"{copied} publish on {topic}, with what is for it and what is not: rospy sends all by the type of the first"
-    return of_node(why, hint=hint) if copied else None
+    why = f"{copied} publish on {topic} with several types: rospy sends all by the type of the first"
+    return of_node(why, hint=hint)
 
 
 def run_scripts(run: Run) -> set[str | None]:
