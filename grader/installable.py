@@ -141,8 +141,9 @@ def nearest_module(name: str, own: Collection[str]) -> str:
 
 def is_python_module(name: str) -> bool:
     """Return whether it is a known module of Python that is none of ROS's."""
-    return name not in OF_ROS and all(
-        one.startswith((PIP, "python3-")) for one in known_packages().get(name, ("",))
+    packages = known_packages().get(name, ())  # none: only ROS's own repository has it
+    return (
+        name not in OF_ROS and bool(packages) and all(one.startswith((PIP, "python3-")) for one in packages)
     )
 
 

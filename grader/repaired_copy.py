@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 
 from grader.files import temporary_folder
-from grader.judging.repair_charges import BUILD, DONE_BEFORE_RUNS, is_unmade
+from grader.judging.repair_charges import BUILD, DONE_BEFORE_RUNS, OF_PACKAGES, is_unmade
 from grader.judging.repeats_and_repairs import (
     concerns,
     is_first_line_added,
@@ -36,7 +36,7 @@ from grader.rubric.model import Rubric
 
 REPAIRED, REPEATED = "repaired-1", "repeated-1"
 REPAIRS_MAX = 4
-"""So many lines are repaired, however many mistakes are on one."""
+"""So many lines of scripts and launch files are repaired, however many mistakes are on one."""
 
 
 def choose_repairs(
@@ -75,8 +75,7 @@ def choose_repairs(
         for one in counting
         if one.kind not in DONE_BEFORE_RUNS and (any(uses(name, one) for name in lost) or unblocks(one))
     ]
-    places = list(dict.fromkeys((one.file, one.line or one.before) for one in helping))[:REPAIRS_MAX]
-    chosen = [one for one in helping if (one.file, one.line or one.before) in places]
+    chosen = most_of(helping)
     scenarios = sorted(name for name in lost if any(uses(name, one) for one in chosen))
     if not scenarios and not any(map(unblocks, chosen)):
         return (), ()
@@ -87,6 +86,15 @@ def choose_repairs(
     return (*(one for one in before if not is_first_line_added(one, rubric, chosen)), *chosen), tuple(
         scenarios
     )
+
+
+def most_of(helping: Sequence[Repair]) -> list[Repair]:
+    """Return the repairs of so many lines, and all of the manifest and of CMakeLists.txt: they need no run of their
+    own, and without one of them the build shows nothing of the others."""
+    places = dict.fromkeys((one.file, one.line or one.before) for one in helping)
+    of_build = [place for place in places if posixpath.basename(place[0]) in OF_PACKAGES]
+    others = [place for place in places if place not in of_build][:REPAIRS_MAX]
+    return [one for one in helping if (one.file, one.line or one.before) in {*of_build, *others}]
 
 
 def _find_in_all(submission: Submission, facts: PackageFacts, rubric: Rubric) -> list[Repair]:

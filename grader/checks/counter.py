@@ -28,6 +28,7 @@ from grader.checks.support.counters import (
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.processes import (
     OnTopic,
+    by_copies,
     is_written_as,
     slips_of,
 )
@@ -240,6 +241,8 @@ def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
     if losses(run, topic):
         return grade_again(f"too little was recorded on {topic}", measured="no number")
     if any(c.messages for c in run.student_channels(topic)):
+        if mixed := by_copies(package, run, topic, unjudged):
+            return mixed.about(measured="no number")
         hint = "publish the counter itself, as an Int8"
         return unjudged(f"{topic} carries no numbers", measured="no number", hint=hint)
     return no_message(package, run, topic).about(measured="no message")
@@ -295,7 +298,9 @@ def _wrong(count: Count, found: Wrong, run: Run, params: StepParams) -> Verdict 
 
 def _of_clock(verdict: Verdict, count: Count, run: Run, package: PackageFacts, params: OnTopic) -> Verdict:
     """Return that neither a clock nor chance is a counter, where the script has its values from them. A clock may even
-    have passed: it skips only when it is late."""
+    have passed: it skips only when it is late. Nor is what several publishers send."""
+    if mixed := by_copies(package, run, params.topic, failed):
+        return mixed if verdict.status.is_lost else verdict
     slip = next(
         (
             s

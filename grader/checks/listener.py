@@ -19,6 +19,7 @@ from grader.checks.support.console_output import (
 from grader.checks.support.exit_causes import explain_early_end, explain_error
 from grader.checks.support.processes import (
     GlobalName,
+    copied_topic,
     is_written_as,
     lives,
     named_at,
@@ -41,7 +42,6 @@ from grader.checks.support.text import (
 from grader.checks.support.topics import (
     call_in_comment,
     cite,
-    copied_topic,
     misfit,
     refused_type,
     run_slip,

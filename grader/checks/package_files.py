@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
@@ -368,6 +369,8 @@ def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
     slip = f"; it declares {join_words(near)}" if near else ""
     last = max((d.line for d in at_build), default=_last_line(found))
     lines = tuple(FileCitation(file=found.file, line=d.line) for d in at_build)
+    if joined := _in_one_tag(found, missing):
+        return joined
     misspelt = [d for d in found.dependencies if d.kind in RUNTIME_KINDS and d.name in near]
     hint = f"add {' '.join(f'<{tag}>{n}</{tag}>' for n in missing)} below line {last}"
     if len(missing) == len(misspelt) == 1:
@@ -380,6 +383,23 @@ def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
         citations=lines or (FileCitation(file=found.file, line=last),),
     )
     return verdict.seeking("dependency", missing[0]) if len(missing) == 1 else verdict
+
+
+def _in_one_tag(found: Manifest, missing: Sequence[str]) -> Verdict | None:
+    """Return the tags that name several packages at once, where these are all that is missing."""
+    apart = {
+        d: re.split(r"[\s,;]+", d.name.strip(" ,;")) for d in found.dependencies if d.kind in RUNTIME_KINDS
+    }
+    joined = {d: names for d, names in apart.items() if len(names) > 1 and set(names) & set(missing)}
+    if not set(missing) <= {name for names in joined.values() for name in names}:
+        return None
+    lines = join_words(f"line {d.line} names {join_words(names)} in one tag" for d, names in joined.items())
+    tags = (
+        f"on line {d.line}, write {' '.join(f'<{d.kind}>{n}</{d.kind}>' for n in joined[d])}" for d in joined
+    )
+    message = f"{found.file} does not declare {join_words(missing)} as a run-time dependency: {lines}"
+    cited = tuple(FileCitation(file=found.file, line=d.line) for d in joined)
+    return failed(message, measured=_declared_text(found), hint=join_words(tags), citations=cited)
 
 
 def _last_line(found: Manifest) -> int:

@@ -17,6 +17,7 @@ from grader.checks.support.fields import value_text
 from grader.checks.support.parameters import params_on_server, resolved_param, where_given
 from grader.checks.support.processes import (
     OnTopic,
+    copied_topic,
     is_written_as,
     life_of,
     observed_until_ns,
@@ -29,7 +30,6 @@ from grader.checks.support.topics import (
     Sender,
     call_in_comment,
     cite,
-    copied_topic,
     nothing_sent,
     sent_by,
     whole_until_ns,
@@ -274,10 +274,12 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
     message = f"{params.topic} falls silent {lasted} after its first message, although its node keeps running"
     if slow := _asked_slow(found, run, package, params):
         return slow
-    if slip := next(iter(_slips(run, package, params, "spin-in-loop", "unregistered")), None):
+    others = _goes_on(found, run, params)
+    kinds: tuple[SlipKind, ...] = ("spin-in-loop", "unregistered", *(() if others else ("loop-left",)))
+    if slip := next(iter(_slips(run, package, params, *kinds)), None):
         return failed(f"{message}: {slip.message}", hint=slip.fix, citations=(slip.place,))
     hint = f"publish in a loop `{LOOP}`, not a fixed number of times"
-    if others := _goes_on(found, run, params):
+    if others:
         message += f" and goes on publishing on {others}"
         hint = f"publish on {params.topic} in the loop that publishes on {others} too"
     return failed(message, hint=hint).if_repeated()

@@ -12,6 +12,7 @@ from grader.checks.support.processes import (
     GlobalPattern,
     OnTopic,
     TypeName,
+    by_copies,
     is_called,
     named_at,
     plain_type,
@@ -105,6 +106,8 @@ def _wrong_type(package: PackageFacts, run: Run, channel: Channel, params: Topic
     hint = f"{imports(of_types, name, 'msg')}, then {call}"
     message = f"{channel.publisher} publishes {plain_type(channel.type)} on {params.topic}, not {params.type}"
     cited = named_at(package, run, "publisher", params.topic)
+    if mixed := by_copies(package, run, params.topic, failed):
+        message, hint = f"{message}: {mixed.message}", mixed.hint
     return failed(message, hint=hint, citations=cited)
 
 

@@ -19,15 +19,18 @@ from grader.checks.support.launch import not_executable
 from grader.checks.support.launch_slips import node_slip, own_script
 from grader.checks.support.scripts import BACKUPS, PYTHON, SYNTAX, installed, is_product, names_script
 from grader.checks.support.text import RATE_SLOT, TYPE_SLOT, VALUE_SLOT, in_language
+from grader.evidence.events import PACKAGE_RUN
 from grader.installable import noetic_messages
+from grader.judging.cited_lines import LINE_CHARS, LINES_READ
 from grader.judging.facts import SOURCES, Facts, language_of
 from grader.model.package import LaunchFile, PackageFacts
 from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation, Status, Verdict, cited_lines
 from grader.rubric.model import Criterion, Rubric
-from grader.wording import significant
+from grader.wording import numbers_text, significant
 
 POINTS_MAX = 3
+_NO_FIELD = re.compile(r"has no attribute '(?P<field>\w+)'.*? \((?P<file>[\w./-]+), line (?P<line>\d+)\)")
 USUAL_RATE_HZ = 10
 Told = TypeVar("Told", Verdict, CriterionResult)
 OF_FILES = ("build", "cmake", "manifest")
@@ -196,3 +199,21 @@ def fill_slots(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdic
     hz = float(str(asked.get("rate", {}).get("rate_hz", USUAL_RATE_HZ)))
     hint = verdict.hint.replace(VALUE_SLOT, value).replace(RATE_SLOT, f"rospy.Rate({significant(hz)})")
     return verdict.model_copy(update={"hint": hint})
+
+
+def name_other_lines(verdict: Verdict, facts: Facts) -> Verdict:
+    """Return the verdict; where a field is not there that a line reads or sets, its hint has the other lines too."""
+    found, build = _NO_FIELD.search(verdict.message), facts.runs.get(PACKAGE_RUN)
+    if found is None or build is None or not verdict.hint.startswith("write "):
+        return verdict
+    lines = [line.partition("#")[0] for line in build.file_lines(found["file"])[:LINES_READ]]
+    number = int(found["line"])
+    owner = re.search(rf"(?:\w+\.)+{found['field']}\b", lines[number - 1] if number <= len(lines) else "")
+    same = re.compile(rf"(?<![\w.]){re.escape(owner[0])}\b") if owner is not None else None
+    others = [n for n, line in enumerate(lines, 1) if n != number and same and same.search(line[:LINE_CHARS])]
+    if not others:
+        return verdict
+    where = f"line{'s' if len(others) > 1 else ''} {numbers_text(others)}"
+    return verdict.model_copy(
+        update={"hint": f"{verdict.hint}, and correct `{found['field']}` on {where} too"}
+    )

@@ -18,7 +18,12 @@ from grader.checks.build import explain_by_build
 from grader.checks.registry import NotRecorded
 from grader.checks.support.exit_causes import explain_by_exception
 from grader.checks.support.launch import explain_by_refused_launch
-from grader.checks.support.parameters import explain_by_misplaced_parameter, explain_by_unread_parameter
+from grader.checks.support.launch_connections import explain_by_late_remap
+from grader.checks.support.parameters import (
+    explain_by_misplaced_parameter,
+    explain_by_overwritten_parameter,
+    explain_by_unread_parameter,
+)
 from grader.checks.support.processes import plain_type
 from grader.checks.support.scripts import without_git
 from grader.checks.support.text import near_names, texts_in
@@ -38,6 +43,7 @@ from grader.judging.annotate import (
     compile_command,
     fill_slots,
     lab_names,
+    name_other_lines,
     with_lab_names,
     with_own_name,
 )
@@ -248,8 +254,10 @@ def _with_made_up(rubric: Rubric, criterion: Criterion, verdict: Verdict) -> Ver
 
 EXPLANATIONS = (
     explain_by_refused_launch,
+    explain_by_late_remap,
     explain_by_exception,
     explain_by_unheard_topic,
+    explain_by_overwritten_parameter,
     explain_by_unread_parameter,
     explain_by_misplaced_parameter,
     explain_by_wrong_value,
@@ -280,7 +288,7 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
                 found = explain(check, package, run, found)
             found = explain_by_build(package, facts.runs.get(PACKAGE_RUN), found)
         found = fill_slots(choose_hint_language(found, criterion, facts), criterion, facts.rubric)
-        found = _with_package_name(found, criterion, facts)
+        found = _with_package_name(name_other_lines(found, facts), criterion, facts)
         return _without_git(found, facts.package)
     except NotRecorded as missing:
         return missing.verdict

@@ -18,7 +18,7 @@ from grader.checks.support.launch import NOT_STARTED, refusal, unset_arg_fixes
 from grader.checks.support.launch_connections import find_renaming
 from grader.checks.support.launch_slips import find_launch, later_fixes, refusals
 from grader.checks.support.missing_names import name_slip
-from grader.checks.support.scripts import SYNTAX
+from grader.checks.support.scripts import SYNTAX, cmake_calls
 from grader.checks.support.text import (
     IN_OWN_WORDS,
     SAID_DATA,
@@ -29,6 +29,7 @@ from grader.checks.support.text import (
     in_language,
     in_source,
     in_words,
+    near_names,
     says,
     texts_in,
     texts_of_cpp,
@@ -191,7 +192,7 @@ class Later:
         """Yield how each is repaired."""
         by_check = {
             "rate": self._rate, "node-name": self._node_name, "hears": self._heard, "topic-type": self._published,
-            "message": self._message, "logs": self._logged, "copies": self._copied,
+            "build": self._built, "message": self._message, "logs": self._logged, "copies": self._copied,
         }  # fmt: skip
         if not self._ran:
             yield from self._names()
@@ -254,6 +255,22 @@ class Later:
             if slip.name:
                 yield Fix(f"write `while not {slip.name}():` on {_line(slip)}", (slip.fix,))
 
+    def _built(self) -> Iterator[Fix]:
+        """Sources of C++ that are not there: CMake asks for them only once it has found all packages."""
+        calls = cmake_calls(self._package, "add_executable", "add_library")
+        words = (word for call in calls for word in call.args[1:])
+        named = dict.fromkeys(word for word in words if PurePosixPath(word).suffix in SOURCES)
+        there = [one.path for one in self._package.files if PurePosixPath(one.path).suffix in SOURCES]
+        for path in (one for one in named if "$" not in one and self._package.file(one) is None):
+            near = near_names(path, there)
+            fix = (
+                f"write {near[0]} instead of {path}"
+                if near
+                else f"add {path}, which is not there, and push it"
+            )
+            if path not in self._verdict.message:
+                yield Fix(f"{fix}, since CMakeLists.txt builds a target of it" if not near else fix)
+
     def _function_at(self, slip: PythonSlip) -> int:
         """Return the line of the last `def` above the slip: what gives a name its value there is of use below it."""
         lines = self._build.file_lines(slip.file)[: slip.line] if self._build is not None else []
@@ -286,6 +303,9 @@ class Later:
         for slip in self._of("not-called"):
             if "sleep" in slip.name:
                 yield Fix(f"on {_line(slip)}, {slip.fix}")
+        for slip in self._of("loop-left") if not self._ran else ():
+            if not slip.name:
+                yield Fix(f"{slip.fix}, since {slip.message}", (slip.fix,))
         for path in sorted(self._paths) if not self._ran else ():
             lines = [line[:LINE_CHARS] for line in self._build.file_lines(path)] if self._build else []
             yield from self._rate_of_lines(path, lines, significant(hz))

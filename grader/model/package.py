@@ -270,6 +270,15 @@ class LaunchLine(Placed, Record):
     line: int
 
 
+class LateRemap(LaunchLine):
+    """A `<remap>` to the name `to` with no `<node>` behind it, and so without effect: its place is above the tag on
+    the line `above`. `namespace` is that of its group."""
+
+    namespace: str
+    to: str
+    above: int
+
+
 class LaunchArg(Placed, Record):
     """An `<arg>` that has no value where `$(arg …)` asks for it. `declared`: there is an `<arg>`, without a default,
     and `line` is its own; else the line that asks."""
@@ -361,6 +370,7 @@ class LaunchFile(Record):
     commented: tuple[tuple[str, int], ...] = ()
     switched_off: tuple[tuple[str, int, str], ...] = ()
     unset_args: tuple[LaunchArg, ...] = ()
+    late_remaps: tuple[LateRemap, ...] = ()
 
     def starts(self, programs: AbstractSet[str]) -> set[str]:
         """Return which of these programs the file starts, by their names; the `.py` may be missing."""

@@ -43,8 +43,8 @@ class PythonSlip(Placed, Record):
     - `main-guard`: `__name__` is compared with another word than `__main__`.
     - `never-reached`: an endless loop before the first `publish(…)`.
     - `spin-in-loop`: a loop that publishes and waits in `spin()`.
-    - `loop-left`: a loop that ends in its first turn, or after a number of them, or a callback that ends the node;
-      `name` is the function that it asks, where a `not` is missing.
+    - `loop-left`: a loop that ends in its first turn, or after a number of them, or a callback that ends the node, or
+      the only `publish(…)`, above a loop that waits; `name` is the function that it asks, where a `not` is missing.
     - `sleep-outside`, `sleep-twice`: a loop whose `sleep()` is outside it, or that waits twice in each turn.
     - `publish-twice`: a loop that publishes on one topic more than once in each turn.
     - `deaf`: why the node goes on after Ctrl-C.

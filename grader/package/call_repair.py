@@ -400,8 +400,11 @@ def _bound_in(part: ast.AST) -> set[str]:
 
 def _numbers(call: ast.Call, name: str) -> Iterator[Argument]:
     size = next((k.value for k in call.keywords if k.arg == "queue_size"), None)
-    first = call.args[0] if call.args else None
-    if _is_text(size) and size.value.isdigit():
+    first, third = call.args[0] if call.args else None, call.args[2] if len(call.args) == 3 else None
+    if name == "Publisher" and size is None and third is not None and _is_number(third):
+        why = "the third value of `Publisher(…)` is no queue size, which it takes by its name"
+        yield Argument([(third, f"queue_size={ast.unparse(third)}")], why)
+    elif _is_text(size) and size.value.isdigit():
         yield Argument([(size, size.value)], "`queue_size` is a string")
     elif name in {"Rate", "sleep"} and _is_text(first) and first.value.replace(".", "", 1).isdigit():
         yield Argument([(first, first.value)], f"`rospy.{name}` takes a number, not a string")

@@ -48,7 +48,32 @@ OF_ROS = {
 """Modules that there are, whose names begin like that of another one."""
 MODULES_OF_MESSAGES = ("point_cloud2",)
 """Modules beside the `msg` of a package of messages, called nearly like a class."""
+NO_MESSAGES = "messages are not imported from {}"
+SUFFIX = "the module of {} is called {}"
 MODULES = frozenset({"math", "os", "random", "rospy", "sys", "time"})
+
+
+def without_suffixes(text: str, types: list[str]) -> Iterator[Step]:
+    """`import talker.py` for `import talker`, wherever the code has it; then what else is wrong with imports."""
+    named = [n for n in nodes_in(tree_of(text)) if isinstance(n, ast.Import | ast.ImportFrom | ast.Attribute)]
+    places = {name: n.lineno for n in reversed(named) if (name := _file_of(n))}
+    for name, line in sorted(places.items(), key=lambda one: one[1]):
+        lines = text.split("\n")
+        for number in {n.lineno - 1 for n in named if _file_of(n) or ast.unparse(n) == name}:
+            lines[number] = re.sub(rf"(?<![\w.]){re.escape(name)}\b", name.removesuffix(".py"), lines[number])
+        for step in step_to(
+            "module", line, text, "\n".join(lines), SUFFIX.format(name, name.removesuffix(".py"))
+        ):
+            text = step["text"]
+            yield step
+    yield from with_modules(text, types)
+
+
+def _file_of(node: ast.AST) -> str:
+    """Return what an import names with the `.py` of its file, `talker.py`; "" of any other."""
+    names = [one.name for one in node.names] if isinstance(node, ast.Import) else []
+    names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+    return next((name for name in names if name.endswith(".py")), "")
 
 
 def with_modules(text: str, types: list[str]) -> Iterator[Step]:
@@ -79,7 +104,9 @@ def with_modules(text: str, types: list[str]) -> Iterator[Step]:
         lines, at = text.split("\n"), node.lineno - 1
         after = re.sub(rf"from\s+{re.escape(module)}\b", f"from {near}.msg", lines[at], count=1)
         if near and all(_is_near_one(name, known[near]) for name in names) and after != lines[at]:
-            for step in step_to("module", at + 1, text, with_line(lines, at, after), module):
+            for step in step_to(
+                "module", at + 1, text, with_line(lines, at, after), NO_MESSAGES.format(module)
+            ):
                 text = step["text"]
                 yield step
 
@@ -137,7 +164,7 @@ def _with_class_imported(text: str, node: ast.Import, known: dict[str, set[str]]
         if others := [ast.unparse(ast.Import([other])) for other in node.names if other is not one]:
             blanks = lines[at][: len(lines[at]) - len(lines[at].lstrip())]
             after = "\n".join(blanks + line for line in (*others, right))
-        yield from step_to("module", at + 1, text, with_line(lines, at, after), one.name)
+        yield from step_to("module", at + 1, text, with_line(lines, at, after), NO_MESSAGES.format(one.name))
         return
 
 
@@ -147,7 +174,8 @@ def _with_inner_module(text: str, node: ast.Import) -> Iterator[Step]:
     lines, at = text.split("\n"), node.lineno - 1
     if package in MESSAGES and is_one_edit(inner.lower(), "msg"):
         after = lines[at].replace(f"{package}.{inner}", f"{package}.msg", 1)
-        yield from step_to("module", at + 1, text, with_line(lines, at, after), f"{package}.{inner}")
+        why = NO_MESSAGES.format(f"{package}.{inner}")
+        yield from step_to("module", at + 1, text, with_line(lines, at, after), why)
 
 
 def with_imports(text: str, types: list[str]) -> Iterator[Step]:

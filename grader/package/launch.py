@@ -14,6 +14,7 @@ from grader.model.package import Fault, LaunchFile, LaunchNode
 from grader.package.launch_loader import Find, Scope, load, unknown_attributes, wanted
 from grader.package.reading import read_markup
 from grader.package.xml import line_of, parse_what_is_left, parse_xml
+from grader.wording import is_one_edit
 
 _FILES_MAX = 100
 _TAGS_MAX = 20_000
@@ -142,6 +143,7 @@ def _record(path: str, parsed: _Parsed, own: tuple[str, ...], find: Find) -> Lau
         unknown_tags=tuple(_unknown(parsed.element)),
         switched_off=tuple(loaded.switched_off),
         unset_args=tuple(loaded.unset_args.values()),
+        late_remaps=tuple(loaded.late_remaps),
         commented=tuple(islice(_commented(parsed.element), _COMMENTED_MAX)),
     )
 
@@ -169,7 +171,9 @@ def _unknown(parent: etree._Element) -> Iterator[tuple[str, int]]:
 def _wrong_root(path: str, root: str, line: int | None) -> Fault:
     letters = " in lower case" if root.lower() == "launch" else ""
     cause = f"the file begins with `<{root}>`; roslaunch wants `<launch>`{letters}"
-    return Fault(file=path, line=line, kind="WrongRoot", message=f"root tag is {root}", cause=cause)
+    fix = f"write `<launch>` instead of `<{root}>`, and `</launch>` instead of `</{root}>`"
+    fix = fix if is_one_edit(root.lower(), "launch") or letters else ""
+    return Fault(file=path, line=line, kind="WrongRoot", message=f"root tag is {root}", cause=cause, fix=fix)
 
 
 def _nested_root(path: str, line: int | None) -> Fault:

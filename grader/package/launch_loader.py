@@ -16,7 +16,7 @@ from lxml import etree
 from pydantic import Field
 
 from grader.installable import known_packages
-from grader.model.package import Fault, LaunchArg, LaunchLine, LaunchLoad, LaunchNode, LaunchParam
+from grader.model.package import Fault, LateRemap, LaunchArg, LaunchLine, LaunchLoad, LaunchNode, LaunchParam
 from grader.model.record import Record
 from grader.package.xml import line_of
 from grader.package.xml_slips import ATTRIBUTES
@@ -24,6 +24,7 @@ from grader.package.xml_slips import ATTRIBUTES
 INCLUDES_MAX = 50
 DEPTH_MAX = 10
 WORK_MAX = 10_000
+STARTING = ("node", "group", "include")
 _TOO_MUCH = "launch files that hold more than a robot can start"
 _FOUND = re.compile(r"\$\(find\s+([^()\s]+)\s*\)/+(.+)")
 _SUBSTITUTION = re.compile(r"\$\(([^()]*)\)")
@@ -55,6 +56,7 @@ class Loaded:
     faults: list[Fault] = field(default_factory=list)
     unset_args: dict[tuple[str, str], LaunchArg] = field(default_factory=dict)
     switched_off: list[tuple[str, int, str]] = field(default_factory=list)
+    late_remaps: list[LateRemap] = field(default_factory=list)
     included: int = 0
     work: int = 0
 
@@ -132,6 +134,16 @@ class _Loader:
                 scope = self._change_scope(child, scope)
             else:
                 self._add(child, scope.of(child))
+        self._note_late(parent, scope)
+
+    def _note_late(self, parent: etree._Element, scope: Scope) -> None:
+        """Note the `<remap>`s behind all that starts nodes: they are in force only for what follows."""
+        tags = [one for one in parent if isinstance(one.tag, str) and wanted(one, scope)]
+        starting = [place for place, one in enumerate(tags) if one.tag in STARTING]
+        for one in (one for one in tags[starting[-1] :] if one.tag == "remap") if starting else ():
+            said = _line(one, scope, scope.get(one, "from")).model_dump()
+            said |= {"namespace": scope.namespace, "to": _remap(one, scope)[1]}
+            self.loaded.late_remaps.append(LateRemap(**said, above=line_of(tags[starting[0]]) or 0))
 
     def _note_off(self, element: etree._Element) -> None:
         """Note the nodes that are left out, by the `if` or `unless` of the tag that leaves them out."""

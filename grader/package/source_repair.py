@@ -26,7 +26,7 @@ from grader.package.call_repair import (
     with_quoted_calls,
     with_values_called,
 )
-from grader.package.import_repair import with_classes, with_imports, with_message_classes, with_modules
+from grader.package.import_repair import with_classes, with_imports, with_message_classes, without_suffixes
 from grader.package.member_repair import with_members
 from grader.package.name_repair import bound_in, meant_by, with_methods, with_names, with_self
 from grader.package.syntax_repair import (
@@ -95,7 +95,7 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
         for repair in (
             _without_old_names,
             _without_old_print,
-            lambda t: with_modules(t, types),
+            lambda t: without_suffixes(t, types),
             lambda t: with_classes(t, types),
             lambda t: with_imports(t, types),
             with_self,

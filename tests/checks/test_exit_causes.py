@@ -205,6 +205,8 @@ from std_msgs.msg import Int8
         (1, "import std_msgs.msg.String",
          "ModuleNotFoundError: No module named 'std_msgs.msg.String'; 'std_msgs.msg' is not a package",
          "write `from std_msgs.msg import String`"),
+        (1, "import half.py", "ModuleNotFoundError: No module named 'half.py'; 'half' is not a package",
+         "write half instead of half.py"),
         (1, "from std_msgs.mgs import String", "ModuleNotFoundError: No module named 'std_msgs.mgs'",
          "write std_msgs.msg instead of std_msgs.mgs"),
         (1, "from sensor_msgs.msgs import Imu", "ModuleNotFoundError: No module named 'sensor_msgs.msgs'",

@@ -163,6 +163,9 @@ CASES: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str,
     "a loop that lacks its not": (
         "node", DIES, TALKER, [slip("loop-left", "", name="rospy.is_shutdown", fix="on line 5, write …")],
         f"; then write `while not rospy.is_shutdown():` on line 5 of {FILE}"),
+    "a loop of so many turns": (
+        "node", DIES, TALKER, [slip("loop-left", "it ends after a fixed number of rounds", fix="write `while …`")],
+        "; then write `while …`, since it ends after a fixed number of rounds"),
     "a guard with another word": (
         "node", DIES, TALKER, [slip("main-guard", "")],
         f"; then write `if __name__ == '__main__':` on line 5 of {FILE}"),

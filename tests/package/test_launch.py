@@ -38,6 +38,18 @@ def test_nodes_remaps_includes_and_lines():
     assert launch.includes == ("$(find lab1)/launch/other.launch",)
 
 
+def test_remaps_below_all_nodes_of_their_place_are_late():
+    assert parse_launch(LAUNCH.encode(), "a.launch").late_remaps == ()
+    node, remap = '<node pkg="p" type="t" name="{}"/>', '<remap from="{}" to="b"/>\n'
+    text = f'<launch>\n<group ns="g">\n{node.format("n")}\n{remap.format("x")}</group>\n{remap.format("y")}</launch>'
+    late = parse_launch(text.encode(), "a.launch").late_remaps
+    assert [(one.value, one.line, one.namespace, one.above) for one in late] == [
+        ("x", 4, "/g/", 3),
+        ("y", 6, "/", 2),
+    ]
+    assert parse_launch(f"<launch>{remap.format('x')}</launch>".encode(), "a.launch").late_remaps == ()
+
+
 def test_attributes_that_are_not_there_are_none():
     (node,) = parse_launch(b'<launch><node type=""/></launch>', "a.launch").nodes
     assert (node.pkg, node.type, node.name, node.remaps) == (None, "", None, ())

@@ -8,11 +8,12 @@ from pathlib import Path
 import pytest
 
 from grader.model.python_slip import PythonSlip, SlipKind
-from grader.model.repair import BY_HAND, DEFAULT_SHARES, KINDS
+from grader.model.repair import BY_HAND, DEFAULT_SHARES, KINDS, Repair
 from grader.model.submission import chmod_hint
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs
 from grader.package.repairs.editing import changed_lines
 from grader.package.repairs.names import is_near, is_one_edit
+from grader.repaired_copy import REPAIRS_MAX, most_of
 from tests.package.repairing import (
     CMAKELISTS,
     LAUNCHED,
@@ -177,3 +178,9 @@ def test_an_import_of_what_is_not_there_is_deleted_where_nothing_uses_it(
     )
     found = find_repairs(folder, facts_of(folder).model_copy(update={"slips": slips}), WANTED)
     assert [one.fix for one in found if one.kind == "missing-import"] == (["delete it"] if deleted else [])
+
+
+def test_a_line_of_the_build_is_repaired_whatever_number_of_scripts_lines_are() -> None:
+    lines = [Repair(kind="missing-call", file="src/a.py", line=n, message="", fix="") for n in range(1, 7)]
+    project = Repair(kind="build-line", file="../other/CMakeLists.txt", line=2, message="", fix="")
+    assert most_of([*lines, project]) == [*lines[:REPAIRS_MAX], project]

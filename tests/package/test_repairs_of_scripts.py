@@ -366,6 +366,22 @@ CASES = {
         swapped(TALKER, ("import rospy\nfrom std_msgs.msg import Int8\n", "import rospy, std_msgs.msg.Int8\n")),
         ["missing-import"], "messages are not imported from std_msgs.msg.Int8", after={TALKER: SCRIPT},
     ),
+    "file-imported-with-its-suffix": Case(
+        swapped(TALKER, ("import rospy\n", "import rospy, half.py\n"), ("publish(1)", "publish(half.py.of(2))")),
+        ["missing-import"], "the module of half.py is called half",
+        after={TALKER: "publish(half.of(2))"},
+    ),
+    "name-imported-from-a-file-with-its-suffix": Case(
+        swapped(TALKER, ("import rospy\n", "import rospy\nfrom half.py import of\nfrom std_msgs import Int8\n")),
+        ["missing-import", "missing-import"], "the module of half.py is called half",
+    ),
+    "queue-size-without-its-name": Case(
+        swapped(TALKER, ("Int8, queue_size=10", "Int8, 10")), ["missing-call"],
+        "the third value of `Publisher(…)` is no queue size", after={TALKER: "Int8, queue_size=10)"},
+    ),
+    "listener-of-subscribers": Case(
+        swapped(TALKER, ("Int8, queue_size=10", "Int8, Listener(), queue_size=10")), [],
+    ),
     "method-of-the-class-itself": Case(
         swapped(TALKER, ("def main():", "class T:\n    def half():\n        return 5\n\ntool = T()\n\ndef main():"),
                 ("publish(1)", "publish(T.half())")), [],

@@ -143,3 +143,10 @@ def test_a_callback_of_many_conditions_is_read_once(tmp_path: Path) -> None:
     ifs = "".join(f"    if m.data == {n}:\n        x = {n}\n" for n in range(60))
     assert said(f"def cb(m):\n{ifs}    print(m.data)", tmp_path) == []
     assert [kind for kind, _, _ in said(f"def cb(m):\n{ifs}", tmp_path)] == ["not-printed"]
+
+
+def test_a_callback_that_gives_its_argument_another_value_is_named(tmp_path: Path) -> None:
+    found = said("def cb(m):\n    m = A()\n    print(m.data)\n", tmp_path)
+    assert [(kind, fix) for kind, _, fix in found] == [("not-printed", "delete line 2")]
+    assert said("def cb(m):\n    print(m.data)\n    m = A()\n", tmp_path) == []
+    assert said("def cb(m):\n    m = m.data\n    print(m)\n", tmp_path) == []

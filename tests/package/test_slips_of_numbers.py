@@ -33,7 +33,7 @@ def test_a_rate_that_is_a_parameter_is_known(tmp_path, rate, found):
     ("code", "found"),
     [
         ("r = rospy.Rate(5)", [("5", 2)]),
-        ("r = rospy.Rate(HZ)", [("7.5", 1)]),
+        ("r = rospy.Rate(HZ)", [("7.5", 2)]),
         ("r = rospy.Rate(1 / 0.4)", [("2.5", 2)]),
         ("while True:\n    rospy.sleep(0.2)", [("5", 3)]),
         ("while True:\n    time.sleep(2)", [("0.5", 3)]),

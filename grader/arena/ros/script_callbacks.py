@@ -179,7 +179,7 @@ class Printing:
         self.own, self.value, self.functions = own, value, functions
         self.body = own.body if isinstance(own.body, list) else [ast.Expr(own.body)]
         self.name = "the callback `%s`" % own.name if hasattr(own, "name") else "the `lambda`"
-        self.known, self.shared = {message: ((0, 0), False)}, []
+        self.known, self.shared, self.lost = {message: ((0, 0), False)}, [], 0
         nodes = [n for one in self.body for n in ast.walk(one)]
         self.nodes = sorted((n for n in nodes if hasattr(n, "lineno")), key=place)
         outer = {name for n in nodes if isinstance(n, (ast.Global, ast.Nonlocal)) for name in n.names}
@@ -192,6 +192,8 @@ class Printing:
         of_message, changed = self.holds(assigned.value)
         for target in getattr(assigned, "targets", None) or [assigned.target]:
             for one in target.elts if isinstance(target, ast.Tuple) else [target]:
+                if not of_message and dotted(one) in self.known and assigned in self.body:
+                    self.lost = self.lost or assigned.lineno
                 if of_message and not isinstance(one, ast.Name):
                     self.shared.append(dotted(one))
                 if of_message and dotted(one) not in self.known:
@@ -215,6 +217,10 @@ class Printing:
         if self.is_elsewhere():
             return None
         told = [n for n in self.prints if self.of_message(n)]
+        if self.lost and told and told[0].lineno > self.lost:
+            message = "line %d gives what holds the message another value before line %d prints it"
+            message %= (self.lost, told[0].lineno)
+            return self.lost, "not-printed", message, "delete line %d" % self.lost
         if told:
             return self.in_part(told)
         if not self.prints:

@@ -60,7 +60,7 @@ def loop_rate(call, timed, value, number):
         pause, fix = dotted(call.func) if timed == "sleep" else "", ""
         if is_call(value, "Duration"):
             pause, fix = dotted(value.func), "its second number counts nanoseconds, so it is %.9g s" % number
-        yield slip(value.lineno, "rate-number", hz, fix=fix, name=pause)
+        yield slip(call.lineno, "rate-number", hz, fix=fix, name=pause)
 
 
 def nanoseconds_apart(call):
@@ -142,6 +142,23 @@ def stopped_loops(tree):
             message = "the loop ends the first time around, at the %s on line %d" % (word, left.lineno)
             fix = "remove it from line %d, or put it inside an `if`" % left.lineno
             yield slip(left.lineno, "loop-left", message, fix=fix)
+
+
+def published_before(tree):
+    """The only `publish(…)` of a file, where it stands above a loop that does nothing but wait."""
+    published = calls_in(tree, "publish")
+    for node in walk(tree) if len(published) == 1 else ():
+        above = None
+        for one in node.body if isinstance(getattr(node, "body", None), list) else ():
+            called = {called_name(n) for n in ast.walk(one) if isinstance(n, ast.Call)}
+            waits = isinstance(one, ast.While) and is_endless(one) and "sleep" in called
+            if isinstance(one, ast.Expr) and one.value is published[0]:
+                above = one.lineno
+            elif above and waits and called <= {"sleep", "is_shutdown"}:
+                message = "the publish(…) on line %d is above the loop on line %d, and runs once"
+                fix = "move line %d into that loop, above line %d, with the same spaces or tabs before it"
+                message, fix = message % (above, one.lineno), fix % (above, one.body[0].lineno)
+                yield slip(above, "loop-left", message, fix=fix)
 
 
 def is_counted(loop):

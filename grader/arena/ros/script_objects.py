@@ -5,6 +5,7 @@ Nothing is executed. Python 3.8, standard library only.
 """
 
 import ast
+import builtins
 import difflib
 
 from script_names import (
@@ -30,6 +31,7 @@ def object_slips(tree):
     for one in classes:
         if all(dotted(base) == "object" for base in one.bases):
             yield from lacking_attributes(Members(one, tree))
+    yield from methods_inside(tree)
     yield from classes_as_objects({one.name: one for one in classes}, tree)
 
 
@@ -106,6 +108,23 @@ def lacking_attributes(own):
             yield slip(node.lineno, "object", message, fix=fix, name=name)
 
 
+def methods_inside(tree):
+    """Yield where a method is read that is defined inside another one."""
+    reads = {}
+    for n in walk(tree):
+        if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Load):
+            reads.setdefault(n.attr, n.lineno)
+    for owner in (n for n in walk(tree) if isinstance(n, ast.ClassDef)):
+        for method in (n for n in owner.body if isinstance(n, ast.FunctionDef)):
+            inner = [n for n in ast.walk(method) if isinstance(n, ast.FunctionDef) and n is not method]
+            for one in inner:
+                if one.name in reads and [arg.arg for arg in one.args.args[:1]] == ["self"]:
+                    message = "`%s` on line %d is inside of `%s`" % (one.name, one.lineno, method.name)
+                    fix = "begin line %d with the same spaces or tabs as line %d, and move the lines below it as far"
+                    fix %= (one.lineno, method.lineno)
+                    yield slip(reads[one.name], "object", message, fix=fix, name=one.name)
+
+
 def never_given(own, name, line):
     """Return why an attribute is not there that nothing gives a value, and what to do."""
     for method in own.methods.values():
@@ -169,6 +188,35 @@ def classes_as_objects(classes, tree):
         yield slip(
             n.lineno, "object", message, fix="on line %d, write `%s`" % (line, right), name=method.name
         )
+
+
+def names_of_objects(tree):
+    """Yield names that one method of a class gives a value and another reads, and `self` outside of all functions."""
+    parts = [n for n in walk(tree) if isinstance(n, (ast.FunctionDef, ast.ClassDef))]
+    within = {inner for one in parts for inner in ast.walk(one)}
+    names = [n for n in walk(tree) if isinstance(n, ast.Name)]
+    shared = bound_names(tree) | set(dir(builtins))
+    shared |= {name for n in within if isinstance(n, ast.Global) for name in n.names}
+    for one in (n for n in names if n.id == "self" and n not in within):
+        given = any(one in n.args for n in walk(tree) if isinstance(n, ast.Call))
+        fix = "take `self` out of the brackets" if given else "write the object's name instead of `self`"
+        message = "`self` is known only inside of a class's methods"
+        yield slip(one.lineno, "undefined", message, fix="on line %d, %s" % (one.lineno, fix), name="self")
+    for owner in (one for one in parts if isinstance(one, ast.ClassDef)):
+        methods = [n for n in owner.body if isinstance(n, ast.FunctionDef)]
+        methods = [n for n in methods if n.args.args and n.args.args[0].arg == "self"]
+        names = {m.name: [n for n in ast.walk(m) if isinstance(n, ast.Name)] for m in methods}
+        givers = {n.id: m for m in names for n in names[m] if not isinstance(n.ctx, ast.Load)}
+        for method in methods:
+            own = {n.arg for n in ast.walk(method) if isinstance(n, ast.arg)} | shared
+            own |= {n.id for n in names[method.name] if not isinstance(n.ctx, ast.Load)}
+            for node in (n for n in names[method.name] if n.id in givers and n.id not in own):
+                uses = [*names[method.name], *names[givers[node.id]]]
+                lines = sorted({n.lineno for n in uses if n.id == node.id})
+                message = "`%s` has a value only in `%s(…)`" % (node.id, givers[node.id])
+                fix = "on lines %s and %d, write `self.%s` instead of `%s`"
+                fix %= (", ".join(map(str, lines[:-1])), lines[-1], node.id, node.id)
+                yield slip(node.lineno, "undefined", message, fix=fix, name=node.id)
 
 
 # ---- what ROS is given
@@ -257,14 +305,15 @@ def hidden_names(tree):
 
 
 def queue_sizes(tree):
-    """Publishers whose `queue_size` is a string: rospy takes it, and sends nothing."""
+    """Publishers whose `queue_size` is a string, or a number without its name: rospy takes it, and sends nothing."""
     for node in walk(tree):
+        third = node.args[2] if is_call(node, "Publisher") and len(node.args) == 3 else None
+        if isinstance(third, ast.Constant) and type(third.value) is int and third.value:
+            message = "the third value of `Publisher(…)` is no queue size, which it takes by its name"
+            fix = "write `queue_size=%d` instead of `%d`" % (third.value, third.value)
+            yield slip(third.lineno, "queue-size", message, fix=fix)
         for one in node.keywords if is_call(node, "Publisher") else ():
-            if (
-                one.arg == "queue_size"
-                and isinstance(one.value, ast.Constant)
-                and isinstance(one.value.value, str)
-            ):
-                size = one.value.value[:TEXT_LIMIT]
-                fix = "write `queue_size=%s`, without quotes" % (size or "10")
+            value = getattr(one.value, "value", None)
+            if one.arg == "queue_size" and isinstance(value, str):
+                fix = "write `queue_size=%s`, without quotes" % (value[:TEXT_LIMIT] or "10")
                 yield slip(one.value.lineno, "queue-size", "`queue_size` is a string", fix=fix)

@@ -30,6 +30,7 @@ from script_loops import (
     is_shutdown,
     loop_rates,
     never_reached,
+    published_before,
     publishes_twice,
     sleepless_loops,
     sleeps_twice,
@@ -49,6 +50,7 @@ from script_names import (
 )  # fmt: skip
 from script_objects import (
     hidden_names,
+    names_of_objects,
     object_slips,
     queue_sizes,
     subscribed_again,
@@ -77,11 +79,11 @@ def slips(tree):
             fix = "delete line %d, which makes a number of it" % line if line else ""
             found.append(slip(node.lineno, "input", message, fix=fix, name=how_often(node, tree)))
     finders = (
-        misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops, sleeps_twice,
-        publishes_twice, callbacks, waiting_callbacks, queue_sizes, graph_names, object_slips, said_texts, deaf_loops,
-        clock_values, counter_slips, counter_starts, without_effect, assigned_late, hidden_names, subscribed_again,
-        imports, taken_off, unstarted_servers, wrong_values, unprinted_messages, values_left_out,
-        unused_publishers,
+        names_of_objects, misspelt, loop_rates, resets, never_run, never_reached, stopped_loops,
+        published_before, sleepless_loops, sleeps_twice, publishes_twice, callbacks, waiting_callbacks,
+        queue_sizes, graph_names, object_slips, said_texts, deaf_loops, clock_values, counter_slips,
+        counter_starts, without_effect, assigned_late, hidden_names, subscribed_again, imports, taken_off,
+        unstarted_servers, wrong_values, unprinted_messages, values_left_out, unused_publishers,
     )  # fmt: skip
     for find in finders:
         found += find(tree)
@@ -95,6 +97,13 @@ def slips(tree):
     if "init_node" not in calls and ("Publisher" in calls or "Subscriber" in calls or does_something(tree)):
         fix = "make it a node: `rospy.init_node(…)`, then its topics, then `rospy.spin()` or a loop"
         found.append(slip(1, "no-init", "nothing in the script calls `rospy.init_node(…)`", fix=fix))
+    # of two that say why a name is not there, the first is about the class that it belongs to
+    first = {(one["line"], one["name"]): one for one in reversed(found) if one["kind"] == "undefined"}
+    found = [
+        one
+        for one in found
+        if first.get((one["line"], one["name"]), one) is one or one["kind"] != "undefined"
+    ]
     return sorted(found, key=lambda one: one["line"])[:SLIPS_LIMIT]
 
 

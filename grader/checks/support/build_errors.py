@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import PurePosixPath
 
@@ -46,6 +46,9 @@ from grader.wording import join_words, numbers_text, there_is
 ALWAYS_THERE = ("catkin", "rospy", "roscpp", "std_msgs")
 ONE_EDIT = 0.88
 SLIPS_OF_COMPONENTS = ("COMPONENT", "COMPONENETS", "COMPONETS", "COMPONENTES", "Components", "components")
+KEYWORDS = ("REQUIRED", "COMPONENTS")
+_SIGNS = re.compile(r"[,:]|[;.]$")
+"""What other languages write between names."""
 SLIP = 0.8
 """How alike a name is that is written for one that every machine has: `pospy` for `rospy`."""
 UNKNOWN_COMMAND = "Unknown CMake command"
@@ -119,20 +122,39 @@ def _unreadable(found: re.Match[str], package: PackageFacts, lines: Sequence[str
 
 
 def _misspelt_components(package: PackageFacts) -> dict[str, str]:
-    """Return the names behind COMPONENTS that are a slip of a package that every machine has, or a half of its name
-    (`std msgs`), with what is meant."""
-    calls = [call.args for call in cmake_calls(package, "find_package") if call.args[:1] == ("catkin",)]
-    named = [name for args in calls for name in args[1:] if name not in ("REQUIRED", "COMPONENTS")]
+    """Return what find_package(…) reads as names and is none, with what is meant: with a sign behind it (`rospy,`), a
+    slip of a package that every machine has, or a half of its name (`std msgs`)."""
+    calls = [call.args for call in cmake_calls(package, "find_package")]
+    named = [name for args in calls if args[:1] == ("catkin",) for name in args[1:]]
+    whole_names = {half: whole for whole in ALWAYS_THERE for half in whole.split("_")}
     found: dict[str, str] = {}
-    for name in dict.fromkeys(named):
-        halves = (
-            whole for whole in ALWAYS_THERE if name in whole.split("_") and {*whole.split("_")} <= {*named}
-        )
-        near = get_close_matches(name, ALWAYS_THERE, 1, SLIP) if name not in known_packages() else []
-        meant = next(halves, near[0] if near else "")
-        if meant and name not in ALWAYS_THERE:
+    for name in dict.fromkeys((*(args[0] for args in calls if args), *named)):
+        bare = " ".join(_SIGNS.sub(" ", name).split())
+        whole = whole_names.get(name, "")
+        near = get_close_matches(bare, ALWAYS_THERE, 1, SLIP) if bare not in known_packages() else []
+        meant = bare if not near or " " in bare else near[0]
+        meant = whole if "_" in whole and {*whole.split("_")} <= {*named} else meant
+        if meant and meant != name and name not in (*KEYWORDS, *ALWAYS_THERE):
             found[name] = meant
     return found
+
+
+def _explain_misspelt(slips: Mapping[str, str], package: PackageFacts) -> Explained:
+    right = "; ".join(f"write {new} instead of {old}" for old, new in slips.items())
+    declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
+    too = "; in package.xml too" if declared.intersection(slips) else ""
+    signs = {sign[0] for old in slips for sign in _SIGNS.findall(old)}
+    if all(_SIGNS.sub(" ", old).split() == new.split() for old, new in slips.items()):
+        parts = [old.strip("".join(signs)) for old in slips]
+        where = f"with a `{min(signs)}` behind {'it' if len(parts) == 1 else 'each'}"
+        if any(" " in new for new in slips.values()):
+            parts, where = [f"`{old}`" for old in slips], "as one word"
+        return Explained(
+            f"find_package(…) names {join_words(parts)} {where}, and only blanks part its names", right + too
+        )
+    named = join_words(f"`{old}`" if signs else old for old in slips)
+    what = "is no package of that name" if len(slips) == 1 else "are no packages of these names"
+    return Explained(f"find_package(…) names {named}, and there {what}", right + too)
 
 
 def _of_submission(name: str, packages: Sequence[PackageFacts]) -> Explained | None:
@@ -155,11 +177,7 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
         why = f"find_package(…) reads {name} as the name of a package: the keyword is COMPONENTS"
         return Explained(why, f"write COMPONENTS instead of {name}")
     if slips := _misspelt_components(package):
-        right = "; ".join(f"write {new} instead of {old}" for old, new in slips.items())
-        what = "is no package of that name" if len(slips) == 1 else "are no packages of these names"
-        declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
-        too = "; in package.xml too" if declared.intersection(slips) else ""
-        return Explained(f"find_package(…) names {join_words(slips)}, and there {what}", f"{right}{too}")
+        return _explain_misspelt(slips, package)
     if explained := _of_submission(name, (package, *package.also)) or _of_no_ros(name, package):
         return explained
     placeholder = re.fullmatch(r"dep(end)?\d", name) is not None
@@ -179,12 +197,7 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
 
 
 def _of_no_ros(name: str, package: PackageFacts) -> Explained | None:
-    """Explain a name of ROS 2's or of a Python module's, or one with a sign behind it; None for any other."""
-    if name[-1:] in {",", ";", ".", ":"}:
-        why = (
-            f"find_package(…) names {name[:-1]} with a `{name[-1]}` behind it, and only blanks part its names"
-        )
-        return Explained(why, f"write {name[:-1]} instead of {name}")
+    """Explain a name of ROS 2's or of a Python module's; None for any other."""
     if name in ROS_2:
         return Explained(f"it needs {name}, which is from ROS 2", f"take {name} out: this lab is for ROS 1")
     if not is_no_package(name):
@@ -544,7 +557,10 @@ def _not_catkin(found: re.Match[str], package: PackageFacts, _lines: Sequence[st
 
 
 _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str]], Explained]], ...] = (
-    (r'Could not find a package configuration file provided by "([\w-]+[,;.:]?)"', _missing_package),
+    (
+        r'Could not find a package configuration file provided by "([\w-]+(?:[,;.:][\w,;.:-]*)?)"',
+        _missing_package,
+    ),
     (r'By not providing "Find([\w-]+)\.cmake"', _missing_library),
     (r"Could NOT find ([\w-]+) \(missing:", _missing_library),
     (r"(add_\w+_files)\(\) directory not found: (\S+)", _missing_folder),

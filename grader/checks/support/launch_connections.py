@@ -5,14 +5,17 @@ What `ns` and `<remap>` make of its name, which of them to remove to have the ri
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
+from grader.checks.registry import Check
 from grader.checks.support.launch import nodes_up
 from grader.checks.support.launch_slips import own_script
-from grader.checks.support.topics import nodes_on, topics_with
+from grader.checks.support.processes import run_scripts
+from grader.checks.support.topics import End, nodes_on, topics_with
 from grader.evidence.events import GraphEvent
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchLine, LaunchNode, PackageFacts
@@ -23,6 +26,7 @@ from grader.wording import join_words
 UNRESOLVED = "$("
 CONNECTED_WITHIN_S = 3.0
 """Nodes that were on a topic together for longer, and not connected, differ in its type."""
+ENDS: tuple[End, ...] = ("publishers", "subscribers")
 RENAMES = ("remap", "args")
 """Where a launch file gives a topic another name by itself; any other line does it by a namespace."""
 
@@ -187,6 +191,27 @@ def blame_renaming(
     message = f"{verdict.message}: it {renaming.why}"
     update = {"message": message, "hint": renaming.fix, "citations": renaming.citations}
     return verdict.model_copy(update=update)
+
+
+def explain_by_late_remap(
+    check: Check, package: PackageFacts | None, run: object, verdict: Verdict
+) -> Verdict:
+    """Return a loss with the `<remap>` that would give a topic its name, and stands below the nodes that have it."""
+    lost = verdict.status.is_lost and not verdict.cause and not check.name.endswith("-xml")
+    if not lost or package is None or not isinstance(run, Run) or any(run_scripts(run)):
+        return verdict
+    had = {topic for end in ENDS for topic in topics_with(run, end)}
+    said = f"{verdict.message} {verdict.expected}"
+    for late in (one for file in package.launch_files for one in file.late_remaps):
+        ends = [topic for topic in had if f"/{topic}".endswith(f"/{late.value}")]
+        ends = [topic for topic in ends if topic.startswith(late.namespace)]
+        spaces = {topic.removesuffix(late.value.lstrip("/")) for topic in ends}
+        meant = {_whole(late.to, space) for space in spaces if space.endswith("/")}
+        if any(topic not in had and re.search(rf"{re.escape(topic)}(?![\w/])", said) for topic in meant):
+            why = f"the <remap> on line {late.line} of {late.file} has no effect on the nodes above it"
+            hint = f"move the <remap> from line {late.line} of {late.file} to above line {late.above}"
+            return verdict.explained(why, hint, (late.place,), cause=why)
+    return verdict
 
 
 def blame_same_script(

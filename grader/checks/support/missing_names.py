@@ -42,8 +42,8 @@ _FROM_PACKAGE = re.compile(r"cannot import name '(\w+)' from '(\w+)'")
 _IN_MODULE = re.compile(r"No module named '(\w+\.(?:msg|srv))\.(\w+)'")
 _KEYWORD = re.compile(r"got an unexpected keyword argument '(\w+)'")
 NO_MODULE = re.compile(r"No module named '(\w+)'$")
-_OF_MESSAGES = re.compile(r"No module named '(\w+)\.(\w+)'$")
-_HIDDEN = re.compile(r"'(\w+)\.[\w.]+'; '\1' is not a package|partially initialized module '(\w+)'")
+_OF_MESSAGES = re.compile(r"No module named '(\w+)\.(\w+)'(?:$|; '\1' is not a package)")
+_HIDDEN = re.compile(r"'(\w+)\.(?!py')[\w.]+'; '\1' is not a package|partially initialized module '(\w+)'")
 KEYWORDS = (
     "anonymous", "log_level", "disable_signals", "argv", "queue_size", "latch", "tcp_nodelay", "headers", "callback",
     "callback_args", "buff_size", "subscriber_listener", "data_class", "oneshot", "timeout", "default",
@@ -212,6 +212,11 @@ def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | 
         return (
             f"did you mean {inner[1]}.{right}?",
             f"write {inner[1]}.{right} instead of {inner[1]}.{inner[2]}",
+        )
+    if inner and inner[2] == "py":
+        return (
+            f"a module's name has no `.py` of its file: it is {inner[1]}",
+            f"write {inner[1]} instead of {inner[1]}.py",
         )
     asked, wanted = NO_MODULE.search(message), _FROM_PACKAGE.search(message)
     if asked and (known := _module_of_others(asked[1], package)):

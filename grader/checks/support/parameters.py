@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 from grader.checks.registry import Check
 from grader.checks.support.console_output import Line
 from grader.checks.support.exit_causes import Ending, explain_end, explain_error
+from grader.checks.support.fields import value_text
 from grader.checks.support.processes import early_end
 from grader.checks.support.text import get_param, init, near_names
 from grader.checks.support.topics import cite, is_unexplained, nodes_on, published_topics
@@ -264,6 +265,33 @@ def explain_by_misplaced_parameter(
     else:
         hint += f'name="{last if asked.startswith(within) else asked}"'
     return verdict.explained(sets, hint, (param.place,), cause=asked)
+
+
+def explain_by_overwritten_parameter(
+    check: Check, package: PackageFacts | None, run: object, verdict: Verdict
+) -> Verdict:
+    """Return a lost mark with the line that sets a parameter which the run or the launch file gives another value."""
+    if not is_unexplained(check, verdict) or package is None or not isinstance(run, Run):
+        return verdict
+    given, nodes = {name: one.value for name, one in params_given(run).items()}, run.student_nodes()
+    for _, event in run.params:
+        name = absolute_name(event.name)
+        param = where_given(package, name)
+        own = event.caller_id in nodes and event.action == "set"
+        if not own and (name in given or param is not None):
+            given[name] = event.value
+        elif own and name in given and given[name] != event.value:
+            slips = [s for s in package.slips if s.kind == "sets-parameter"]
+            slips = [s for s in slips if resolved_param(s.message, event.caller_id) == name]
+            where = f"line {slips[0].line} of {slips[0].file}" if slips else event.caller_id
+            giver = f"line {param.line} of {param.file}" if param is not None else "the run"
+            why = (
+                f"{where} sets {name} to {value_text(event.value)}, in place of the value that {giver} gives"
+            )
+            hint = "read it with `rospy.get_param(…)`, and do not set it"
+            hint = f"on {where}, write `get_param` instead of `set_param`" if slips else hint
+            return verdict.explained(why, hint, tuple(s.place for s in slips[:1]), cause=name)
+    return verdict
 
 
 def _is_too_early(run: Run) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Annotated, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field
@@ -159,6 +159,36 @@ def run_slips(package: PackageFacts, run: Run, *kinds: SlipKind) -> list[PythonS
     """Return what is remarkable, of these kinds, in the scripts that run."""
     scripts = run_scripts(run)
     return [s for s in package.slips if s.kind in kinds and s.file in scripts]
+
+
+def copied_topic(
+    package: PackageFacts, run: Run, kind: Literal["publisher", "subscriber"], topic: str = ""
+) -> str:
+    """Return the lines of one running script that name the same topic, this one if any is given: one is copied and not
+    changed; "" for none."""
+    places: dict[tuple[str, str], list[int]] = {}
+    for slip in run_slips(package, run, kind):
+        name = slip.message.strip("/")
+        if name == (topic.strip("/") or name):
+            places.setdefault((slip.file, name), []).append(slip.line)
+    found = ((file, sorted(set(lines))) for (file, _), lines in places.items())
+    return next((f"lines {join_words(map(str, n))} of {file}" for file, n in found if len(n) > 1), "")
+
+
+def by_copies(package: PackageFacts, run: Run, topic: str, of_node: Callable[..., Verdict]) -> Verdict | None:
+    """Return that a script publishes on a topic with several types, of which one is for it; None where none does."""
+    copied = copied_topic(package, run, "publisher", topic)
+    named = {
+        s.place for s in run_slips(package, run, "publisher") if s.message.strip("/") == topic.strip("/")
+    }
+    if (
+        not copied
+        or len({s.message for s in run_slips(package, run, "publisher-type") if s.place in named}) < 2
+    ):
+        return None
+    hint = f"give the one of {copied} that is for another topic that topic's name"
+    why = f"{copied} publish on {topic} with several types: rospy sends all by the type of the first"
+    return of_node(why, hint=hint)
 
 
 def run_scripts(run: Run) -> set[str | None]:

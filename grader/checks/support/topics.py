@@ -11,6 +11,7 @@ from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_end, explain_error
 from grader.checks.support.processes import (
     NO_SCRIPT_HINT,
+    copied_topic,
     early_end,
     is_written_as,
     lives,
@@ -461,20 +462,6 @@ def call_in_comment(package: PackageFacts, run: Run, call: str) -> PythonSlip | 
     """Return where a script that runs has such a call in a comment: `Subscriber`."""
     found = run_slips(package, run, "commented-out")
     return next((s for s in found if s.name.rpartition(" ")[2] == call), None)
-
-
-def copied_topic(
-    package: PackageFacts, run: Run, kind: Literal["publisher", "subscriber"], topic: str = ""
-) -> str:
-    """Return the lines of one running script that name the same topic, this one if any is given: one is copied and not
-    changed; "" for none."""
-    places: dict[tuple[str, str], list[int]] = {}
-    for slip in run_slips(package, run, kind):
-        name = slip.message.strip("/")
-        if name == (topic.strip("/") or name):
-            places.setdefault((slip.file, name), []).append(slip.line)
-    found = ((file, sorted(set(lines))) for (file, _), lines in places.items())
-    return next((f"lines {join_words(map(str, n))} of {file}" for file, n in found if len(n) > 1), "")
 
 
 def _commented_out(what: str, slip: PythonSlip, of_node: Callable[..., Verdict]) -> Verdict:

@@ -337,7 +337,7 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "old-name": ("{place}: {word} is Python 2",
      "put a value in the code in place of `raw_input(…)`: a node cannot ask for input"),
     "import": ("{place} uses {word}, which is not imported", ""),
-    "module": ("{place}: messages are not imported from {word}", ""),
+    "module": ("{place}: {word}", ""),
     "name": ("{place}: {word} is not defined", ""),
     "quotes": ("{place}: quotes are missing around {word}", ""),
     "attribute": ("{place}: there is no {word}", ""),
