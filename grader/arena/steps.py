@@ -30,7 +30,7 @@ from grader.arena.session import NS, ArenaSession
 from grader.arena.settling import is_settled, is_silent
 from grader.errors import ArenaError, EvidenceError
 from grader.evidence.decode import FindText
-from grader.evidence.events import GOAL_STATUS, MISFIT, UNHEARD, ActorEvent
+from grader.evidence.events import GOAL_STATUS, MISFIT, UNHEARD, UNSENDABLE, ActorEvent
 from grader.evidence.message_values import MessageType, Moment, ServiceTypes, md5_of
 from grader.model.message_definitions import other_fields
 from grader.rubric.scenario import Action, Call, Play, Publish, Scenario, Start, Step, Transform, Typed, Wait
@@ -184,9 +184,7 @@ class StepRunner:
             self._note_misfit(topic, type_, error)
             return
         if self._md5sums.setdefault(topic, found.md5sum) != found.md5sum:
-            self._note(
-                "note", topic, f"the grader cannot publish {type_}: a recording has another type there"
-            )
+            self._note("note", topic, f"{UNSENDABLE}{type_}: a recording has another type there")
             return
         self._types[topic] = found
         about = {"type": type_, "md5sum": found.md5sum, "definition": found.definition}
@@ -251,7 +249,7 @@ class StepRunner:
 
     def _note_misfit(self, topic: str, type_: str, error: ValueError) -> None:
         """Note why nothing of that type can be published: by the student's own definition, or by the rubric's."""
-        begin = MISFIT if self._arena.place.is_own(type_) else f"the grader cannot publish {type_}: "
+        begin = MISFIT if self._arena.place.is_own(type_) else f"{UNSENDABLE}{type_}: "
         self._note("note", topic, f"{begin}{error}")
 
     async def _stream(self, publish: Publish) -> None:

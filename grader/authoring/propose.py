@@ -29,6 +29,7 @@ from grader.authoring.rubric_draft import (
     second_look,
     step_for,
 )
+from grader.checks.build import judge_build
 from grader.checks.package_files import RUNTIME_KINDS
 from grader.errors import RosMissing, SubmissionError
 from grader.evidence.reader import load_evidence, package_facts
@@ -37,12 +38,14 @@ from grader.files import temporary_folder
 from grader.intake import open_submission
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress
+from grader.model.verdict import Status
 from grader.package import read_package
 from grader.rubric.load import LoadedRubric
 
 WINDOW_S = 6
 WRAPS = 2
 LIVES_S = 5
+OF_THE_COURSE = "A package of the course's goes into one folder with it: --from FOLDER --package NAME"
 
 
 class Proposal(DraftSheet):
@@ -54,6 +57,9 @@ class Proposal(DraftSheet):
         super().__init__()
         self._facts, self._parts, self._seen, self._runs = facts, parts, seen, runs
         self._files()
+        build = runs.get("package")
+        if build and build.processes and (built := judge_build(facts, build)).status is not Status.PASS:
+            self.notes.append(f"little of the package was seen: {built.message}. {OF_THE_COURSE}")
         for name, script in parts.nodes.items():
             self._node(name, script, seen[name])
         for name, launch in parts.launches.items():

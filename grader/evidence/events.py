@@ -21,6 +21,8 @@ RECORDING_MISSING = "recording.missing"
 RECORDING_PROBLEM = "recording.problem"
 MISFIT = "the package's definition does not fit: "
 """Begins the detail of the answer to a call that could not be made, because the student's own `.srv` is another one."""
+UNSENDABLE = "the grader cannot publish "
+"""Begins the detail of a note about messages that the rubric has wrong."""
 
 
 GOAL_STATUS = (

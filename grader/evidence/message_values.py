@@ -33,7 +33,7 @@ FORMS = frozenset({*ENDS, "each", "repeat", "count", "except"})
 """What stands in the place of a value, and is none itself."""
 OTHER_TEXTS = {"tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms\n"}
 """Of types that rosbags does not know, and that are needed where their packages are not installed too."""
-_NOW = re.compile(r"now(?:\s*([+-])\s*(\d+(?:\.\d+)?))?", re.ASCII)
+NOW = re.compile(r"now(?:\s*([+-])\s*(\d+(?:\.\d+)?))?", re.ASCII)
 _SPAN = re.compile(r"(\d{1,7})(?:-(\d{1,7}))?", re.ASCII)
 _CONSTANT = re.compile(r"(\w+)\s+(\w+)\s*=(.*)", re.ASCII)
 _FIELD = re.compile(r"([\w/]+)(\[\d*\])?\s+(\w+)", re.ASCII)
@@ -218,7 +218,7 @@ class _Filling:
 
     def _clock(self, type_: str, value: object) -> dict[str, Any]:
         """Return `secs` and `nsecs` for `now`, a number of seconds, or just these two."""
-        if isinstance(value, str) and type_ == "time" and (match := _NOW.fullmatch(value.strip())):
+        if isinstance(value, str) and type_ == "time" and (match := NOW.fullmatch(value.strip())):
             ns = self._moment.now_ns + round(float((match[1] or "") + (match[2] or "0")) * NS)
         elif isinstance(value, int | float) and not isinstance(value, bool):
             ns = round(value * NS)

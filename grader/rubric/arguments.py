@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 from grader.rubric.definitions import slip_of
 from grader.rubric.simulators import PROGRAMS, set_in
-from grader.rubric.spelling import PROSE, is_slip, texts_in
-from grader.rubric.yaml_lines import KeyPath, as_map, as_maps, as_texts
+from grader.rubric.spelling import PROSE, is_slip
+from grader.rubric.yaml_lines import KeyPath, as_map, as_maps, as_texts, texts_in
 from grader.wording import did_you_mean, join_words
 
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")
@@ -39,6 +39,26 @@ def argument_faults(scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterato
             fault = fault or _other_way(text, start, scenario, known) or _fault(text, start, known)
             if fault:
                 yield ("start", index, "args", number), fault
+
+
+def argument_warnings(rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    """Yield private parameters that nothing else in the rubric names, and decimal numbers with a comma."""
+    known, handout = _known(rubric), str(rubric.get("handout") or "")
+    named = known.params if re.search(r"~\w", handout) else known.params | known.words
+    for scenario, one in as_map(rubric.get("scenarios")).items():
+        for index, start in as_maps(as_map(one).get("start")):
+            for number, text in as_texts(start.get("args")):
+                name, _, value = text.partition(":=")
+                at = ("scenarios", scenario, "start", index, "args", number)
+                if re.fullmatch(r"-?\d+,\d+", value):
+                    yield at, f"ROS reads {value} as text: a decimal number has a point, no comma"
+                elif start.get("script") and re.match(r"_(?!_)\w+:=", text) and name[1:] not in named:
+                    said = join_words([f"~{one}" for one in sorted(known.params)])
+                    yield (
+                        at,
+                        f"nothing else in the rubric names ~{name[1:]}"
+                        + (f": it has {said}" if said else ""),
+                    )
 
 
 def _blanks(text: str) -> str:

@@ -42,11 +42,17 @@ INTEGERS = {
 }
 
 
-def cross_faults(data: object, checks: Mapping[str, Check], *, complete: bool = True) -> list[Fault]:
+def cross_faults(
+    data: object,
+    checks: Mapping[str, Check],
+    *,
+    complete: bool = True,
+    files: Mapping[str, bytes] | None = None,
+) -> list[Fault]:
     """Return every fault that shows only between one part of a rubric and another, or between it and the checks.
 
     Where `checks` are not complete, because the instructor's file of them is broken, a name that is near none is
-    left alone: it may be one of theirs.
+    left alone: it may be one of theirs. `files` are those beside the rubric, of which the course's types are read.
     """
     rubric = as_map(data)
     scenarios = as_map(rubric.get("scenarios"))
@@ -66,7 +72,7 @@ def cross_faults(data: object, checks: Mapping[str, Check], *, complete: bool = 
     faults += _gates(rubric, criteria)
     faults += _late(rubric)
     faults += _packages(rubric, scenarios, criteria)
-    faults += reference_faults(rubric, checks)
+    faults += reference_faults(rubric, checks, files or {})
     return faults
 
 

@@ -11,10 +11,9 @@ from typing import Any
 from grader.checks.support.fields import is_number
 from grader.rubric.definitions import services_in
 from grader.rubric.simulators import set_in
-from grader.rubric.spelling import texts_in
 from grader.rubric.started import starts_of
 from grader.rubric.step_faults import given_steps
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts
+from grader.rubric.yaml_lines import Fault, KeyPath, as_list, as_map, as_maps, as_texts, texts_in
 from grader.wording import join_words, plural
 
 Criteria = Sequence[tuple[int, dict[str, Any]]]
@@ -24,6 +23,7 @@ SHORTEST_S = {"reacts": 0.1, "action-result": 0.2, "stamps": 0.02}
 """By check, the shortest time within which a correct node's answer comes on a busy machine."""
 STRICT, LAX = 0.02, 0.5
 """Of a rate, the least tolerance that a busy machine keeps, and one with which half or twice the rate passes."""
+CLOSE_DEG = 0.5
 CLOSE_M = 0.02
 """No student's robot stops as near to its goal as this."""
 OF_VALUES = frozenset({"field-equals", "field-bounds", "reacts"})
@@ -52,6 +52,8 @@ def demand_warnings(rubric: dict[str, Any], criteria: Criteria, scenarios: Scena
     yield from _waited_for_nothing(criteria, scenarios)
     yield from _without_its_node(rubric, scenarios)
     yield from _silent_anyway(criteria)
+    yield from _other_ends(criteria)
+    yield from _other_rows(criteria, scenarios)
     yield from _launched_nodes(criteria, scenarios)
     yield from _other_transforms(criteria, scenarios)
     for index, criterion in criteria:
@@ -83,6 +85,9 @@ def _hard(at: KeyPath, check: str, given: dict[str, Any]) -> Iterator[Fault]:
             (*at, "tolerance"),
             f"{tolerance:g} is very strict: on a busy machine a correct package may miss it",
         )
+    for key in ("heading_tolerance_deg", "tolerance_deg"):
+        if is_number(given.get(key)) and given[key] < CLOSE_DEG:
+            yield (*at, key), f"{given[key]:g} is very strict: it is in degrees"
     if check in {"ends-at", "path"} and is_number(tolerance_m) and tolerance_m < CLOSE_M:
         yield (*at, "tolerance_m"), f"{tolerance_m:g} m is very strict: no robot keeps it"
 
@@ -264,6 +269,45 @@ def _more_values(criteria: Criteria, scenarios: Scenarios, handout: str) -> Iter
         if sent and count == sent + 1 and not PERIODIC.search(handout) and re.search(r"\beach\b", handout):
             fault = f"are {count}, and {criterion.get('scenario')} sends {plural(sent, 'message')}"
             yield ("criteria", index, "with", "values"), fault
+
+
+def _other_ends(criteria: Criteria) -> Iterator[Fault]:
+    """Yield ends of a path that have the numbers of the same run's goal, with other signs or in another order."""
+    goals = [(one, as_map(one.get("with"))) for _, one in criteria if one.get("check") == "ends-at"]
+    for index, criterion in criteria:
+        path, judged = as_map(criterion.get("with")), criterion.get("scenario")
+        points = as_list(path.get("points")) if criterion.get("check") == "path" else []
+        for other, asked in goals if points else ():
+            end, goal = as_list(points[-1]), as_list(asked.get("goal"))
+            is_same = (other.get("scenario"), asked.get("topic")) == (judged, path.get("topic"))
+            if "asked_on" in asked or not is_same or not all(map(is_number, (*end, *goal))) or end == goal:
+                continue
+            if sorted(map(abs, end)) == sorted(map(abs, goal)):
+                fault = f"is {end}, and {other.get('id')} wants it to end at {goal}"
+                yield ("criteria", index, "with", "points", len(points) - 1), fault
+
+
+def _other_rows(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
+    """Yield more rows than the run sends messages, of which the program is to write each; and bounds that what it sends
+    is not within."""
+    for index, criterion in criteria:
+        given, scenario = as_map(criterion.get("with")), scenarios.get(str(criterion.get("scenario")), {})
+        rows, count, at = given.get("rows_at_least"), _sent(scenario), ("criteria", index, "with")
+        if is_number(rows) and 0 < count < rows <= 2 * count and len(starts_of(scenario)) == 1:
+            yield (
+                (*at, "rows_at_least"),
+                f"is {rows}, and {criterion.get('scenario')} sends {plural(count, 'message')}",
+            )
+        bounds = as_map(given.get("bounds"))
+        sent = [one for step in given_steps(scenario, "publish") for one in as_list(step.get("values"))]
+        for column, bound in bounds.items() if len(bounds) == 1 and all(map(is_number, sent)) else ():
+            low, high = (as_map(bound).get(key) for key in ("min", "max"))
+            outside = [
+                one for one in sent if (is_number(low) and one < low) or (is_number(high) and one > high)
+            ]
+            if 0 < len(outside) < len(sent):
+                fault = f"{criterion.get('scenario')} sends {outside[0]:g}, which is not within them"
+                yield (*at, "bounds", column), fault
 
 
 def _sent(scenario: dict[str, Any]) -> int:
@@ -518,10 +562,17 @@ def _without_its_node(rubric: dict[str, Any], scenarios: Scenarios) -> Iterator[
 
 
 def _launched_nodes(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
-    """Yield counts of nodes of a launch file that are more than the criterion about it names."""
-    for _, criterion in criteria:
+    """Yield counts of nodes of a launch file that are more than the criterion about it names, and programs of the
+    rubric's among these that another run starts from another package."""
+    programs = [str(start.get("program")) for one in scenarios.values() for start in starts_of(one)]
+    owners = {PurePosixPath(program).stem: program.partition("/")[0] for program in programs}
+    for index, criterion in criteria:
         name, nodes = str(criterion.get("scenario")), as_map(as_map(criterion.get("with")).get("nodes"))
         scenario = scenarios.get(name, {})
+        for node, package in nodes.items():
+            owner = owners.get(str(node).rpartition("/")[2])
+            if owner and isinstance(package, str) and package != owner:
+                yield ("criteria", index, "with", "nodes", node), f"is of {owner} elsewhere in the rubric"
         count = as_map(scenario.get("until")).get("nodes")
         if nodes and isinstance(count, int) and count > len(nodes) and len(starts_of(scenario)) == 1:
             fault = (

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from grader.checks.support.frames import FRAME_PATTERN
-from grader.rubric.scenario import NAME_PATTERN, PROGRAM_PATTERN, TYPE_PATTERN
+from grader.rubric.scenario import NAME_PATTERN, PACKAGE_PATTERN, PROGRAM_PATTERN, TYPE_PATTERN
 from grader.rubric.yaml_lines import Fault, KeyPath
 from grader.wording import did_you_mean, shorten
 
@@ -23,6 +23,7 @@ PATTERN_RULES = {
     TYPE_PATTERN: "must be a type like std_msgs/String",
     FRAME_PATTERN: "must be a frame without blanks or a slash before it, as tf2 has them, like base_link",
     PROGRAM_PATTERN: "must be a program like turtlesim/turtlesim_node",
+    PACKAGE_PATTERN: "must be the name of a package, without folders: one of the course lies beside the rubric",
 }
 TIME = "a time with its zone, such as 2026-11-20T23:59:00+01:00"
 DAY = "a day such as 2026-11-02"

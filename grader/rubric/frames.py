@@ -207,6 +207,11 @@ def _swapped_frames(
         return
     sent = [(one.get("parent"), one.get("child")) for one in given_steps(scenario, "transform")]
     sent += _asked_frames([one for n, one in criteria if n < index])
+    equal = [as_map(one.get("with")) for _, one in criteria if one.get("check") == "field-equals"]
+    named = {
+        str(one.get("field")): one.get("value") for one in equal if one.get("topic") == given.get("pose_of")
+    }
+    sent.append((named.get("header.frame_id"), named.get("child_frame_id")))
     for publish in given_steps(scenario, "publish"):
         value = as_map(publish.get("value"))
         if publish.get("topic") == given.get("pose_of"):

@@ -254,7 +254,7 @@ def _faults(source: Source, samples: Sequence[Value], beside: Beside, folder: Pa
     for sample in samples:
         faults = [
             *model_faults(Rubric, sample),
-            *cross_faults(sample, beside.known, complete=beside.own.complete),
+            *cross_faults(sample, beside.known, complete=beside.own.complete, files=beside.files),
         ]
         known = {path for path, _ in found} if sample is not samples[0] else set()
         found += [one for one in faults_of_sample(faults, source.data, as_map(sample)) if one[0] not in known]

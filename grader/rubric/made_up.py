@@ -51,6 +51,7 @@ GIVEN = {
 NAMED = ("name", "topic", "service", "action", "process", "child")
 """The keys of these parts that name them."""
 _IN_TEXT = re.compile(r"\{made_up: ?([\w-]+)\}")
+_NEARLY = re.compile(r"\{ ?made[ _-]?up\b", re.IGNORECASE)
 
 
 class MadeUp(Record):
@@ -374,9 +375,11 @@ def _no_names(part: object, path: KeyPath) -> Iterator[Fault]:
     """Yield places of made-up values that have no name."""
     if isinstance(part, dict) and part.keys() == {KEY} and not isinstance(part[KEY], str):
         yield (*path, KEY), "takes the name of one value: {made_up: rate}"
+    elif isinstance(part, str) and _NEARLY.search(_IN_TEXT.sub("", part)):
+        yield path, "a made-up value is written {made_up: rate}, with its own name"
     elif isinstance(part, dict | list):
         for key, inner in part.items() if isinstance(part, dict) else enumerate(part):
-            yield from _no_names(inner, (*path, key))
+            yield from _no_names(f"{{{key}" if inner is None else inner, (*path, key))
 
 
 def _declared_values(data: Mapping[str, Any]) -> dict[str, MadeUp]:

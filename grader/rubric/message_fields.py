@@ -32,8 +32,8 @@ from grader.rubric.definitions import (
     slip_of,
 )
 from grader.rubric.simulators import set_in, topics_of_programs
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
-from grader.wording import join_words
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in, texts_in
+from grader.wording import did_you_mean, join_words
 
 USUAL_PACKAGES = ("std_msgs", "geometry_msgs", "sensor_msgs", "nav_msgs")
 USUAL_TYPES = {
@@ -69,9 +69,8 @@ STAMPED = "is_stamp"
 _NUMBER = re.compile(r"[-+]?\d+(\.\d*)?([eE][-+]?\d+)?")
 
 
-def field_faults(rubric: dict[str, Any]) -> Iterator[Fault]:
+def field_faults(rubric: dict[str, Any], known: Definitions) -> Iterator[Fault]:
     """Yield fields that are not there, and values that they can never have."""
-    known = Definitions(rubric)
     yield from _no_types(rubric, known)
     yield from _quoted_params(rubric)
     other_kinds = list(_other_kinds(rubric))
@@ -97,6 +96,11 @@ def field_faults(rubric: dict[str, Any]) -> Iterator[Fault]:
 def _no_types(rubric: dict[str, Any], known: Definitions) -> Iterator[Fault]:
     """Yield types of fields in the rubric's definitions that there are not, or not without their package."""
     own_packages = {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
+    for path, type_ in texts_in((), rubric):
+        package, _, name = type_.partition("/")
+        there = [one.partition("/")[2] for one in known.of_course if one.startswith(f"{package}/")]
+        if path[-1] == "type" and there and name and name not in there:
+            yield path, f'{package} has no type "{name}"{did_you_mean(name, there)}'
     for path, type_, suffix, own in own_texts(rubric):
         package = type_.partition("/")[0]
         messages = known.messages_of(package)
@@ -405,8 +409,14 @@ def _sent_fields(scenario: dict[str, Any], known: Definitions) -> Iterator[tuple
     for at, kind, part, value in sent:
         own = known.text(kind, SUFFIXES[part])
         is_known = own or part in PARTS[".action"]  # other types are looked at where they are sent
-        shape = known.shape(kind, part) if is_known and isinstance(value, dict) else None
-        if shape is not None and (fault := shape.misfit(value)):
+        shape = known.shape(kind, part) if is_known and isinstance(value, dict | list) else None
+        if (
+            shape is not None
+            and isinstance(value, list)
+            and "data" not in {one.name for one in shape.types[kind]}
+        ):
+            yield at, f"is one message, a map of the fields of {kind}: several are values"
+        elif shape is not None and (fault := shape.misfit(value)):
             yield at, fault
         elif shape is None and (part or kind.partition("/")[0] not in noetic_messages()):
             yield from _quoted(at, value)

@@ -9,11 +9,13 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.support.fields import is_number
+from grader.model.message_definitions import BUILT_IN
+from grader.rubric.definitions import services_in
 from grader.rubric.message_fields import said_types
 from grader.rubric.simulators import set_in
-from grader.rubric.spelling import is_slip, texts_in
+from grader.rubric.spelling import is_slip
 from grader.rubric.started import starts_of
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in, texts_in
 from grader.wording import join_words
 
 WORDS = {
@@ -38,6 +40,10 @@ PLAIN_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w]|\.\d)")
 PRIMITIVE = re.compile(r"(?:std_msgs/)?([Uu]?[Ii]nt|[Ff]loat)(8|16|32|64)")
 OLD_NAMES = {"byte": "int8", "char": "uint8"}
 SAYS = frozenset({"prints", "logs"})
+VALUES = ("value", "values", "expect", "result")
+"""Keys of texts that a node has to publish or to answer."""
+FIELD = re.compile(r"^\s*([a-z]+\d*)\s+(\w+)\s*(?:#.*)?$", re.MULTILINE)
+"""A field of a primitive type in a definition."""
 
 
 def prose_warnings(rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -61,8 +67,11 @@ def prose_warnings(rubric: dict[str, Any]) -> Iterator[Fault]:
         yield from _misspelt_keys(at, given, rubric)
         if check in {"node-lives", "node-name"}:
             yield from _unsaid_node(at, given, rubric, handout)
-        if check in SAYS:
-            yield from _other_text(at, given, handout)
+        yield from _other_text(at, given, handout, ("text", "template") if check in SAYS else VALUES)
+        parent, child = (rf"`?{re.escape(str(given.get(key)))}`?(?!\w)" for key in ("parent", "child"))
+        is_back = check == "transform" and re.search(rf"from {child}\s+to {parent}", handout)
+        if is_back and not re.search(rf"from {parent}\s+to {child}", handout):
+            yield (*at, "parent"), f"the handout has it from {given.get('child')} to {given.get('parent')}"
 
 
 def _shifted_numbers(index: int, criterion: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -94,9 +103,8 @@ def _rates(text: str) -> set[float]:
 
 def _is_setting(path: KeyPath) -> bool:
     """Return whether a number is about the run or the marks, and not about what a node publishes or prints."""
-    key = next((part for part in reversed(path) if not isinstance(part, int)), "")
     return bool(
-        re.search(r"_s$|^(?:rate_hz|warp|points|bonus|penalty|at_most|digits|goal|number)$", str(key))
+        re.search(r"_s$|^(?:rate_hz|warp|points|bonus|penalty|at_most|digits|goal|number)$", str(path[-1]))
     )
 
 
@@ -134,12 +142,13 @@ def _unsaid_node(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any], han
     nodes = {
         name for said in re.findall(r"\bnodes? `[^.;:(]*", handout) for name in re.findall(r"`/?(\w+)`", said)
     }
-    files = " ".join([*packages_in(rubric), *re.findall(r"[\w/]+\.(?:py|cpp)\b", handout)])
+    runs = [as_map(one) for one in as_map(rubric.get("scenarios")).values()]
+    scripts = [str(start.get("script")) for scenario in runs for start in starts_of(scenario)]
+    files = " ".join([*packages_in(rubric), *scripts, *re.findall(r"[\w/]+\.(?:py|cpp)\b", handout)])
     for number, name in as_texts(given.get("names")):
         if nodes and name.strip("/") not in nodes and re.search(rf"\b{re.escape(name.strip('/'))}\b", files):
-            fault = (
-                f"is no node of the handout, which has {join_words(sorted(nodes - set(packages_in(rubric))))}"
-            )
+            others = nodes - set(packages_in(rubric)) | {*re.findall(r"\bnode `/?(\w+)`", handout)}
+            fault = f"is no node of the handout, which has {join_words(sorted(others))}"
             yield (*at, "names", number), fault
 
 
@@ -151,6 +160,8 @@ def _sent_otherwise(scenarios: Mapping[str, dict[str, Any]], handout: str) -> It
         sent: list[tuple[KeyPath, dict[str, Any]]] = [
             (("probes", n, "type"), probe) for n, probe in as_maps(scenario.get("probes"))
         ]
+        for at, _, one in services_in(scenario):
+            yield from _other_fields(("scenarios", name, *at, "definition"), one.get("definition"), handout)
         for n, step in as_maps(scenario.get("steps")):
             sent.append((("steps", n, "publish", "type"), as_map(step.get("publish"))))
             line = as_map(step.get("type")).get("line")
@@ -183,7 +194,10 @@ def _other_number(
 
 
 def _other_types(at: KeyPath, given: dict[str, Any], handout: str) -> Iterator[Fault]:
-    """Yield types of numbers that the handout does not have, where it has another of the same kind and size."""
+    """Yield types of numbers that the handout does not have, where it has another of the same kind and size; and fields
+    of a definition that it gives another type."""
+    for key in ("text", "definition"):
+        yield from _other_fields((*at, key), given.get(key), handout)
     said = {match[0] for match in PRIMITIVE.finditer(handout)}
     if not said:
         return
@@ -207,6 +221,14 @@ def _other_types(at: KeyPath, given: dict[str, Any], handout: str) -> Iterator[F
             near = [one for one in sorted(said) if ("/" in one) == ("/" in str(kind))]
             if near:
                 yield path, f"the handout has {join_words(near)}, and not {written}"
+
+
+def _other_fields(path: KeyPath, text: object, handout: str) -> Iterator[Fault]:
+    """Yield fields of a definition to which the handout gives another type."""
+    for kind, name in FIELD.findall(str(text or "")):
+        there = BUILT_IN & {*re.findall(rf"\b(\w+)`? `?{name}\b", handout)}
+        if there and kind not in there:
+            yield path, f"has {kind} {name}, and the handout {join_words(sorted(there))} {name}"
 
 
 def _plain(kind: object) -> str:
@@ -262,17 +284,16 @@ def _numbers_of_title(
         yield (*at, "title"), f"has {numbers[0]:g}, and neither the criterion nor a run has it"
 
 
-def _other_text(at: KeyPath, given: dict[str, Any], handout: str) -> Iterator[Fault]:
-    """Yield a text to print that the handout has with other blanks or signs, or another case."""
-    for key in ("text", "template"):
-        text = given.get(key)
-        if not isinstance(text, str) or not _letters(text):
+def _other_text(at: KeyPath, given: dict[str, Any], handout: str, keys: tuple[str, ...]) -> Iterator[Fault]:
+    """Yield a text to print or to send that the handout has with other blanks or signs, or another case."""
+    for path, text in (one for key in keys for one in texts_in((key,), given.get(key))):
+        if not _letters(text) or text == path[-1]:
             continue
         pattern = r"[-+]?\d+(?:\.\d+)?".join(map(re.escape, text.split("{number}")))
         quoted = [re.sub(r"\s+", " ", one) for one in re.findall(r"`([^`]+)`", handout)]
         alike = [one for one in quoted if _letters(one) == _letters(text) or _is_begun(one, text)]
         if alike and not re.search(pattern, re.sub(r"\s+", " ", handout)):
-            yield (*at, key), f"the handout has `{alike[0]}`, with other blanks or signs"
+            yield (*at, *path), f"the handout has `{alike[0]}`, with other blanks or signs"
 
 
 def _is_begun(said: str, text: str) -> bool:

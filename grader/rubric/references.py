@@ -15,18 +15,17 @@ from grader.checks.registry import Check, Reference
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.ros_packages import TypeKind, ros_packages
 from grader.rubric.arguments import argument_faults
-from grader.rubric.definitions import services_in
+from grader.rubric.definitions import Definitions, services_in
 from grader.rubric.durations import steps_s
 from grader.rubric.frames import frame_faults
 from grader.rubric.message_fields import field_faults
 from grader.rubric.reachable import reach_faults
 from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Until
 from grader.rubric.simulators import PROGRAMS, asked_faults, only_publisher, parameter_faults
-from grader.rubric.spelling import texts_in
 from grader.rubric.started import started_faults, starts_of
 from grader.rubric.step_faults import given_steps
 from grader.rubric.unknown_names import SURE, topics_in, unknown_names, values_of, with_other_topics
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in, texts_in
 from grader.wording import closest, did_you_mean, join_words
 
 LAUNCH_ENDINGS = (".launch", ".xml")
@@ -46,7 +45,9 @@ ENDINGS = (".py", ".yaml", ".yml", ".sh", ".bash", ".exe", ".pl", ".lua", ".js",
 OTHER_DISTROS = ("melodic", "kinetic", "indigo", "foxy", "humble", "jazzy")
 
 
-def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Iterator[Fault]:
+def reference_faults(
+    rubric: dict[str, Any], checks: Mapping[str, Check], files: Mapping[str, bytes]
+) -> Iterator[Fault]:
     """Yield a fault for everything that is named and not there."""
     scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
     for name, scenario in scenarios.items():
@@ -69,7 +70,7 @@ def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Ite
     for index, package in as_texts(as_map(rubric.get("needs")).get("apt")):
         if fault := _no_debian_package(package):
             yield ("needs", "apt", index), fault
-    yield from field_faults(rubric)
+    yield from field_faults(rubric, Definitions(rubric, files))
     yield from frame_faults(rubric)
     yield from _unused_faults(rubric, scenarios, checks)
     yield from started_faults(rubric, scenarios, checks)
@@ -160,7 +161,7 @@ def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -
     """A program, or a type of messages or services. The student's own package may have any type."""
     if not isinstance(value, str):
         return
-    own = {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
+    own = {*packages_in(rubric), *(PurePosixPath(name).name for _, name in as_texts(rubric.get("packages")))}
     fault = ""
     if to == "program" and not re.fullmatch(PROGRAM_PATTERN, value):
         fault = f'name its package too, like turtlesim/turtlesim_node, not "{value}"'

@@ -11,7 +11,7 @@ from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.installable import noetic_messages
 from grader.rubric.message_fields import type_judged, types_of
 from grader.rubric.simulators import TRUE_POSE
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, own_packages
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, own_packages, texts_in
 from grader.wording import is_one_edit
 
 ONE_NAME = re.compile(
@@ -174,6 +174,12 @@ def _last_word(path: KeyPath, text: str, rubric: dict[str, Any]) -> str:
     """Return the part of a name by which others would know it; "" for a text that is not a name of the student's."""
     if ONE_NAME.fullmatch(text) or (_key(path) in PLAIN_NAMES and text != path[-1]):
         return PurePosixPath(text).stem
+    if (
+        len(path) == 4
+        and path[-2:] == ("with", "value")
+        and str(_judged(path, rubric).get("field")).endswith("frame_id")
+    ):
+        return text
     is_field = FIELDS & {*path[:-1]} and text == path[-1] and not _is_known_field(path, rubric)
     return text.rpartition(".")[2].partition("[")[0] if is_field or _is_own_field(path, rubric) else ""
 
@@ -196,13 +202,18 @@ def _is_known_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
     return any(kind and kind.partition("/")[0] not in own_packages(rubric) for kind in kinds)
 
 
+def _judged(path: KeyPath, rubric: dict[str, Any]) -> dict[str, Any]:
+    """Return what the criterion at a place asks for."""
+    criterion = next((one for index, one in as_maps(rubric.get("criteria")) if index == path[1]), {})
+    return as_map(criterion.get("with"))
+
+
 def _is_own_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
     """Return whether a field of a message type is meant that the student or the course defines, or one that no message
     of ROS's has, on a topic whose type is not said."""
     if len(path) != 4 or path[-2:] != ("with", "field"):
         return False
-    criterion = next((one for index, one in as_maps(rubric.get("criteria")) if index == path[1]), {})
-    given = as_map(criterion.get("with"))
+    given = _judged(path, rubric)
     kinds = [*types_of(str(given.get("topic")), rubric)]
     if not kinds:
         of_ros = {
@@ -210,16 +221,3 @@ def _is_own_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
         }
         return not of_ros.issuperset(re.findall(r"[^\W\d]\w*", str(given.get("field"))))
     return any(str(kind).partition("/")[0] in own_packages(rubric) for kind in kinds)
-
-
-def texts_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, str]]:
-    """Yield all texts in a part of a rubric, keys too, each with its place."""
-    if isinstance(value, str):
-        yield path, value
-    elif isinstance(value, dict):
-        for key, inner in value.items():
-            yield (*path, key), str(key)
-            yield from texts_in((*path, key), inner)
-    elif isinstance(value, list):
-        for index, inner in enumerate(value):
-            yield from texts_in((*path, index), inner)

@@ -20,8 +20,8 @@ from grader.model.message_definitions import NOT_FINITE
 from grader.ros_packages import ros_packages
 from grader.rubric.fault_words import model_faults
 from grader.rubric.scenario import STEP_S_MAX, Action, Step, Transform, Until
-from grader.rubric.spelling import is_slip, texts_in
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts
+from grader.rubric.spelling import is_slip
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, texts_in
 from grader.wording import did_you_mean
 
 KINDS = tuple(Step.model_fields)

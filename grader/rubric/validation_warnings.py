@@ -12,15 +12,15 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.support.fields import is_number
+from grader.rubric.arguments import argument_warnings
 from grader.rubric.definitions import services_in
 from grader.rubric.demand_warnings import demand_warnings
 from grader.rubric.message_fields import POSES, VELOCITIES
 from grader.rubric.prose_warnings import SHIFTS, numbers_in, prose_warnings
 from grader.rubric.simulators import set_in, topics_of_programs
-from grader.rubric.spelling import texts_in
 from grader.rubric.started import starts_of
 from grader.rubric.step_faults import given_steps
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in, texts_in
 from grader.wording import join_words, plural
 
 SHORT = {"limit_s": 3.0, "first_message_s": 3.0, "quiet_s": 1.0, "alive_s": 0.5, "window_s": 2.0}
@@ -55,6 +55,7 @@ def warnings(data: object) -> Iterator[Fault]:
     yield from _without_input(criteria, scenarios)
     yield from demand_warnings(rubric, criteria, scenarios)
     yield from prose_warnings(rubric)
+    yield from argument_warnings(rubric)
     for index, criterion in criteria:
         at, given = ("criteria", index, "with"), as_map(criterion.get("with"))
         scenario = scenarios.get(str(criterion.get("scenario")), {})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import date
@@ -24,6 +25,7 @@ OF_ANY_KIND = frozenset({
 """Keys of values that may be text as well as true or false."""
 TEXT_TAG = "tag:yaml.org,2002:str"
 INT_TAG = "tag:yaml.org,2002:int"
+BOOL_TAG = "tag:yaml.org,2002:bool"
 MERGE_TAG = "tag:yaml.org,2002:merge"
 PLAIN_TAGS = frozenset({"tag:yaml.org,2002:map", "tag:yaml.org,2002:seq"})
 
@@ -331,7 +333,11 @@ class _Reader:
         line = node.start_mark.line + 1
         is_cut = node.tag == INT_TAG and value.start_mark.index == value.end_mark.index
         remedy = "a decimal number has a point, no comma" if is_cut else "put the key in quotes"
-        self.faults.append((path, f"{shown} on line {line} is not a string: {remedy}"))
+        truth = str(self.loader.construct_object(node)).lower() if node.tag == BOOL_TAG else ""
+        fault = f"{shown} on line {line} is not a string: {remedy}"
+        if truth not in {"", shown.lower()}:
+            fault = f"the key {shown} of line {line} is {truth} in YAML: put it in quotes"
+        self.faults.append((path, fault))
         return None
 
     def _scalar(self, node: yaml.Node, path: KeyPath) -> Value:
@@ -399,3 +405,16 @@ def as_texts(value: object) -> list[tuple[int, str]]:
     """Return the texts in a list, each with its place in the list."""
     items = value if isinstance(value, list) else []
     return [(index, item) for index, item in enumerate(items) if isinstance(item, str)]
+
+
+def texts_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, str]]:
+    """Yield all texts in a part of a rubric, keys too, each with its place."""
+    if isinstance(value, str):
+        yield path, value
+    elif isinstance(value, dict):
+        for key, inner in value.items():
+            yield (*path, key), str(key)
+            yield from texts_in((*path, key), inner)
+    elif isinstance(value, list):
+        for index, inner in enumerate(value):
+            yield from texts_in((*path, index), inner)

@@ -109,6 +109,15 @@ def test_a_node_that_failed_is_named_in_a_note(tmp_path):
     assert load_rubric(str(path)).rubric.max_points == 100
 
 
+def test_a_build_that_failed_is_noted_first() -> None:
+    made = {"name": "catkin_make", "role": "build", "exit_code": 2}
+    runs = build_runs({"runs": {"package": {"processes": [made]}}, "package": {}})
+    proposal = Proposal(package_facts(runs["package"]), Parts(nodes={}, launches={}), {}, runs)
+    (note,) = proposal.notes
+    assert note.startswith("little of the package was seen: catkin_make failed")
+    assert note.endswith("--from FOLDER --package NAME")
+
+
 def test_nothing_to_see_twice():
     seen = {"node": observe(run_of(topics=[{"topic": "/c", "callerid": "/node"}]))}
     assert second_look("lab1", Parts(nodes={"node": "src/node.py"}, launches={}), seen) is None

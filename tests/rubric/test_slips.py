@@ -30,8 +30,9 @@ SLIPS = Path(__file__).with_name("slips.yaml")
 
 @pytest.fixture(scope="module")
 def examples(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of the examples, with what lies beside them."""
-    return shutil.copytree(rubrics_folder() / "examples", tmp_path_factory.mktemp("rubrics") / "examples")
+    """The folder of the examples, with what lies beside them, and a lab with a package of the course's."""
+    folder = shutil.copytree(rubrics_folder() / "examples", tmp_path_factory.mktemp("rubrics") / "examples")
+    return shutil.copytree(Path(__file__).with_name("rover"), folder, dirs_exist_ok=True)
 
 
 def _spoiled(examples: Path, name: str, old: str, new: str) -> Path:

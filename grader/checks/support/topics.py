@@ -34,8 +34,9 @@ from grader.checks.support.text import (
     subscriber,
     texts_in,
 )
-from grader.evidence.events import MISFIT, UNHEARD
+from grader.evidence.events import MISFIT, UNHEARD, UNSENDABLE
 from grader.evidence.run import Channel, Run
+from grader.installable import NOTHING_TO_DO
 from grader.model.package import LaunchNode, PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.record import Record
@@ -493,12 +494,14 @@ def nothing_sent(package: PackageFacts, run: Run, topic: str, of: Sender) -> Ver
 
 def misfit(run: Run, topic: str = "") -> Verdict | None:
     """Return the verdict where the grader could not send anything (on that topic), because the student's own message
-    is defined otherwise."""
-    notes = (e for _, e in run.actors if e.action == "note" and e.detail.startswith(MISFIT))
+    is defined otherwise, or because the rubric is wrong."""
+    notes = (e for _, e in run.actors if e.action == "note" and e.detail.startswith((MISFIT, UNSENDABLE)))
     note = next((e for e in notes if topic in {"", e.topic}), None)
     if note is None:
         return None
     message = f"nothing could be sent on {note.topic}: {note.detail}"
+    if note.detail.startswith(UNSENDABLE):
+        return inconclusive(message, hint=f"{NOTHING_TO_DO}tell your instructor")
     return failed(message, hint="use the handout's names and types in the .msg file, and build again")
 
 

@@ -113,5 +113,5 @@ def _repair_spin(files: Files, path: str) -> None:
     if end is None or "main" not in code:
         return
     indent = "  " if end["brace"] else end["indent"]
-    message = f"{path} ends as soon as it has subscribed, because nothing keeps it running"
+    message = f"{path} ends as soon as it is set up, because nothing keeps it running"
     files.change("missing-call", path, "\n".join([*lines[:at], f"{indent}{SPIN}", *lines[at:]]), message)

@@ -358,7 +358,7 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "inside": ("{place}: from here on the lines are outside of {calls}, which makes the node",
      "change the indentation: "),
     "main": ("{place}: nothing calls {calls}", "add `if __name__ == '__main__':`, and {calls} below it"),
-    "spin": ("{file} ends as soon as it has subscribed, because nothing keeps it running",
+    "spin": ("{file} ends as soon as it is set up, because nothing keeps it running",
      "write {word} as the last line of the code that makes the node"),
 }  # fmt: skip
 """What is wrong, and how it is repaired, where that is known without Python's own message."""
