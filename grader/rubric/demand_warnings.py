@@ -39,7 +39,6 @@ def demand_warnings(rubric: dict[str, Any], criteria: Criteria, scenarios: Scena
     yield from _answers_waited_for(scenarios, handout)
     yield from _more_values(criteria, scenarios, handout)
     yield from _left_out(scenarios)
-    yield from _crossed(scenarios)
     yield from _fewer_arguments(scenarios)
     yield from _numbers_as_text(scenarios)
     yield from _other_lengths(criteria)
@@ -175,23 +174,6 @@ def _not_its_name(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) ->
             (*at, "anonymous"),
             f"is required, and the rubric names {below}, which is below a name without digits",
         )
-
-
-BOUNDS = (("low", "high"), ("min", "max"), ("lower", "upper"), ("minimum", "maximum"))
-
-
-def _crossed(scenarios: Scenarios) -> Iterator[Fault]:
-    """Yield requests whose lower bound is above the upper one."""
-    for name, scenario in scenarios.items():
-        for at, part, one in services_in(scenario):
-            request = as_map(one.get(part)) if part == "request" else {}
-            for low, high in BOUNDS:
-                both = is_number(request.get(low)) and is_number(request.get(high))
-                if both and request[low] > request[high]:
-                    yield (
-                        ("scenarios", name, *at, part, low),
-                        f"is more than {high}, {request[high]:g}: is that meant?",
-                    )
 
 
 def _never_set(at: KeyPath, given: dict[str, Any]) -> Iterator[Fault]:

@@ -54,6 +54,7 @@ def warnings(data: object) -> Iterator[Fault]:
     yield from _not_private(scenarios, str(rubric.get("handout") or ""))
     yield from _without_input(criteria, scenarios)
     yield from demand_warnings(rubric, criteria, scenarios)
+    yield from _crossed_bounds(scenarios)
     yield from prose_warnings(rubric)
     yield from argument_warnings(rubric)
     for index, criterion in criteria:
@@ -101,6 +102,23 @@ def _short_waits(scenarios: Mapping[str, dict[str, Any]]) -> Iterator[Fault]:
             if is_number(limit_s) and limit_s < WAIT_S:
                 fault = f"{limit_s:g} s is very short: on a busy machine a correct package may need more"
                 yield ("scenarios", name, *at, "limit_s"), fault
+
+
+BOUNDS = (("low", "high"), ("min", "max"), ("lower", "upper"), ("minimum", "maximum"))
+
+
+def _crossed_bounds(scenarios: Mapping[str, dict[str, Any]]) -> Iterator[Fault]:
+    """Yield requests whose lower bound is above the upper one."""
+    for name, scenario in scenarios.items():
+        for at, part, one in services_in(scenario):
+            request = as_map(one.get(part)) if part == "request" else {}
+            for low, high in BOUNDS:
+                both = is_number(request.get(low)) and is_number(request.get(high))
+                if both and request[low] > request[high]:
+                    yield (
+                        ("scenarios", name, *at, part, low),
+                        f"is more than {high}, {request[high]:g}: is that meant?",
+                    )
 
 
 def _lone_quotes(rubric: dict[str, Any]) -> Iterator[Fault]:

@@ -6,7 +6,8 @@ a clock. Nothing is executed. Python 3.8, standard library only.
 
 import ast
 
-from script_names import called_name, calls_in, dotted, functions_in, is_call, slip, text_of, turns, walk
+from script_loops import turns
+from script_names import called_name, calls_in, dotted, functions_in, is_call, slip, text_of, walk
 
 CLOCKS = {
     "get_time", "get_rostime", "now", "time", "time_ns", "monotonic", "monotonic_ns", "perf_counter",

@@ -15,7 +15,6 @@ from script_names import (
     is_call,
     slip,
     text_of,
-    turns,
     walk,
 )
 
@@ -274,6 +273,18 @@ def waiting_callbacks(tree):
 
 def is_short(sleep):
     return bool(sleep.args) and (constant(sleep.args[0], lambda node: node) or 1.0) < 0.1
+
+
+def turns(tree):
+    """Yield each node with its function, and whether a loop in there does it again and again."""
+    left = [(tree, None, False)]
+    while left:
+        node, function, again = left.pop()
+        yield node, (function, again)
+        for child in ast.iter_child_nodes(node):
+            own = isinstance(child, (ast.FunctionDef, ast.Lambda))
+            looped = again or isinstance(node, (ast.While, ast.For))
+            left.append((child, child if own else function, looped and not own))
 
 
 def is_endless(loop, function=None):

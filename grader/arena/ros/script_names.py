@@ -33,18 +33,6 @@ def calls_in(node, *names):
     return [n for n in getattr(node, "all_nodes", None) or ast.walk(node) if is_call(n, *names)]
 
 
-def turns(tree):
-    """Yield each node with its function, and whether a loop in there does it again and again."""
-    left = [(tree, None, False)]
-    while left:
-        node, function, again = left.pop()
-        yield node, (function, again)
-        for child in ast.iter_child_nodes(node):
-            own = isinstance(child, (ast.FunctionDef, ast.Lambda))
-            looped = again or isinstance(node, (ast.While, ast.For))
-            left.append((child, child if own else function, looped and not own))
-
-
 def functions_in(tree):
     """Return the functions and methods of a module by their names."""
     return {n.name: n for n in walk(tree) if isinstance(n, ast.FunctionDef)}

@@ -1,0 +1,140 @@
+"""What `requires` means: which lost criterion explains that there was nothing to judge for another one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import PurePath
+
+from grader.checks import Check
+from grader.checks.support.text import texts_in
+from grader.judging.repair_charges import is_unmade
+from grader.model.verdict import Status, Verdict, cited_lines, inconclusive
+from grader.rubric.model import Criterion, Rubric
+
+OF_CONNECTIONS = ("connected", "launch-connects", "launch-runs")
+"""Checks of which nodes are connected, at whatever rate messages come."""
+
+
+class Requirements:
+    """Applies `requires`: give it each criterion's verdict after those of the criteria that it requires."""
+
+    def __init__(self, rubric: Rubric, checks: Mapping[str, Check]) -> None:
+        self._rubric = rubric
+        self._criteria = {c.id: c for c in rubric.criteria}
+        self._checks = checks
+        self._roots: dict[str, str] = {}
+        self.verdicts: dict[str, Verdict] = {}
+
+    def apply(self, criterion: Criterion, verdict: Verdict) -> Verdict:
+        """Return `blocked` where there was nothing to judge and a required criterion explains it, named by its root.
+
+        What was found here stays in the message.
+        """
+        if not verdict.unjudged:
+            return verdict
+        lost = [r for r in criterion.requires if self._explains(r, criterion, verdict)]
+        same = [r for r in lost if _cause(self.verdicts[r]) == _cause(verdict)]
+        same = same or [r for r in lost if _cause(self.verdicts[r]) in verdict.message]
+        if lost:
+            # what is not there at all explains most, then what is said of the same topics and nodes
+            names = _graph_names(criterion)
+            shared = {r: len(names & _graph_names(self._criteria[r])) for r in lost}
+            blocking = min(same or lost, key=lambda r: (not self.verdicts[r].unjudged, -shared[r]))
+            root = self._roots[criterion.id] = self._roots.get(blocking, blocking)
+            message = f"blocked by {root}: {self.verdicts[root].message}"
+            if verdict.message not in message:
+                message = f"{message}; for this criterion: {_without_cause(verdict)}"
+            # what is sure and explains it would come again with the run
+            sure = self.verdicts[root].unjudged or self._criteria[root].scenario == criterion.scenario
+            update = {
+                "timing": verdict.timing and (self.verdicts[root].timing or not sure),
+                "status": Status.BLOCKED,
+                "score": 0.0,
+                "message": message,
+                "hint": f"fix {root} first",
+                "blocked_by": root,
+            }
+            return verdict.model_copy(update=update)
+        undecided = next((r for r in criterion.requires if self.verdicts[r].status.is_open), None)
+        if undecided is None:
+            return verdict
+        message = f"{verdict.message}; and {undecided} could not be judged"
+        return inconclusive(message, expected=verdict.expected, measured=verdict.measured, hint=verdict.hint)
+
+    def _explains(self, required: str, criterion: Criterion, found: Verdict) -> bool:
+        """Return whether the loss of a required criterion can be why there was nothing to judge for this one.
+
+        What else was wrong with a node, or with a file, is no reason for its process, or for the build, to end; unless
+        it was at the same line, or what is absent is named.
+        """
+        verdict = self.verdicts[required]
+        # the line below which a call that is missing goes is not a fault
+        is_missing = bool(verdict.sought_name("call") or verdict.sought_name("below"))
+        same_line = not is_missing and not cited_lines(verdict.citations).isdisjoint(
+            cited_lines(found.citations)
+        )
+        same_run = self._criteria[required].scenario == criterion.scenario
+        if not verdict.status.is_lost or is_unmade(verdict):
+            return False  # a program that the build did not make is no reason for the build to fail
+        named = verdict.unjudged and any(text in found.message for text in _paths(self._criteria[required]))
+        if same_run and found.cause not in {"", verdict.cause} and not named and not same_line:
+            return False  # its process ended of something else
+        if verdict.unjudged:
+            return True
+        if self._is_repaired(required, criterion, found) and not same_line:
+            return False
+        was_there = (found.silent and (same_run or found.status is Status.PASS)) or self._leaves_it_there(
+            required, criterion
+        )
+        return not was_there or bool(verdict.cause) or _cause(verdict) in found.message
+
+    def _is_repaired(self, required: str, criterion: Criterion, found: Verdict) -> bool:
+        """Return whether the arena puts right what the required criterion asks for, bits and first lines, before it
+        runs anything."""
+        check = self._checks.get(self._criteria[required].check)
+        if check is None or not check.run_anyway or criterion.scenario is None:
+            return False
+        return check.name != "build" or not (found.unbuilt or self._is_compiled(criterion))
+
+    def _leaves_it_there(self, required: str, criterion: Criterion) -> bool:
+        """Return whether what the required criterion judges can be wrong of a node that is there and connected."""
+        one = self._criteria[required]
+        check = self._checks.get(one.check)
+        if check is None:
+            return False
+        rate = criterion.check in OF_CONNECTIONS and check.rate_bounds(one.parameters) is not None
+        return rate or (check.of_lives and not self._is_below(required, criterion))
+
+    def _is_below(self, required: str, criterion: Criterion) -> bool:
+        """Return whether the criterion asks for a private name of the node that the required one names."""
+        parts = {part for text in texts_in(criterion.parameters) for part in text.split("/")[:-1] if part}
+        return bool(parts.intersection(texts_in(self._criteria[required].parameters.get("names"))))
+
+    def _is_compiled(self, criterion: Criterion) -> bool:
+        """Return whether it is about a program that only a build makes: a script runs from its source."""
+        scenario = self._rubric.scenarios.get(criterion.scenario or "")
+        starts = scenario.start if scenario is not None else ()
+        process = str(criterion.parameters.get("process")).partition("/")[0]
+        about = [start for start in starts if start.name == process and not start.is_rostest] or starts
+        return any(start.built or (start.script and not PurePath(start.script).suffix) for start in about)
+
+
+def _graph_names(criterion: Criterion) -> set[str]:
+    """Return the topics, services and nodes that the criterion asks for."""
+    return {text for text in texts_in(criterion.parameters) if text.startswith("/")}
+
+
+def _paths(criterion: Criterion) -> list[str]:
+    """Return the parameters that look like the path of a file of the package: no topic."""
+    return [text for text in texts_in(criterion.parameters) if "/" in text and not text.startswith("/")]
+
+
+def _cause(verdict: Verdict) -> str:
+    return verdict.cause or verdict.message
+
+
+def _without_cause(verdict: Verdict) -> str:
+    """Return what was found, without the cause that the blocking criterion's message has named already."""
+    if not verdict.cause:
+        return verdict.message
+    return verdict.message.replace(f" ({verdict.cause})", "").replace(f": {verdict.cause}", "")
