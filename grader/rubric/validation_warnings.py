@@ -55,6 +55,7 @@ def warnings(data: object) -> Iterator[Fault]:
     yield from _without_input(criteria, scenarios)
     yield from demand_warnings(rubric, criteria, scenarios)
     yield from _crossed_bounds(scenarios)
+    yield from _unasked_bits(criteria, scenarios)
     yield from prose_warnings(rubric)
     yield from argument_warnings(rubric)
     for index, criterion in criteria:
@@ -363,6 +364,22 @@ def _not_private(scenarios: Mapping[str, dict[str, Any]], handout: str) -> Itera
             if param.count("/") == 1 and re.search(rf"~{re.escape(param[1:])}\b", handout):
                 fault = f"the handout has ~{param[1:]}, which is below the node's own name: /<node>{param}"
                 yield ("scenarios", name, *at, "name"), fault
+
+
+def _unasked_bits(
+    criteria: Sequence[tuple[int, dict[str, Any]]], scenarios: Mapping[str, dict[str, Any]]
+) -> Iterator[Fault]:
+    """Yield scripts that no criterion asks to be executable, where one asks it of another script: the grader sets the
+    bit of each before it runs them."""
+    asked = {str(as_map(c.get("with")).get("path")) for _, c in criteria if c.get("check") == "executable"}
+    told = set(asked)
+    for name, scenario in scenarios.items():
+        for number, start in as_maps(scenario.get("start")):
+            script = str(start.get("script"))
+            if asked and script.endswith(".py") and script not in told:
+                told.add(script)
+                fault = f"no criterion asks whether {script} can be run, as one does of {min(asked)}"
+                yield ("scenarios", name, "start", number, "script"), fault
 
 
 OF_NODES = frozenset({"node-lives", "node-name", "launch-runs", "launch-connects"})
