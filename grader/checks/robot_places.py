@@ -241,7 +241,10 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
     there = next((pose for pose in judged if params.is_near(pose)), None)
     if there is not None:
         message = f"it is there after {there.time_s - asked.began_s(judged):.1f} s, but keeps moving: {at}"
-        return failed(message, hint="publish a zero velocity once you are there")
+        hint = "publish a zero velocity once you are there"
+        if params.asked_on is None:  # it may be a place on its way
+            hint = f"see on the map where it goes on; if it has to stop there, {hint}"
+        return failed(message, hint=hint)
     speed_m_s = _speed_m_s(judged)
     if speed_m_s > SLOW_M_S:
         message = f"{at}, and is still on its way at {speed_m_s:.2f} m/s"

@@ -42,6 +42,7 @@ DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark",
 OF_SYNTAX = {"python-syntax", "launch-syntax", "yaml-syntax"}
 """Of a line that could not be read, the copy shows for the first time what it says."""
 MADE_BY_BUILDS = {".msg", ".srv", ".action", ".c", ".cc", ".cpp", ".cxx"}
+_PLACE = re.compile(r"^line \d+ of [^:]+: ")
 NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
@@ -173,7 +174,7 @@ def charged_verdict(
     hints = clauses + advice_on(one for one in repairs if one not in told)
     said = verdict.message
     unsaid = [one for one in repairs if PurePosixPath(one.file).name not in said]
-    words = [said, *(words for words in messages_of(unsaid) if words not in said)]
+    words = [said, *(one for one in messages_of(unsaid) if (_PLACE.sub("", one) or one) not in said)]
     is_new = not copy.hint or not set(copy.hint.split("; ")) <= set(hints)
     if further:
         words += [f"with that repaired, it is blocked by {copy.blocked_by}"]

@@ -150,7 +150,7 @@ def _explain_misspelt(slips: Mapping[str, str], package: PackageFacts) -> Explai
         if any(" " in new for new in slips.values()):
             parts, where = [f"`{old}`" for old in slips], "as one word"
         return Explained(
-            f"find_package(…) names {join_words(parts)} {where}, and only blanks part its names", right + too
+            f"find_package(…) names {join_words(parts)} {where}; only spaces go between names", right + too
         )
     named = join_words(f"`{old}`" if signs else old for old in slips)
     what = "is no package of that name" if len(slips) == 1 else "are no packages of these names"

@@ -6,12 +6,14 @@ from __future__ import annotations
 import ast
 import re
 from contextlib import suppress
+from pathlib import PurePosixPath
 
 from grader.checks.support.console_output import Frame, Traceback
 from grader.checks.support.text import shown
 from grader.installable import noetic_messages
 from grader.model.package import PackageFacts
 from grader.syntax_fixes import parsed
+from grader.wording import join_words
 
 Meaning = tuple[str, str]
 """The cause, and what to do."""
@@ -283,6 +285,18 @@ def _decimal(value: ast.expr) -> Meaning | None:
     return None
 
 
+NUMBER_TYPES = ("Int", "UInt", "Float", "Byte", "Char", "Bool")
+"""How the types of std_msgs that hold a number begin."""
+
+
+def _constants(package: PackageFacts) -> list[str]:
+    """Return the constants of the package's own messages, as scripts write them: `Reading.OK`."""
+    own = (one for each in (package, *package.also) for one in each.interfaces)
+    return [
+        f"{PurePosixPath(one.path).stem}.{f.name}" for one in own for f in one.fields if f.value is not None
+    ]
+
+
 def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
     """Return why a message does not take the value that is published: a text for a number, a number for a text, or the
     publisher of another topic."""
@@ -308,7 +322,9 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
     if point is not None:
         return point[0], rewritten(frame.source, (sent.args[0], point[1])) if sent is not None else ""
     here = owners.get(owner)
-    others = [s for s in owners.values() if (types[s.line] == "String") is not wants_text]
+    others = [
+        s for s in owners.values() if types[s.line].startswith(NUMBER_TYPES if wants_text else "String")
+    ]
     if here is not None and here not in others and len(others) == 1:
         why = f"`{owner}` publishes {types[here.line]} on {here.message} (line {here.line})"
         lines = sorted((here.line, others[0].line))
@@ -318,6 +334,9 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
         return why, fix
     call = "str(…)" if wants_text else "int(…)"
     hint = f"publish a {kind} here, `{call}`; {other} go to the publisher of their own topic"
+    field, constants = re.search(r"field (\w+) must", found.message), _constants(package)
+    if field and constants and not wants_text:
+        hint = f"give its field {field[1]} one of the type's constants: {join_words(constants, 'or')}"
     return f"the message takes a {kind} but gets something else", hint
 
 
