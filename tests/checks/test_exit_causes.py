@@ -24,6 +24,7 @@ def leave():
 number_pub = rospy.Publisher('chatter', String)
 text_pub = rospy.Publisher('numbers', Int8)
 from std_msgs.msg import Int8
+from geometry_msgs.msg import Twist
 speed_pub = rospy.Publisher('cmd_vel', Twist)
 """
 
