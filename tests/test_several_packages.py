@@ -174,8 +174,8 @@ def test_fix_repairs_them_all(copy):
             f'scenarios.sensor.start[0].package: the lab has no package "weather_statoin" (did you mean "{STATION}"?)',
         ),
         (
-            f"     package: {STATION}, with: {{path",
-            "     package: lab9, with: {path",
+            f"     package: {STATION}, with: {{path: scripts/sensor",
+            "     package: lab9, with: {path: scripts/sensor",
             f'criteria[3].package: the lab has no package "lab9": there is {MSGS} and {STATION}',
         ),
         (

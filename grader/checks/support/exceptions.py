@@ -180,7 +180,7 @@ def _not_finite(message: str, source: str) -> Meaning | None:
     value = inner.left if isinstance(inner, ast.BinOp) else inner
     checked = "…" if value is None else shown(ast.unparse(value))
     return (
-        f"a value in this line is {'NaN' if 'NaN' in message else 'infinite'}, which no whole number is",
+        f"a value in this line is {'NaN' if 'NaN' in message else 'infinite'}, which cannot become a whole number",
         f"go on to this line only if `math.isfinite({checked})`: NaN is equal to nothing, so `==` never finds it",
     )
 
