@@ -515,7 +515,7 @@ def _other_value(
     elif params.when == "last" and (topic := _repeated(found, run, params)):
         message += f": each value is the one that came on {topic}"
         hint = "keep what was there before from callback to callback: `self.… = 0` in `__init__`, `+=` in the callback"
-    elif params.when == "first" and _in_vain(run, params.topic, first.time_ns):
+    elif params.when == "first" and _waited_without_message(run, params.topic, first.time_ns):
         topics = join_words(sorted(filter(None, sent))) or "that"
         message += f", which came only after {topics}"
         hint = f"publish once on {params.topic} before you wait for any message, as soon as the publisher is made"
@@ -549,7 +549,7 @@ def _repeated(found: Sequence[Reading], run: Run, params: FieldEqualsParams) -> 
     return ""
 
 
-def _in_vain(run: Run, topic: str, before_ns: int) -> bool:
+def _waited_without_message(run: Run, topic: str, before_ns: int) -> bool:
     """Return whether the scenario had waited for a message on the topic, and none had come."""
     waits = ((t, e.detail) for t, e in run.actors if e.action == "wait" and e.topic == topic)
     return any(t < before_ns and "did not come" in detail for t, detail in waits)
