@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field
@@ -149,8 +149,22 @@ def _fault(package: PackageFacts, run: Run, goal: Goal, params: ActionResultPara
     found = list(differences(goal.end.value, params.result, params.tolerance))
     if found:
         message = f"{goal.name} of {params.action} ends {status} with {join_words(map(str, found))}"
-        return failed(message, hint=f"fill in the result before you send it: {hint}")
+        return failed(message, hint=_how_to_fill(goal.end.value, params.result, hint))
     return _too_late(run, goal, params) or _no_feedback(run, goal, params)
+
+
+def _how_to_fill(got: Mapping[str, Any], wanted: Mapping[str, Any], hint: str) -> str:
+    """Return the advice on a result with other fields: that of one which nothing was written into, is to do so."""
+    if not any(got.values()):
+        return f"fill in the result before you send it: {hint}"
+    numbers = [(name, got.get(name), value) for name, value in wanted.items() if type(value) is int]
+    for name, came, value in numbers:
+        if type(came) is int and abs(came - value) == 1:
+            side = "high" if came > value else "low"
+            return (
+                f"{name} is one too {side}: look at the condition of the loop, and at where {name} is counted"
+            )
+    return f"look at where {join_words(list(wanted))} is worked out"
 
 
 def _passed(run: Run, goal: Goal, params: ActionResultParams) -> Verdict:

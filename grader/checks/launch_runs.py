@@ -12,6 +12,7 @@ from grader.checks.launch_files import missing_node
 from grader.checks.launch_params import params_in_place, params_misplaced
 from grader.checks.registry import DependencyName, LaunchName, ProgramName, check
 from grader.checks.support.launch import (
+    NOTHING_STARTS,
     finished,
     is_exact,
     node_slips,
@@ -396,7 +397,7 @@ def _twins(file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
         cited = tuple(FileCitation(file=node.file or file.path, line=line) for line in lines)
         message = f"two nodes are called {node.full_name} (lines {first.line} and {node.line} of {file.path})"
         hint = f'on line {lines[0]}, write ns="{lacking[0].rpartition("/")[0].strip("/")}"'
-        return failed(f"{message}, and roslaunch starts nothing", hint=hint, citations=cited)
+        return failed(f"{message}, and {NOTHING_STARTS}", hint=hint, citations=cited)
     return None
 
 

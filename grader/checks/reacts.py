@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect
+from collections import Counter
 from collections.abc import Sequence
 from itertools import groupby
 from typing import Annotated, Literal, NamedTuple
@@ -42,6 +44,10 @@ from grader.wording import plural, significant
 
 ORDER_S = 0.1
 """Two topics come over two connections: so much earlier a message may be recorded than what it answers."""
+
+TURNED_MIN, TURNED_SHARE = 2, 0.2
+"""A node does the opposite: seen so often both ways, and otherwise in no more than this share of its messages, as what
+it publishes may be a little older than what it has just heard."""
 
 
 class Condition(Record):
@@ -265,8 +271,25 @@ def _early(
     lead_s = to_s(first_ns) - to_s(too_early[0])
     message = f"{params.effect.words} comes {lead_s:.2f} s before {params.trigger.words}"
     hint = "publish it only when the message that you receive calls for it"
+    if params.effect.field is not None and all(map(params.effect.holds, effects)):
+        message = f"every message has {params.effect.words}, also those before {params.trigger.words}"
+        hint = f"give {params.effect.field} another value until the message comes that calls for this one"
+    elif _is_turned_round(causes, effects, params):
+        message = (
+            f"{params.effect.words} comes where it is not so that {params.trigger.words}, and not where it is"
+        )
+        hint = "turn the condition around, or swap its two branches"
     verdict = failed(message, hint=hint, measured=f"{plural(len(too_early), 'message')} too early")
     return _unless_late(verdict, too_early[-1], (causes[0].time_ns, first_ns), run, params)
+
+
+def _is_turned_round(causes: Sequence[Reading], effects: Sequence[Reading], params: ReactsParams) -> bool:
+    """Return whether the effect is there as long as the cause is not, and missing as long as it is."""
+    times = [one.time_ns for one in causes]
+    known = [(causes[at - 1], one) for one in effects if (at := bisect(times, one.time_ns))]
+    pairs = Counter((params.trigger.holds(cause), params.effect.holds(effect)) for cause, effect in known)
+    right = pairs[True, True] + pairs[False, False]
+    return min(pairs[True, False], pairs[False, True]) >= TURNED_MIN and right <= TURNED_SHARE * len(known)
 
 
 def _between(effects: Sequence[Reading], span: tuple[int, int], run: Run, params: ReactsParams) -> list[int]:

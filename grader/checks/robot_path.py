@@ -139,7 +139,7 @@ def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
         count = f"{len(params.points)} points" if len(params.points) > 1 else "its point"
         return passed(f"the path passes {count} within {significant(params.tolerance_m)} m", measured=figures)
     if stands(taken):
-        return never_moves(taken, figures)
+        return never_moves(taken, figures, run)
     words = _in_degrees(run) or what_is_wrong(taken, params.way, course, mirror=params.relative)
     verdict = failed(words.message, hint=words.hint, measured=figures)
     nearly = followed(taken, params.way.points, 2 * params.tolerance_m + _drift_m(run, taken, params.way))
@@ -149,12 +149,22 @@ def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
     return excused(verdict, run, run.start_ns, run.end_ns, lambda late: late.reason(LATE_MS, LATE_P95_MS))
 
 
-def never_moves(path: Sequence[Pose], figures: str) -> Verdict:
+def never_moves(path: Sequence[Pose], figures: str, run: Run) -> Verdict:
     """Return the loss of a robot that stays where it is, and turns there at most."""
     if turned_rad(path) > TURNING_RAD:
         hint = f"{DRIVE}: linear.x, and not only angular.z"
         return unjudged("it turns, and never leaves its place", measured=figures, hint=hint)
-    return unjudged("it never moves", measured=figures, hint=DRIVE)
+    return only_sideways(unjudged("it never moves", measured=figures, hint=DRIVE), run)
+
+
+def only_sideways(verdict: Verdict, run: Run) -> Verdict:
+    """Return the loss with its cause where the student's velocities have a linear.y, and never a linear.x."""
+    for channel in run.student_channels():
+        commands = [command for _, command in commands_of(channel)]
+        if any(one.left for one in commands) and not any(one.forward for one in commands):
+            why = f"linear.x of {channel.topic} is always 0, and linear.y does not move a robot on wheels"
+            return verdict.explained(why, "set linear.x in place of linear.y")
+    return verdict
 
 
 def _drift_m(run: Run, path: Sequence[Pose], way: Way) -> float:

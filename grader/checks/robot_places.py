@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated, NamedTuple
@@ -10,7 +11,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
-from grader.checks.robot_path import DRIVE, metres, never_moves, spot, unreadable
+from grader.checks.robot_path import DRIVE, metres, never_moves, only_sideways, spot, unreadable
 from grader.checks.support.clocks import LATE_MS, Lateness, excused, no_clock, run_seconds
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.geometry import (
@@ -18,6 +19,7 @@ from grader.checks.support.geometry import (
     TURNING_RAD,
     Area,
     Band,
+    Command,
     Point,
     Pose,
     PoseFields,
@@ -35,7 +37,7 @@ from grader.checks.support.geometry import (
 )
 from grader.checks.support.processes import GlobalName, named_at, observed_until_ns
 from grader.checks.support.text import subscriber
-from grader.checks.support.topics import SYSTEM_TOPICS, cite, no_message, nodes_on
+from grader.checks.support.topics import SYSTEM_TOPICS, cite, no_message, nodes_on, topics_with
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -57,8 +59,10 @@ NEARLY = 1.25
 """A loss by no more than this factor is one that a single run's timing could have made."""
 STEER = (
     "the angle to turn by, towards a point, is math.atan2(dy, dx) minus the heading, both in radians, brought between "
-    "-pi and pi: math.remainder(angle, 2 * math.pi)"
+    "-pi and pi: math.remainder(angle, 2 * math.pi); dx and dy are the point minus the robot's place"
 )
+SEE = "see on the map where it leaves its way, and what it does there"
+"""For a robot that knows no position: it steers by what it sees."""
 STRAIGHT = 2.0
 """A way that is longer by this factor than it brings the robot nearer is not a slow one, but a wrong one."""
 
@@ -237,7 +241,7 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
         never = (
             f"it never moves, and stays {metres(math.dist(last.point, params.goal))} from {spot(params.goal)}"
         )
-        return _never_moves(never, judged, asked, run)
+        return _never_moves(never, judged, asked, run, params)
     there = next((pose for pose in judged if params.is_near(pose)), None)
     if there is not None:
         message = f"it is there after {there.time_s - asked.began_s(judged):.1f} s, but keeps moving: {at}"
@@ -245,35 +249,53 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
         if params.asked_on is None:  # it may be a place on its way
             hint = f"see on the map where it goes on; if it has to stop there, {hint}"
         return failed(message, hint=hint)
-    speed_m_s = _speed_m_s(judged)
-    if speed_m_s > SLOW_M_S:
-        message = f"{at}, and is still on its way at {speed_m_s:.2f} m/s"
+    speed_m_s, told = _speed_m_s(judged), [one for one in _told(run, asked)[-1:] if one.speed]
+    if speed_m_s > SLOW_M_S or told:
+        still = f"on its way at {speed_m_s:.2f} m/s" if speed_m_s > SLOW_M_S else "told to drive"
+        message = f"{at}, and is still {still}"
         nearer_m = math.dist(judged[0].point, params.goal) - math.dist(last.point, params.goal)
         around, strays = turned_rad(judged) / math.tau, length_m(judged) > STRAIGHT * nearer_m
         driven = f"it drives {metres(length_m(judged))} and is {metres(max(0.0, nearer_m))} nearer"
         driven = driven if strays else f"it turns around {around:.1f} times on its way"
-        turn = f"{'it drives away' if nearer_m < 0 else driven}: {STEER}"
+        turn = f"{'it drives away' if nearer_m < 0 else driven}: {_steer(run, params)}"
         strays = strays or around > 1
         return failed(message, hint=turn if strays else "drive faster, or take a shorter way")
     if turned_rad(judged, STILL_S) > TURNING_RAD:
-        return failed(f"{at}, and turns on the spot", hint=STEER)
+        return failed(f"{at}, and turns on the spot", hint=_steer(run, params))
     hint = f"stop only where the distance is less than {significant(params.tolerance_m)} m"
     return failed(at, hint=hint)
 
 
-def _never_moves(message: str, judged: Sequence[Pose], asked: Stretch, run: Run) -> Verdict:
-    """Return the loss of a robot that stays where it is: it turns there, is told to stop, or is told nothing."""
-    if turned_rad(judged, STILL_S) > TURNING_RAD:
-        return unjudged(f"{message}, and turns on the spot", hint=STEER)
+def _steer(run: Run, params: EndsAtParams) -> str:
+    """Return how a robot turns towards its goal, where its node may know where it is."""
+    heard = {topic for topic in topics_with(run, "subscribers") if topic not in SYSTEM_TOPICS}
+    kinds = {kind for _, event in run.graph for topic, kind in event.topic_types.items() if topic in heard}
+    knows = params.asked_on is not None or params.topic in heard or not heard
+    return STEER if knows or any(re.search("Odometry|Pose|TFMessage", kind) for kind in kinds) else SEE
+
+
+def _told(run: Run, asked: Stretch) -> list[Command]:
+    """Return the velocities of the student's nodes in the time of a goal."""
     to_s = run_seconds(run)
-    sent = [
-        command
-        for c in run.student_channels()
-        for t, command in commands_of(c)
-        if to_s is not None and asked.from_s <= to_s(t) <= asked.to_s
-    ]
+    if to_s is None:
+        return []
+    sent = sorted(pair for c in run.student_channels() for pair in commands_of(c))
+    return [command for t, command in sent if asked.from_s <= to_s(t) <= asked.to_s]
+
+
+def _never_moves(
+    message: str, judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtParams
+) -> Verdict:
+    """Return the loss of a robot that stays where it is: it turns there, is told to stop, is in front of something, or
+    is told nothing."""
+    if turned_rad(judged, STILL_S) > TURNING_RAD:
+        return unjudged(f"{message}, and turns on the spot", hint=_steer(run, params))
+    sent = _told(run, asked)
+    if any(command.forward for command in sent):
+        hint = "see on the map what is in its way, and turn away from that before you drive on"
+        return unjudged(f"{message}, though it is told to drive", hint=hint)
     if not sent or any(command.speed or command.turn for command in sent):
-        return unjudged(message, hint=DRIVE)
+        return only_sideways(unjudged(message, hint=DRIVE), run)
     message += f": {plural(len(sent), 'velocity', 'velocities')} came, and {'all are' if len(sent) > 1 else 'it is'} 0"
     hint = (
         "look at the condition that stops it: the distance is math.hypot(dx, dy), which is never less than 0"
@@ -445,7 +467,7 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
     inside = share_inside(path, out)
     figures = f"{inside:.0%} of the time inside, {metres(max(out))} outside at most, {metres(long_m)} long"
     if stands(path) and (params.least_m or not any(out)):
-        return never_moves(path, figures)
+        return never_moves(path, figures, run)
     if inside < params.share - ROUNDING or (params.share == 1 and any(out)):
         verdict = _outside(path, out, region, inside, params)
     elif long_m < params.least_m:

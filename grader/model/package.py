@@ -426,6 +426,17 @@ class Interface(Record):
         name, _, suffix = posixpath.basename(self.path).partition(".")
         return tuple(f"{name}{part}" for part in CLASSES_OF.get(suffix, ("",)))
 
+    @property
+    def members(self) -> dict[str, list[str]]:
+        """The names that each of these classes has: of a message, of a request and a response, of what an action takes
+        and gives. A service's own class, and an action's messages, are not among them."""
+        found: dict[str, list[str]] = {}
+        for one in self.fields:
+            found.setdefault(f"{self.classes[0].removesuffix('Action')}{one.part.capitalize()}", []).append(
+                one.name
+            )
+        return found
+
 
 BUILD_SPACES = frozenset({"build", "devel", "install"})
 """Where catkin puts what it makes: a copy of a package in there is none."""

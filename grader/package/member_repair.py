@@ -13,8 +13,9 @@ import math
 import re
 import time
 import tokenize
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from itertools import chain
+from typing import NamedTuple
 
 from grader.package.name_repair import bound_in
 from grader.package.syntax_repair import Step, edited, last_name, nodes_in, span_of, step_to, tree_of
@@ -26,6 +27,8 @@ MEMBERS = {
     "message": ("data",),
 }
 """By what makes the object, or a message of std_msgs: what belongs to it."""
+GIVES = {"Subscriber": "", "Service": "Request", "SimpleActionServer": "Goal"}
+"""By what calls a callback: what the class of what it gets is called, behind the type's name."""
 OF_TEXTS = tuple(name for name in dir(str) if not name.startswith("_"))
 ALL_MEMBERS = frozenset(chain.from_iterable(MEMBERS.values()))
 KEYWORDS = {
@@ -48,15 +51,21 @@ Edit = tuple[tuple[int, int, int], str]
 """Line (from 0), start and end of what is replaced, and what is written for it."""
 
 
-def with_members(text: str, of_rospy: Collection[str]) -> Iterator[Step]:
-    """Yield the steps after which names of objects and of what belongs to them are as they are meant. `of_rospy` are
-    the names that rospy has."""
+class Known(NamedTuple):
+    """The names that rospy has, and the fields of the messages that the package defines, by class."""
+
+    of_rospy: Collection[str]
+    fields: Mapping[str, Collection[str]]
+
+
+def with_members(text: str, known: Known) -> Iterator[Step]:
+    """Yield the steps after which names of objects and of what belongs to them are as they are meant."""
     for find in (_dots, _misspelt_members, _misspelt_keywords, _lost_values, _lost_places):
-        for edit, why in find(text, of_rospy):
+        for edit, why in find(text, known):
             (line, _, _), _ = edit
             for step in step_to("argument", line + 1, text, edited(text, [(*edit[0], edit[1])]), why):
                 yield step
-                yield from with_members(step["text"], of_rospy)
+                yield from with_members(step["text"], known)
                 return
 
 
@@ -101,9 +110,9 @@ class _Names:
         return is_named and (first.type == tokenize.STRING or is_class)
 
 
-def _dots(text: str, of_rospy: Collection[str]) -> Iterator[tuple[Edit, str]]:
+def _dots(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
     """Yield `rospy,spin()` and `rospyspin()`, for `rospy.spin()`, and `"chatter". String`, for `"chatter", String`."""
-    names = _Names(tree_of(text), of_rospy)
+    names = _Names(tree_of(text), known.of_rospy)
     if "*" in names.bound:
         return
     given = list(tokenize.generate_tokens(io.StringIO(text).readline))
@@ -144,7 +153,7 @@ def _of_self(tree: ast.Module) -> set[str]:
     return (attributes | methods) - plain - {getattr(one, "name", "") for one in tree.body}
 
 
-def _misspelt_members(text: str, _names: Collection[str]) -> Iterator[tuple[Edit, str]]:
+def _misspelt_members(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
     """Yield `rate.slep()` and `msg.Data`."""
     tree, lines = tree_of(text), text.split("\n")
     kinds = {
@@ -157,14 +166,17 @@ def _misspelt_members(text: str, _names: Collection[str]) -> Iterator[tuple[Edit
         id(n): name for one in tree.body if (name := getattr(one, "name", "")) in own for n in nodes_in(one)
     }
     stored = {n.attr for n in nodes_in(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
-    messages = _messages_of_std(tree)
+    messages = _messages_of_callbacks(tree, known.fields)
     for node in (n for n in nodes_in(tree) if isinstance(n, ast.Attribute)):
-        members: tuple[str, ...] = MEMBERS["message"] if id(node.value) in messages else ()
+        members: Collection[str] = messages.get(id(node.value), ())
         of_text = isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
         owner = ast.unparse(node.value)
         kind = inside.get(id(node), "") if owner == "self" else kinds.get(owner, owner.removesuffix("()"))
-        members = OF_TEXTS if of_text else own.get(kind) or MEMBERS.get(kind, members)
-        right = _near(node.attr, members) if node.attr not in {*members, *stored} else ""
+        fields = known.fields.get(kind, ()) if kind not in own else ()
+        members = OF_TEXTS if of_text else own.get(kind) or MEMBERS.get(kind) or fields or members
+        right = (
+            _near(node.attr, members) if node.attr not in {*members, *(stored if not fields else ())} else ""
+        )
         span = span_of(lines, node)
         if right and span is not None:
             line, _, end = span
@@ -181,28 +193,36 @@ def _members_of(one: ast.ClassDef) -> tuple[str, ...]:
     return (*(s.name for s in one.body if isinstance(s, ast.FunctionDef)), *stored, *named)
 
 
-def _messages_of_std(tree: ast.Module) -> set[int]:
-    """Return the uses of callbacks' messages that are of std_msgs, whose field is `data`, by their identity."""
+def _messages_of_callbacks(
+    tree: ast.Module, fields: Mapping[str, Collection[str]]
+) -> dict[int, Collection[str]]:
+    """Return what belongs to the messages, requests and goals in callbacks, by the identity of each use: `data` where
+    they are of std_msgs, else the fields that the package gives them."""
     imports = [n for n in nodes_in(tree) if isinstance(n, ast.ImportFrom) and n.module == "std_msgs.msg"]
-    types = {a.asname or a.name for n in imports for a in n.names}
-    calls = [n for n in nodes_in(tree) if isinstance(n, ast.Call) and last_name(n.func) == "Subscriber"]
-    named = {last_name(c.args[2]) for c in calls if len(c.args) > 2 and last_name(c.args[1]) in types}
-    functions = [
-        n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef) and n.name in named and n.args.args
-    ]
+    of_std = {a.asname or a.name: MEMBERS["message"] for n in imports for a in n.names}
+    named: dict[str, Collection[str]] = {}
+    for call in (n for n in nodes_in(tree) if isinstance(n, ast.Call) and len(n.args) > 1):
+        given = {str(k.arg): k.value for k in call.keywords} | dict(
+            zip(("name", "type", "callback"), call.args, strict=False)
+        )
+        kind, part = last_name(given["type"]), GIVES.get(last_name(call.func))
+        callback = given.get("callback") or given.get("handler") or given.get("execute_cb")
+        if part is not None and callback is not None:
+            named[last_name(callback)] = {**of_std, **fields}.get(f"{kind.removesuffix('Action')}{part}", ())
     return {
-        id(use)
-        for function in functions
+        id(use): named[function.name]
+        for function in nodes_in(tree)
+        if isinstance(function, ast.FunctionDef) and function.name in named and function.args.args
         for use in nodes_in(function)
         if isinstance(use, ast.Name) and use.id == function.args.args[-1].arg
     }
 
 
-def _misspelt_keywords(text: str, _names: Collection[str]) -> Iterator[tuple[Edit, str]]:
+def _misspelt_keywords(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
     """Yield `Publisher(…, quue_size=10)`, and `queue_size10`."""
     lines = text.split("\n")
     for call in (n for n in nodes_in(tree_of(text)) if isinstance(n, ast.Call)):
-        keywords = KEYWORDS.get(last_name(call.func), ())
+        keywords = KEYWORDS.get(last_name(call.func)) or tuple(known.fields.get(last_name(call.func), ()))
         for one in (k for k in call.keywords if keywords and k.arg and k.arg not in keywords):
             right, at = _near(str(one.arg), keywords), one.lineno - 1
             if right and at < len(lines) and (found := re.search(rf"\b{one.arg}(?=\s*=)", lines[at])):
@@ -224,7 +244,7 @@ def _misspelt_keywords(text: str, _names: Collection[str]) -> Iterator[tuple[Edi
                 yield (span, f"{found[1]}={found[2]}"), f"`=` is missing between `{found[1]}` and its value"
 
 
-def _lost_values(text: str, _names: Collection[str]) -> Iterator[tuple[Edit, str]]:
+def _lost_values(text: str, _known: Known) -> Iterator[tuple[Edit, str]]:
     """Yield `rate : rospy.Rate(10)` and `rate == rospy.Rate(10)`, which give a name no value."""
     tree, lines = tree_of(text), text.split("\n")
     stored = {ast.unparse(n) for n in nodes_in(tree) if isinstance(getattr(n, "ctx", None), ast.Store)}
@@ -244,7 +264,7 @@ def _lost_values(text: str, _names: Collection[str]) -> Iterator[tuple[Edit, str
             yield ((span[0], colon, colon + 1), "="), "a name gets its value by `=`, and not by `:`"
 
 
-def _lost_places(text: str, _names: Collection[str]) -> Iterator[tuple[Edit, str]]:
+def _lost_places(text: str, _known: Known) -> Iterator[tuple[Edit, str]]:
     """Yield `"hello world s" % x`, `"hello world %s" & x` and `"hello world %s" + x`."""
     tree, lines = tree_of(text), text.split("\n")
     calls = [n for n in nodes_in(tree) if isinstance(n, ast.Call) and len(n.args) > 1]

@@ -27,7 +27,7 @@ from grader.package.call_repair import (
     with_values_called,
 )
 from grader.package.import_repair import with_classes, with_imports, with_message_classes, without_suffixes
-from grader.package.member_repair import with_members
+from grader.package.member_repair import Known, with_members
 from grader.package.name_repair import bound_in, meant_by, with_methods, with_names, with_self
 from grader.package.syntax_repair import (
     Step,
@@ -58,6 +58,8 @@ NAMES_OF_ROSPY = (
     "wait_for_service"
 )
 ROSPY = frozenset(NAMES_OF_ROSPY.split())
+WAITING = frozenset({"Subscriber", "Service", "Timer", "SimpleActionServer"})
+"""What a node that only waits is made of."""
 LOOPED = frozenset({"is_shutdown", "sleep", "spin"})
 OF_TWO_FRAMES = {"lookup_transform", "can_transform", "lookupTransform", "canTransform", "waitForTransform"}
 ROLES = {
@@ -73,21 +75,23 @@ ROLES = {
 }
 
 
-def examine(files: list[list[str]], types: list[str], site: str) -> Iterator[dict[str, Any]]:
-    """Yield for each pair of name and text its steps and its names. `types` are message types that the lab uses, `site`
-    is the folder that has fissix."""
+def examine(
+    files: list[list[str]], types: list[str], fields: dict[str, list[str]], site: str
+) -> Iterator[dict[str, Any]]:
+    """Yield for each pair of name and text its steps and its names. `types` are message types that the lab uses,
+    `fields` are those of the package's own messages by class, `site` is the folder that has fissix."""
     warnings.simplefilter("ignore")
     sys.path.append(site)
     for file, text in files:
         try:
-            steps = list(_steps(text, types))
+            steps = list(_steps(text, types, Known(ROSPY, fields)))
             names = _names(steps[-1]["text"] if steps else text)
         except (RecursionError, MemoryError):
             steps, names = [], []
         yield {"file": file, "steps": steps, "names": names}
 
 
-def _steps(text: str, types: list[str]) -> Iterator[Step]:
+def _steps(text: str, types: list[str], known: Known) -> Iterator[Step]:
     for step in make_readable(text):
         text = step["text"]
         yield step
@@ -99,7 +103,7 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
             lambda t: with_classes(t, types),
             lambda t: with_imports(t, types),
             with_self,
-            lambda t: with_members(t, ROSPY),
+            lambda t: with_members(t, known),
             _with_quotes,
             with_names,
             with_methods,
@@ -115,6 +119,7 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
             _with_lines_inside,
             _with_start,
             _with_main,
+            _with_server_started,
             _with_spin,
         ):
             for step in repair(text):
@@ -318,11 +323,29 @@ def _with_main(text: str) -> Iterator[Step]:
         yield from step_to("main", makers[0].lineno, text, after, makers[0].name)
 
 
+def _with_server_started(text: str) -> Iterator[Step]:
+    """An action server that waits for a `start()`, where nothing in the file calls or names one."""
+    tree, lines = tree_of(text), text.split("\n")
+    if any(isinstance(node, ast.Attribute) and node.attr == "start" for node in nodes_in(tree)):
+        return
+    for node in nodes_in(tree):
+        made = node.value if isinstance(node, ast.Assign) else None
+        if not isinstance(node, ast.Assign) or not isinstance(made, ast.Call):
+            continue
+        waits = [k for k in made.keywords if k.arg == "auto_start" and ast.unparse(k.value) == "False"]
+        before = lines[node.lineno - 1][: node.col_offset]
+        if last_name(made.func) == "SimpleActionServer" and waits and not before.strip():
+            last, call = node.end_lineno or node.lineno, f"{ast.unparse(node.targets[0])}.start()"
+            after = "\n".join([*lines[:last], f"{before}{call}", *lines[last:]])
+            yield from step_to("server", last, text, after, call)
+            return
+
+
 def _with_spin(text: str) -> Iterator[Step]:
     """A node that only waits for messages, and ends at once."""
     tree = tree_of(text)
     calls = [n for n in nodes_in(tree) if isinstance(n, ast.Call)]
-    waits = [c for c in calls if last_name(c.func) in {"Subscriber", "Service", "Timer"}]
+    waits = [c for c in calls if last_name(c.func) in WAITING]
     rospy = next((a.asname or a.name for n in nodes_in(tree) if isinstance(n, ast.Import)
                   for a in n.names if a.name == "rospy"), "")  # fmt: skip
     loops = any(isinstance(n, ast.While) for n in nodes_in(tree))

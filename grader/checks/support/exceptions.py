@@ -37,6 +37,7 @@ NUMBER_OF_PARTS = "not every message has so many parts"
 _NO_FILE = re.compile(r"No such file or directory: '([^']+)'")
 _NOT_WRITABLE = re.compile(r"(?:Permission denied|Read-only file system): '([^']+)'")
 _UNPACKED = re.compile(r"(not enough|too many) values to unpack \(expected (\d+)(?:, got (\d+))?")
+_NO_ITEMS = re.compile(r"\b(min|max)\(\) (?:arg is an empty sequence|iterable argument is empty)")
 _NO_NUMBER = re.compile(
     r"(?:invalid literal for int\(\) with base \d+|could not convert string to float): (.+)"
 )
@@ -163,6 +164,12 @@ def _value(message: str, source: str, _marked: tuple[int, int] | None) -> Meanin
         came = f"; {found[3]} came" if found[3] else ""
         hint = f"check how many there are before you unpack them: {NUMBER_OF_PARTS}"
         return f"{plural(int(found[2]), 'value')} are expected on the right of `=`{came}", hint
+    if found := _NO_ITEMS.search(message):
+        said = f"the list that {found[1]}() looks through has no item"
+        return (
+            said,
+            f"check first that it has one, or write what the result is then: `{found[1]}(…, default=…)`",
+        )
     if (found := _NO_NUMBER.search(message)) and found[1].endswith(".py'"):
         return _program(source)
     if found:

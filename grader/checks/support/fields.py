@@ -98,6 +98,23 @@ def _reading(time_ns: int, message: Any, path: str, *, numbers: bool) -> Reading
     return Reading(time_ns, tuple(values), "")
 
 
+def set_beside(message: object, path: str, wanted: object, tolerance: float) -> str:
+    """Return the one other field of a message that has the value which is wanted of this one; "" for none or several,
+    and for the values that every field begins with."""
+    if not wanted or isinstance(wanted, bool | list | Mapping):
+        return ""
+    found = [name for name, value in _leaves(message) if name != path and _equal(value, wanted, tolerance)]
+    return found[0] if len(found) == 1 else ""
+
+
+def _leaves(value: object, path: str = "") -> Iterator[tuple[str, object]]:
+    if isinstance(value, Mapping):
+        for name, inner in value.items():
+            yield from _leaves(inner, f"{path}.{name}" if path else str(name))
+    elif not isinstance(value, list | tuple):
+        yield path, value
+
+
 def no_field(missing: Reading, channels: Iterable[Channel]) -> Verdict:
     """Return the verdict where not one message has it: another type of message, most often."""
     channel = next(c for c in channels if c.messages)

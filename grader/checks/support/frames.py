@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
-from grader.evidence.run import Channel
+from grader.evidence.run import Channel, Run
 
 TOPICS = ("/tf", "/tf_static")
 Vector = tuple[float, float, float]
@@ -175,3 +176,20 @@ class Tree:
             if one.parent == parent:
                 return found
         return None
+
+
+_LOOKED_UP = re.compile(r"\"([^\"]{1,80})\" passed to lookupTransform argument \w+ does not exist")
+
+
+def unknown_frame(run: Run, output: Iterable[str]) -> str:
+    """Return the frame that a node still cannot look up when the run ends, as its output says; "" for none."""
+    found = [m[1] for line in output if (m := _LOOKED_UP.search(line))]
+    sent = {
+        name
+        for channel in run.channels
+        if channel.topic in TOPICS
+        for value in channel.values
+        for one in (value or {}).get("transforms") or ()
+        for name in (one.get("child_frame_id"), one.get("header", {}).get("frame_id"))
+    }
+    return next((name for name in found[-1:] if name not in sent), "")

@@ -51,6 +51,7 @@ YAML = {".yaml", ".yml"}
 _NO_LAUNCH_FILE = "is neither a launch file in package"
 NOT_STARTED = r"Unable to launch \[([^\s\[\]]+)-\d+\]"
 # what roslaunch says when it starts nothing, what it means, and what to do ({0}: the pattern's group)
+NOTHING_STARTS = "roslaunch starts nothing"
 _REFUSALS = (
     (r"multiple nodes named \[([^\[\]\n]+)\]", "two nodes are named {0}", "give each <node> its own name"),
     (r"cannot contain a namespace", "a node's name has a slash in it",
@@ -171,7 +172,7 @@ def refusal(run: Run, package: PackageFacts) -> Absence | None:
             fix = hint.format(*words).replace("<package>", package.name)
             if pattern == NO_FILE and (meant := _file_meant(package, words[0])):
                 fix = f"write $(find {package.name})/{meant}"
-            said = f"roslaunch starts nothing: {why.format(*words)}"
+            said = f"{NOTHING_STARTS}: {why.format(*words)}"
             if pattern == BAD_FILE and (unread := _unread_yaml(text, package)):
                 return unread
             if pattern == NO_PACKAGE and (lacking := _lacks_package(words[0], said, text, package)):
@@ -187,7 +188,7 @@ def _lacks_package(name: str, said: str, text: str, package: PackageFacts) -> Ab
         return Absence(f"{said}: this one is called {package.name}", f"write $(find {package.name})")
     if name not in known_packages():
         return None
-    why = f"roslaunch starts nothing: it needs the package {name}, which this grading machine lacks"
+    why = f"{NOTHING_STARTS}: it needs the package {name}, which this grading machine lacks"
     hint = install_hint(name, text.splitlines())
     return Absence(why, hint, of_machine=True, refused=NO_PACKAGE, about=name)
 
@@ -199,9 +200,7 @@ def _unread_yaml(text: str, package: PackageFacts) -> Absence | None:
         return None
     path = paths_by_name(package).get(PurePosixPath(found[1]).name, "")
     cited = (FileCitation(file=path, line=words.line),) if path else ()
-    said = (
-        f"roslaunch starts nothing: {shown(path or PurePosixPath(found[1]).name)} does not load: {words.why}"
-    )
+    said = f"{NOTHING_STARTS}: {shown(path or PurePosixPath(found[1]).name)} does not load: {words.why}"
     return Absence(said, words.hint, citations=cited, refused=BAD_FILE)
 
 
@@ -219,7 +218,8 @@ def explain_by_refused_launch(
         return verdict
     ended = early_end(run)
     refused = refusal(run, package) if ended is not None and ended.start.argv[:1] == ("roslaunch",) else None
-    if refused is None or refused.why in verdict.message or not verdict.cause:
+    is_told = NOTHING_STARTS in verdict.message or (refused is not None and refused.why in verdict.message)
+    if refused is None or is_told or not verdict.cause:
         return verdict
     message = verdict.message.replace(f" ({verdict.cause})", "").replace(f": {verdict.cause}", "")
     update = {"message": f"{message}: {refused.why}", "hint": refused.hint, "cause": refused.why}
@@ -254,7 +254,7 @@ def _unset_args(text: str, package: PackageFacts) -> Absence | None:
     where = f"line{'s' * (len(lines) > 1)} {join_words(map(str, lines))} of {args[0].file}"
     declares = join_words(f'<arg name="{arg.name}" default="…"/>' for arg in args)
     verb = "uses" if len(lines) == 1 else "use"
-    why = f"roslaunch starts nothing: {where} {verb} {names}, which no <arg> declares"
+    why = f"{NOTHING_STARTS}: {where} {verb} {names}, which no <arg> declares"
     hint = f"below <launch>, add {declares}, with {'its value' if len(args) == 1 else 'their values'} in place of …"
     cited = tuple(arg.place for arg in args)
     return Absence(why, hint, citations=tuple(dict.fromkeys(cited)))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import PurePosixPath
 from typing import Literal
 
 from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_end, explain_error
+from grader.checks.support.frames import unknown_frame
 from grader.checks.support.processes import (
     NO_SCRIPT_HINT,
     copied_topic,
@@ -247,7 +247,7 @@ def _judge_advertised(
 
 def _by_what_is_heard(run: Run, message: str, of_node: Callable[..., Verdict]) -> Verdict:
     """Return the verdict on a node that may wait for something: a frame that is not sent, or a message."""
-    if frame := _unknown_frame(run):
+    if frame := unknown_frame(run, _output(run)):
         why = f"{message}: the node looks up the frame {shown(frame)}, and tf knows none of that name"
         hint = "write the name of a frame that is sent: `rosrun tf view_frames` draws them"
         return of_node(why, measured="no message", hint=hint).seeking("quoted", frame)
@@ -288,21 +288,6 @@ UNTOLD = (
     "transforms are sent, and nothing follows from them",
     "print what the lookup raises: `except tf2_ros.TransformException as error: rospy.logwarn(error)`",
 )
-_LOOKED_UP = re.compile(r"\"([^\"]{1,80})\" passed to lookupTransform argument \w+ does not exist")
-
-
-def _unknown_frame(run: Run) -> str:
-    """Return the frame that a node still cannot look up when the run ends, as its output says; "" for none."""
-    found = [m[1] for line in _output(run) if (m := _LOOKED_UP.search(line))]
-    sent = {
-        name
-        for channel in run.channels
-        if channel.topic in {"/tf", "/tf_static"}
-        for value in channel.values
-        for one in (value or {}).get("transforms") or ()
-        for name in (one.get("child_frame_id"), one.get("header", {}).get("frame_id"))
-    }
-    return next((name for name in found[-1:] if name not in sent), "")
 
 
 def _output(run: Run) -> Iterator[str]:
@@ -339,7 +324,7 @@ def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
         e.topic or ""
         for _, e in run.actors
         if e.actor == "grader" and (e.action == "publish" or (e.action == "note" and e.detail == UNHEARD))
-    )
+    ) | dict.fromkeys(offered := _unheard_programs(run))
     others = topics_with(run, "subscribers")
     missed = [topic for topic in topics if topic not in others]
     connected = {
@@ -351,7 +336,7 @@ def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
     near = next(((topic, found) for topic in missed if (found := near_names(topic, others))), None)
     if not missed or not run.student_nodes() or (near is None and len(missed) < len(topics)):
         return None
-    topic, found = near or (missed[0], others)
+    topic, found = near or (missed[0], offered.get(missed[0], others))
     if refused := refused_type(run, topic):
         return refused
     if topic in TF_TOPICS:
@@ -360,7 +345,28 @@ def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
     seen = f"; {nodes_on(run, found[0], 'subscribers')[0]} subscribes to {join_words(found)}" if found else ""
     message = f"the run publishes on {topic}, and no node subscribes to it{seen}"
     remapped = _remap_to(package, run, topic, found[0]) if package is not None and found else ""
-    return failed(message, hint=remapped or f"add {subscriber(topic, f'{TYPE_SLOT}, callback')}")
+    add = f"add {subscriber(topic, f'{TYPE_SLOT}, callback')}"
+    if topic in offered:
+        add = f"subscribe to {topic} in place of {join_words(found, 'or')}, on which nothing is published"
+    return failed(message, hint=remapped or add)
+
+
+def _unheard_programs(run: Run) -> dict[str, tuple[str, ...]]:
+    """Return the topics of programs beside the student's nodes that none of these hears, by those of the same type
+    which they hear in their place, and on which nobody publishes."""
+    types = {topic: kind for _, event in run.graph for topic, kind in event.topic_types.items()}
+    fed = topics_with(run, "publishers", lambda _: True)
+    heard = topics_with(run, "subscribers")
+    found: dict[str, tuple[str, ...]] = {}
+    for channel in run.channels:
+        own = run.is_student_node(channel.callerid)
+        if own or channel.by_grader or not channel.messages or channel.topic in {*heard, *SYSTEM_TOPICS}:
+            continue
+        kind = plain_type(channel.type)
+        alike = tuple(t for t in heard if t not in fed and plain_type(types.get(t, "")) == kind)
+        if alike:
+            found[channel.topic] = alike
+    return found
 
 
 def _remap_to(package: PackageFacts, run: Run, topic: str, heard: str) -> str:

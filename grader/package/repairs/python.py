@@ -35,11 +35,11 @@ ATTEMPTS = 3
 Cause = Literal[
     "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
     "old-name", "module", "import", "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument",
-    "unbound", "kept", "guard", "inside", "start", "main", "spin", "line", "twice", "turned",
+    "unbound", "kept", "guard", "inside", "start", "main", "server", "spin", "line", "twice", "turned",
 ]  # fmt: skip
 CALLS = (
     "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument", "unbound", "kept", "guard",
-    "inside", "start", "main", "spin",
+    "inside", "start", "main", "server", "spin",
 )  # fmt: skip
 KINDS: dict[str, RepairKind] = {
     **dict.fromkeys(("module", "import"), "missing-import"),
@@ -90,7 +90,9 @@ def repair_python(
     _spell_package(files, scripts, package)
     texts = {script: text for script in scripts if (text := files.text(script))}
     names: dict[str, tuple[Name, ...]] = {}
-    for entry in _examine(texts, types):
+    interfaces = [one for each in (package, *package.also) for one in each.interfaces]
+    fields = {name: names for one in interfaces for name, names in one.members.items()}
+    for entry in _examine(texts, types, fields):
         for cause, steps in _join_steps(entry.steps):
             _change(files, entry.file, cause, steps)
         names[entry.file] = entry.names
@@ -193,7 +195,7 @@ def _unknown_message(line: str) -> str:
     return f"{wrong[0]} in {found[1]}.msg" if wrong and not meant else ""
 
 
-def _examine(texts: dict[str, str], types: Sequence[str]) -> Iterator[_Entry]:
+def _examine(texts: dict[str, str], types: Sequence[str], fields: dict[str, list[str]]) -> Iterator[_Entry]:
     deadline, left = time.monotonic() + WALL_S, list(texts)
     for _ in range(ATTEMPTS):
         wall_s = deadline - time.monotonic()
@@ -201,7 +203,7 @@ def _examine(texts: dict[str, str], types: Sequence[str]) -> Iterator[_Entry]:
             return
         request = [[file, texts[file]] for file in left]
         answer = run_limited(
-            EXAMINE, request, list(types), _site(), limits=ChildLimits(wall_s=wall_s, **LIMITS)
+            EXAMINE, request, list(types), fields, _site(), limits=ChildLimits(wall_s=wall_s, **LIMITS)
         )
         for entry in filter(None, map(_entry, answer.lines.splitlines())):
             if entry.file in left:
@@ -358,6 +360,7 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "inside": ("{place}: from here on the lines are outside of {calls}, which makes the node",
      "change the indentation: "),
     "main": ("{place}: nothing calls {calls}", "add `if __name__ == '__main__':`, and {calls} below it"),
+    "server": ("{place}: the action server of line {line} is never started", "below line {line}, write `{word}`"),
     "spin": ("{file} ends as soon as it is set up, because nothing keeps it running",
      "write {word} as the last line of the code that makes the node"),
 }  # fmt: skip
