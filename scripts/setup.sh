@@ -215,7 +215,6 @@ make_venv() {
   say "installing the grader into .venv"
   .venv/bin/python -m pip --disable-pip-version-check --no-input install -qq -e '.[dev]' ||
     die "pip could not install the grader: see above, then run make setup again"
-  .venv/bin/python -m compileall -q grader || true # a start takes longer without, and nothing else
   printf '%s\n' "$1" >.venv/setup-stamp
 }
 
@@ -261,6 +260,8 @@ stamp="$(cksum <pyproject.toml) $PWD"
 if ! ready "$stamp"; then
   make_venv "$stamp"
 fi
+# Each time: the processes that read scripts and run arenas keep no bytecode, and would compile what has changed in every grading.
+.venv/bin/python -m compileall -q grader || true
 install_extras
 if [ "${1:-}" != --no-browser ]; then
   install_browser
