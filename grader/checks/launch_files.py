@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from difflib import get_close_matches
-from itertools import count
+from itertools import chain, count
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
@@ -239,7 +239,7 @@ def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
 def _node_tag(file: LaunchFile, pkg: str, name: str) -> str:
     """Return the tag of a node, by a name that no other node of the file has: roslaunch takes none twice."""
     stem, taken = PurePosixPath(name).stem, {node.name for node in file.nodes}
-    free = next(one for one in (stem, *(f"{stem}_{i}" for i in count(2))) if one not in taken)
+    free = next(one for one in chain([stem], (f"{stem}_{i}" for i in count(2))) if one not in taken)
     return f'<node pkg="{pkg}" type="{name}" name="{free}" output="screen"/>'
 
 
