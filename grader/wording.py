@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from itertools import chain
 
 LISTED_MAX = 6
@@ -149,6 +149,12 @@ def is_one_edit(one: str, other: str) -> bool:
     one, other = one[start:], other[start:]
     swapped = one[:2] == other[1::-1] and one[2:] == other[2:]
     return swapped or one[1:] == other[1:] or one[1:] == other or one == other[1:]
+
+
+def is_word_of(given: str, name: str, names: Collection[str]) -> bool:
+    """Return whether `given` is a word of `name`, all of whose words stand among `names` one by one (`std msgs`)."""
+    words = name.split("_")
+    return len(words) > 1 and given in words and set(words) <= set(names)
 
 
 def numbers_text(numbers: Iterable[int]) -> str:

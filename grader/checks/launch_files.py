@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from difflib import get_close_matches
+from itertools import chain, count
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
@@ -200,7 +201,9 @@ def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
     if test := next((t for t in file.tests if t.type == name), None):
         cited = (test.place,)
         message = f"{message}: only rostest starts a <test>"
-        return failed(message, hint=f"write {_node_tag(pkg, name)} in place of the <test>", citations=cited)
+        return failed(
+            message, hint=f"write {_node_tag(file, pkg, name)} in place of the <test>", citations=cited
+        )
     commented = (line for kind, line in file.commented if kind in {name, PurePosixPath(name).stem})
     if line := next(commented, None):
         cited = (FileCitation(file=file.path, line=line),)
@@ -230,11 +233,14 @@ def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
             message = f"{message}, which stands inside of another <node>"
             hint = f"end the <node> above line {line} before it begins: with `/>`, or with </node> above line {line}"
         return failed(message, hint=hint, citations=cited)
-    return failed(message, hint=f"below <launch>, add {_node_tag(pkg, name)}")
+    return failed(message, hint=f"below <launch>, add {_node_tag(file, pkg, name)}")
 
 
-def _node_tag(pkg: str, name: str) -> str:
-    return f'<node pkg="{pkg}" type="{name}" name="{PurePosixPath(name).stem}" output="screen"/>'
+def _node_tag(file: LaunchFile, pkg: str, name: str) -> str:
+    """Return the tag of a node, by a name that no other node of the file has: roslaunch takes none twice."""
+    stem, taken = PurePosixPath(name).stem, {node.name for node in file.nodes}
+    free = next(one for one in chain([stem], (f"{stem}_{i}" for i in count(2))) if one not in taken)
+    return f'<node pkg="{pkg}" type="{name}" name="{free}" output="screen"/>'
 
 
 def _exists(package: PackageFacts, name: str) -> bool:
@@ -367,7 +373,7 @@ def _no_shell(package: PackageFacts, file: LaunchFile, params: OpensParams) -> V
     lying = [f.path for f in package.files if f.path.endswith(".sh")]
     seen = f"; {there_is(lying)} in the package" if lying else ""
     name = PurePosixPath(lying[0]).name if lying else "<script>.sh"
-    hint = f"below <launch>, add {_node_tag(package.name, name)}"
+    hint = f"below <launch>, add {_node_tag(file, package.name, name)}"
     return failed(f"{file.path} has no <node> that starts a shell script{seen}", hint=hint)
 
 

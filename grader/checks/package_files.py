@@ -10,10 +10,10 @@ from typing import NamedTuple
 from grader.checks.registry import DependencyName, NoParams, PackageName, check
 from grader.checks.support.scripts import add_hint, find_script, is_product, move_hint
 from grader.checks.support.text import near_names, shown
-from grader.model.package import MANIFEST, Manifest, PackageFacts, meant_manifest
+from grader.model.package import MANIFEST, Dependency, Manifest, PackageFacts, meant_manifest
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
-from grader.wording import join_words, plural
+from grader.wording import is_word_of, join_words, plural
 
 OTHERS = {
     "launch": ("launcher", "launchers", "launchfile", "launchfiles", "launch_files"),
@@ -365,24 +365,32 @@ def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
         if at_build
         else ""
     )
-    near = [n for name in missing for n in near_names(name, declared) if n not in names]
-    slip = f"; it declares {join_words(near)}" if near else ""
+    slips = _misspelt(found, missing, names)
+    misspelt = [d for deps in slips.values() for d in deps]
+    slip = f"; it declares {join_words(dict.fromkeys(d.name for d in misspelt))}" if slips else ""
     last = max((d.line for d in at_build), default=_last_line(found))
-    lines = tuple(FileCitation(file=found.file, line=d.line) for d in at_build)
+    lines = tuple(FileCitation(file=found.file, line=d.line) for d in misspelt or at_build)
     if joined := _in_one_tag(found, missing):
         return joined
-    misspelt = [d for d in found.dependencies if d.kind in RUNTIME_KINDS and d.name in near]
-    hint = f"add {' '.join(f'<{tag}>{n}</{tag}>' for n in missing)} below line {last}"
-    if len(missing) == len(misspelt) == 1:
-        hint = f"write {missing[0]} instead of {misspelt[0].name} on line {misspelt[0].line}"
-        lines = (FileCitation(file=found.file, line=misspelt[0].line),)
+    hints = [f"write {n} instead of {d.name} on line {d.line}" for n, deps in slips.items() for d in deps]
+    if absent := [n for n in missing if n not in slips]:
+        hints.append(f"add {' '.join(f'<{tag}>{n}</{tag}>' for n in absent)} below line {last}")
     verdict = failed(
         f"{found.file} does not declare {join_words(missing)} as a run-time dependency{slip or only}",
         measured=_declared_text(found),
-        hint=hint,
+        hint="; ".join(hints),
         citations=lines or (FileCitation(file=found.file, line=last),),
     )
     return verdict.seeking("dependency", missing[0]) if len(missing) == 1 else verdict
+
+
+def _misspelt(found: Manifest, missing: Sequence[str], names: Sequence[str]) -> dict[str, list[Dependency]]:
+    """Return what is declared in place of a missing name: the only slip of it, or its words one by one."""
+    at_run_time = [d for d in found.dependencies if d.kind in RUNTIME_KINDS and d.name not in names]
+    declared = {d.name for d in at_run_time}
+    slips = {n: [d for d in at_run_time if d.name in near_names(n, declared)] for n in missing}
+    apart = {n: [d for d in at_run_time if is_word_of(d.name, n, declared)] for n in missing}
+    return {n: deps for n in missing if (deps := apart[n] or (slips[n] if len(slips[n]) == 1 else []))}
 
 
 def _in_one_tag(found: Manifest, missing: Sequence[str]) -> Verdict | None:

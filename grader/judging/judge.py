@@ -167,7 +167,7 @@ def _with_repaired_copy(
         repairs,
         built=not needs_build(of_copy.package) or was_built(first) or not was_built(repaired),
         builds=was_built(first),
-        launched=launched_in(of_copy.package),
+        launched=launched_in(of_copy.package, of_copy.runs.get(PACKAGE_RUN)),
     )
     # what no repair helps still has all of its faults
     as_it_is = add_later_faults(verdicts, rubric, facts)

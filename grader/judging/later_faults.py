@@ -61,6 +61,10 @@ RATE_SHARE = 0.05
 """By so much a rate that a script asks for may differ from the right one."""
 
 
+OF_NUMBERS = re.compile(r"%[-+0-9.]*[dioxXeEfFgG]\b")
+"""What takes no text in place of it."""
+CALL_LINES = 2
+"""How many more lines a call that prints may have."""
 OF_DATA = re.compile(r"String|Bool|Byte|Char|U?Int\d+|Float\d+")
 """Types of std_msgs with one plain value, `data`."""
 
@@ -276,6 +280,15 @@ class Later:
         lines = self._build.file_lines(slip.file)[: slip.line] if self._build is not None else []
         return max((n for n, text in enumerate(lines, 1) if text.lstrip().startswith("def ")), default=0)
 
+    def _has_no_field(self, slip: PythonSlip) -> bool:
+        """Return whether a topic's callback prints its argument, and takes no field of it up to there."""
+        lines = self._build.file_lines(slip.file) if self._build is not None else []
+        body = "\n".join(lines[max(self._function_at(slip) - 1, 0) : slip.line + CALL_LINES])
+        named = re.match(r"\s*def (\w+)\((?:self, *)?(\w+)\)", body)
+        call = rf"Subscriber\(.*[ ,.=]{named[1]} *[,)]" if named else "(?!)"
+        is_callback = any(re.search(call, line) for line in lines)
+        return is_callback and named is not None and not re.search(rf"\b{named[2]}\.|= *{named[2]}\b", body)
+
     def _text_of(self, slip: PythonSlip) -> str:
         lines = self._build.file_lines(slip.file) if self._build is not None else ()
         return lines[slip.line - 1] if slip.line <= len(lines) else ""
@@ -409,22 +422,37 @@ class Later:
         told = heard and self._ran  # of a node on its topic, what ROS refused says it
         if other and (elsewhere or (not told and f"/{types[0].message}" not in self._verdict.message)):
             yield self._retype("subscribe with", sent[0], types[0])
+        other_type = types[0].message if other else ""
+        yield from self._printed(heard, other_type, of_text=own == "String")
+
+    def _printed(self, heard: Sequence[PythonSlip], other_type: str, *, of_text: bool) -> Iterator[Fix]:
+        """Yield what is wrong in what is printed of what these subscribe to, with what other type if there is one."""
         template, said = str(self._wanted.get("template", VALUE)), self._of("prints")
+        wanted = f"print '{in_words(template)}'"
         if len(heard) > 1 and ", callback)" in self._verdict.hint and self._lacks_words("def callback("):
-            yield Fix(f"write `def callback(msg):` above it, which prints '{in_words(template)}'")
+            yield Fix(f"write `def callback(msg):` above it, which {wanted.replace('print', 'prints', 1)}")
             return
         said = [one for one in said if SAID_DATA in one.message]
         unheard = not self._ran or not (isinstance(self._run, Run) and probes_on(self._run, self._topic))
-        if not unheard or template == VALUE or any(says(one.message, template) for one in said):
+        if not unheard or template == VALUE:
             return
-        if len(said) == 1 >= len({one.line for one in heard}):  # else it may be another callback
-            wanted = f"print '{in_words(template)}'"
+        right = [one for one in said if says(one.message, template)]
+        if right and len(heard) == 1 and self._has_no_field(right[0]):
+            yield Fix(f"print the `data` of the message on {_line(right[0])}")
+        if right and other_type and of_text and (place := OF_NUMBERS.search(self._text_of(right[0]))):
+            yield Fix(f"write %s instead of {place[0]} on {_line(right[0])}")
+        if right:
+            return
+        # what else the callback does with a message may fail with the right type, if its fields are others
+        own_fields = other_type and not OF_DATA.fullmatch(other_type)
+        if not own_fields and len(said) == 1 >= len({one.line for one in heard}):  # else of another callback
             there = f"on {_line(said[0])}, not '{in_source(said[0].message)}'"
             yield Fix(f"{wanted} {there}", general=f"{wanted}, {IN_OWN_WORDS}")
         elif self._lacks_words(template.partition(VALUE)[0]):
-            # what else the callback does with a message may fail with the right type
-            yield Fix(f"print '{in_words(template)}'{' first in the callback' if other else ''}")
-        elif other and not said and len(self._of("prints")) == 1:  # a field that the right type does not have
+            yield Fix(f"{wanted}{' first in the callback' if other_type else ''}")
+        elif (
+            other_type and not said and len(self._of("prints")) == 1
+        ):  # a field that the right type does not have
             only = self._of("prints")[0]
             says_it = " ".join(template.partition(VALUE)[0].split()) in " ".join(only.message.split())
             what = "the `data` of the message" if says_it else f"'{in_words(template)}'"

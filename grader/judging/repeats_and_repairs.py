@@ -232,12 +232,12 @@ def _only_installs(repair: Repair) -> bool:
 
 
 Launched = Mapping[str, Collection[str]]
-"""The names of launch files, each with those of the programs that it starts."""
+"""The names of launch files, each with those of the programs that it starts, and of scripts with those they name."""
 
 
-def launched_in(package: PackageFacts | None) -> Launched:
+def launched_in(package: PackageFacts | None, build: Run | None = None) -> Launched:
     """Return which programs each launch file starts. One that can also run something else (what it includes, a command,
-    what only roslaunch works out) starts `ANY`."""
+    what only roslaunch works out) starts `ANY`. Of scripts whose lines the build has, which others they can use."""
     packages = (package, *package.also) if package is not None else ()
     found: dict[str, set[str]] = {}
     for file in (file for one in packages for file in one.launch_files):
@@ -245,7 +245,25 @@ def launched_in(package: PackageFacts | None) -> Launched:
         unclear = file.fault is not None or any("$(" in one for one in types) or len(file.includes) > 0
         unclear = unclear or any(param.value is None for param in file.params)
         found.setdefault(PurePosixPath(file.path).name, set()).update({ANY} if unclear else types)
+    if build is not None and len(packages) == 1:
+        found.update(_scripts_named(packages[0], build))
     return found
+
+
+def _scripts_named(package: PackageFacts, build: Run) -> dict[str, set[str]]:
+    """Return for each script of the package those whose names stand in it, or in one of these: what it may import."""
+    words: dict[str, set[str]] = {}
+    for file in (one for one in package.files if one.path.endswith(".py")):
+        lines = build.file_lines(file.path)
+        if not lines and file.size_bytes:
+            return {}
+        said = words_of(" ".join(lines).replace(".", " "))
+        words.setdefault(PurePosixPath(file.path).name, set()).update(said)
+    named = {name: {one for one in words if one.removesuffix(".py") in said} for name, said in words.items()}
+    for name, found in named.items():  # with what those name, and so on
+        for others in named.values():
+            others.update(found if name in others else ())
+    return named
 
 
 ANY = "*"
@@ -278,11 +296,13 @@ def is_used_by(
         return True
     if name.endswith((".launch", ".launch.xml")):
         return launches and not known
-    a_program = any(name in programs for programs in launched.values())
+    a_program = any(name in found for file, found in launched.items() if not file.endswith(".py"))
+    imported = [launched.get(one, {name}) for one in _started_files(scenario)]
+    unused = name.endswith(".py") and imported != [] and not any(name in found for found in imported)
     not_run = repair.kind == "launch-type" or (
         repair.kind == "yaml-syntax" and name in _read_by_grader(scenario)
     )
-    return not not_run and (launches or not (known or a_program))
+    return not not_run and (launches or not (known or a_program or unused))
 
 
 def _may_launch(scenario: Scenario, program: str, launched: Launched) -> bool:

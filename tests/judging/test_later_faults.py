@@ -281,6 +281,47 @@ def test_what_a_callback_does_besides_comes_after_the_print() -> None:
     assert hint.endswith("not Int32 and print 'I heard <message>' first in the callback")
 
 
+def test_a_text_that_another_function_prints_is_not_the_messages() -> None:
+    heard = [NODE | ROOT, HEARS | {"requires": ["node"]}]
+    slips = [
+        slip("subscriber", "colour"), slip("subscriber-type", "Colour"), slip("prints", "I send {data}", 9),
+    ]  # fmt: skip
+    hint = hint_of("node", DIES, heard, *slips, source=LACKS)
+    assert hint.endswith("not Colour and print 'I heard <message>' first in the callback")
+
+
+@pytest.mark.parametrize(
+    ("callback", "told"),
+    [
+        ("def callback(msg):\n    rospy.loginfo('I heard %s', msg)\n", True),
+        ("def callback(msg):\n    rospy.loginfo('I heard %s',\n        msg.data)\n", False),
+        ("def callback(msg):\n    said = msg\n    print('I heard', said.data)\n", False),
+        ("def show(text):\n    print('I heard', text)\n", False),
+    ],
+)
+def test_a_message_that_is_printed_whole_is_named_behind_another_mistake(callback: str, told: bool) -> None:
+    heard = [NODE | ROOT, HEARS | {"requires": ["node"]}]
+    line = 3 if "said" in callback else 2
+    slips = [slip("subscriber", "chatter"), slip("prints", "I heard {data}", line)]
+    source = f"{callback}Subscriber('chatter', String, callback)\n"
+    assert (
+        "print the `data` of the message on line 2" in hint_of("node", DIES, heard, *slips, source=source)
+    ) is told
+
+
+@pytest.mark.parametrize(("place", "told"), [("%d", True), ("%.2f", True), ("%s", False)])
+def test_a_text_is_not_printed_as_a_number(place: str, told: bool) -> None:
+    heard = [NODE | ROOT, HEARS | {"requires": ["node"]}]
+    slips = [
+        slip("subscriber", "home"),
+        slip("subscriber-type", "Int32"),
+        slip("prints", "I heard {data}", 2),
+    ]
+    source = f"def callback(msg):\n    rospy.loginfo('I heard {place}', msg.data)\n"
+    hint = hint_of("node", DIES, heard, *slips, source=source)
+    assert (f"write %s instead of {place} on line 2" in hint) is told
+
+
 @pytest.mark.parametrize("call", ["input()", "int(input(…))"])
 def test_a_text_that_takes_the_place_of_input_is_told_once(call: str) -> None:
     asks = [f'  File "/ws/src/lab1/{FILE}", line 3, in <module>', f"    said = {call}"]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
@@ -552,3 +553,25 @@ def test_what_no_repair_helps_is_told_with_all_of_its_faults() -> None:
         runs[f"repaired-1/{name}"] = replace(run, metadata={**run.metadata, **about})
     hints = {c.id: c.hint for c in judge(rubric(*ALL), runs)}
     assert hints["node"].startswith("on line 9, write callback instead of calback. For the rest, tell")
+
+
+@pytest.mark.parametrize(
+    ("talker", "helper", "uses"),
+    [
+        ("import rospy\n", "", False),
+        ("import other\n", "", True),
+        ("from lab1 import helper\n", "import other\n", True),
+        ("", "import other\n", True),
+    ],
+)
+def test_a_module_concerns_the_scripts_that_name_it(talker: str, helper: str, uses: bool) -> None:
+    asked = rubric(*ALL, scenarios={"talker": SCENARIO})
+    repair = Repair(
+        kind="python-syntax", file="src/other.py", line=1, before="a", after="b", message="m", fix="b"
+    )
+    texts = {str(SCRIPT["path"]): talker, "src/helper.py": helper or "pass\n", "src/other.py": "a\n"}
+    files = [{"path": path, "size_bytes": 9} for path in texts]
+    package = complete_facts({**PACKAGE, "name": "lab1", "files": files})
+    build = cast("Run", SimpleNamespace(file_lines=lambda path: texts[path].splitlines()))
+    known = launched_in(package, build)
+    assert is_used_by(asked.scenarios["talker"], repair, asked, built=True, launched=known) is uses

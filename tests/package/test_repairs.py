@@ -17,6 +17,7 @@ from grader.repaired_copy import REPAIRS_MAX, most_of
 from tests.package.repairing import (
     CMAKELISTS,
     LAUNCHED,
+    MANIFEST,
     SCRIPT,
     TALKER,
     WANTED,
@@ -184,3 +185,16 @@ def test_a_line_of_the_build_is_repaired_whatever_number_of_scripts_lines_are() 
     lines = [Repair(kind="missing-call", file="src/a.py", line=n, message="", fix="") for n in range(1, 7)]
     project = Repair(kind="build-line", file="../other/CMakeLists.txt", line=2, message="", fix="")
     assert most_of([*lines, project]) == [*lines[:REPAIRS_MAX], project]
+
+
+def test_a_name_that_is_written_apart_is_put_together_in_each_tag(tmp_path: Path) -> None:
+    apart = "<build_depend>std</build_depend><build_depend>msgs</build_depend><exec_depend>std</exec_depend>"
+    manifest = MANIFEST.replace("</package>", f"{apart}</package>")
+    folder = package(tmp_path, {"package.xml": manifest})
+    found = repair_all(folder, asking(dependencies=("std_msgs",)))
+    assert {one.message for one in found} >= {
+        f"there is no package {name}" for name in ("std", "msgs")
+    } or found
+    text = (folder / "package.xml").read_text()
+    assert text.count(">std_msgs<") == 3
+    assert ">msgs<" not in text

@@ -125,6 +125,9 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("never-reached", 5, "the publish(…) on line 7")]),
         (node("    for i in range(9):\n        p.publish(1)\n") + CALLED,
          [("loop-left", 4, "write `while not rospy.is_shutdown():` on line 4")]),
+        *((node(f"    while rospy.is_shutdown() {end}:\n        p.publish(1)\n") + CALLED,
+           [("loop-left", 4, "on line 4, write `while not rospy.is_shutdown():`")])
+          for end in ("!= 0", "== True", "is True")),
         (node("    for i in range(9):\n        p.publish(i)\n") + CALLED, [("loop-left", 4, "put it inside a `while")]),
         (node("    while not rospy.is_shutdown() and n < 9:\n        p.publish(1)\n") + CALLED,
          [("loop-left", 4, "the loop on line 4 ends after a fixed number of rounds")]),

@@ -104,6 +104,17 @@ def never_reached(tree):
                     yield slip(loop.lineno, "never-reached", message, fix=fix)
 
 
+def loop_ends(test):
+    """Return the call in a condition that holds only when the node should end: `is_shutdown()`, or `is_shutdown() != 0`
+    and the like."""
+    if isinstance(test, ast.Compare) and len(test.ops) == 1 and isinstance(test.comparators[0], ast.Constant):
+        wanted = isinstance(test.ops[0], (ast.Eq, ast.Is))
+        unwanted = isinstance(test.ops[0], (ast.NotEq, ast.IsNot))
+        if (wanted or unwanted) and test.comparators[0].value == wanted:
+            test = test.left
+    return test if is_call(test, "is_shutdown") else None
+
+
 def stopped_loops(tree):
     """`spin()` in a loop that publishes: the loop does not come round. `break` or `return` in each of its turns, or so
     many turns and no more. And `if` in place of `while`.
@@ -115,11 +126,12 @@ def stopped_loops(tree):
             message = "the `if` on line %d runs what follows it once" % loop.lineno
             fix = "write `while` instead of `if` on line %d" % loop.lineno
             yield slip(loop.lineno, "loop-left", message, fix=fix)
-        if isinstance(loop, ast.While) and is_call(loop.test, "is_shutdown"):
+        ending = loop_ends(loop.test) if isinstance(loop, ast.While) else None
+        if ending is not None:
             message = (
                 "the loop on line %d runs only when the node should end: a `not` is missing" % loop.lineno
             )
-            asks = dotted(loop.test.func)
+            asks = dotted(ending.func)
             fix = "on line %d, write `while not %s():`" % (loop.lineno, asks)
             yield slip(loop.lineno, "loop-left", message, fix=fix, name=asks)
         if not isinstance(loop, (ast.While, ast.For)) or not calls_in(loop, "publish"):
@@ -128,7 +140,7 @@ def stopped_loops(tree):
             message = "the loop stops at the spin() on line %d, which waits until the node ends" % spin.lineno
             fix = "remove spin(): the loop keeps the node alive"
             yield slip(spin.lineno, "spin-in-loop", message, fix=fix)
-        if is_counted(loop) and not turned[loop][1]:
+        if is_counted(loop) and ending is None and not turned[loop][1]:
             message = "the loop on line %d ends after a fixed number of rounds" % loop.lineno
             used = {n.id for one in loop.body for n in ast.walk(one) if isinstance(n, ast.Name)}
             fix = "write `while not rospy.is_shutdown():` on line %d" % loop.lineno

@@ -41,7 +41,7 @@ from grader.model.package import (
     meant_command,
 )
 from grader.model.verdict import FileCitation
-from grader.wording import join_words, numbers_text, there_is
+from grader.wording import is_word_of, join_words, numbers_text, there_is
 
 ALWAYS_THERE = ("catkin", "rospy", "roscpp", "std_msgs")
 ONE_EDIT = 0.88
@@ -133,7 +133,7 @@ def _misspelt_components(package: PackageFacts) -> dict[str, str]:
         whole = whole_names.get(name, "")
         near = get_close_matches(bare, ALWAYS_THERE, 1, SLIP) if bare not in known_packages() else []
         meant = bare if not near or " " in bare else near[0]
-        meant = whole if "_" in whole and {*whole.split("_")} <= {*named} else meant
+        meant = whole if is_word_of(name, whole, named) else meant
         if meant and meant != name and name not in (*KEYWORDS, *ALWAYS_THERE):
             found[name] = meant
     return found

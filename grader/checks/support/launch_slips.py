@@ -149,7 +149,8 @@ def starts_built(package: PackageFacts, file: LaunchFile, script: str) -> list[L
     `.py`."""
     stem = PurePosixPath(script).stem
     is_built = stem != script and any(one.is_called(stem) for one in programs(package))
-    return [node for node in file.nodes if is_built and node.type == stem]
+    off = {line for _, line, _ in file.switched_off}
+    return [node for node in file.nodes if is_built and node.type == stem and node.line not in off]
 
 
 def _called_in(package: PackageFacts, file: LaunchFile, script: str) -> str:

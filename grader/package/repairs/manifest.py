@@ -10,7 +10,7 @@ from grader.package.manifest import parse_manifest, required_tags
 from grader.package.repairs.editing import Files, repair_xml
 from grader.package.repairs.names import Wanted, is_near
 from grader.package.xml import parse_xml
-from grader.wording import is_one_edit
+from grader.wording import is_one_edit, is_word_of
 
 FORMAT_1 = r"<package(\s+format\s*=\s*[\"']1[\"'])?\s*>"
 VALUES = (
@@ -95,19 +95,19 @@ def _add_buildtool(files: Files) -> None:
 
 
 def _spell_dependency(files: Files, name: str) -> None:
-    """Write the name of a package in place of a slip of it, which no package has."""
+    """Write the name of a package in place of slips of it, which no package has, and of its words one by one."""
     text = files.text(MANIFEST) or ""
-    plain = _blank_comments(text)
-    for found in re.finditer(r"<(\w*depend)\b[^<>]*>\s*([\w-]+)\s*</\1>", plain) if _parses(text) else ():
-        given = found[2]
-        is_slip = given != name and (is_one_edit(given, name) or given.lower() == name)
-        if is_slip and given not in {*known_packages(), *noetic_messages(), *OF_ROS}:
-            line = text.count("\n", 0, found.start(2)) + 1
-            changed = f"{text[: found.start(2)]}{name}{text[found.end(2) :]}"
-            message = f"line {line} of {MANIFEST}: there is no package {given}"
-            files.change("manifest-line", MANIFEST, changed, message)
-            _spell_dependency(files, name)
-            return
+    tags = re.compile(r"<(\w*depend)\b[^<>]*>\s*([\w-]+)\s*</\1>")
+    given = {found[2] for found in tags.finditer(_blank_comments(text))} if _parses(text) else set[str]()
+    near = {
+        one for one in given if is_one_edit(one, name) or one.lower() == name or is_word_of(one, name, given)
+    }
+    slips = near - {name, *known_packages(), *noetic_messages(), *OF_ROS}
+    while found := next((one for one in tags.finditer(_blank_comments(text)) if one[2] in slips), None):
+        line = text.count("\n", 0, found.start(2)) + 1
+        message = f"line {line} of {MANIFEST}: there is no package {found[2]}"
+        text = f"{text[: found.start(2)]}{name}{text[found.end(2) :]}"
+        files.change("manifest-line", MANIFEST, text, message)
 
 
 def _add_dependency(files: Files, name: str) -> None:
