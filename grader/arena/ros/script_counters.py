@@ -271,7 +271,7 @@ def clock_values(tree):
 
 
 def values_left_out(tree):
-    """Loops that count in each turn, and publish only in some: an `if` asks for what is counted."""
+    """Loops that publish only in some of their turns: an `if` asks for what they count, or they count nothing."""
     source = Source(tree)
     for loop in walk(tree):
         body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
@@ -281,7 +281,8 @@ def values_left_out(tree):
             inside = set(ast.walk(one))
             counted = {dotted(t) for n in ast.walk(loop) if n not in inside for t in increments(n)}
             others = {ast.dump(n.func) for n in calls_in(loop, "publish") if n not in sent}
-            if sent and names_in(one.test) & counted and ast.dump(sent[0].func) not in others:
+            asks = names_in(one.test) & counted if counted else not calls_in(one.test, "is_shutdown")
+            if sent and asks and ast.dump(sent[0].func) not in others:
                 lines = (sent[0].lineno, one.lineno)
                 message = "line %d publishes only under the condition on line %d" % lines
                 fix = (
@@ -289,6 +290,39 @@ def values_left_out(tree):
                     % lines
                 )
                 yield slip(sent[0].lineno, "published-in-part", message, fix=fix, name=source.topic(sent[0]))
+
+
+TELLS = ("publish", "print")
+
+
+def published_unchanged(tree):
+    """Loops that publish in each turn what a line above them made, and do nothing else with it than to print it."""
+    set_at = {}
+    for n in walk(tree):
+        if isinstance(getattr(n, "ctx", None), ast.Store):
+            set_at.setdefault(dotted(n).partition(".")[0], []).append(n.lineno)
+    plain = {dotted(t) for t in constants_in(walk(tree))}
+    for loop in walk(tree):
+        inside = [n for one in loop.body for n in ast.walk(one)] if isinstance(loop, ast.While) else []
+        told = [n for n in inside if called_name(n) in TELLS or called_name(n).startswith("log")]
+        told_of = {id(n) for call in told for n in ast.walk(call)}
+        names = [n for n in inside if isinstance(n, ast.Name)]
+        used = {n.id for n in names if id(n) not in told_of}
+        read = {n.id for n in names if id(n) not in told_of and isinstance(n.ctx, ast.Load)}
+        read |= {name for n in told if called_name(n) == "publish" for name in names_in(n)}
+        fresh = {n.id for n in names if isinstance(n.ctx, ast.Store)} - read
+        for call in (n for n in told if called_name(n) == "publish" and len(n.args) == 1):
+            name = dotted(call.args[0])
+            lines = set_at.get(name, [])
+            if name in plain or name in used or len(lines) != 1 or lines[0] >= loop.lineno:
+                continue
+            line = lines[0]
+            fix = "move line %d into that loop, above line %d" % (line, loop.body[0].lineno)
+            fix = "on line %d, publish `%s`" % (call.lineno, min(fresh)) if len(fresh) == 1 else fix
+            message = (
+                "each pass through the loop on line %d publishes `%s`, which only line %d makes, above it"
+            )
+            yield slip(call.lineno, "no-effect", message % (loop.lineno, name, line), fix=fix, name=name)
 
 
 class Source:

@@ -21,6 +21,7 @@ from script_counters import (
     counter_starts,
     counts,
     knows_time,
+    published_unchanged,
     resets,
     sends_no_time,
     values_left_out,
@@ -83,7 +84,8 @@ def slips(tree):
         published_before, sleepless_loops, sleeps_twice, publishes_twice, callbacks, waiting_callbacks,
         queue_sizes, graph_names, object_slips, said_texts, deaf_loops, clock_values, counter_slips,
         counter_starts, without_effect, assigned_late, hidden_names, subscribed_again, imports, taken_off,
-        unstarted_servers, wrong_values, unprinted_messages, values_left_out, unused_publishers,
+        unstarted_servers, wrong_values, unprinted_messages, values_left_out, published_unchanged,
+        unused_publishers,
     )  # fmt: skip
     for find in finders:
         found += find(tree)

@@ -185,6 +185,9 @@ def _parameter(message: str, source: str) -> Meaning | None:
     if call is None or len(call.args) != 2 or "expected string" not in message:
         return None
     value, name = call.args
+    if isinstance(value, ast.Name) and not is_text(name):
+        cause = f"the parameter's name comes first, in quotes, and `{shown(value.id)}` is no text"
+        return cause, f"write the parameter's name, in quotes, in place of `{shown(value.id)}`"
     if is_text(name) and not is_text(value):
         return "the parameter's name comes first, then its value", rewritten(
             source, (value, name), (name, value)

@@ -18,6 +18,7 @@ from grader.package.repairs.cmakelists import rename_package, repair_cmake
 from grader.package.repairs.cpp import repair_cpp
 from grader.package.repairs.editing import (
     BOM,
+    UTF16,
     Files,
     NotRepairable,
     make_executable,
@@ -115,9 +116,9 @@ def _repair_bytes(data: bytes, repair: Repair) -> bytes:
         return data.replace(b"\r\n", b"\n")
     if repair.kind == "byte-order-mark":
         return data.removeprefix(BOM)
-    if repair.kind == "encoding":
-        return to_utf8(data)
-    return replace_lines(data, repair)
+    if repair.kind == "encoding" or data.startswith(UTF16):
+        data = to_utf8(data)
+    return data if repair.kind == "encoding" else replace_lines(data, repair)
 
 
 def _rename_package(folder: Path, repair: Repair) -> None:
