@@ -17,7 +17,6 @@ from grader.checks.support.scripts import (
     find_script,
     installed,
     is_found,
-    is_no_script,
     move_hint,
     names_script,
     paths_by_name,
@@ -146,7 +145,7 @@ def _syntax_verdict(file: SourceFile, fault: Fault, obstacles: list[Obstacle]) -
     why = (fault.cause or fault.message) if fault.fix and fault.fix in hint else fault.explanation
     fixes = [hint, *(o.fix for o in obstacles)]
     source = f", {where}: {as_code(shown(fault.source.strip()))}" if fault.source.strip() else ""
-    return (unjudged if is_no_script(file) else failed)(
+    return (unjudged if file.is_no_script else failed)(
         f"{file.path} {where}: {fault.kind}: {why}{others}",
         measured=f"{file.path}: {_mode(file)}, {_first_line(file)}{source}",
         hint="; ".join(fixes),

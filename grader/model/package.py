@@ -265,6 +265,13 @@ class SourceFile(Record):
         return self.python and self.shebang is not None and "python" not in self.shebang.interpreter
 
     @property
+    def is_no_script(self) -> bool:
+        """Whether the whole file is something else than a script, such as a web page."""
+        fault = self.python_fault
+        whole = fault is not None and fault.line is None and fault.kind == "SyntaxError"
+        return whole and not self.in_other_encoding
+
+    @property
     def in_other_encoding(self) -> bool:
         """Whether it is not saved as UTF-8, as which the arena saves a script before it runs."""
         return self.encoding in {"utf-16", "unknown-8bit"}

@@ -45,7 +45,6 @@ from grader.checks.support.scripts import (
     OF_INTERFACES,
     SYNTAX,
     copies_of,
-    is_no_script,
     move_hint,
     path_in_package,
     without_git,
@@ -172,7 +171,7 @@ def explain_end(life: Life, run: Run, package: PackageFacts) -> Ending:
 
 def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
     script = package.file(life.start.script or "")
-    fault = script.python_fault if script is not None and is_no_script(script) else None
+    fault = script.python_fault if script is not None and script.is_no_script else None
     whole = Ending(fault.explanation, syntax_hint(fault)) if fault is not None else None
     if refused := whole or _refused_name(life, run):
         return refused

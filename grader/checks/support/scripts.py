@@ -366,10 +366,3 @@ def syntax_fault(file: SourceFile) -> Fault | None:
     old = file.shebang is not None and file.shebang.found and file.shebang.interpreter.startswith("python2")
     fault = file.python_fault
     return fault if fault is not None and fault.kind in UNPARSED and not old else None
-
-
-def is_no_script(file: SourceFile) -> bool:
-    """Return whether the whole file is something else than a script, such as a web page."""
-    fault = file.python_fault
-    whole = fault is not None and fault.line is None and fault.kind == "SyntaxError"
-    return whole and not file.in_other_encoding  # which the arena saves as UTF-8
