@@ -81,7 +81,8 @@ class PythonSlip(Placed, Record):
     - `rate-number`, `rate-parameter`: a loop or a timer whose rate is a number, in Hz, or a parameter.
     - `start-value`, `added-first`: where a counter, `name`, gets its first number, `message`, and where a loop adds one
       to it before it publishes (`fix`: which lines to move).
-    - `reset-value`, `reset-limit`: where a counter goes back, to the number `message`, or when it reaches it.
+    - `reset-value`, `reset-limit`: where a counter goes back, to the number `message`, or when it reaches it (`name`:
+      `range`, where it is that of a loop).
     - `sets-parameter`: where it sets a parameter.
     - `argument-text`: where an argument of the command line is kept as a text; `fix` is the line with a number in its
       place.

@@ -186,6 +186,8 @@ COUNTERS = {
     "below-another": (f"{LOOP}    p.publish(1)\nc += 1\n", None),
     "two-sleeps": (f"{LOOP}    p.publish(c)\n    r.sleep()\n    rospy.sleep(1)\n", ("sleep-twice", 5, "delete line 5")),
     "sleeps-apart": (f"{LOOP}    r.sleep()\n    p.publish(c)\n    r.sleep()\n", ("sleep-twice", 5, "delete line 5")),
+    "sleeps-between-topics": (f"{LOOP}    p.publish(c)\n    r.sleep()\n    q.publish(c)\n    r.sleep()\n",
+                              ("sleep-twice", 6, "delete line 6")),
     "same-message-again": (f"{LOOP}    p.publish(c)\n    p.publish(c)\n    r.sleep()\n",
                            ("publish-twice", 4, "delete line 4")),
     "three-messages": (f"{LOOP}    p.publish(a)\n    b = 1\n    p.publish(b)\n    p.publish(c)\n    r.sleep()\n",

@@ -36,11 +36,12 @@ def in_brackets(counter, rest):
 
 def resets(tree):
     """Where a counter goes back: the number that it is set to in an `if` that asks for it, and the number in that `if`,
-    or behind a `%`.
+    or behind a `%`, or in the `range(…)` of a loop that publishes.
     """
     added = {
         id(n.right): n.left for n in walk(tree) if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Add)
     }
+    yield from limits_of_ranges(tree)
     for node in walk(tree):
         value, done, asked, fix = None, (), [], ""
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
@@ -63,6 +64,14 @@ def resets(tree):
                 yield slip(part.lineno, "reset-limit", "%d" % whole(part), fix=fix)
         if value is not None:
             yield slip(value.lineno, "reset-value", "%d" % whole(value))
+
+
+def limits_of_ranges(tree):
+    for node in walk(tree):
+        ranged = isinstance(node, ast.For) and called_name(node.iter) == "range" and calls_in(node, "publish")
+        limit = whole((node.iter.args[:2] or [None])[-1]) if ranged else None
+        if limit is not None:
+            yield slip(node.lineno, "reset-limit", "%d" % limit, name="range")
 
 
 def whole(node):

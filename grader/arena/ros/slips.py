@@ -307,5 +307,7 @@ def without_effect(tree):
         elif isinstance(value, ast.Compare) and isinstance(value.ops[0], ast.Eq):
             name = dotted(value.left)
             if "..." not in name:
+                right = value.comparators[0]
+                right = repr(right.value) if isinstance(right, ast.Constant) else dotted(right)
                 message = "`%s ==` compares and gives no value" % name
-                yield slip(node.lineno, "compared", message, fix="write `%s =`" % name)
+                yield slip(node.lineno, "compared", message, fix="write `%s = %s`" % (name, right))
