@@ -98,6 +98,7 @@ def counter_slips(tree):
         sent = [i for i, one in enumerate(body) if calls_in(one, "publish")]
         added = {dotted(t): n for n in inside for t in increments(n)} if sent else {}
         for name, node in added.items():
+            yield from reset_the_wrong_way([one for one in body if isinstance(one, ast.If)], name)
             set_at = [i for i, one in enumerate(body) if name in (dotted(t) for t in constants_in([one]))]
             reset_at = [i for i, one in enumerate(body) if isinstance(one, ast.If) and name in reset_in(one)]
             if set_at:
@@ -113,6 +114,28 @@ def counter_slips(tree):
                     message = "line %d adds one after the counter was reset, so what follows a reset is one too high"
                     fix = "move line %d above the `if` on line %d" % (node.lineno, line)
                     yield slip(line, "reset-early", message % node.lineno, fix=fix, name=name)
+
+
+def reset_the_wrong_way(ifs, name):
+    """An `if` that resets a counter while it is below its limit: `if not n > 127: n = 0`, `if n < 127: n = 0`."""
+    for one in ifs:
+        inverted = isinstance(one.test, ast.UnaryOp) and isinstance(one.test.op, ast.Not)
+        test = one.test.operand if inverted else one.test
+        below = (ast.Gt, ast.GtE) if inverted else (ast.Lt, ast.LtE)
+        if (
+            not isinstance(test, ast.Compare)
+            or not isinstance(test.ops[0], below)
+            or dotted(test.left) != name
+        ):
+            continue
+        limit, resets_to = (
+            whole(test.comparators[0]),
+            [whole(n.value) for n in one.body if isinstance(n, ast.Assign) and dotted(n.targets[0]) == name],
+        )
+        if limit is not None and any(value is not None and value < limit for value in resets_to):
+            message = "the `if` on line %d resets `%s` while it is below %d" % (one.lineno, name, limit)
+            fix = "delete the `not` on line %d" if inverted else "on line %d, write `>` in the condition"
+            yield slip(one.lineno, "set-in-loop", message, fix=fix % one.lineno, name=name)
 
 
 def counter_starts(tree):

@@ -328,7 +328,9 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
     others = [
         s for s in owners.values() if types[s.line].startswith(NUMBER_TYPES if wants_text else "String")
     ]
-    if here is not None and here not in others and len(others) == 1:
+    # where no text is published at all, the other one does not get what belongs here
+    is_swap = not wants_text or any(s.kind == "publishes" for s in slips)
+    if here is not None and here not in others and len(others) == 1 and is_swap:
         why = f"`{owner}` publishes {types[here.line]} on {here.message} (line {here.line})"
         lines = sorted((here.line, others[0].line))
         fix = (
