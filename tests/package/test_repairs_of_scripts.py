@@ -37,6 +37,10 @@ CASES = {
                 ("        rate", "=======\n        publisher.publish(2)\n>>>>>>> 3f2a9c1 (second try)\n        rate")),
         ["python-syntax"], "git's merge markers",
     ),
+    "module-for-a-type": Case(
+        swapped(TALKER, ("from std_msgs.msg import Int8", "import std_msgs.msg"), ("Int8, ", "std_msgs.msg, ")),
+        ["missing-call"], "`std_msgs.msg` is a module, and no type",
+    ),
     "two-values-published": Case(
         swapped(TALKER, ("publisher.publish(", "publisher.publish('count', ")), ["missing-call"], "takes one value"),
     "latin-1": Case({TALKER: SCRIPT.replace("import rospy\n", "import rospy  # caf\u00e9\n").encode("latin-1")},
