@@ -28,7 +28,7 @@ COMMENTED_OUT = "block commented out"
 """What the grader says of a comment that is the first line of the block below it."""
 OUT_OF_BLOCK = "ends its block too early"
 """What the grader says of a line further out than the block that goes on below it."""
-MERGE_MARKER = re.compile(r"(<{7}|={7}|>{7})(\s|$)")
+MERGE_MARKER = re.compile(r"(<{7}|={7}|>{7}|\|{7})(\s|$)")
 _BLOCK = re.compile(rf"\s*{BLOCK}")
 _BRACE = rf"(?:\}}\s*)?{BLOCK}(?:.*[\w\])\"])?\s*\{{$"
 _TEXT = re.compile(r"""("(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')|#.*""")
@@ -79,6 +79,13 @@ class Reason(NamedTuple):
     def text(self) -> str:
         """Both in one sentence."""
         return f"{self.why}: {self.fix}" if self.fix else self.why
+
+
+LFS_BEGINS = "version https://git-lfs"
+LFS_POINTER = Reason(
+    "the file is only a pointer of Git LFS, and what it points to was not handed in",
+    "`git lfs pull` fetches that: hand it in, or commit it without Git LFS",
+)
 
 
 class _Habit(NamedTuple):

@@ -342,7 +342,8 @@ def _needs_answer(facts: PackageFacts, path: str) -> bool:
     if file is None:
         return False
     shebang = file.shebang
-    return file.executable is False or shebang is None or shebang.crlf or shebang.found is False
+    unusable = shebang is None or shebang.crlf or shebang.found is False or file.names_other_language
+    return file.executable is False or unusable
 
 
 def order_runs(rubric: Rubric, rated: Container[str]) -> tuple[str, ...]:

@@ -38,7 +38,6 @@ ABSOLUTE_PYTHON = re.compile(r"/(\w+/)*python3?")
 BROWSER_PATH = re.compile(
     rb"(?<![\w./-])/(?:usr/|usr/local/|snap/)?bin/(" + "|".join(BROWSERS).encode() + rb")(?![\w./-])"
 )
-OTHER_ENCODINGS = ("utf-16", "unknown-8bit")
 LARGE_BYTES = 4 << 20
 MANIFEST = """<package format="2"><name>{}</name><version>0.0.0</version><description>A repair</description>
 <maintainer email="student@example.org">student</maintainer><license>TODO</license>
@@ -216,11 +215,12 @@ def _repair(path: Path, facts: SourceFile | None) -> Iterator[str]:
         yield "executable bit"
     path.chmod(0o755)
     shebang, data = facts.shebang, path.read_bytes()
-    if facts.encoding in OTHER_ENCODINGS and not facts.binary:
+    if facts.in_other_encoding and not facts.binary:
         yield "encoding"
         data = to_utf8(data)
         path.write_bytes(data)
-    if shebang is not None and not shebang.crlf and shebang.found is not False:
+    usable = shebang is not None and shebang.found is not False and not facts.names_other_language
+    if shebang is not None and not shebang.crlf and usable:
         return
     text = data.removeprefix(b"\xef\xbb\xbf")
     if shebang is not None:

@@ -25,6 +25,7 @@ from grader.checks.support.processes import (
     LOGGERS,
     Life,
     early_end,
+    first_interrupt_ns,
     life,
     lives,
     nodes_of,
@@ -48,6 +49,7 @@ from grader.checks.support.topics import cite
 from grader.evidence.events import ConsoleLine
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
+from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
 from grader.wording import join_words, plural, significant
@@ -317,7 +319,8 @@ def logs(package: PackageFacts, run: Run, params: LogsParams) -> Verdict:
     right = next((one for one in lines if _has(one.text, params) and one.level == params.level), None)
     level = params.level.upper()
     verdict = (
-        (passed(f"{right.node} logs {shown(right.text)!r} at level {level}") if right else None)
+        _behind_spin(package, run, lines, params)
+        or (passed(f"{right.node} logs {shown(right.text)!r} at level {level}") if right else None)
         or _other_level(lines, params)
         or _only_printed(run, params)
         or _near(run, lines, params)
@@ -335,6 +338,26 @@ def logs(package: PackageFacts, run: Run, params: LogsParams) -> Verdict:
 
 def _has(text: str, params: LogsParams) -> bool:
     return " ".join(params.text.split()) in " ".join(text.split())
+
+
+def _hindered(package: PackageFacts, run: Run, params: LogsParams) -> PythonSlip | None:
+    """Return the line that logs the text, where it stands in an `if` or behind a `spin()` and no other does."""
+    said = [s for s in run_slips(package, run, "prints") if _has(s.message, params)]
+    return said[0] if said and all(s.fix for s in said) else None
+
+
+def _behind_spin(
+    package: PackageFacts, run: Run, lines: Iterable[Logged], params: LogsParams
+) -> Verdict | None:
+    """Return the loss where the text came only once the node was being stopped, as its line stands behind `spin()`."""
+    slip, pressed = _hindered(package, run, params), first_interrupt_ns(run)
+    times = [t for t, line in _asked_lines(run, params) if _has(line.line, params)]
+    times += [line.at_ns for line in lines if _has(line.text, params)]
+    if slip is None or " above " not in slip.fix or pressed is None or min(times, default=0) < pressed:
+        return None
+    where = f"line {slip.line} of {slip.file} comes after spin()"
+    message = f"{params.text!r} is logged only when the node is stopped: {where}"
+    return failed(message, hint=f"in {slip.file}, {slip.fix}", citations=(slip.place,))
 
 
 def _other_level(lines: Iterable[Logged], params: LogsParams) -> Verdict | None:
@@ -434,6 +457,9 @@ def _silent(package: PackageFacts, run: Run, nodes: tuple[str, ...], params: Log
     if slip := next(debug, None):
         message = f"{message}: `rospy.{slip.name}` on line {slip.line} of {slip.file} is not sent"
         return failed(message, hint=f"on line {slip.line}, {_call(params)}", citations=(slip.place,))
+    if slip := _hindered(package, run, params):
+        message = f"{message}: line {slip.line} of {slip.file} would, and it is not reached"
+        return failed(message, hint=f"in {slip.file}, {slip.fix}", citations=(slip.place,))
     return failed(message, hint=f"{_call(params)} below {INIT}: above it, nothing is sent")
 
 

@@ -145,7 +145,7 @@ def _syntax_verdict(file: SourceFile, fault: Fault, obstacles: list[Obstacle]) -
     why = (fault.cause or fault.message) if fault.fix and fault.fix in hint else fault.explanation
     fixes = [hint, *(o.fix for o in obstacles)]
     source = f", {where}: {as_code(shown(fault.source.strip()))}" if fault.source.strip() else ""
-    return failed(
+    return (unjudged if file.is_no_script else failed)(
         f"{file.path} {where}: {fault.kind}: {why}{others}",
         measured=f"{file.path}: {_mode(file)}, {_first_line(file)}{source}",
         hint="; ".join(fixes),

@@ -211,9 +211,10 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     elif verdict is None:
         near = near_names(topic, subscribed)
         other = f"; it subscribes to {join_words(near or subscribed)}" if subscribed else ""
-        hint = (
-            f"{f'name the topic {topic} in' if near else 'add'} {subscriber(topic, f'{TYPE_SLOT}, callback')}"
-        )
+        spare = run_slip(package, run, "callback-missing")
+        callback = (spare.name if spare else "") or "callback"
+        call = subscriber(topic, f"{TYPE_SLOT}, {callback}")
+        hint = f"name the topic {topic} in {call}" if near else f"add {call}"
         if copied := copied_topic(package, run, "subscriber"):
             other = f"{other}, on {copied}"
             hint = f"write {topic} on the one of {copied} whose callback is for it"

@@ -193,11 +193,21 @@ def _wrong_time(
         wrong = wrong_growth(told, clocks, short=short)
         if wrong is not None:
             too_few = own_doing and wrong.status is Status.INCONCLUSIVE
+            wrong = _made_once(wrong, package, run, channel) if len(set(told)) == 1 else wrong
             return _too_few(package, run, heard, params) if too_few else wrong
         counted = _judge_counting(package, run, channel, told)
         if counted is not None:
             return counted
     return None
+
+
+def _made_once(verdict: Verdict, package: PackageFacts, run: Run, channel: Channel) -> Verdict:
+    """Return the verdict on a time that stays, with the line that publishes what only one above its loop made."""
+    slips = slips_of(package, run, channel.callerid, "no-effect")
+    slip = next((s for s in slips if "publishes" in s.message), None)
+    if slip is None or verdict.status is not Status.FAIL:
+        return verdict
+    return verdict.explained(f"{slip.file}: {slip.message}", f"in {slip.file}, {slip.fix}", (slip.place,))
 
 
 def _judge_counting(

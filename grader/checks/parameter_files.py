@@ -10,6 +10,7 @@ from grader.checks.registry import ProcessName, check
 from grader.checks.support.parameters import (
     INDENT,
     Key,
+    Words,
     absolute_name,
     describe_missing,
     duplicate_advice,
@@ -30,6 +31,7 @@ from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Citation, FileCitation, Verdict, failed, grade_again, passed
+from grader.syntax_fixes import LFS_BEGINS, LFS_POINTER
 from grader.wording import join_words, plural, there_is
 
 
@@ -124,6 +126,8 @@ def _error(run: Run, one: Life, path: str, build: Run) -> Verdict | None:
         return None
     lines = [line.line for _, line in run.lines(one.name) if line.line.strip()]
     words = explain_yaml(lines)
+    if text_of(build, path).startswith(LFS_BEGINS):
+        words = Words(*LFS_POINTER, 1)
     if words is not None and words.line is not None:
         text = text_of(build, path)
         column = explain_yaml_column(text, words.line) if words.hint == INDENT else None
@@ -160,7 +164,7 @@ def _missing(
     )
     above, _, last = name.rpartition("/")
     shallow = f"{above.rpartition('/')[0]}/{last}"
-    moved = _column(name, shallow, keys)
+    moved = _column(name, shallow, keys, missing)
     hint = f"write it so that rosparam list shows exactly {name}"
     root = name.split("/")[1]
     if all(one.removeprefix(f"/{root}") in found for one in missing):
@@ -196,12 +200,15 @@ def _given_twice(name: str, path: str, keys: tuple[Key, ...]) -> Verdict | None:
     return failed(message, hint=hint, citations=(FileCitation(file=path, line=second),))
 
 
-def _column(name: str, shallow: str, keys: tuple[Key, ...]) -> str:
+def _column(name: str, shallow: str, keys: tuple[Key, ...], missing: list[str]) -> str:
     """How far to indent a name that stands one level too high: as far as its neighbours are."""
     above, _, last = name.rpartition("/")
     beside = next((key for key in keys if key.path.rpartition("/")[0] == above), None)
     own = next((key for key in keys if key.path == shallow), None)
     parent = above.rpartition("/")[2]
+    if own is not None and all(key.path != above for key in keys):
+        lasts = [one.rpartition("/")[2] for one in missing if one.rpartition("/")[0] == above]
+        return f"write `{parent}:` above line {own.line}, as far in, and indent {join_words(lasts)} by two more spaces"
     if beside is None:
         return f"indent {last} by two spaces more than {parent}, below it"
     where = f"on line {own.line} " if own else ""

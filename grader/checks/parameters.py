@@ -148,7 +148,14 @@ def _not_printed(
     texts = [line.text.strip() for line in lines if line.text.strip()]
     seen = f"; it prints {shown(texts[-1])!r}" if texts else "; it prints nothing at all"
     message = f"{names} {_are(missing)} not printed with the values on the server{seen}"
-    return _share_printed(params, missing, message, log_param(missing[0]))
+    own = [e for _, e in run.params if e.action == "set" and run.is_student_node(e.caller_id)]
+    early = next((e for e in own if [absolute_name(e.name)] == missing and is_printed(e.value, lines)), None)
+    if early is None:
+        return _share_printed(params, missing, message, log_param(missing[0]))
+    hint = f"read {missing[0]} into a variable above the line that sets it, and print that variable"
+    why = f"{message}: it is set to that value before it is read"
+    cited = named_at(package, run, "sets-parameter", missing[0])
+    return _share_printed(params, missing, why, hint).about(citations=cited)
 
 
 def _share_printed(params: ParamsReadParams, missing: Sequence[str], message: str, hint: str) -> Verdict:

@@ -200,7 +200,10 @@ class Later:
         }  # fmt: skip
         if not self._ran:
             yield from self._names()
-        yield from by_check[self._criterion.check]() if self._criterion.check in by_check else ()
+        readable = not any(
+            one is not None and one.is_no_script for one in map(self._package.file, self._paths)
+        )
+        yield from by_check[self._criterion.check]() if self._criterion.check in by_check and readable else ()
 
     def _of(self, *kinds: str) -> list[PythonSlip]:
         return [slip for slip in self._slips if slip.kind in kinds]

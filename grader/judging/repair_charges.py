@@ -282,7 +282,8 @@ def is_next_fault(one: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> boo
     found = {(c.file, c.line) for c in one.citations if isinstance(c, FileCitation) and c.file in files}
     again = cited_lines(copy.citations)
     again -= lines_read_now(repairs)
-    return found != set() and not copy.unjudged and not found & again and _is_other_fault(one, copy)
+    in_repaired = found != set() or one.unjudged
+    return in_repaired and not copy.unjudged and not found & again and _is_other_fault(one, copy)
 
 
 def lines_read_now(repairs: Iterable[Repair]) -> set[tuple[str, int]]:

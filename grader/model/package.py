@@ -259,6 +259,23 @@ class SourceFile(Record):
     python: bool = False
     python_fault: Fault | None = None
 
+    @property
+    def names_other_language(self) -> bool:
+        """Whether it is Python, and its first line has a shell or the like run it."""
+        return self.python and self.shebang is not None and "python" not in self.shebang.interpreter
+
+    @property
+    def is_no_script(self) -> bool:
+        """Whether the whole file is something else than a script, such as a web page."""
+        fault = self.python_fault
+        whole = fault is not None and fault.line is None and fault.kind == "SyntaxError"
+        return whole and not self.in_other_encoding
+
+    @property
+    def in_other_encoding(self) -> bool:
+        """Whether it is not saved as UTF-8, as which the arena saves a script before it runs."""
+        return self.encoding in {"utf-16", "unknown-8bit"}
+
 
 class LaunchLine(Placed, Record):
     """A tag that gives the topics of nodes other names: a `<remap>`, `value` its `from`; `args`, the `args` of a

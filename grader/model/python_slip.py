@@ -34,7 +34,8 @@ class PythonSlip(Placed, Record):
     - `object`: why an object of a class lacks an attribute where it is read, or that the class is used in its place.
     - `outside-method`: a call in a class, but outside its methods, that uses an unknown name.
     - `defined-twice`: a callback that a second function of its name hides, or an imported name that a class hides.
-    - `no-effect`, `compared`: a statement such as `++i`, or `i == 0`.
+    - `no-effect`, `compared`: a statement such as `++i`, or `i == 0`; or a loop that publishes what only a line above
+      it made, `name`.
     - `commented-out`: a ROS call in a comment; `name` is `sleep`, or `pub = Publisher`.
     - `input`: the node asks for input, and nodes get none; `name` is `once` where no loop does it again, and `paused`
       in a loop that sleeps.
@@ -63,7 +64,8 @@ class PythonSlip(Placed, Record):
     - `clock-value`: the values of the topic `message` are read from a clock, or made up at random (`name`: `random`),
       and nothing is counted.
     - `never-published`: a publisher of the topic `name` that nothing in the script uses.
-    - `published-in-part`: a loop that counts in each turn, and publishes on the topic `name` only in some.
+    - `published-in-part`: a loop that publishes on the topic `name` only in some of its turns, though it counts in each
+      or counts nothing.
     - `wrong-value`: a value that is none: a comparison with NaN, the sine of an angle in degrees, a service's answer
       that is made and not returned (`name`: `nan`, `degrees`, `return`).
 
@@ -75,11 +77,12 @@ class PythonSlip(Placed, Record):
       its place.
     - `publisher-type`, `subscriber-type`: the message type on that line.
     - `publishes`, `prints`: a text that is published or printed by the call `name` (`loginfo`), with `{}` for a value
-      in it and `{data}` for that of a message.
+      in it and `{data}` for that of a message. `fix` says where to move what an `if` or a `spin()` holds up.
     - `rate-number`, `rate-parameter`: a loop or a timer whose rate is a number, in Hz, or a parameter.
     - `start-value`, `added-first`: where a counter, `name`, gets its first number, `message`, and where a loop adds one
       to it before it publishes (`fix`: which lines to move).
-    - `reset-value`, `reset-limit`: where a counter goes back, to the number `message`, or when it reaches it.
+    - `reset-value`, `reset-limit`: where a counter goes back, to the number `message`, or when it reaches it (`name`:
+      `range`, where it is that of a loop).
     - `sets-parameter`: where it sets a parameter.
     - `argument-text`: where an argument of the command line is kept as a text; `fix` is the line with a number in its
       place.

@@ -141,16 +141,17 @@ def _is_callback(function: ast.FunctionDef) -> bool:
     return len(given) > len(function.args.defaults) or not any(returns)
 
 
-def with_arguments(text: str) -> Iterator[Step]:
+def with_arguments(text: str, kinds: list[str]) -> Iterator[Step]:
+    """`kinds` are the message types that the lab uses."""
     lines = text.split("\n")
     tree = tree_of(text)
-    for mistake in chain(_wrong_arguments(tree), _names_of_objects(tree)):
+    for mistake in chain(_wrong_arguments(tree, kinds), _names_of_objects(tree)):
         spans = [(span, new) for node, new in mistake.edits if (span := span_of(lines, node))]
         if len(spans) == len(mistake.edits):
             after = edited(text, [(*span, new) for span, new in spans])
             for step in step_to("argument", spans[0][0][0] + 1, text, after, mistake.why):
                 yield step
-                yield from with_arguments(step["text"])
+                yield from with_arguments(step["text"], kinds)
                 return
 
 
@@ -195,16 +196,15 @@ NUMBERS = re.compile(r"U?Int\d+|Float\d+|Byte|Char")
 LOGS = re.compile(r"log(debug|info|warn|err|fatal)")
 
 
-def _wrong_arguments(tree: ast.Module) -> Iterator[Argument]:
+def _wrong_arguments(tree: ast.Module, kinds: list[str]) -> Iterator[Argument]:
     """Yield what calls of rospy's are given in another form than they take it."""
+    known = bound_in(tree) | set(dir(builtins))
     types, of_rospy = _imported(tree, "msg"), _imported(tree, "rospy")
     functions = {one.name for one in tree.body if isinstance(one, ast.FunctionDef)}
     methods = {f"self.{n.name}" for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)}
     values = [(t, n.value) for n in nodes_in(tree) if isinstance(n, ast.Assign) for t in n.targets]
     rates = {ast.unparse(target) for target, value in values if _called(value) == "Rate"}
-    of_numbers = {
-        ast.unparse(target) for target, value in values if NUMBERS.fullmatch(_published_type(value))
-    }
+    published = {ast.unparse(target): kind for target, value in values if (kind := _published_type(value))}
     yield from _published_nothing(tree)
     for call in (n for n in nodes_in(tree) if isinstance(n, ast.Call)):
         name = _called(call)
@@ -220,19 +220,33 @@ def _wrong_arguments(tree: ast.Module) -> Iterator[Argument]:
                     [(call, f"{ast.unparse(call.func)}()")], "a Rate already knows how long to sleep"
                 )
         elif name == "publish" and isinstance(call.func, ast.Attribute):
-            if ast.unparse(call.func.value) in of_numbers:
-                yield from _text_of_a_number(call)
+            kind = published.get(ast.unparse(call.func.value), "")
+            yield from _text_of_a_number(call) if NUMBERS.fullmatch(kind) else ()
+            yield from _published_together(call, kind)
         elif _is_rospys(call.func, of_rospy):
             yield from _logged(call) if LOGS.fullmatch(name) else ()
-            yield from _of_topic(call, types) if name in {"Publisher", "Subscriber"} else ()
+            yield from _in_quotes(call, name, known)
+            yield from _of_topic(call, types, kinds) if name in {"Publisher", "Subscriber"} else ()
             yield from _type_of_topic(call, types, functions) if name in {"Publisher", "Subscriber"} else ()
             yield from _numbers(call, name)
             yield from _callback(call, name, functions)
+            yield from _without_callback(call, tree) if name == "Subscriber" else ()
             yield from _subscribed(call, name, functions | methods)
             yield from _without_quotes(call, name, functions)
 
 
-def _of_topic(call: ast.Call, types: set[str]) -> Iterator[Argument]:
+def _in_quotes(call: ast.Call, name: str, known: set[str]) -> Iterator[Argument]:
+    """Of `Publisher('x, String')`, which has its other arguments within the quotes of the first."""
+    first = call.args[0] if call.args and name in {"Publisher", "Subscriber", "init_node"} else None
+    begin, comma, rest = first.value.partition(",") if _is_text(first) else ("", "", "")
+    inner = tree_of(f"f({rest.strip()})") if comma else ast.Module([], [])
+    names = {n.id for n in nodes_in(inner) if isinstance(n, ast.Name)}
+    if first is not None and len(inner.body) == 1 and names - {"f"} and names - {"f"} <= known:
+        why = "the quotes end behind the name, before the other arguments"
+        yield Argument([(first, f"{begin!r}, {rest.strip()}")], why)
+
+
+def _of_topic(call: ast.Call, types: set[str], kinds: list[str]) -> Iterator[Argument]:
     """Of `Publisher` and `Subscriber`, which take a topic's name and a class."""
     first, second, *_ = [*call.args, None, None]
     if isinstance(first, ast.Name) and _is_type(first.id, types) and _is_text(second):
@@ -241,6 +255,11 @@ def _of_topic(call: ast.Call, types: set[str]) -> Iterator[Argument]:
         )
         return
     given = next((k.value for k in call.keywords if k.arg == "data_class"), second)
+    module = ast.unparse(given) if isinstance(given, ast.Attribute) and given.attr == "msg" else ""
+    of_module = [kind.rpartition("/")[2] for kind in kinds if module == f"{kind.partition('/')[0]}.msg"]
+    if given is not None and len(of_module) == 1:
+        why = f"`{module}` is a module, and no type of messages"
+        yield Argument([(given, f"{module}.{of_module[0]}")], why)
     name = ast.unparse(given.func) if isinstance(given, ast.Call) and not given.args else ""
     if _is_text(given) and _is_type(given.value, types):
         yield Argument([(given, given.value)], "the type is given as a string")
@@ -282,6 +301,18 @@ def _text_of_a_number(call: ast.Call) -> Iterator[Argument]:
         if isinstance(given, ast.Call) and _called(given) == "str" and len(given.args) == 1:
             edit = (given, ast.unparse(given.args[0]))
             yield Argument([edit], "the message takes a number, and `str(…)` makes a string of it")
+
+
+def _published_together(call: ast.Call, kind: str) -> Iterator[Argument]:
+    """Of `publish('a %s', b)`: a message of one field takes one value."""
+    text, values, why = next(iter(call.args), None), call.args[1:], "`publish(…)` takes one value"
+    if NUMBERS.fullmatch(kind) and len(values) == 1 and _is_text(text):
+        yield Argument([(call, f"{ast.unparse(call.func)}({ast.unparse(values[0])})")], why)
+    elif kind == "String" and values and _is_text(text) and text.value.count("%") in {0, len(values)}:
+        given = ", ".join(map(ast.unparse, values))
+        given = given if isinstance(values[0], ast.Name | ast.Call) and not values[1:] else f"({given})"
+        places = repr(text.value) if "%" in text.value else _with_places(text.value, len(values))
+        yield Argument([(call, f"{ast.unparse(call.func)}({places} % {given})")], why)
 
 
 def _names_beside(function: ast.FunctionDef, call: ast.Call) -> set[str]:
@@ -337,13 +368,17 @@ def _logged(call: ast.Call) -> Iterator[Argument]:
         yield Argument(edits, "the string comes first, then its values")
         return
     if _is_text(text) and values and "%" not in text.value:
-        if len(values) == 1 and (right := with_place(repr(text.value))):
-            yield Argument([(text, right)], "the string has no `%` in it")
-            return
-        places = " ".join(["%s"] * len(values))
-        blank = "" if not text.value or text.value[-1].isspace() else " "
-        edit = (text, repr(f"{text.value}{blank}{places}"))
-        yield Argument([edit], "the string has fewer `%` than there are values after it")
+        right = with_place(repr(text.value)) if len(values) == 1 else ""
+        lacks = "no `%` in it" if right else "fewer `%` than there are values after it"
+        yield Argument([(text, _with_places(text.value, len(values)))], f"the string has {lacks}")
+
+
+def _with_places(text: str, count: int) -> str:
+    """Return how a string is written that has places for so many values."""
+    if count == 1 and (right := with_place(repr(text))):
+        return right
+    blank = "" if not text or text[-1].isspace() else " "
+    return repr(f"{text}{blank}{' '.join(['%s'] * count)}")
 
 
 def _names_of_objects(tree: ast.Module) -> Iterator[Argument]:
@@ -422,6 +457,19 @@ def _callback(call: ast.Call, name: str, functions: set[str]) -> Iterator[Argume
         for one in given:
             if _is_text(one) and one.value in functions:
                 yield Argument([(one, one.value)], f"'{one.value}' is a string, not a function")
+
+
+def _without_callback(call: ast.Call, tree: ast.Module) -> Iterator[Argument]:
+    """Of `Subscriber('x', String)`, where one function that takes a message is used nowhere."""
+    if len(call.args) != len(("topic", "type")) or any(k.arg in {None, "callback"} for k in call.keywords):
+        return
+    used = {last_name(n) for n in nodes_in(tree) if isinstance(n, ast.Name | ast.Attribute)}
+    spare = [n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef) and n.name not in used]
+    taking = [n for n in spare if len([a for a in n.args.args if a.arg != "self"]) == 1]
+    if len(taking) == 1:
+        name = "self." * (taking[0].args.args[0].arg == "self") + taking[0].name
+        edit = (call.args[1], f"{ast.unparse(call.args[1])}, {name}")
+        yield Argument([edit], "`Subscriber(…)` gets no callback")
 
 
 def _subscribed(call: ast.Call, name: str, functions: set[str]) -> Iterator[Argument]:

@@ -21,6 +21,7 @@ from grader.package.reading import printable
 from grader.syntax_fixes import (
     BLOCK,
     COMMENTED_OUT,
+    LFS_POINTER,
     MERGE_MARKER,
     OUT_OF_BLOCK,
     Reason,
@@ -118,6 +119,7 @@ _MESSAGES: tuple[tuple[str, ...], ...] = (
      "write the code of its cells into a script: `jupyter nbconvert --to script` does that"),
     (r"document in a file", "the whole file is a document of a word processor, or an archive",
      "save it as plain text, with an editor for programs"),
+    (r"pointer in a file", *LFS_POINTER),
     (r"PDF in a file", "the whole file is a PDF", "write the script as plain text, with an editor for programs"),
     (r"line numbers in", "each line begins with its number, which is no part of the program",
      "delete the numbers in front of the lines"),

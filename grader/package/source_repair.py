@@ -113,7 +113,7 @@ def _steps(text: str, types: list[str], known: Known) -> Iterator[Step]:
             with_calls,
             with_quoted_calls,
             with_callbacks,
-            with_arguments,
+            lambda t: with_arguments(t, types),
             with_globals,
             with_lines_turned,
             _with_lines_inside,

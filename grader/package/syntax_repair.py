@@ -17,6 +17,7 @@ from typing import Any
 
 from grader.syntax_fixes import (
     DELETE_LINE,
+    MERGE_MARKER,
     PLAIN,
     corrections,
     reason_of_line,
@@ -30,7 +31,7 @@ STATEMENT_LINES_MAX = 12
 ODD_LINES_MAX = 3
 FIXERS = ("print", "except", "exec", "raise", "repr", "ne", "numliterals", "long", "unicode")
 OLD_PRINT = re.compile(r"\bprint\b(?!\s*\()")
-ALL_OVER = ("tabs", "python2", "braces", "characters")
+ALL_OVER = ("merged", "tabs", "python2", "braces", "characters")
 OF_SIGNS = re.compile("does not match opening|unmatched|unterminated")
 OUTERMOST = re.compile(r"(import|from)\s|if\s+__name__\b")
 EMPTY_EXCEPT = re.compile(r"expected an indented block after 'except' statement on line (\d+)")
@@ -90,7 +91,7 @@ def _one_step(text: str, error: Error) -> Step | None:
 
 def _step(cause: str, text: str, candidate: str, error: Error) -> Step:
     word = re.match(r"name '(\w+)'", error["message"])
-    is_elsewhere = cause in ("braces", "commented", "level", "line", "twice", "turned")
+    is_elsewhere = cause in ("merged", "braces", "commented", "level", "line", "twice", "turned")
     line = _first_changed(text, candidate) if is_elsewhere else error["line"]
     added = candidate.split("\n")[line - 1].strip() if cause == "line" else ""
     return {
@@ -136,7 +137,19 @@ def _only_tabs(text: str, error: Error) -> bool:
     return error["kind"] == "TabError" and syntax_error(_all_expanded(text, 8)) is None
 
 
+def _first_version(text: str) -> str:
+    """Return the text with empty lines in place of git's merge markers and of the version behind `=======`."""
+    kept, part = [], ""
+    for line in text.split("\n"):
+        marker = MERGE_MARKER.match(line)
+        part = marker[1][0] if marker and (part or line[0] == "<") else part
+        kept.append("" if part and (marker or part == "=") else line)
+        part = "" if part == ">" else part
+    return "\n".join(kept)
+
+
 def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
+    yield "merged", _first_version(text)
     if error["kind"] in {"TabError", "IndentationError"}:
         yield "tabs", _all_expanded(text, 8)
         yield "tabs", _like_the_line_before(text, error["line"])

@@ -65,6 +65,11 @@ CASES = {
     "utf16": ("x = 1\n".encode("utf-16"), None, "UTF-16"),
     "page": ("\n<!DOCTYPE html>\n<html><title>talker.py</title></html>\n", None, "is a web page"),
     "notebook": ('{"cells": [{"cell_type": "code"}], "nbformat": 4}\n', None, "is a Jupyter notebook"),
+    "pointer": (
+        "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 3\n",
+        None,
+        "a pointer of Git LFS",
+    ),
     "document": ("{\\rtf1\\ansi import rospy}\n", None, "a document of a word processor"),
     "numbered": ("1 import rospy\n2\n3 x = 1\n4\n5 y = 2\n", None, "begins with its number"),
     "null": (b"x = 1\n\0\n", 2, "null bytes"),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.package.repairing import CMAKELISTS, SCRIPT, TALKER, Case, asking, check, swapped
+from tests.package.repairing import CMAKELISTS, MANIFEST, SCRIPT, TALKER, XML, Case, asking, check, swapped
 
 pytestmark = pytest.mark.usefixtures("without_processes")
 
@@ -30,6 +30,19 @@ CASES = {
     "crlf": Case({TALKER: SCRIPT.replace("\n", "\r\n")}, ["line-ends"], "has Windows line endings"),
     "bom": Case({TALKER: b"\xef\xbb\xbf" + SCRIPT.encode()}, ["byte-order-mark"], "byte order mark"),
     "utf-16": Case({TALKER: SCRIPT.encode("utf-16")}, ["encoding"], "saved as UTF-16"),
+    "manifest-utf-16": Case({XML: MANIFEST.encode("utf-16")}, ["manifest-line"], "package.xml is saved as UTF-16",
+        after={XML: MANIFEST}),
+    "merge-markers": Case(
+        swapped(TALKER, ("        publisher.pub", "<<<<<<< HEAD\n        publisher.pub"),
+                ("        rate", "=======\n        publisher.publish(2)\n>>>>>>> 3f2a9c1 (second try)\n        rate")),
+        ["python-syntax"], "git's merge markers",
+    ),
+    "module-for-a-type": Case(
+        swapped(TALKER, ("from std_msgs.msg import Int8", "import std_msgs.msg"), ("Int8, ", "std_msgs.msg, ")),
+        ["missing-call"], "`std_msgs.msg` is a module, and no type",
+    ),
+    "two-values-published": Case(
+        swapped(TALKER, ("publisher.publish(", "publisher.publish('count', ")), ["missing-call"], "takes one value"),
     "latin-1": Case({TALKER: SCRIPT.replace("import rospy\n", "import rospy  # caf\u00e9\n").encode("latin-1")},
                 ["encoding"], "not saved as UTF-8"),
     "no-shebang-and-a-slip": Case(

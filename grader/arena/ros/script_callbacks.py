@@ -27,6 +27,7 @@ def callbacks(tree):
     """
     yield from ending_callbacks(tree)
     functions = functions_in(tree)
+    yield from spare_callbacks(tree, functions)
     for node in walk(tree):
         name = called_name(node)
         if name not in CALLBACKS:
@@ -63,6 +64,21 @@ def callbacks(tree):
                 message, fix = wrong_callback(own, node, functions, isinstance(meant, ast.Attribute), values)
                 message = message or "`%s` takes %d arguments, but ROS passes it %s" % (own.name, least, what)
                 yield slip(own.lineno, "callback-values", message, fix=fix, name=own.name)
+
+
+def spare_callbacks(tree, functions):
+    """The only function that reads a message and that nothing names, in a script without a Subscriber."""
+    if calls_in(tree, "Subscriber"):
+        return
+    read = {n.id for n in walk(tree) if isinstance(n, ast.Name)} | {
+        getattr(n, "attr", "") for n in walk(tree)
+    }
+    data = {dotted(n.value) for n in walk(tree) if isinstance(n, ast.Attribute) and n.attr == "data"}
+    spare = [f for name, f in functions.items() if name not in read and takes(f, "self" in read) == (1, 1)]
+    spare = [f for f in spare if f.args.args[-1].arg in data]
+    if len(spare) == 1:
+        name = ("self." if len(spare[0].args.args) > 1 else "") + spare[0].name
+        yield slip(spare[0].lineno, "callback-missing", "no Subscriber is given `%s`" % name, name=name)
 
 
 def wrong_callback(own, call, functions, bound, values):

@@ -36,11 +36,12 @@ def in_brackets(counter, rest):
 
 def resets(tree):
     """Where a counter goes back: the number that it is set to in an `if` that asks for it, and the number in that `if`,
-    or behind a `%`.
+    or behind a `%`, or in the `range(…)` of a loop that publishes.
     """
     added = {
         id(n.right): n.left for n in walk(tree) if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Add)
     }
+    yield from limits_of_ranges(tree)
     for node in walk(tree):
         value, done, asked, fix = None, (), [], ""
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
@@ -63,6 +64,14 @@ def resets(tree):
                 yield slip(part.lineno, "reset-limit", "%d" % whole(part), fix=fix)
         if value is not None:
             yield slip(value.lineno, "reset-value", "%d" % whole(value))
+
+
+def limits_of_ranges(tree):
+    for node in walk(tree):
+        ranged = isinstance(node, ast.For) and called_name(node.iter) == "range" and calls_in(node, "publish")
+        limit = whole((node.iter.args[:2] or [None])[-1]) if ranged else None
+        if limit is not None:
+            yield slip(node.lineno, "reset-limit", "%d" % limit, name="range")
 
 
 def whole(node):
@@ -89,6 +98,7 @@ def counter_slips(tree):
         sent = [i for i, one in enumerate(body) if calls_in(one, "publish")]
         added = {dotted(t): n for n in inside for t in increments(n)} if sent else {}
         for name, node in added.items():
+            yield from reset_the_wrong_way([one for one in body if isinstance(one, ast.If)], name)
             set_at = [i for i, one in enumerate(body) if name in (dotted(t) for t in constants_in([one]))]
             reset_at = [i for i, one in enumerate(body) if isinstance(one, ast.If) and name in reset_in(one)]
             if set_at:
@@ -104,6 +114,28 @@ def counter_slips(tree):
                     message = "line %d adds one after the counter was reset, so what follows a reset is one too high"
                     fix = "move line %d above the `if` on line %d" % (node.lineno, line)
                     yield slip(line, "reset-early", message % node.lineno, fix=fix, name=name)
+
+
+def reset_the_wrong_way(ifs, name):
+    """An `if` that resets a counter while it is below its limit: `if not n > 127: n = 0`, `if n < 127: n = 0`."""
+    for one in ifs:
+        inverted = isinstance(one.test, ast.UnaryOp) and isinstance(one.test.op, ast.Not)
+        test = one.test.operand if inverted else one.test
+        below = (ast.Gt, ast.GtE) if inverted else (ast.Lt, ast.LtE)
+        if (
+            not isinstance(test, ast.Compare)
+            or not isinstance(test.ops[0], below)
+            or dotted(test.left) != name
+        ):
+            continue
+        limit, resets_to = (
+            whole(test.comparators[0]),
+            [whole(n.value) for n in one.body if isinstance(n, ast.Assign) and dotted(n.targets[0]) == name],
+        )
+        if limit is not None and any(value is not None and value < limit for value in resets_to):
+            message = "the `if` on line %d resets `%s` while it is below %d" % (one.lineno, name, limit)
+            fix = "delete the `not` on line %d" if inverted else "on line %d, write `>` in the condition"
+            yield slip(one.lineno, "set-in-loop", message, fix=fix % one.lineno, name=name)
 
 
 def counter_starts(tree):
@@ -271,7 +303,7 @@ def clock_values(tree):
 
 
 def values_left_out(tree):
-    """Loops that count in each turn, and publish only in some: an `if` asks for what is counted."""
+    """Loops that publish only in some of their turns: an `if` asks for what they count, or they count nothing."""
     source = Source(tree)
     for loop in walk(tree):
         body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
@@ -281,7 +313,8 @@ def values_left_out(tree):
             inside = set(ast.walk(one))
             counted = {dotted(t) for n in ast.walk(loop) if n not in inside for t in increments(n)}
             others = {ast.dump(n.func) for n in calls_in(loop, "publish") if n not in sent}
-            if sent and names_in(one.test) & counted and ast.dump(sent[0].func) not in others:
+            asks = names_in(one.test) & counted if counted else not calls_in(one.test, "is_shutdown")
+            if sent and asks and ast.dump(sent[0].func) not in others:
                 lines = (sent[0].lineno, one.lineno)
                 message = "line %d publishes only under the condition on line %d" % lines
                 fix = (
@@ -289,6 +322,39 @@ def values_left_out(tree):
                     % lines
                 )
                 yield slip(sent[0].lineno, "published-in-part", message, fix=fix, name=source.topic(sent[0]))
+
+
+TELLS = ("publish", "print")
+
+
+def published_unchanged(tree):
+    """Loops that publish in each turn what a line above them made, and do nothing else with it than to print it."""
+    set_at = {}
+    for n in walk(tree):
+        if isinstance(getattr(n, "ctx", None), ast.Store):
+            set_at.setdefault(dotted(n).partition(".")[0], []).append(n.lineno)
+    plain = {dotted(t) for t in constants_in(walk(tree))}
+    for loop in walk(tree):
+        inside = [n for one in loop.body for n in ast.walk(one)] if isinstance(loop, ast.While) else []
+        told = [n for n in inside if called_name(n) in TELLS or called_name(n).startswith("log")]
+        told_of = {id(n) for call in told for n in ast.walk(call)}
+        names = [n for n in inside if isinstance(n, ast.Name)]
+        used = {n.id for n in names if id(n) not in told_of}
+        read = {n.id for n in names if id(n) not in told_of and isinstance(n.ctx, ast.Load)}
+        read |= {name for n in told if called_name(n) == "publish" for name in names_in(n)}
+        fresh = {n.id for n in names if isinstance(n.ctx, ast.Store)} - read
+        for call in (n for n in told if called_name(n) == "publish" and len(n.args) == 1):
+            name = dotted(call.args[0])
+            lines = set_at.get(name, [])
+            if name in plain or name in used or len(lines) != 1 or lines[0] >= loop.lineno:
+                continue
+            line = lines[0]
+            fix = "move line %d into that loop, above line %d" % (line, loop.body[0].lineno)
+            fix = "on line %d, publish `%s`" % (call.lineno, min(fresh)) if len(fresh) == 1 else fix
+            message = (
+                "each pass through the loop on line %d publishes `%s`, which only line %d makes, above it"
+            )
+            yield slip(call.lineno, "no-effect", message % (loop.lineno, name, line), fix=fix, name=name)
 
 
 class Source:

@@ -220,15 +220,17 @@ def sleeps_in_if(loop):
 
 
 def sleeps_twice(tree):
-    """Loops that wait twice in each of their turns, and publish once."""
+    """Loops that wait twice in each of their turns, and publish once on each topic."""
     for loop in walk(tree):
         body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
         at = [i for i, n in enumerate(body) if isinstance(n, ast.Expr) and called_name(n.value) == "sleep"]
         if len(at) != 2:
             continue
         between, around = body[at[0] + 1 : at[1]], body[: at[0]] + body[at[1] + 1 :]
-        publish = [any(calls_in(one, "publish") for one in part) for part in (between, around)]
-        if sorted(publish) == [False, True]:
+        sent = [
+            {ast.dump(n.func) for one in part for n in calls_in(one, "publish")} for part in (between, around)
+        ]
+        if any(sent) and sent[0].isdisjoint(sent[1]):
             lines = (body[at[0]].lineno, body[at[1]].lineno)
             message = "the loop sleeps on line %d and again on line %d" % lines
             yield slip(lines[1], "sleep-twice", message, fix="delete line %d" % lines[1])

@@ -505,17 +505,36 @@ def said_texts(tree):
         if isinstance(node, FUNCTIONS):
             kinds.update(arg.arg for arg in ast.walk(node.args) if isinstance(arg, ast.arg))
     read = Texts({name: values[0] for name, values in given.items() if len(values) == 1 and values[0]}, kinds)
+    moves = moves_to_run(tree)
     for node in walk(tree):
         if is_call(node, "publish") and len(node.args) == 1:
             place, text = read.message(node.args[0])
             yield from said("publishes", place, text.replace(NODE, VALUE), "publish")
         elif called_name(node) in PRINTED and node.args:
-            yield from said("prints", node, read.printed(node), called_name(node))
+            yield from said("prints", node, read.printed(node), called_name(node), moves.get(node, ""))
 
 
-def said(kind, node, text, call):
+def said(kind, node, text, call, fix=""):
     if text and text != VALUE and len(text) <= TEXT_LIMIT:
-        yield slip(node.lineno, kind, text, name=call)
+        yield slip(node.lineno, kind, text, fix=fix, name=call)
+
+
+def moves_to_run(tree):
+    """Return for calls that stand behind a `spin()`, or in an `if`, where to move them so that they run anyway."""
+    found = {}
+    for node in walk(tree):
+        asks = isinstance(node, ast.If) and "__name__" not in map(dotted, ast.walk(node.test))
+        for call in calls_below(node.body) if asks and not calls_in(node.test, "is_shutdown") else ():
+            found[call] = "move line %d out of the `if` on line %d" % (call.lineno, node.lineno)
+        body = node.body if isinstance(getattr(node, "body", None), list) else []
+        spins = [i for i, one in enumerate(body) if isinstance(one, ast.Expr) and is_call(one.value, "spin")]
+        for call in calls_below(body[spins[0] + 1 :]) if spins else ():
+            found[call] = "move line %d above line %d" % (call.lineno, body[spins[0]].lineno)
+    return found
+
+
+def calls_below(statements):
+    return [n for one in statements for n in ast.walk(one) if isinstance(n, ast.Call)]
 
 
 class Texts:

@@ -21,6 +21,7 @@ from script_counters import (
     counter_starts,
     counts,
     knows_time,
+    published_unchanged,
     resets,
     sends_no_time,
     values_left_out,
@@ -83,7 +84,8 @@ def slips(tree):
         published_before, sleepless_loops, sleeps_twice, publishes_twice, callbacks, waiting_callbacks,
         queue_sizes, graph_names, object_slips, said_texts, deaf_loops, clock_values, counter_slips,
         counter_starts, without_effect, assigned_late, hidden_names, subscribed_again, imports, taken_off,
-        unstarted_servers, wrong_values, unprinted_messages, values_left_out, unused_publishers,
+        unstarted_servers, wrong_values, unprinted_messages, values_left_out, published_unchanged,
+        unused_publishers,
     )  # fmt: skip
     for find in finders:
         found += find(tree)
@@ -305,5 +307,7 @@ def without_effect(tree):
         elif isinstance(value, ast.Compare) and isinstance(value.ops[0], ast.Eq):
             name = dotted(value.left)
             if "..." not in name:
+                right = value.comparators[0]
+                right = repr(right.value) if isinstance(right, ast.Constant) else dotted(right)
                 message = "`%s ==` compares and gives no value" % name
-                yield slip(node.lineno, "compared", message, fix="write `%s =`" % name)
+                yield slip(node.lineno, "compared", message, fix="write `%s = %s`" % (name, right))

@@ -55,6 +55,7 @@ NO_SCRIPTS = (
     (re.compile(rb"\s*\{.{0,200}\"(?:cells|nbformat)\"\s*:", re.DOTALL), "a notebook in a file for Python"),
     (re.compile(rb"\{\\rtf|PK\x03\x04|\xd0\xcf\x11\xe0"), "a document in a file for Python"),
     (re.compile(rb"%PDF-"), "a PDF in a file for Python"),
+    (re.compile(rb"version https://git-lfs"), "a pointer in a file for Python"),
 )
 """How files begin that were saved under a script's name."""
 NUMBERED_LINES = 5

@@ -339,7 +339,8 @@ def _where_reset(verdict: Verdict, turn: Step, written: Sequence[PythonSlip], pa
     slip = next((s for s in written if s.kind == kind and abs(int(s.message) - number) <= apart), None)
     if slip is None or turn.change > 0 or verdict.status is not Status.FAIL:
         return verdict
-    does = "" if wrong_value else f" compares it with {slip.message}"
+    limits = f"ends its range at {slip.message}" if slip.name else f"compares it with {slip.message}"
+    does = "" if wrong_value else f" {limits}"
     message = f"{verdict.message} ({slip.file}, line {slip.line}{does})"
     right = params.minimum if wrong_value else params.maximum
     hint = f"on line {slip.line}, write {right} instead of {slip.message}"
@@ -350,6 +351,8 @@ def _where_reset(verdict: Verdict, turn: Step, written: Sequence[PythonSlip], pa
 
 def _limit_hint(slip: PythonSlip, params: WrapParams) -> str:
     most = params.maximum
+    if slip.name == "range":
+        return f"on line {slip.line}, let the range end at {most + 1}: {most} is its last number then"
     return f"let it count up to {most} there: `if counter > {most}`, or `% {most + 1}`, on line {slip.line}"
 
 

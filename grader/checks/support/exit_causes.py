@@ -41,7 +41,14 @@ from grader.checks.support.rospy_calls import (
     without_message,
     wrong_class,
 )
-from grader.checks.support.scripts import OF_INTERFACES, SYNTAX, path_in_package
+from grader.checks.support.scripts import (
+    OF_INTERFACES,
+    SYNTAX,
+    copies_of,
+    move_hint,
+    path_in_package,
+    without_git,
+)
 from grader.checks.support.text import LOOP, RATE_SLOT, SPIN, VALUE_SLOT, near_names, shown
 from grader.evidence.events import STOPPED
 from grader.evidence.run import Run
@@ -50,7 +57,7 @@ from grader.installable import (
     ON_THE_MACHINE,
     install_hint,
 )
-from grader.model.package import Fault, PackageFacts
+from grader.model.package import Fault, PackageFacts, SourceFile
 from grader.model.python_slip import PythonSlip
 from grader.model.verdict import Citations, FileCitation, Verdict, machine_lacks
 from grader.syntax_fixes import COMMENTED_OUT, corrected, without_brace
@@ -163,7 +170,10 @@ def explain_end(life: Life, run: Run, package: PackageFacts) -> Ending:
 
 
 def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
-    if refused := _refused_name(life, run):
+    script = package.file(life.start.script or "")
+    fault = script.python_fault if script is not None and script.is_no_script else None
+    whole = Ending(fault.explanation, syntax_hint(fault)) if fault is not None else None
+    if refused := whole or _refused_name(life, run):
         return refused
     if limit := _limit(life, run):
         return Ending(limit, "a node of this lab needs little memory, few processes and little time")
@@ -210,7 +220,11 @@ def _ran_to_the_end(printed: Sequence[str]) -> Ending:
 
 def _not_run(life: Life, package: PackageFacts) -> Ending | None:
     """Explain a script that comes to its end because nothing calls what it defines, or because its loop is left."""
-    script = next((f for f in package.files if f.path == life.start.script), None)
+    script = package.file(life.start.script or "")
+    if script is not None and (other := _real_copy(script, package)):
+        cause = f"its script ran to the end: it makes no node, but {other}, which has the same name, does"
+        hint = without_git(move_hint(package, other, script.path), package)
+        return Ending(cause, hint, by_itself=True)
     if script is not None and script.shebang_fault == "empty-file":
         return Ending("its file is empty", f"write the node in {script.path}", by_itself=True)
     kinds = ("main-guard", "not-called", "never-called", "loop-left", "commented-out", "no-init")
@@ -230,6 +244,14 @@ def _not_run(life: Life, package: PackageFacts) -> Ending | None:
     called = f"call {slip.name}() at the end of the script, below {MAIN}" if slip.name else f"write {MAIN}"
     cause = f"its script ran to the end: {slip.message} ({slip.file}, line {slip.line})"
     return Ending(cause, slip.fix or called, (slip.place,), by_itself=True)
+
+
+def _real_copy(script: SourceFile, package: PackageFacts) -> str:
+    """Return the only other file of a script's name, where that one makes a node and the script itself makes none; ""
+    where it is not so."""
+    nodes = {s.file for s in package.slips if s.kind == "node-name"}
+    others = [one.path for one in copies_of(package, script.path) if one.path != script.path]
+    return others[0] if script.path not in nodes and len(others) == 1 and others[0] in nodes else ""
 
 
 def _in_comments(slips: Sequence[PythonSlip]) -> dict[str, str]:

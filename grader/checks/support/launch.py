@@ -18,7 +18,7 @@ from grader.checks.support.launch_slips import (
     programs_hint,
 )
 from grader.checks.support.parameters import explain_yaml
-from grader.checks.support.processes import early_end, lives, observed_until_ns
+from grader.checks.support.processes import early_end, first_interrupt_ns, lives, observed_until_ns
 from grader.checks.support.scripts import paths_by_name, programs, shebang_obstacles
 from grader.checks.support.text import INIT, near_names, shown
 from grader.evidence.run import Run
@@ -81,10 +81,14 @@ _REFUSALS = (
 
 
 def not_run(run: Run) -> Verdict | None:
-    """Nothing was started at all."""
-    if lives(run) or run.graph:
-        return None
-    return grade_again("roslaunch was not run")
+    """Nothing was started at all, or roslaunch was stopped before it had read anything: the machine stood still."""
+    if not lives(run) and not run.graph:
+        return grade_again("roslaunch was not run")
+    pressed, said = first_interrupt_ns(run), [(t, c.line) for t, c in run.console]
+    was_early = pressed is not None and all(t >= pressed for t, _ in said)
+    if was_early and any(line == "KeyboardInterrupt" for _, line in said) and not run.student_nodes():
+        return grade_again("roslaunch was still starting itself when it was stopped")
+    return None
 
 
 def node_slips(package: PackageFacts, file: LaunchFile, run: Run) -> Verdict | None:

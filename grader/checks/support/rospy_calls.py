@@ -185,6 +185,9 @@ def _parameter(message: str, source: str) -> Meaning | None:
     if call is None or len(call.args) != 2 or "expected string" not in message:
         return None
     value, name = call.args
+    if isinstance(value, ast.Name) and not is_text(name):
+        cause = f"the parameter's name comes first, in quotes, and `{shown(value.id)}` is no text"
+        return cause, f"write the parameter's name, in quotes, in place of `{shown(value.id)}`"
     if is_text(name) and not is_text(value):
         return "the parameter's name comes first, then its value", rewritten(
             source, (value, name), (name, value)
@@ -325,7 +328,9 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
     others = [
         s for s in owners.values() if types[s.line].startswith(NUMBER_TYPES if wants_text else "String")
     ]
-    if here is not None and here not in others and len(others) == 1:
+    # where no text is published at all, the other one does not get what belongs here
+    is_swap = not wants_text or any(s.kind == "publishes" for s in slips)
+    if here is not None and here not in others and len(others) == 1 and is_swap:
         why = f"`{owner}` publishes {types[here.line]} on {here.message} (line {here.line})"
         lines = sorted((here.line, others[0].line))
         fix = (

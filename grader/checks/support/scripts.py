@@ -231,7 +231,7 @@ def shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
         yield Obstacle("does not begin with a #! line", fix)
     elif file.shebang.found is False:
         yield Obstacle(f"names {file.shebang.interpreter}, which is not on a ROS machine", fix)
-    elif file.python and "python" not in file.shebang.interpreter:
+    elif file.names_other_language:
         yield Obstacle(f"is Python, and its first line names {file.shebang.interpreter}", fix)
 
 

@@ -238,7 +238,8 @@ def _judge_advertised(
         return verdict.model_copy(update={"cause": deaf.message})
     if slip := call_in_comment(package, run, "publish"):
         return _commented_out(message, slip, of_node)
-    unused = [s for s in run_slips(package, run, "never-published") if is_written_as(s.name, topic)]
+    kinds: tuple[SlipKind, ...] = ("never-published", *(() if _heard_topics(run) else ("published-in-part",)))
+    unused = [s for s in run_slips(package, run, *kinds) if is_written_as(s.name, topic)]
     if unused:
         verdict = of_node(f"{message}: {unused[0].message}", measured="no message", hint=unused[0].fix)
         return verdict.about(citations=(unused[0].place,))

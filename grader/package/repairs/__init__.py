@@ -18,6 +18,7 @@ from grader.package.repairs.cmakelists import rename_package, repair_cmake
 from grader.package.repairs.cpp import repair_cpp
 from grader.package.repairs.editing import (
     BOM,
+    UTF16,
     Files,
     NotRepairable,
     make_executable,
@@ -71,7 +72,9 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     scripts = _scripts(files, package, wanted, renames)
     repair_files(files, scripts)
     rename_files(files, renames)
-    paths = [renames.get(f.path, f.path) for f in scripts if f.python and f.link is None]
+    paths = [
+        renames.get(f.path, f.path) for f in scripts if f.python and f.link is None and not f.is_no_script
+    ]
     names = repair_python(files, paths, package, wanted.types)
     name = repair_manifest(files, package, wanted)
     repair_cmake(files, package, name, wanted, [f.path for f in scripts])
@@ -115,9 +118,9 @@ def _repair_bytes(data: bytes, repair: Repair) -> bytes:
         return data.replace(b"\r\n", b"\n")
     if repair.kind == "byte-order-mark":
         return data.removeprefix(BOM)
-    if repair.kind == "encoding":
-        return to_utf8(data)
-    return replace_lines(data, repair)
+    if repair.kind == "encoding" or data.startswith(UTF16):
+        data = to_utf8(data)
+    return data if repair.kind == "encoding" else replace_lines(data, repair)
 
 
 def _rename_package(folder: Path, repair: Repair) -> None:

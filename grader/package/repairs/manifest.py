@@ -6,8 +6,10 @@ import re
 
 from grader.installable import known_packages, noetic_messages
 from grader.model.package import MANIFEST, PackageFacts
+from grader.model.repair import Repair
 from grader.package.manifest import parse_manifest, required_tags
-from grader.package.repairs.editing import Files, repair_xml
+from grader.package.repairs.editing import UTF16, Files, as_text, read_data, repair_xml
+from grader.package.repairs.files import to_utf8
 from grader.package.repairs.names import Wanted, is_near
 from grader.package.xml import parse_xml
 from grader.wording import is_one_edit, is_word_of
@@ -33,6 +35,13 @@ OF_ROS = {"rospy", "roscpp", "catkin", "message_generation", "message_runtime", 
 
 def repair_manifest(files: Files, package: PackageFacts, wanted: Wanted) -> str:
     """Find what the manifest lacks, and return the name that the package has in the end."""
+    data = read_data(files.folder, MANIFEST) or b""
+    if data.startswith(UTF16):
+        files.put(MANIFEST, as_text(to_utf8(data)))
+        first = (files.text(MANIFEST) or "").split("\n", 1)[0]
+        message, fix = f"{MANIFEST} is saved as UTF-16", f"save {MANIFEST} as UTF-8 in your editor"
+        place = {"file": MANIFEST, "line": 1, "before": first, "after": first}
+        files.add(Repair(kind="manifest-line", **place, message=message, fix=fix))
     text = files.text(MANIFEST)
     if text is None:
         return package.name

@@ -33,7 +33,7 @@ ATTEMPTS = 3
 """A source that crashes Python costs its own repairs, not those of the others."""
 
 Cause = Literal[
-    "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
+    "merged", "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
     "old-name", "module", "import", "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument",
     "unbound", "kept", "guard", "inside", "start", "main", "server", "spin", "line", "twice", "turned",
 ]  # fmt: skip
@@ -280,6 +280,13 @@ def _rewritten(before: str, after: str) -> str:
     return "; ".join([f"write {found[0][1]}", *written]) + more
 
 
+def _emptied_lines(before: str, after: str) -> str:
+    """Return `lines 3 and 5 to 8`, of lines that have nothing in them any more."""
+    pairs = enumerate(zip(before.split("\n"), after.split("\n"), strict=False), start=1)
+    numbers = [number for number, (old, new) in pairs if old and not new]
+    return f"{'line' if len(numbers) == 1 else 'lines'} {numbers_text(numbers)}"
+
+
 def _further_in(before: str, after: str, line: int) -> str:
     """Return by how many characters more the line begins."""
     one, other = (text.split("\n")[line - 1 : line] or [""] for text in (before, after))
@@ -315,6 +322,7 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
             names=names,
             calls=calls,
             told=told,
+            emptied=_emptied_lines(before, after),
             further=_further_in(before, after, first.line),
         )
         for words in WORDS[cause]
@@ -328,6 +336,8 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
 
 BELOW = "{place}: `global {word}` comes after a line that uses {word}"
 WORDS: dict[Cause, tuple[str, str]] = {
+    "merged": ("{place}: git's merge markers (`<<<<<<<`) are still in the file",
+     "keep one of the two versions: delete the other one and the markers, such as {emptied}"),
     "tabs": ("{place}: tabs and spaces are mixed in the indentation", "replace the tabs: "),
     "level": ("{place}: {told}", "change the indentation: "),
     "indent": ("{place}: the line after a `:` must be indented", "indent line {line} by {further} more spaces"),
