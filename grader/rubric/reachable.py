@@ -73,7 +73,7 @@ def _too_many(
         topic, rate_hz = given.get("topic"), given.get("rate_hz")
         of_rate = check is not None and hasattr(check.params, "rate_bounds")
         if of_rate and isinstance(rate_hz, int | float) and rate_hz > 0:
-            rates[str(topic)] = float(rate_hz)
+            rates[str(topic)] = max(rates.get(str(topic), 0), float(rate_hz))
     for name, scenario in scenarios.items():
         until = as_map(scenario.get("until"))
         limit_s = until.get("limit_s", Until.model_fields["limit_s"].default)
