@@ -240,10 +240,11 @@ def _rhythm(
     )
     if not times:
         return None
-    longest_ns = max([SILENT_PERIODS * params.period_ns, *(b - a for a, b in pairwise(times))])
-    if from_ns is not None and times[0] - from_ns > longest_ns:
-        times.insert(0, from_ns)
-    silent = until_ns is not None and until_ns - times[-1] > SILENT_PERIODS * params.period_ns
+    least_ns = SILENT_PERIODS * params.period_ns
+    if from_ns is not None:  # a stretch begins and ends anywhere between two messages
+        least_ns = max([least_ns, *(b - a for a, b in pairwise(times))])
+        times = [*([from_ns] if times[0] - from_ns > least_ns else []), *times]
+    silent = until_ns is not None and until_ns - times[-1] > least_ns
     return Rhythm(times_ns=tuple(times), until_ns=until_ns if silent and until_ns is not None else times[-1])
 
 
