@@ -114,6 +114,7 @@ class ServedAction:
         self._types: dict[str, MessageType] = {}
         self._goals = arena.watch(f"{served.name}/goal")
         self._cancels = arena.watch(f"{served.name}/cancel")
+        self._ended = 0
 
     def offer(self) -> None:
         """Advertise its topics, before anything is started."""
@@ -163,7 +164,9 @@ class ServedAction:
             if cancelled or feedback is None:
                 break
             self._send("feedback", {"status": status, "feedback": feedback})
-        number = PREEMPTED if cancelled else ENDS[one.ends]
+        ends = (one.ends,) if isinstance(one.ends, str) else one.ends
+        number = PREEMPTED if cancelled else ENDS[ends[min(self._ended, len(ends) - 1)]]
+        self._ended += 1
         end = {"goal_id": goal_id, "status": number}
         value = {"request": goal, "response": one.result}
         about = {"topic": one.name, "type": one.type, "value": value, "detail": GOAL_STATUS[number]}

@@ -36,7 +36,7 @@ from grader.evidence.reader import load_evidence, package_facts
 from grader.evidence.run import Run
 from grader.files import temporary_folder
 from grader.intake import open_submission
-from grader.model.package import PackageFacts
+from grader.model.package import Interface, PackageFacts
 from grader.model.progress import Progress
 from grader.model.verdict import Status
 from grader.package import read_package
@@ -80,8 +80,20 @@ class Proposal(DraftSheet):
         if installed := self._installed_scripts():
             title, parameters = "CMake installs the scripts", {"scripts": installed}
             self.add("cmake-install", title, "cmake-install", parameters, requires=["cmake"])
+        for one in facts.interfaces:
+            self._definition(one)
         before = ["manifest", "cmake"]
         self.add("build", "The package builds", "build", {}, requires=before, reproduce="catkin_make")
+
+    def _definition(self, one: Interface) -> None:
+        """A message, service or action of the package's own, with all of its fields and constants."""
+        fields = {field.path: field.type for field in one.fields if field.value is None}
+        constants = {field.path: field.value for field in one.fields if field.value is not None}
+        about = {"fields": fields, "constants": constants, "ordered": len(fields) > 1}
+        parameters = {"file": one.path, **{key: value for key, value in about.items() if value}}
+        if one.fault is None and (fields or constants):
+            title = f"{one.path} is as in the handout"
+            self.add(f"{label_of(PurePosixPath(one.path).stem)}-definition", title, "definition", parameters)
 
     def _installed_scripts(self) -> list[str]:
         calls = self._facts.cmake.calls if self._facts.cmake else ()
@@ -100,7 +112,8 @@ class Proposal(DraftSheet):
             ]  # fmt: skip
         if seen.failed or not seen.nodes:
             why = seen.failed or "no node was registered"
-            self.notes.append(f"{script} was not observed ({why}): does it need parameters or another node?")
+            needs = "" if "No module named" in why else ": does it need parameters or another node?"
+            self.notes.append(f"{script} was not observed ({why}){needs}")
             return
         self._scenario(name, seen)
         node = self._life(name, script, seen, requires)
@@ -112,7 +125,17 @@ class Proposal(DraftSheet):
                 id_, parameters = f"service-{label_of(service)}", {"service": service, "type": kind}
                 title = f"{service} is offered"
                 self.add(id_, title, "service", parameters, scenario=name, requires=[node])
+                call = f"- call: {{service: {service}, type: {kind}, request: {self._request(kind)}}}"
+                self.notes.append(f"what {service} answers is not covered: a step can call it, {call}")
         self._hearing(name, script, seen, requires)
+
+    def _request(self, kind: str) -> str:
+        """Return a request of a service of the package's own, as it can be written in a step."""
+        path = f"srv/{kind.rpartition('/')[2]}.srv"
+        fields = [
+            f.name for i in self._facts.interfaces if i.path == path for f in i.fields if f.part == "request"
+        ]
+        return f"{{{', '.join(f'{name}: …' for name in fields)}}}"
 
     def _words(self, name: str, file: str, seen: Observed, node: str) -> None:
         """What it logs and which parameters it shows."""

@@ -27,7 +27,7 @@ from grader.untrusted_text import line, visible, without_ci_commands
 WEIGHTS = {
     "manifest": 1, "cmake": 1, "build": 1, "executable": 1, "node-lives": 1, "node-name": 1, "topic-type": 2, "rate": 3,
     "counter-start": 1, "counter-step": 1, "counter-wrap": 3, "message": 1, "hears": 2, "service": 2, "latched": 1,
-    "cmake-install": 2, "launch-xml": 2, "launch-runs": 2, "reacts": 2,
+    "cmake-install": 2, "launch-xml": 2, "launch-runs": 2, "reacts": 2, "definition": 1,
 }  # fmt: skip
 
 RubricEntry = dict[str, Any]

@@ -22,6 +22,8 @@ from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, passed, unjudged
 from grader.wording import join_words, plural, significant
 
+CALLS_SHOWN = 8
+
 
 class CallsParams(Record):
     """The service, and what has to be asked of it."""
@@ -172,17 +174,34 @@ def _fault(
     package: PackageFacts, run: Run, params: CallsParams, wanted: dict[str, Any], left: tuple[Request, ...]
 ) -> Verdict:
     """Some call came: either it is another one, or there are too few."""
-    came = len(requests(run, params.service))
-    error = explain_error(package, run)
+    made = requests(run, params.service)
+    came, error, end = len(made), explain_error(package, run), explain_early_end(package, run)
+    is_over = not error and end is not None and end.by_itself
+    if (came >= len(params.wanted) or is_over) and (other := _in_another_order(params, wanted, made)):
+        return other
     if left and (came >= len(params.wanted) or not error):
         return _other_request(params, wanted, left)
     with_fields = f" with {fields_text(wanted)}" if wanted else ""
     what = f"{params.service} is called {plural(came, 'time')}, but there was no other call{with_fields}"
-    if end := explain_early_end(package, run) or error:
+    if end := end or error:
         return end.verdict(failed, f"{what}: {end.cause}")
     return failed(
         what, hint=f"{plural(len(params.wanted), 'call')} are expected: call it again"
     ).if_repeated()
+
+
+def _in_another_order(params: CallsParams, wanted: dict[str, Any], made: Sequence[Request]) -> Verdict | None:
+    """The request that is missing is right where it comes: it comes at another place, or less often."""
+    if len(params.wanted) == 1 or all(any(_differences(one, wanted, params)) for one in made):
+        return None
+    asked = [f"({fields_text(one)})" for one in params.wanted]
+    came = [f"({_text(one)})" for one in made]
+    message = f"{params.service} is called with {_in_turn(came)}, not with {_in_turn(asked)}"
+    return failed(message, hint=f"make {plural(len(asked), 'call')} in this order: {_in_turn(asked)}")
+
+
+def _in_turn(calls: Sequence[str]) -> str:
+    return ", ".join([*calls[:CALLS_SHOWN], *(["…"] if len(calls) > CALLS_SHOWN else [])])
 
 
 def _other_request(params: CallsParams, wanted: dict[str, Any], left: tuple[Request, ...]) -> Verdict:

@@ -441,7 +441,9 @@ def _wrong_name(file: LaunchFile, name: str, pkg: str) -> Verdict | None:
         why = f"{file.path} has no node {name}{seen}"
         hint = f'remove ns="{spaces[0].value}" on line {spaces[0].line}: then {name.lstrip("/")} is {name}'
         return failed(why, hint=hint, citations=(spaces[0].place,))
-    hint = f'write <node pkg="{pkg}" name="{name.lstrip("/")}" …/>'
+    space, _, own = name.lstrip("/").rpartition("/")
+    inside = f' ns="{space}"' if space else ""
+    hint = f'write <node pkg="{pkg}" name="{own}"{inside} …/>'
     twice = next(
         (n for n in file.brings if n.ns and n.full_name.replace(f"/{n.ns.strip('/')}/", "/", 1) == name), None
     )

@@ -373,6 +373,9 @@ class FieldEqualsParams(FieldParams):
     """How much numbers may differ, in the field's own unit."""
     when: Literal["every", "first", "last", "any"] = "every"
     """Which messages have to have the value: `every` one, the `first`, the `last` of the run, or `any` of them."""
+    repeats: bool = True
+    """With `values`, whether the same value may come twice in a row; false where the lab asks for a message only when
+    the value changes."""
     of: Sender = "student"
     """Whose messages count: the `student`'s nodes', those of a `program` that the scenario starts beside them, or
     `anyone`'s."""
@@ -383,6 +386,8 @@ class FieldEqualsParams(FieldParams):
             raise ValueError("give one of value and values")
         if self.values and self.when != "every":
             raise ValueError("when is for value, not for values")
+        if not self.repeats and len(self.values) < 2:
+            raise ValueError("repeats is for values, of which one changes into the next")
         texts = [one for one in (self.value, *self.values) if isinstance(one, str)]
         if self.tolerance and not NOT_FINITE.keys() >= {*texts}:
             raise ValueError("tolerance is for numbers, and text has none: write a number without quotes")
@@ -483,8 +488,21 @@ def _in_order(
                 verdict = verdict.if_repeated()
             break
         at = here + 1
+    else:
+        verdict = _said_again(found, params) or verdict
     cited = (_span(run, found, params),)
     return verdict.about(expected=f"{what} {params.words}", measured=_values(found), citations=cited)
+
+
+def _said_again(found: Sequence[Reading], params: FieldEqualsParams) -> Verdict | None:
+    """Messages that say what the one before has said, where one may come only when the value changes."""
+    again = [one for before, one in pairwise(found) if one.values == before.values]
+    if params.repeats or not again:
+        return None
+    count = f"{len(again)} of {plural(len(found), 'message')}"
+    told = f"{count} on {params.topic} say what the one before has said: {params.field} {_values(again[:1])}"
+    hint = f"keep the value that was published last, and publish on {params.topic} only when it changes"
+    return failed(told, hint=hint)
 
 
 def _in_another_order(found: Sequence[Reading], params: FieldEqualsParams) -> Verdict:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Collection, Mapping, Sequence
 from functools import partial
+from itertools import pairwise
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from grader.checks.reacts import ORDER_S, Condition, true_spans
 from grader.checks.registry import Refers, check
 from grader.checks.support.clocks import Lateness, excused, lateness
 from grader.checks.support.exit_causes import explain_early_end
@@ -38,7 +39,7 @@ from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
-from grader.model.verdict import Status, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Status, Verdict, failed, grade_again, inconclusive, passed, unjudged
 from grader.wording import hertz, join_words, plural, seconds, significant
 
 FLOOD_FACTOR = 5
@@ -56,6 +57,7 @@ SLEEPLESS = ("not-called", "sleep-outside", "undefined", "misspelt")
 """Slips that keep a loop from sleeping."""
 LATE_P95_SHARE = 0.2
 LATE_MAX_SHARE = 0.5
+SILENT_PERIODS = 1.5
 STALLS_SHARE = 0.1
 """Of the gaps: who is kept waiting by a full machine is so now and then, and keeps its rate otherwise."""
 
@@ -83,6 +85,19 @@ class RateParams(OnTopic):
     of: Sender = "student"
     """Whose messages count: the `student`'s nodes', those of a `program` that the scenario starts beside them, or
     `anyone`'s."""
+    cause: Annotated[Condition, Refers("cause")] | None = None
+    """For a rate that changes within the run: only messages that come while this is true count. Null: all of them."""
+    within_s: Annotated[float, Field(ge=0)] = 0.0
+    """How soon after the cause begins the rate has to hold. Required with a `cause`; give the longest pause of the loop
+    before it, which a node may sleep to its end."""
+
+    @model_validator(mode="after")
+    def _has_cause(self) -> RateParams:
+        if (self.cause is None) == bool(self.within_s):
+            raise ValueError("give cause and within_s together")
+        if self.cause is not None and self.cause.field is None:
+            raise ValueError("a cause of a rate needs a field: a message alone has no end")
+        return self
 
     @property
     def low_hz(self) -> float:
@@ -102,8 +117,11 @@ class RateParams(OnTopic):
         return self.period_ns * (1 - self.gap_tolerance), self.period_ns * (1 + self.gap_tolerance)
 
     @property
-    def rate_bounds(self) -> RateBounds:
-        """Return what the recorder has to know of the rate: a run may end when it is clear."""
+    def rate_bounds(self) -> RateBounds | None:
+        """Return what the recorder has to know of the rate: a run may end when it is clear. One that is asked for a
+        part of the run has no say in that."""
+        if self.cause is not None:
+            return None
         low_ns, high_ns = self.bounds_ns
         return RateBounds(
             topic=self.topic,
@@ -128,7 +146,8 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
         without a sleep fills the network and takes a whole core.
 
     How it is measured
-        In real time, over at least 5 s after the first message. The mean has to lie within 5 % of the
+        In real time, over at least 5 s after the first message, or with a `cause` in each stretch of at least
+        5 s in which it is true. The mean has to lie within 5 % of the
         nominal rate, and 95 % of the gaps within half a period of the nominal one (a rubric may set other
         bounds). One single stall costs nothing. If the grading machine itself was late while a rate failed,
         or had no time to spare and only a few long gaps are wrong, this costs nothing and the run is
@@ -140,23 +159,51 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
         around it, and nothing slow in the loop. `rostopic hz <topic>` shows the rate.
     """
     expected = f"{params.low_hz:g} to {params.high_hz:g} Hz on {params.topic}, evenly"
+    if params.cause is not None:
+        expected += f", from {significant(params.within_s)} s after {params.cause.words}"
     if run.clock != "real":
         message = "rates are judged in real time only, and this run was warped"
         return inconclusive(message, expected=expected, hint="give the criterion a scenario with clock: real")
-    found = rhythm_to_judge(run, params, sent_by(run, params.topic, params.of))
-    if found is None:
-        return nothing_sent(package, run, params.topic, params.of).about(expected=expected)
+    channels = sent_by(run, params.topic, params.of)
+    found = rhythms_to_judge(run, params, channels)
+    if found:
+        verdicts = [_judge(one, run, package, params) for one in found]
+        verdict = next((one for one in verdicts if one.status is not Status.PASS), verdicts[0])
+    elif params.cause is None or not any(c.messages for c in channels):
+        verdict = nothing_sent(package, run, params.topic, params.of)
+    else:
+        verdict = _no_stretch(run, params, params.cause)
+    return verdict.about(expected=expected)
+
+
+def _judge(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict:
+    """Return the verdict on one stretch of messages."""
     verdict = (
         _flood(found, run, package, params)
         or _short(found, run, package, params)
         or _excuse_lateness(_uneven(found, run, package, params), found, run, package, params)
         or passed(f"{params.topic} runs at {hertz(found.mean_hz)}, evenly")
     )
+    if params.cause is not None:
+        verdict = verdict.model_copy(update={"message": f"with {params.cause.words}, {verdict.message}"})
     citations = (cite(run, params.topic, found.times_ns[0], found.times_ns[-1]),)
-    measured = described(found, *params.bounds_ns)
+    measured = found.described(*params.bounds_ns)
     if verdict.status is Status.INCONCLUSIVE or verdict.own_load:
         measured += _lateness(found, run)
-    return verdict.about(expected=expected, measured=measured, citations=citations)
+    return verdict.about(measured=measured, citations=citations)
+
+
+def _no_stretch(run: Run, params: RateParams, cause: Condition) -> Verdict:
+    """Return the verdict where messages came, and none of them when they would count."""
+    readings, topic = cause.come_in(run), params.topic
+    longest_ns = max((until_ns - from_ns for from_ns, until_ns in _spans(run, params, cause)), default=0)
+    if longest_ns >= max(params.min_window_s * 1e9, SILENT_PERIODS * params.period_ns):
+        message = f"no message came on {topic} for {seconds(longest_ns)} with {cause.words}"
+        return failed(message, hint=f"publish on {topic} all the time, also then").if_repeated()
+    if any(map(cause.holds, readings)):
+        return grade_again(f"{cause.words} lasted too short a time to judge the rate of {topic}")
+    hint = f"`rostopic echo {cause.topic}` shows what comes while your node runs"
+    return unjudged(f"{cause.words} never came in this run", hint=hint).if_repeated()
 
 
 def _excuse_lateness(
@@ -169,10 +216,45 @@ def _excuse_lateness(
     return excused(uneven, run, found.times_ns[0], found.until_ns, why)
 
 
-def rhythm_to_judge(run: Run, params: RateParams, channels: Sequence[Channel]) -> Rhythm | None:
-    """Return what these channels of the topic sent, as far as it is judged."""
+def rhythms_to_judge(run: Run, params: RateParams, channels: Sequence[Channel]) -> list[Rhythm]:
+    """Return what these channels of the topic sent, as far as it is judged: in each stretch of time that counts."""
     until_ns = whole_until_ns(run, params.topic, observed_until_ns(run))
-    return rhythm(channels, until_ns, params.period_ns)
+    if params.cause is None:
+        found = [_rhythm(channels, (None, until_ns), params)]
+    else:
+        spans = _spans(run, params, params.cause)
+        least_ns = params.min_window_s * 1e9
+        # A stretch that is too short for a rate counts only where none is long enough.
+        spans = [one for one in spans if one[1] - one[0] >= least_ns] or spans[:1]
+        found = [_rhythm(channels, span, params) for span in spans]
+    return [one for one in found if one is not None]
+
+
+def _rhythm(
+    channels: Sequence[Channel], span: tuple[int | None, int | None], params: RateParams
+) -> Rhythm | None:
+    """Return all messages of these channels in a stretch of time. Silence at its ends counts from 1.5 periods on."""
+    from_ns, until_ns = span
+    times = sorted(
+        t for c in channels for t in c.times_ns if until_ns is None or (from_ns or 0) <= t <= until_ns
+    )
+    if not times:
+        return None
+    least_ns = SILENT_PERIODS * params.period_ns
+    if from_ns is not None:  # a stretch begins and ends anywhere between two messages
+        least_ns = max([least_ns, *(b - a for a, b in pairwise(times))])
+        times = [*([from_ns] if times[0] - from_ns > least_ns else []), *times]
+    silent = until_ns is not None and until_ns - times[-1] > least_ns
+    return Rhythm(times_ns=tuple(times), until_ns=until_ns if silent and until_ns is not None else times[-1])
+
+
+def _spans(run: Run, params: RateParams, cause: Condition) -> list[tuple[int, int]]:
+    """Return when the rate has to hold, from `within_s` after the cause began."""
+    until_ns = whole_until_ns(run, params.topic, run.end_ns)
+    spans = true_spans(cause, cause.come_in(run), run)
+    settle_ns, order_ns = round(params.within_s * 1e9), round(ORDER_S * 1e9)
+    later = [(begin_ns + settle_ns, min(end_ns - order_ns, until_ns or end_ns)) for begin_ns, end_ns in spans]
+    return [(begin_ns, end_ns) for begin_ns, end_ns in later if begin_ns < end_ns]
 
 
 def _lateness(found: Rhythm, run: Run) -> str:
@@ -380,7 +462,10 @@ def _with_line(verdict: Verdict, slip: PythonSlip, params: RateParams) -> Verdic
 
 
 def _slips(run: Run, package: PackageFacts, params: RateParams, *kinds: SlipKind) -> list[PythonSlip]:
-    """Return what is remarkable, of these kinds, in the scripts of the topic's publishers."""
+    """Return what is remarkable, of these kinds, in the scripts of the topic's publishers. Where the rate changes, a
+    line that asks for another one may be right at another time."""
+    if params.cause is not None:
+        kinds = tuple(kind for kind in kinds if not kind.startswith("rate-"))
     channels = run.student_channels(params.topic)
     return [s for c in channels for s in slips_of(package, run, c.callerid, *kinds)]
 
@@ -400,6 +485,9 @@ def _by_parameter(
 ) -> Verdict:
     """Say where the value comes from, if the rate of the node's loop is a parameter with another value than the asked
     one: by the script's line, or because the node reads one that is the rate which was measured."""
+    if params.cause is not None:
+        pause = f"with {params.cause.words}, wait {significant(1 / params.rate_hz)} s between two messages"
+        return verdict.model_copy(update={"hint": f"look at how the loop changes its rate: {pause}"})
     for channel in run.student_channels(params.topic):
         slip = next(iter(slips_of(package, run, channel.callerid, "rate-parameter")), None)
         if slip is None:
@@ -510,31 +598,3 @@ def stalls_explain(found: Rhythm, late: Lateness, params: RateParams) -> bool:
         return False
     without_ns = found.span_ns - sum(stalls) + len(stalls) * params.period_ns
     return params.low_hz <= len(found.gaps_ns) * 1e9 / without_ns <= params.high_hz
-
-
-def described(found: Rhythm, low_ns: float, high_ns: float) -> str:
-    """`9.98 ± 0.02 Hz over 6.0 s: 60 messages, 98 % of gaps in 0.05 to 0.15 s, longest 0.162 s`."""
-    count = plural(len(found.times_ns), "message")
-    if not found.gaps_ns:
-        return count
-    share = 1 - len(found.outside(low_ns, high_ns)) / len(found.gaps_ns)
-    within = f"{math.floor(share * 100)} % of gaps in {low_ns / 1e9:.3g} to {high_ns / 1e9:.3g} s"
-    longest_s = max(found.gaps_ns) / 1e9
-    longest = f"longest {longest_s:.{3 if longest_s >= 0.01 else 6}f} s"
-    return f"{_mean(found)} over {found.span_ns / 1e9:.1f} s: {count}, {within}, {longest}"
-
-
-def _mean(found: Rhythm) -> str:
-    if not math.isfinite(found.interval_hz):
-        return hertz(found.mean_hz)
-    return f"{hertz(found.mean_hz).removesuffix(' Hz')} ± {found.interval_hz:.2f} Hz"
-
-
-def rhythm(channels: Sequence[Channel], until_ns: int | None, period_ns: float) -> Rhythm | None:
-    """Return all messages of these channels until `until_ns`. Silence at the end counts from 1.5 periods on."""
-    times = sorted(t for c in channels for t in c.times_ns if until_ns is None or t <= until_ns)
-    if not times:
-        return None
-    silent_ns = 0 if until_ns is None else until_ns - times[-1]
-    end_ns = times[-1] + silent_ns if silent_ns > 1.5 * period_ns else times[-1]
-    return Rhythm(times_ns=tuple(times), until_ns=end_ns)

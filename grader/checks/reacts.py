@@ -108,6 +108,10 @@ class Condition(Record):
             return readings(channels, self.field, numbers=self.value is None)
         return sorted(Reading(t, (), "") for c in channels for t in c.times_ns)
 
+    def come_in(self, run: Run) -> list[Reading]:
+        """Return the same of all messages on the topic, whoever sent them."""
+        return self.read([c for c in run.channels if c.topic == self.topic])
+
     def holds(self, reading: Reading) -> bool:
         if self.field is None:
             return True
@@ -210,8 +214,7 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
 
 
 def _causes(run: Run, params: ReactsParams) -> list[Reading]:
-    cause = params.cause
-    return cause.read([c for c in run.channels if c.topic == cause.topic]) if cause else []
+    return params.cause.come_in(run) if params.cause else []
 
 
 def _answers(
@@ -351,10 +354,15 @@ def _silent_words(params: ReactsParams) -> str:
 
 def _silent_spans(causes: Sequence[Reading], run: Run, params: ReactsParams) -> list[tuple[int, int]]:
     """Return the stretches of time for which the cause is true: the whole run where none is given."""
-    until_ns = observed_until_ns(run) or run.end_ns
     if params.cause is None:
-        return [(run.start_ns, until_ns)]
-    stretches = [(held, next(group).time_ns) for held, group in groupby(causes, key=params.cause.holds)]
+        return [(run.start_ns, observed_until_ns(run) or run.end_ns)]
+    return true_spans(params.cause, causes, run)
+
+
+def true_spans(cause: Condition, causes: Sequence[Reading], run: Run) -> list[tuple[int, int]]:
+    """Return the stretches of time for which a condition is true of the last message on its topic."""
+    until_ns = observed_until_ns(run) or run.end_ns
+    stretches = [(held, next(group).time_ns) for held, group in groupby(causes, key=cause.holds)]
     ends = [*(from_ns for _, from_ns in stretches[1:]), until_ns]
     return [
         (from_ns, min(end_ns, until_ns))

@@ -98,10 +98,10 @@ class Check:
         return "run" in self.facts
 
     def rate_bounds(self, parameters: Mapping[str, object]) -> RateBounds | None:
-        """Return the rate that a criterion with these parameters judges, or None where it judges none."""
+        """Return the rate that a criterion with these parameters judges in the whole run, None where it judges none."""
         if not hasattr(self.params, "rate_bounds"):
             return None
-        bounds: RateBounds = self.params.model_validate(parameters).rate_bounds
+        bounds: RateBounds | None = self.params.model_validate(parameters).rate_bounds
         return bounds
 
     def references(self, parameters: Mapping[str, object]) -> Iterator[Reference]:

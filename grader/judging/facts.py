@@ -74,6 +74,8 @@ class Facts:
         if asked and package is None:
             return self._not_here(self.rubric.package_of(criterion))
         if package is not None:
+            seen = self.runs.get(criterion.scenario or "")
+            package = package.as_launched(event.argv for _, event in seen.processes) if seen else package
             found |= {"package": package, "build": self.runs[PACKAGE_RUN]}
         return {name: found[name] for name in check.facts}
 

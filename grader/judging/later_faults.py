@@ -312,7 +312,13 @@ class Later:
         pauses = [one for one in numbers if one.name]
         if len(pauses) == 1 and self._lacks_words(".sleep()"):  # no Rate is ever slept by
             numbers = pauses
-        if len({(one.file, one.message) for one in numbers}) == 1 and is_other_rate(numbers[0], hz):
+        # A rate that changes within the run is not the one that its loop is made with.
+        changes = self._wanted.get("cause") is not None
+        if (
+            not changes
+            and len({(one.file, one.message) for one in numbers}) == 1
+            and is_other_rate(numbers[0], hz)
+        ):
             word, ask = ("lines", "ask") if len(numbers) > 1 else ("line", "asks")
             where = f"{word} {numbers_text(sorted(one.line for one in numbers))} of {numbers[0].file}"
             yield Fix(f"make it {significant(hz)} Hz on {where}, which {ask} for {numbers[0].message} Hz")

@@ -102,7 +102,7 @@ class Requirements:
         check = self._checks.get(one.check)
         if check is None:
             return False
-        rate = criterion.check in OF_CONNECTIONS and check.rate_bounds(one.parameters) is not None
+        rate = criterion.check in OF_CONNECTIONS and hasattr(check.params, "rate_bounds")
         return rate or (check.of_lives and not self._is_below(required, criterion))
 
     def _is_below(self, required: str, criterion: Criterion) -> bool:

@@ -11,6 +11,7 @@ from itertools import pairwise
 from pydantic import model_validator
 
 from grader.model.record import Record
+from grader.wording import hertz, plural
 
 ROUNDING = 1e-6
 CONFIDENCE = 1.96
@@ -95,6 +96,20 @@ class Rhythm(Record):
             return math.inf
         error = CONFIDENCE * statistics.stdev(self.gaps_ns) / math.sqrt(count)
         return self.mean_hz * error / statistics.fmean(self.gaps_ns)
+
+    def described(self, low_ns: float, high_ns: float) -> str:
+        """`9.98 ± 0.02 Hz over 6.0 s: 60 messages, 98 % of gaps in 0.05 to 0.15 s, longest 0.162 s`."""
+        count = plural(len(self.times_ns), "message")
+        if not self.gaps_ns:
+            return count
+        share = 1 - len(self.outside(low_ns, high_ns)) / len(self.gaps_ns)
+        within = f"{math.floor(share * 100)} % of gaps in {low_ns / 1e9:.3g} to {high_ns / 1e9:.3g} s"
+        longest_s = max(self.gaps_ns) / 1e9
+        longest = f"longest {longest_s:.{3 if longest_s >= 0.01 else 6}f} s"
+        mean = hertz(self.mean_hz)
+        if math.isfinite(self.interval_hz):
+            mean = f"{mean.removesuffix(' Hz')} ± {self.interval_hz:.2f} Hz"
+        return f"{mean} over {self.span_ns / 1e9:.1f} s: {count}, {within}, {longest}"
 
 
 class RateBounds(Record):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import posixpath
 import re
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from collections.abc import Set as AbstractSet
 from difflib import get_close_matches
 from pathlib import PurePosixPath
@@ -395,6 +395,8 @@ class LaunchFile(Record):
         return {name for name in programs if {name, name.removesuffix(".py")} & types}
 
     readable: tuple[LaunchNode, ...] = ()
+    given: tuple[str, ...] = Field(default=(), exclude_if=lambda value: not value)
+    """The arguments with which it is read: `robot:=tb3`."""
 
 
 CLASSES_OF = {
@@ -486,11 +488,27 @@ class PackageFacts(Record):
     """Slips in Python files that compile."""
     interfaces: tuple[Interface, ...] = ()
     """The package's own `.msg`, `.srv` and `.action` files."""
+    launched: tuple[LaunchFile, ...] = Field(default=(), exclude_if=lambda value: not value)
+    """Launch files once more, read with the arguments that a scenario of the lab gives them."""
     asked: str = Field(default="", exclude_if=lambda value: not value)
     """The lab's name for it, if the lab asks for several packages and this is not the main one."""
     also: tuple[PackageFacts, ...] = Field(default=(), exclude_if=lambda value: not value)
     """The other packages that the lab asks for, as far as they were handed in. Their paths are relative to
     their own folders."""
+
+    def as_launched(self, commands: Iterable[tuple[str, ...]]) -> PackageFacts:
+        """Return the facts with the launch files as these commands of roslaunch read them."""
+        read = {
+            file.path: file
+            for argv in (commands if self.launched else ())
+            for file in self.launched
+            if PurePosixPath(file.path).name in {PurePosixPath(word).name for word in argv}
+            and file.given == tuple(word for word in argv if ":=" in word)
+        }
+        if not read:
+            return self
+        files = tuple(read.get(file.path, file) for file in self.launch_files)
+        return self.model_copy(update={"launch_files": files})
 
     def way_to(self, other: PackageFacts) -> str:
         """Return the path of another package's folder from this one's, `.` for the same: `../lab_msgs`."""

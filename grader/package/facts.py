@@ -14,7 +14,7 @@ import shlex
 import shutil
 import stat
 import tokenize
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
 from pathlib import Path, PurePosixPath
@@ -35,6 +35,7 @@ from grader.package.reading import (
     regular_file,
 )
 from grader.portable import system
+from grader.rubric.model import Rubric
 
 _CHUNK_BYTES = 1 << 20
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
@@ -284,6 +285,7 @@ def read_package(
     cmake_root: str | None = None,
     python_faults: Mapping[str, Fault] | None = None,
     interpreters: Interpreters | None = None,
+    commands: Collection[tuple[str, tuple[str, ...]]] = (),
 ) -> PackageFacts:
     """Return the facts of one package.
 
@@ -291,7 +293,7 @@ def read_package(
     package's folder as CMake saw it; without a trace, a parser reads `CMakeLists.txt`. `python_faults` are
     those that ROS's own Python found, by path; without them, this Python looks, in a process of its own.
     `interpreters` tells whether a program of a shebang is on ROS's machine (an absolute path, or a name
-    behind `env`).
+    behind `env`). `commands` are launch files with the arguments that scenarios give them.
     """
     entries = read_files(package, interpreters)
     with ThreadPoolExecutor(1) as beside:
@@ -309,6 +311,7 @@ def read_package(
             package.folder,
             ((e.file.path, e.path) for e in _readable(entries)),
             (manifest.name if manifest else package.name, package.name),
+            commands,
         )
         report = asked.result()
     faults = report.faults if python_faults is None else python_faults
@@ -320,7 +323,8 @@ def read_package(
         manifest_fault=manifest_fault,
         cmake=cmake,
         files=_with_faults(files, faults),
-        launch_files=launch_files,
+        launch_files=tuple(one for one in launch_files if not one.given),
+        launched=tuple(one for one in launch_files if one.given),
         hints=hints,
         slips=(*report.slips, *cpp_slips(package.folder, (e.path for e in _readable(entries)))),
         interfaces=_interfaces(package.folder, _readable(entries)),
@@ -328,10 +332,16 @@ def read_package(
     )
 
 
-def read_packages(submission: Submission) -> PackageFacts:
+def read_packages(submission: Submission, rubric: Rubric) -> PackageFacts:
     """Return the facts of a submission's main package, with those of the others."""
-    facts = read_package(submission.package, hints=submission.hints)
-    return facts.model_copy(update={"also": tuple(map(read_package, submission.also))})
+    starts = (start for scenario in rubric.scenarios.values() for start in scenario.start)
+    given = (
+        (PurePosixPath(s.launch).name, tuple(a for a in s.args if ":=" in a)) for s in starts if s.launch
+    )
+    commands = {(name, args) for name, args in given if args}
+    facts = read_package(submission.package, hints=submission.hints, commands=commands)
+    also = tuple(read_package(one, commands=commands) for one in submission.also)
+    return facts.model_copy(update={"also": also})
 
 
 def with_build_facts(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from itertools import islice
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
 from lxml import etree
@@ -44,14 +44,25 @@ def is_launch_file(path: str) -> bool:
 
 
 def read_launch_files(
-    folder: Path, paths: Iterable[tuple[str, str]], names: Iterable[str] = ()
+    folder: Path,
+    paths: Iterable[tuple[str, str]],
+    names: Iterable[str] = (),
+    commands: Collection[tuple[str, tuple[str, ...]]] = (),
 ) -> tuple[LaunchFile, ...]:
     """Return each launch file; `paths` are pairs of the name to show and the path on disk relative to `folder`.
 
-    `names` are the package's own, as `$(find …)` calls it.
+    `names` are the package's own, as `$(find …)` calls it. After them come the files of `commands`, by their names,
+    as roslaunch reads them with these arguments.
     """
-    places = dict(paths)
-    return _records(_Library(places, lambda path: read_markup(folder, places[path])), names)
+    places, own = dict(paths), tuple(dict.fromkeys(names))
+    library = _Library(places, lambda path: read_markup(folder, places[path]))
+    launched = (
+        _record(path, library.parsed(path), own, library.find, given)
+        for name, given in commands
+        for path in library.paths
+        if PurePosixPath(path).name == name
+    )
+    return (*_records(library, own), *launched)
 
 
 def parse_launch_files(texts: Mapping[str, bytes], names: Iterable[str] = ()) -> tuple[LaunchFile, ...]:
@@ -119,17 +130,21 @@ def _parse(data: bytes, path: str) -> _Parsed:
     return _Parsed(element, None, root)
 
 
-def _record(path: str, parsed: _Parsed, own: tuple[str, ...], find: Find) -> LaunchFile:
+def _record(
+    path: str, parsed: _Parsed, own: tuple[str, ...], find: Find, given: tuple[str, ...] = ()
+) -> LaunchFile:
     nodes: list[LaunchNode] = []
     includes: list[str] = []
     if parsed.element is None:
         left = [_node(e, ()) for e in parsed.left.iter("node")] if parsed.left is not None else ()
         return LaunchFile(
-            path=path, root=parsed.root, nodes=(), includes=(), fault=parsed.fault, readable=tuple(left)
-        )
+            path=path, root=parsed.root, nodes=(), includes=(), fault=parsed.fault, readable=tuple(left),
+            given=given,
+        )  # fmt: skip
     if wanted(parsed.element):
         _walk(parsed.element, (), nodes, includes)
-    loaded = load(parsed.element, Scope(file=path, own=own), find)
+    args = dict(one.split(":=", 1) for one in given)
+    loaded = load(parsed.element, Scope(file=path, own=own, args=args), find)
     return LaunchFile(
         path=path,
         root=parsed.root,
@@ -145,6 +160,7 @@ def _record(path: str, parsed: _Parsed, own: tuple[str, ...], find: Find) -> Lau
         unset_args=tuple(loaded.unset_args.values()),
         late_remaps=tuple(loaded.late_remaps),
         commented=tuple(islice(_commented(parsed.element), _COMMENTED_MAX)),
+        given=given,
     )
 
 

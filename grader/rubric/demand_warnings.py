@@ -12,7 +12,7 @@ from grader.checks.support.fields import is_number
 from grader.rubric.definitions import services_in
 from grader.rubric.simulators import set_in
 from grader.rubric.started import starts_of
-from grader.rubric.step_faults import given_steps
+from grader.rubric.step_faults import count_causes, given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, as_list, as_map, as_maps, as_texts, texts_in
 from grader.wording import join_words, plural
 
@@ -243,11 +243,23 @@ def _answers_waited_for(scenarios: Scenarios, handout: str) -> Iterator[Fault]:
 
 
 def _more_values(criteria: Criteria, scenarios: Scenarios, handout: str) -> Iterator[Fault]:
-    """Yield more values, one after the other, than the run sends messages, where the node answers each with one."""
+    """Yield more values than the run sends messages, where the node answers each with one, or has causes to change."""
+    paced = {
+        as_map(one.get("with")).get("topic") for _, one in criteria if "rate_hz" in as_map(one.get("with"))
+    }
     for index, criterion in criteria:
-        sent = _sent(scenarios.get(str(criterion.get("scenario")), {}))
-        values = as_map(criterion.get("with")).get("values")
+        name = str(criterion.get("scenario"))
+        sent, given = _sent(scenarios.get(name, {})), as_map(criterion.get("with"))
+        values = given.get("values")
         count = len(values) if isinstance(values, list) else 0
+        causes = count_causes(scenarios.get(name, {}))
+        if causes is not None and count - 1 > causes and given.get("topic") not in paced:
+            gives = f"the steps of {name} give the node {plural(causes, 'cause')} to change it"
+            yield (
+                ("criteria", index, "with", "values"),
+                f"are {count}, and {gives}: does it change by itself?",
+            )
+            continue
         if sent and count == sent + 1 and not PERIODIC.search(handout) and re.search(r"\beach\b", handout):
             fault = f"are {count}, and {criterion.get('scenario')} sends {plural(sent, 'message')}"
             yield ("criteria", index, "with", "values"), fault

@@ -9,11 +9,13 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
-from grader.checks.support.fields import is_number
+from grader.checks.rate import RateParams
+from grader.checks.reacts import Condition
+from grader.checks.support.fields import Reading, is_number
 from grader.rubric.scenario import ROSTEST_ENDING, Action, Probe, Scenario, Step, Until
 from grader.rubric.step_faults import ROWS_PER_MESSAGE, given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps
-from grader.wording import plural
+from grader.wording import plural, significant
 
 FASTEST_HZ = 100
 """No lab asks for rows of a table, or feedback, more often than this."""
@@ -33,6 +35,10 @@ class Asked(NamedTuple):
     given: dict[str, Any]
     name: str
     scenario: dict[str, Any]
+
+
+LASTING = ("window_s", "alive_s")
+"""Conditions of `until` that hold after a time, once the last step is done."""
 
 
 def late_faults(scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
@@ -218,3 +224,46 @@ def within_faults(about: Asked) -> Iterator[Fault]:
             yield at, f"{fault}: give it a longer limit_s"
     if about.check in {"reacts", "ends-at"} and most_s is not None and within_s >= most_s:
         yield at, f"{about.name} lasts {most_s:g} s at most: what comes later is not seen"
+
+
+def stretch_faults(about: Asked) -> Iterator[Fault]:
+    """Yield rates that are judged while something is so that the run's steps keep up for too short a time."""
+    try:
+        params = RateParams.model_validate(about.given) if about.check == "rate" else None
+    except ValidationError:  # said elsewhere
+        params = None
+    if params is None or params.cause is None:
+        return
+    longest = _kept_up_s(params.cause, about.scenario)
+    needs_s = params.within_s + params.min_window_s
+    if longest and longest < needs_s:
+        keeps = f"{about.name} keeps {params.cause.words} up for {significant(longest)} s at most"
+        takes = f"within_s and min_window_s are {significant(needs_s)} s"
+        yield (*about.path, "within_s"), f"{keeps}, and {takes}: let a step wait for longer"
+
+
+def _kept_up_s(cause: Condition, scenario: dict[str, Any]) -> float | None:
+    """Return for how long the longest time the steps of a run keep a condition up; None where they do not send it, or
+    nobody knows how long they last."""
+    steps, until = _read_steps(scenario), as_map(scenario.get("until"))
+    if steps is None or steps_s(scenario) is None or until.keys() - {*LASTING, "limit_s"}:
+        return None
+    longest_s = lasting_s = 0.0
+    held: bool | None = None
+    for step in steps:
+        if step.published is not None and step.published.topic == cause.topic:
+            holds = _holds(cause, step.published.value)
+            if holds is None:
+                return None
+            lasting_s, held = (lasting_s if holds == held else 0.0), holds
+        lasting_s += step.lasts_s
+        longest_s = max(longest_s, lasting_s if held else 0.0)
+    after_s = max((until[key] for key in LASTING if is_number(until.get(key))), default=0.0)
+    return None if held is None else max(longest_s, lasting_s + after_s if held else 0.0)
+
+
+def _holds(cause: Condition, value: object) -> bool | None:
+    """Return whether a condition is true of a message that a step sends; None where its field is not plain there."""
+    for part in (cause.field or "").split("."):
+        value = value.get(part, 0) if isinstance(value, dict) else value if part == "data" else None
+    return cause.holds(Reading(0, (value,), "")) if isinstance(value, int | float | str) else None

@@ -15,6 +15,7 @@ from grader.rubric.message_fields import said_types
 from grader.rubric.simulators import set_in
 from grader.rubric.spelling import is_slip
 from grader.rubric.started import starts_of
+from grader.rubric.unknown_names import topics_in
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in, texts_in
 from grader.wording import join_words
 
@@ -39,7 +40,9 @@ EXPECTED = ("value", "values", "numbers", "rate_hz", "result", "expect", "goal",
 PLAIN_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w]|\.\d)")
 PRIMITIVE = re.compile(r"(?:std_msgs/)?([Uu]?[Ii]nt|[Ff]loat)(8|16|32|64)")
 OLD_NAMES = {"byte": "int8", "char": "uint8"}
-SAYS = frozenset({"prints", "logs"})
+TEXTS = {"prints": ("text", "template"), "logs": ("text", "template"), "definition": ("file",)}
+"""By check, the parameters that the handout has as text."""
+LEVEL = re.compile(r"\b(warn|error|debug)(?:s|ing|ings)?\b", re.IGNORECASE)
 VALUES = ("value", "values", "expect", "result")
 """Keys of texts that a node has to publish or to answer."""
 FIELD = re.compile(r"^\s*([a-z]+\d*)\s+(\w+)\s*(?:#.*)?$", re.MULTILINE)
@@ -60,14 +63,17 @@ def prose_warnings(rubric: dict[str, Any]) -> Iterator[Fault]:
         name = str(criterion.get("scenario"))
         scenario = scenarios.get(name, {})
         yield from _shifted_numbers(index, criterion, rubric)
-        yield from _numbers_of_title(index, criterion, scenarios)
+        yield from _numbers_of_title(index, criterion, scenarios, rubric)
         yield from _other_node(at, check, given, scenario, handout)
         yield from _other_number(at, check, given, scenario, name)
         yield from _other_types(at, given, handout)
         yield from _misspelt_keys(at, given, rubric)
-        if check in {"node-lives", "node-name"}:
+        if check in {"node-lives", "node-name", "launch-runs"}:
             yield from _unsaid_node(at, given, rubric, handout)
-        yield from _other_text(at, given, handout, ("text", "template") if check in SAYS else VALUES)
+        yield from _other_text(at, given, handout, TEXTS.get(check, VALUES))
+        yield from _of_another_topic(index, criterion, rubric)
+        if check == "logs":
+            yield from _other_level(at, given, str(criterion.get("title")), handout)
         parent, child = (rf"`?{re.escape(str(given.get(key)))}`?(?!\w)" for key in ("parent", "child"))
         is_back = check == "transform" and re.search(rf"from {child}\s+to {parent}", handout)
         if is_back and not re.search(rf"from {parent}\s+to {child}", handout):
@@ -150,6 +156,40 @@ def _unsaid_node(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any], han
             others = nodes - set(packages_in(rubric)) | {*re.findall(r"\bnode `/?(\w+)`", handout)}
             fault = f"is no node of the handout, which has {join_words(sorted(others))}"
             yield (*at, "names", number), fault
+    for name, package in as_map(given.get("nodes")).items():
+        last = str(name).rpartition("/")[2]
+        is_started = any(
+            PurePosixPath(str(s.get("program"))).stem == last for one in runs for s in starts_of(one)
+        )
+        if package in packages_in(rubric) and nodes and last not in nodes and not is_started:
+            others = {*re.findall(r"\bnode `/?(\w+)`", handout)} or nodes
+            yield (*at, "nodes", name), f"is no node of the handout, which has {join_words(sorted(others))}"
+
+
+def _of_another_topic(index: int, criterion: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield a topic that the title does not name, where it names another one of the rubric."""
+    given = as_map(criterion.get("with"))
+    own, title = {*topics_in(given)}, str(criterion.get("title"))
+    named = {*re.findall(r"(?<![\w/])/[\w/]*\w", title)}
+    others = {topic for _, one in as_maps(rubric.get("criteria")) for topic in topics_in(one.get("with"))}
+    if isinstance(given.get("topic"), str) and named and named <= others and not named & own:
+        yield (
+            ("criteria", index, "with", "topic"),
+            f"is not what the title has: {join_words(sorted(named))}",
+        )
+
+
+def _other_level(at: KeyPath, given: dict[str, Any], title: str, handout: str) -> Iterator[Fault]:
+    """Yield the level of a log message for which the title, or the handout's sentence about its text, has another."""
+    said = {level.lower() for level in LEVEL.findall(title)}
+    for sentence in re.split(r"(?<=[.;])\s+", handout):
+        said |= (
+            {one.lower() for one in LEVEL.findall(sentence)}
+            if f"`{given.get('text')}`" in sentence
+            else set()
+        )
+    if len(said) == 1 and given.get("level", "info") not in said:
+        yield (*at, "level"), f"is {given.get('level', 'info')}, and the rubric's text has {said.pop()}"
 
 
 def _sent_otherwise(scenarios: Mapping[str, dict[str, Any]], handout: str) -> Iterator[Fault]:
@@ -259,18 +299,26 @@ def _misspelt_keys(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -
 
 
 def _numbers_of_title(
-    index: int, criterion: dict[str, Any], scenarios: Mapping[str, dict[str, Any]]
+    index: int, criterion: dict[str, Any], scenarios: Mapping[str, dict[str, Any]], rubric: dict[str, Any]
 ) -> Iterator[Fault]:
     """Yield numbers of a criterion's title that neither the criterion nor a run has, where they have others; and a rate
-    that is not the title's."""
+    that is not the title's, or where that has none, the handout's."""
     given, title = as_map(criterion.get("with")), str(criterion.get("title"))
     at, rate_hz = ("criteria", index), given.get("rate_hz")
     rates = _rates(title)
+    others = [as_map(one.get("with")) for _, one in as_maps(rubric.get("criteria"))]
+    known = {one.get("rate_hz") for one in others if one.get("topic") == given.get("topic")}
+    is_told = "cause" not in given and len(known) > 1  # said of the two criteria
+    if not rates and not is_told and "made_up" not in rubric and is_number(rate_hz):
+        sentences = re.split(r"(?<=[.;])\s+", str(rubric.get("handout", "")))
+        about = [one for one in sentences if re.search(rf"{re.escape(str(given.get('topic')))}(?!\w)", one)]
+        rates = _rates(" ".join(about))
     if any(is_number(rate_hz) and round(rate_hz / by, 9) in rates for by in SHIFTS):
         return  # said elsewhere
     if rates and is_number(rate_hz) and rate_hz not in rates:
         said = join_words([f"{one:g}" for one in sorted(rates)])
-        yield (*at, "with", "rate_hz"), f"{rate_hz:g} is not what the title has: {said}"
+        where = "title" if _rates(title) else "handout"
+        yield (*at, "with", "rate_hz"), f"{rate_hz:g} is not what the {where} has: {said}"
         return
     numbers = [float(one) for one in PLAIN_NUMBER.findall(title)]
     runs = list(scenarios.values())
@@ -293,13 +341,15 @@ def _other_text(at: KeyPath, given: dict[str, Any], handout: str, keys: tuple[st
         quoted = [re.sub(r"\s+", " ", one) for one in re.findall(r"`([^`]+)`", handout)]
         alike = [one for one in quoted if _letters(one) == _letters(text) or _is_begun(one, text)]
         if alike and not re.search(pattern, re.sub(r"\s+", " ", handout)):
-            yield (*at, *path), f"the handout has `{alike[0]}`, with other blanks or signs"
+            is_same = alike[0].lower() == text.lower()
+            how = "in another case" if is_same else "with other blanks or signs"
+            yield (*at, *path), f"the handout has `{alike[0]}`, {how}"
 
 
 def _is_begun(said: str, text: str) -> bool:
     """Return whether a text begins with the words of one that the handout has, but not with its signs."""
     is_longer = len(said.split()) > 1 and _letters(text).startswith(_letters(said))
-    return is_longer and not text.lower().startswith(said.strip().lower())
+    return is_longer and not re.match(rf"{re.escape(said.strip().lower())}(?!\w)", text.lower())
 
 
 def _letters(text: str) -> str:

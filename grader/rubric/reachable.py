@@ -15,7 +15,7 @@ from grader.checks.registry import Check
 from grader.checks.support.fields import Reading, is_number
 from grader.evidence.message_values import ANGLES, FORMS
 from grader.rubric.definitions import PATH_PARTS
-from grader.rubric.durations import Asked, late_faults, longest_s, often_faults, within_faults
+from grader.rubric.durations import Asked, late_faults, longest_s, often_faults, stretch_faults, within_faults
 from grader.rubric.room import pair, room_faults, start_faults
 from grader.rubric.scenario import Scenario, Until
 from grader.rubric.simulators import FIELD_M, PROGRAMS, TRUE_POSE, robot_of
@@ -54,6 +54,7 @@ def reach_faults(
         about = Asked(path, str(criterion.get("check")), given, str(criterion.get("scenario")), scenario)
         yield from often_faults(about)
         yield from within_faults(about)
+        yield from stretch_faults(about)
         yield from room_faults(about)
         yield from _never_sent(about, others)
         if about.check in {"ends-at", "path", "stays-within"}:
@@ -73,7 +74,7 @@ def _too_many(
         topic, rate_hz = given.get("topic"), given.get("rate_hz")
         of_rate = check is not None and hasattr(check.params, "rate_bounds")
         if of_rate and isinstance(rate_hz, int | float) and rate_hz > 0:
-            rates[str(topic)] = float(rate_hz)
+            rates[str(topic)] = max(rates.get(str(topic), 0), float(rate_hz))
     for name, scenario in scenarios.items():
         until = as_map(scenario.get("until"))
         limit_s = until.get("limit_s", Until.model_fields["limit_s"].default)

@@ -138,6 +138,9 @@ class Call(Record):
     in time, the calls of that service after it have half as long, 2 s at most."""
 
 
+GoalEnd = Literal["succeeded", "aborted"]
+
+
 class Served(Record):
     """A service or an action that the grader offers, from before anything starts.
 
@@ -154,8 +157,9 @@ class Served(Record):
     """The feedback that is sent for each goal, one after the other."""
     result: dict[str, Any] = Field(default_factory=dict)
     """The fields of each goal's result; those that it lacks are zero."""
-    ends: Literal["succeeded", "aborted"] = "succeeded"
-    """The state in which goals end. A goal that the client cancels before is preempted."""
+    ends: GoalEnd | Annotated[tuple[GoalEnd, ...], Field(min_length=1)] = "succeeded"
+    """The state in which goals end, or a list of states in turn, of which the last one is repeated: `[aborted,
+    succeeded]`. A goal that the client cancels before is preempted."""
     answer: dict[str, Any] | None = None
     """The fields of each answer; those that it lacks are zero."""
     answers: tuple[dict[str, Any], ...] = ()

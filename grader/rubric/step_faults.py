@@ -21,7 +21,8 @@ from grader.ros_packages import ros_packages
 from grader.rubric.fault_words import model_faults
 from grader.rubric.scenario import STEP_S_MAX, Action, Step, Transform, Until
 from grader.rubric.spelling import is_slip
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, texts_in
+from grader.rubric.started import starts_of
+from grader.rubric.yaml_lines import Fault, KeyPath, as_list, as_map, as_maps, as_texts, texts_in
 from grader.wording import did_you_mean
 
 KINDS = tuple(Step.model_fields)
@@ -416,3 +417,17 @@ def of_type(at: KeyPath, served: dict[str, Any]) -> Iterator[Fault]:
     for type_, place, value in values:
         if wrong := type_.misfit(value):
             yield place, wrong
+
+
+def count_causes(scenario: dict[str, Any]) -> int | None:
+    """Return how often a run's steps do something to the only script that it starts; None where nobody can tell."""
+    starts, steps = starts_of(scenario), [step for _, step in as_maps(scenario.get("steps"))]
+    is_alone = len(starts) == 1 and "script" in starts[0] and not {"serves", "recording"} & scenario.keys()
+    if not is_alone or not steps or any({"play", "action", "transform"} & step.keys() for step in steps):
+        return None
+    sent = given_steps(scenario, "publish")
+    if "probes" in scenario or any("background" in one or "from" in str(one.get("value")) for one in sent):
+        return None
+    done = [step for step in steps if not {"wait", "publish"} & step.keys()]
+    messages = sum(len(as_list(one["values"])) if "values" in one else 1 for one in sent)
+    return messages + len(done) + len(as_maps(scenario.get("calls")))

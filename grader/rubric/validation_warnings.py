@@ -239,16 +239,16 @@ def _other_rates(
     criteria: Sequence[tuple[int, dict[str, Any]]], scenarios: Mapping[str, dict[str, Any]]
 ) -> Iterator[Fault]:
     """Yield rates of a topic for which an earlier criterion wants another one, in a run of the same processes."""
-    before: dict[tuple[str, ...], tuple[str, float]] = {}
+    before: dict[tuple[str, ...], tuple[str, float, dict[str, Any]]] = {}
     for index, criterion in criteria:
         given, scenario = as_map(criterion.get("with")), scenarios.get(str(criterion.get("scenario")), {})
-        rate_hz = given.get("rate_hz")
+        rate_hz, cause = given.get("rate_hz"), as_map(given.get("cause"))
         if not is_number(rate_hz):
             continue
         started = json.dumps([scenario.get("start"), scenario.get("params")], sort_keys=True)
         key = (str(given.get("topic")), str(given.get("of")), started)
-        earlier, other_hz = before.setdefault(key, (str(criterion.get("id")), rate_hz))
-        if rate_hz != other_hz:
+        earlier, other_hz, other = before.setdefault(key, (str(criterion.get("id")), rate_hz, cause))
+        if rate_hz != other_hz and (cause == other or not (cause and other)):
             fault = f"{earlier} wants {other_hz:g} Hz on {key[0]}, not {rate_hz:g}"
             yield ("criteria", index, "with", "rate_hz"), fault
 

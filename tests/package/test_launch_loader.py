@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.model.package import LaunchFile
+from grader.model.package import LaunchFile, PackageFacts
 from grader.package.launch import parse_launch, read_launch_files
 
 
@@ -183,3 +183,20 @@ def test_one_broken_file_does_not_speak_for_the_next() -> None:
     fault = parse_launch(b'<launch\n<node pkg="a"/></launch>', "b.launch").fault
     assert fault is not None
     assert fault.cause.startswith("the tag `<launch` is not finished")
+
+
+def test_arguments_that_a_run_gives_decide_the_names(tmp_path: Path) -> None:
+    """A scenario starts `roslaunch pkg a.launch robot:=tb3`: the names of its nodes are not those of the defaults."""
+    text = '<launch><arg name="robot" default="r"/><node pkg="pkg" type="x.py" name="x" ns="$(arg robot)"/></launch>'
+    (tmp_path / "a.launch").write_text(text)
+    found = read_launch_files(tmp_path, [("a.launch", "a.launch")], ("pkg",), {("a.launch", ("robot:=tb3",))})
+    facts = PackageFacts(
+        name="pkg", path=".", manifest=None, manifest_fault=None, cmake=None, files=(), launch_files=found[:1],
+        launched=found[1:],
+    )  # fmt: skip
+    other = ("roslaunch", "pkg", "a.launch")
+    names = [
+        facts.as_launched([argv]).launch_files[0].brings[0].full_name
+        for argv in (other, (*other, "robot:=tb3"))
+    ]
+    assert names == ["/r/x", "/tb3/x"]

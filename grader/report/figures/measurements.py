@@ -13,7 +13,7 @@ from itertools import chain
 
 from grader.checks.counter import StartParams, StepParams, judge_start
 from grader.checks.listener import HearsParams
-from grader.checks.rate import RateParams, rhythm_to_judge, sleeps_explain, was_late
+from grader.checks.rate import RateParams, rhythms_to_judge, sleeps_explain, was_late
 from grader.checks.robot_path import PathParams, spot
 from grader.checks.robot_places import (
     EndsAtParams,
@@ -224,9 +224,9 @@ def rate_figures(run: Run, params: RateParams) -> Iterator[RateFigure]:
     channels = [c for c in sent_by(run, params.topic, params.of) if c.messages]
     groups = [channels, *([c] for c in channels[:PUBLISHERS_MAX] if len(channels) > 1)]
     for group in groups:
-        found = rhythm_to_judge(run, params, group)
-        if found is not None and found.gaps_ns:
-            yield _rate_figure(run, params, found, group)
+        for found in rhythms_to_judge(run, params, group):
+            if found.gaps_ns:
+                yield _rate_figure(run, params, found, group)
 
 
 def _rate_figure(run: Run, params: RateParams, found: Rhythm, channels: Sequence[Channel]) -> RateFigure:
