@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from typing import Annotated, NamedTuple
 
 from pydantic import Field, model_validator
@@ -46,6 +46,11 @@ ORIGIN = (0.0, 0.0)
 DRIVE = "publish a velocity that is not 0, again and again for as long as it should drive"
 DEGREES_FROM = 20.0
 """Radians a second that no robot of a lab turns with, and that small angles in degrees come to."""
+
+AWAY = 0.3
+"""How far from a corner, as a share of what follows it, the robot is when its direction is looked at."""
+OTHER_TURN_DEG, HALF_TURN_DEG = 20.0, 170.0
+"""A turn by so much more or less is another one; one of nearly half a circle has no side."""
 
 
 class PathParams(Record):
@@ -227,6 +232,7 @@ def what_is_wrong(path: Sequence[Pose], way: Way, course: Course, *, mirror: boo
     return (
         (_explain_mirrored(path, way) if mirror else None)
         or _wrong_start(path, way, course)
+        or _wrong_turn(path, way, course)
         or (_strays(path, way, course) if course.strayed is not None else _ends_short(path, way, course))
     )
 
@@ -255,6 +261,49 @@ def _wrong_start(path: Sequence[Pose], way: Way, course: Course) -> Words | None
     return Words(
         f"it starts at {spot(path[0].point)}, {apart} from {way.name(0)}", "bring it to the start first"
     )
+
+
+def _wrong_turn(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
+    """By another angle than the way turns by, at the last point that it passed; or not at all from there on."""
+    corner = course.reached - 1
+    if not 0 < corner < len(way.points) - 1:
+        return None
+    before, here, goal = way.points[corner - 1 : corner + 2]
+    away_m = max(2 * way.tolerance_m, AWAY * math.dist(here, goal))
+    behind = list(takewhile(lambda pose: math.dist(pose.point, here) < away_m, path[course.at :]))
+    left = path[course.at + len(behind) :]
+    on_its_way = [pose for pose in behind if left and math.dist(pose.point, left[0].point) >= away_m / 3]
+    if not on_its_way:
+        return None
+    came, went, ahead = (
+        _direction(before, here),
+        _direction(on_its_way[-1].point, left[0].point),
+        _direction(here, goal),
+    )
+    turned, asked = (math.degrees(math.remainder(angle - came, math.tau)) for angle in (went, ahead))
+    if abs(math.remainder(turned - asked, 360)) < OTHER_TURN_DEG:
+        return None
+    name = way.name(corner)
+    if abs(turned) < OTHER_TURN_DEG:
+        end_deg = math.degrees(math.remainder(_direction(here, path[-1].point) - came, math.tau))
+        if turned_rad(path[course.at :]) > TURNING_RAD or abs(end_deg) > OTHER_TURN_DEG:
+            return None  # it turns later
+        hint = "publish an angular.z that is not 0, for as long as it takes: an angle is angular.z times time"
+        return Words(f"it drives straight on at {name}, and never turns", hint)
+    message = (
+        f"at {name} it turns by {abs(turned):.0f}°{_side(turned)} instead of {abs(asked):.0f}°{_side(asked)}"
+    )
+    return Words(
+        message, f"turn by {abs(asked):.0f}° there: an angle is angular.z times time, and 180° are math.pi"
+    )
+
+
+def _direction(start: Point, end: Point) -> float:
+    return math.atan2(end[1] - start[1], end[0] - start[0])
+
+
+def _side(turn_deg: float) -> str:
+    return "" if abs(turn_deg) > HALF_TURN_DEG else " to the left" if turn_deg > 0 else " to the right"
 
 
 def _strays(path: Sequence[Pose], way: Way, course: Course) -> Words:
@@ -319,6 +368,11 @@ def _ends_short(path: Sequence[Pose], way: Way, course: Course) -> Words:
     message = f"{points} and ends at {spot(path[-1].point)}, {left} from {way.name(goal)}"
     if every:
         return Words(message, "publish a zero velocity once you are at the last point")
+    if course.reached > 1 and math.dist(path[-1].point, way.points[goal - 1]) <= way.tolerance_m:
+        hint = (
+            "go on from there: count the stretches that the handout asks for, and keep the node alive for all"
+        )
+        return Words(message, hint)
     return Words(message, "drive longer, or keep the node alive until it gets there")
 
 

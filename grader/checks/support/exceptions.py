@@ -37,6 +37,7 @@ NUMBER_OF_PARTS = "not every message has so many parts"
 _NO_FILE = re.compile(r"No such file or directory: '([^']+)'")
 _NOT_WRITABLE = re.compile(r"(?:Permission denied|Read-only file system): '([^']+)'")
 _UNPACKED = re.compile(r"(not enough|too many) values to unpack \(expected (\d+)(?:, got (\d+))?")
+DECIMAL = re.compile(r"'-?\d*\.\d+(?:e-?\d+)?'")
 _NO_ITEMS = re.compile(r"\b(min|max)\(\) (?:arg is an empty sequence|iterable argument is empty)")
 _NO_NUMBER = re.compile(
     r"(?:invalid literal for int\(\) with base \d+|could not convert string to float): (.+)"
@@ -173,8 +174,10 @@ def _value(message: str, source: str, _marked: tuple[int, int] | None) -> Meanin
     if (found := _NO_NUMBER.search(message)) and found[1].endswith(".py'"):
         return _program(source)
     if found:
+        whole = message.startswith("invalid literal for int") and DECIMAL.fullmatch(found[1])
         hint = "convert only what is a number, and print text as it is"
-        return f"{shown(found[1])} is text, not a number", hint
+        told = (f"{shown(found[1])} is no whole number", "write `float(…)` in place of `int(…)`")
+        return told if whole else (f"{shown(found[1])} is text, not a number", hint)
     return None
 
 

@@ -171,14 +171,15 @@ def off_m(point: Point, start: Point, end: Point) -> float:
 class Course(NamedTuple):
     """How a path follows a way of several points.
 
-    `reached` is how many of the points it passed, in order; `strayed` the index of its first pose that is too far
-    from the way there, None where none is; `off_m` the largest distance from the way, up to then. `done` is set
-    where it passed them all and ends at the last.
+    `reached` is how many of the points it passed, in order, and `at` the index of its first pose at the last of them;
+    `strayed` the index of its first pose that is too far from the way there, None where none is; `off_m` the largest
+    distance from the way, up to then. `done` is set where it passed them all and ends at the last.
     """
 
     reached: int
     strayed: int | None
     off_m: float
+    at: int = 0
     done: bool = False
 
 
@@ -190,20 +191,21 @@ def followed(path: Sequence[Pose], points: Sequence[Point], tolerance_m: float) 
     legs = list(pairwise(points))
     if not path or not math.dist(path[0].point, points[0]) <= tolerance_m:
         return Course(0, 0 if path else None, 0.0)
-    on, reached, largest = {0}, 1, 0.0
+    on, reached, at, largest = {0}, 1, 0, 0.0
     for index, pose in enumerate(path):
         near = {leg: d for leg in on if (d := off_m(pose.point, *legs[leg])) <= tolerance_m}
         if not near:
-            return Course(reached, index, largest)
+            return Course(reached, index, largest, at)
         largest = max(largest, min(near.values()))
         on = set(near)
         for leg in range(min(on), len(legs)):
             if leg in on and math.dist(pose.point, legs[leg][1]) <= tolerance_m:
+                at = index if leg + 2 > reached else at
                 reached = max(reached, leg + 2)
                 on |= {leg + 1} & set(range(len(legs)))
     last = len(legs) - 1
     done = last in on and math.dist(path[-1].point, points[-1]) <= tolerance_m
-    return Course(reached, None, largest, done)
+    return Course(reached, None, largest, at, done)
 
 
 class Track(NamedTuple):
