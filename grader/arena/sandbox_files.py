@@ -66,15 +66,8 @@ def prepare(place: Path, ros: RosInstallation) -> None:
     for name in ("python", "python3"):
         (shims / name).symlink_to(ros.python)
     shutil.copyfile(ROS_SIDE / "syntax.py", shims / "grader-syntax.py")
-    for module in (
-        "slips.py",
-        "script_loops.py",
-        "script_objects.py",
-        "script_callbacks.py",
-        "script_counters.py",
-        "script_names.py",
-    ):
-        shutil.copyfile(ROS_SIDE / module, shims / module)
+    for module in (ROS_SIDE / "slips.py", *ROS_SIDE.glob("script_*.py")):
+        shutil.copyfile(module, shims / module.name)
     shutil.copyfile(ROS_SIDE / "functions.py", shims / FUNCTIONS)
     shutil.copyfile(ROS_SIDE / "rostests.py", shims / ROSTESTS)
     _program(shims, "terminal.sh", "grader-terminal", TERMINALS)

@@ -522,19 +522,11 @@ def _other_value(
     why = next(map(str, differences(other, params.value, params.tolerance)), "")
     seen = f"it is {shown(why)}" if first.values else f"it is not there ({first.fault})"
     hint = f"{params.field} has to be {params.words} when you publish"
-    at = [
-        m
-        for c in sent_by(run, params.topic, params.of)
-        for t, m in zip(c.times_ns, c.values, strict=True)
-        if t == first.time_ns
-    ]
-    if not other and (
-        beside := set_beside(at[0] if at else None, params.field, params.value, params.tolerance)
-    ):
-        seen, hint = (
-            f"{seen}; {beside} is {value_text(params.value)}",
-            f"set {params.field} in place of {beside}",
-        )
+    own = sent_by(run, params.topic, params.of)
+    beside = "" if other else set_beside(own, first.time_ns, params.field, params.value, params.tolerance)
+    if beside:
+        seen = f"{seen}; {beside} is {value_text(params.value)}"
+        hint = f"set {params.field} in place of {beside}"
     if params.when == "any":
         message = (
             f"{params.field} of {params.topic} is {params.words} in none of {plural(len(found), 'message')}"

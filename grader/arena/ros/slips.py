@@ -1,9 +1,9 @@
 """Finds what compiles in a student's Python and is not meant: `slips` of a syntax tree, for `syntax.py`.
 
-What nothing calls, statements without an effect, values that are none, imports. Names and texts are for
-`script_names.py`, objects for `script_objects.py`, callbacks for `script_callbacks.py`, loops for `script_loops.py`,
-counters and clocks for `script_counters.py`. Nothing is executed; it is here because a file has to be parsed by ROS's
-own Python, which is to run it. Python 3.8, standard library only.
+What nothing calls, statements without an effect, values that are none, imports. Names are for `script_names.py`, texts
+for `script_texts.py`, objects for `script_objects.py`, callbacks for `script_callbacks.py`, loops for
+`script_loops.py`, counters and clocks for `script_counters.py`. Nothing is executed; it is here because a file has to
+be parsed by ROS's own Python, which is to run it. Python 3.8, standard library only.
 """
 
 import ast
@@ -45,7 +45,6 @@ from script_names import (
     dotted,
     graph_names,
     misspelt,
-    said_texts,
     slip,
     walk,
 )  # fmt: skip
@@ -59,6 +58,7 @@ from script_objects import (
     unstarted_servers,
     unused_publishers,
 )
+from script_texts import said_texts
 
 SLIPS_LIMIT = 100
 """Of a file."""

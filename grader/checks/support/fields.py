@@ -98,12 +98,14 @@ def _reading(time_ns: int, message: Any, path: str, *, numbers: bool) -> Reading
     return Reading(time_ns, tuple(values), "")
 
 
-def set_beside(message: object, path: str, wanted: object, tolerance: float) -> str:
+def set_beside(channels: Iterable[Channel], time_ns: int, path: str, wanted: object, tolerance: float) -> str:
     """Return the one other field of a message that has the value which is wanted of this one; "" for none or several,
     and for the values that every field begins with."""
     if not wanted or isinstance(wanted, bool | list | Mapping):
         return ""
-    found = [name for name, value in _leaves(message) if name != path and _equal(value, wanted, tolerance)]
+    each = (m for c in channels for t, m in zip(c.times_ns, c.values, strict=True) if t == time_ns)
+    leaves = [leaf for message in each for leaf in _leaves(message)]
+    found = [name for name, value in leaves if name != path and _equal(value, wanted, tolerance)]
     return found[0] if len(found) == 1 else ""
 
 

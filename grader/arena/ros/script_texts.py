@@ -1,0 +1,131 @@
+"""Finds the texts that a student's Python publishes and prints, for `slips.py`.
+
+As far as the source has them: values that only a run knows are `{}`. Nothing is executed. Python 3.8, standard library
+only.
+"""
+
+import ast
+import re
+
+from script_names import FUNCTIONS, TEXT_LIMIT, called_name, calls_in, dotted, is_call, slip, walk
+
+PRINTED = ("loginfo", "logwarn", "logerr", "logdebug", "logfatal", "print", "write")
+VALUE, DATA, NODE = "{}", "{data}", "{node}"
+PLACE = re.compile(r"%(?:\(\w*\))?[-+ #0-9.]*[a-zA-Z]|%%")
+FIELD = re.compile(r"\{[^{}]*\}")
+DEPTH = 6
+
+
+def said_texts(tree):
+    """The texts that a script publishes and prints, as far as its source has them: `{}` is a value, `{data}` that of a
+    message, `{node}` the node's name in what is printed."""
+    given, kinds = {}, set()
+    for node in walk(tree):
+        if isinstance(node, (ast.Assign, ast.AugAssign)):
+            for target in getattr(node, "targets", None) or [node.target]:
+                plain = node.value if isinstance(node, ast.Assign) else None
+                given.setdefault(dotted(target), []).append(plain)
+        if isinstance(node, FUNCTIONS):
+            kinds.update(arg.arg for arg in ast.walk(node.args) if isinstance(arg, ast.arg))
+    read = Texts({name: values[0] for name, values in given.items() if len(values) == 1 and values[0]}, kinds)
+    moves = moves_to_run(tree)
+    for node in walk(tree):
+        if is_call(node, "publish") and len(node.args) == 1:
+            place, text = read.message(node.args[0])
+            yield from said("publishes", place, text.replace(NODE, VALUE), "publish")
+        elif called_name(node) in PRINTED and node.args:
+            yield from said("prints", node, read.printed(node), called_name(node), moves.get(node, ""))
+
+
+def said(kind, node, text, call, fix=""):
+    if text and text != VALUE and len(text) <= TEXT_LIMIT:
+        yield slip(node.lineno, kind, text, fix=fix, name=call)
+
+
+def moves_to_run(tree):
+    """Return for calls that stand behind a `spin()`, or in an `if`, where to move them so that they run anyway."""
+    found = {}
+    for node in walk(tree):
+        asks = isinstance(node, ast.If) and "__name__" not in map(dotted, ast.walk(node.test))
+        for call in calls_below(node.body) if asks and not calls_in(node.test, "is_shutdown") else ():
+            found[call] = "move line %d out of the `if` on line %d" % (call.lineno, node.lineno)
+        body = node.body if isinstance(getattr(node, "body", None), list) else []
+        spins = [i for i, one in enumerate(body) if isinstance(one, ast.Expr) and is_call(one.value, "spin")]
+        for call in calls_below(body[spins[0] + 1 :]) if spins else ():
+            found[call] = "move line %d above line %d" % (call.lineno, body[spins[0]].lineno)
+    return found
+
+
+def calls_below(statements):
+    return [n for one in statements for n in ast.walk(one) if isinstance(n, ast.Call)]
+
+
+class Texts:
+    """Reads texts out of expressions. `given` are the names that one assignment gives a value, `arguments` those of
+    functions."""
+
+    def __init__(self, given, arguments):
+        self.given, self.arguments = given, arguments
+
+    def message(self, node):
+        """Return the place and the text of what is published: of a message, that of its `data`."""
+        name = dotted(node)
+        data = self.given.get(name + ".data")
+        if data is not None:
+            return data, self.of(data)
+        value = self.given.get(name, node)
+        if isinstance(value, ast.Call) and called_name(value) == "String" and not value.args:
+            data = [k.value for k in value.keywords if k.arg == "data"]
+            return (data or [node])[0], self.of(data[0]) if data else ""
+        return (node if isinstance(node, ast.Call) else value), self.of(node)
+
+    def printed(self, call):
+        texts = [self.of(arg) for arg in call.args]
+        if called_name(call) == "print":
+            return " ".join(texts)
+        return self.filled(texts[0], call.args[1:]) if len(texts) > 1 else texts[0]
+
+    def of(self, node, depth=DEPTH):
+        """Return the text of an expression; what only a run can tell is `{}`."""
+        if isinstance(node, ast.Constant):
+            return str(node.value).replace("{", "(").replace("}", ")")
+        if isinstance(node, ast.JoinedStr):
+            return "".join(self.of(part, depth) for part in node.values)
+        of_message = isinstance(node, ast.Attribute) and node.attr == "data"
+        if of_message or (isinstance(node, ast.Name) and node.id in self.arguments):
+            return DATA
+        if called_name(node) in ("get_caller_id", "get_name"):
+            return NODE
+        inner = self.inside(node) if depth else None
+        if inner is not None:
+            return self.of(inner, depth - 1)
+        return self.joined(node, depth - 1) if depth else VALUE
+
+    def inside(self, node):
+        """Return the expression that another one gives its text: what is in `str(…)`, or what a name was given."""
+        if isinstance(node, ast.FormattedValue):
+            return node.value
+        if (
+            isinstance(node, ast.Call)
+            and node.args
+            and called_name(node) in ("str", "String", "unicode", "repr")
+        ):
+            return node.args[0]
+        return self.given.get(dotted(node)) if isinstance(node, (ast.Name, ast.Attribute)) else None
+
+    def joined(self, node, depth):
+        """Return the text of `a + b`, `a % b` or `a.format(b)`."""
+        operator = getattr(node, "op", None)
+        if isinstance(operator, ast.Add):
+            number = any(isinstance(getattr(n, "value", ""), (int, float)) for n in (node.left, node.right))
+            return VALUE if number else self.of(node.left, depth) + self.of(node.right, depth)
+        if isinstance(operator, ast.Mod) and isinstance(node.left, ast.Constant):
+            values = node.right.elts if isinstance(node.right, ast.Tuple) else [node.right]
+            return self.filled(self.of(node.left), values)
+        text = getattr(node.func.value, "value", None) if is_call(node, "format") else None
+        return self.filled(text, node.args, FIELD) if isinstance(text, str) else VALUE
+
+    def filled(self, text, values, places=PLACE):
+        """Return the text with what stands in place of its `%s`, or of its `{}`."""
+        value = DATA if values and all(self.of(one, 0) == DATA for one in values) else VALUE
+        return places.sub(lambda found: "%" if found[0] == "%%" else value, text)
