@@ -42,7 +42,11 @@ PRIMITIVE = re.compile(r"(?:std_msgs/)?([Uu]?[Ii]nt|[Ff]loat)(8|16|32|64)")
 OLD_NAMES = {"byte": "int8", "char": "uint8"}
 TEXTS = {"prints": ("text", "template"), "logs": ("text", "template"), "definition": ("file",)}
 """By check, the parameters that the handout has as text."""
-LEVEL = re.compile(r"\b(warn|error|debug)(?:s|ing|ings)?\b", re.IGNORECASE)
+LEVEL = re.compile(
+    r"\blog(info|warn|err|debug)|\blevel `?(info|warn|error|debug)|\bas an? (warning|error)\b|\b(warning|error) `…`",
+    re.IGNORECASE,
+)
+"""Where a level is asked for: other sentences may have an error in them, or warn of something."""
 VALUES = ("value", "values", "expect", "result")
 """Keys of texts that a node has to publish or to answer."""
 FIELD = re.compile(r"^\s*([a-z]+\d*)\s+(\w+)\s*(?:#.*)?$", re.MULTILINE)
@@ -181,13 +185,10 @@ def _of_another_topic(index: int, criterion: dict[str, Any], rubric: dict[str, A
 
 def _other_level(at: KeyPath, given: dict[str, Any], title: str, handout: str) -> Iterator[Fault]:
     """Yield the level of a log message for which the title, or the handout's sentence about its text, has another."""
-    said = {level.lower() for level in LEVEL.findall(title)}
-    for sentence in re.split(r"(?<=[.;])\s+", handout):
-        said |= (
-            {one.lower() for one in LEVEL.findall(sentence)}
-            if f"`{given.get('text')}`" in sentence
-            else set()
-        )
+    text = f"`{given.get('text')}`"
+    about = [title, *(one for one in re.split(r"(?<=[.;])\s+", handout) if text in one)]
+    found = {"".join(groups).lower() for one in about for groups in LEVEL.findall(one.replace(text, "`…`"))}
+    said = {{"err": "error", "warning": "warn"}.get(one, one) for one in found}
     if len(said) == 1 and given.get("level", "info") not in said:
         yield (*at, "level"), f"is {given.get('level', 'info')}, and the rubric's text has {said.pop()}"
 
