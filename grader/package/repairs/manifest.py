@@ -119,9 +119,17 @@ def _spell_dependency(files: Files, name: str) -> None:
         if found is None:
             return
         line = text.count("\n", 0, found.start(2)) + 1
-        message = f"line {line} of {MANIFEST}: there is no package {found[2]}"
-        text = f"{text[: found.start(2)]}{name}{text[found.end(2) :]}"
-        files.change("manifest-line", MANIFEST, text, message)
+        message, fix = f"line {line} of {MANIFEST}: there is no package {found[2]}", ""
+        begin, end, new = (*found.span(2), name)
+        there = {one[1] for one in tags.finditer(_blank_comments(text)) if one[2] == name}
+        if "depend" in there or (there and found[1] == "depend"):
+            begin, end, new = (
+                *found.span(),
+                "",
+            )  # catkin refuses a <depend> beside another tag for the same package
+            fix = f"delete <{found[1]}>{found[2]}</{found[1]}> on line {line}"
+        text = f"{text[:begin]}{new}{text[end:]}"
+        files.change("manifest-line", MANIFEST, text, message, fix)
 
 
 def _add_dependency(files: Files, name: str) -> None:
