@@ -62,6 +62,9 @@ CASES = {
     ),
     "two-values-published": Case(
         swapped(TALKER, ("publisher.publish(", "publisher.publish('count', ")), ["missing-call"], "takes one value"),
+    "a-per-cent-sign-beside-a-value": Case(
+        swapped(TALKER, ("numeric_chatter', Int8", "numeric_chatter', String"), ("import Int8", "import String"),
+                ("publisher.publish(", "publisher.publish('100%', ")), []),
     "latin-1": Case({TALKER: SCRIPT.replace("import rospy\n", "import rospy  # caf\u00e9\n").encode("latin-1")},
                 ["encoding"], "not saved as UTF-8"),
     "no-shebang-and-a-slip": Case(
