@@ -42,6 +42,7 @@ PRIMITIVE = re.compile(r"(?:std_msgs/)?([Uu]?[Ii]nt|[Ff]loat)(8|16|32|64)")
 OLD_NAMES = {"byte": "int8", "char": "uint8"}
 TEXTS = {"prints": ("text", "template"), "logs": ("text", "template"), "definition": ("file",)}
 """By check, the parameters that the handout has as text."""
+SENTENCE_END = re.compile(r"(?<=[.;])\s+")
 LEVEL = re.compile(
     r"\blog(info|warn|err|debug)|\blevel `?(info|warn|error|debug)|\bas an? (warning|error)\b|\b(warning|error) `…`",
     re.IGNORECASE,
@@ -186,7 +187,7 @@ def _of_another_topic(index: int, criterion: dict[str, Any], rubric: dict[str, A
 def _other_level(at: KeyPath, given: dict[str, Any], title: str, handout: str) -> Iterator[Fault]:
     """Yield the level of a log message for which the title, or the handout's sentence about its text, has another."""
     text = f"`{given.get('text')}`"
-    about = [title, *(one for one in re.split(r"(?<=[.;])\s+", handout) if text in one)]
+    about = [title, *(one for one in SENTENCE_END.split(handout) if text in one)]
     found = {"".join(groups).lower() for one in about for groups in LEVEL.findall(one.replace(text, "`…`"))}
     said = {{"err": "error", "warning": "warn"}.get(one, one) for one in found}
     if len(said) == 1 and given.get("level", "info") not in said:
@@ -311,7 +312,7 @@ def _numbers_of_title(
     known = {one.get("rate_hz") for one in others if one.get("topic") == given.get("topic")}
     is_told = "cause" not in given and len(known) > 1  # said of the two criteria
     if not rates and not is_told and "made_up" not in rubric and is_number(rate_hz):
-        sentences = re.split(r"(?<=[.;])\s+", str(rubric.get("handout", "")))
+        sentences = SENTENCE_END.split(str(rubric.get("handout", "")))
         about = [one for one in sentences if re.search(rf"{re.escape(str(given.get('topic')))}(?!\w)", one)]
         rates = _rates(" ".join(about))
     if any(is_number(rate_hz) and round(rate_hz / by, 9) in rates for by in SHIFTS):
