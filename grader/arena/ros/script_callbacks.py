@@ -78,7 +78,8 @@ def spare_callbacks(tree, functions):
     spare = [f for f in spare if [a for a in f.args.args[-1:] if a.arg in data]]
     if len(spare) == 1:
         name = ("self." if len(spare[0].args.args) > 1 else "") + spare[0].name
-        yield slip(spare[0].lineno, "callback-missing", "no Subscriber is given `%s`" % name, name=name)
+        message, fix = "no Subscriber is given `%s`" % name, "pass it: `rospy.Subscriber(…, %s)`" % name
+        yield slip(spare[0].lineno, "callback-missing", message, fix=fix, name=name)
 
 
 def wrong_callback(own, call, functions, bound, values):
