@@ -311,6 +311,8 @@ def _numbers_of_title(
     others = [as_map(one.get("with")) for _, one in as_maps(rubric.get("criteria"))]
     known = {one.get("rate_hz") for one in others if one.get("topic") == given.get("topic")}
     is_told = "cause" not in given and len(known) > 1  # said of the two criteria
+    run = as_map(scenarios.get(str(criterion.get("scenario"))))
+    is_told = is_told or rate_hz in _numbers_within([run.get("start"), run.get("params")])  # by a parameter
     if not rates and not is_told and "made_up" not in rubric and is_number(rate_hz):
         sentences = SENTENCE_END.split(str(rubric.get("handout", "")))
         about = [one for one in sentences if re.search(rf"{re.escape(str(given.get('topic')))}(?!\w)", one)]
@@ -324,14 +326,19 @@ def _numbers_of_title(
         return
     numbers = [float(one) for one in PLAIN_NUMBER.findall(title)]
     runs = list(scenarios.values())
-    there = {abs(number) for _, number in numbers_in((), [given, runs])}
-    texts = " ".join(text for _, text in texts_in((), [given, runs]))
-    there |= {abs(float(one)) for one in re.findall(r"\d+(?:\.\d+)?", texts)}
+    there, texts = _numbers_within([given, runs]), " ".join(text for _, text in texts_in((), [given, runs]))
     is_open = "made_up" in texts or not any(key in given for key in EXPECTED) or "launch" in given
     own = {number for _, number in numbers_in((), given)}
     is_open = is_open or any(round(number * by, 9) in own for number in numbers for by in SHIFTS)
     if len(numbers) == 1 and not rates and not is_open and abs(numbers[0]) not in there:
         yield (*at, "title"), f"has {numbers[0]:g}, and neither the criterion nor a run has it"
+
+
+def _numbers_within(value: object) -> set[float]:
+    """Return all numbers of a part of the rubric, without their signs, also those within its texts."""
+    texts = " ".join(text for _, text in texts_in((), value))
+    inside = {float(one) for one in re.findall(r"\d+(?:\.\d+)?", texts)}
+    return inside | {abs(number) for _, number in numbers_in((), value)}
 
 
 def _other_text(at: KeyPath, given: dict[str, Any], handout: str, keys: tuple[str, ...]) -> Iterator[Fault]:

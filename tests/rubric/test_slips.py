@@ -563,3 +563,16 @@ def test_a_title_may_speak_of_an_error_that_is_no_level(examples: Path) -> None:
     title = ("battery", "title: It says that the battery is low", "title: It says how large the error is")
     path = _spoiled(examples, *title)
     assert warnings_of(load_rubric(str(path)), path.name) == []
+
+
+def test_a_rate_may_be_that_of_a_parameter_which_the_run_sets(examples: Path) -> None:
+    path = _spoiled(
+        examples,
+        "battery",
+        "script: scripts/battery_monitor.py}",
+        'script: scripts/battery_monitor.py, args: ["_hz:=4"]}',
+    )
+    text = path.read_text(encoding="utf-8").replace("rate_hz: 5, cause", "rate_hz: 4, cause")
+    path.write_text(text, encoding="utf-8")
+    told = warnings_of(load_rubric(str(path)), path.name)
+    assert [one for one in told if "rate_hz" in one] == []
