@@ -154,17 +154,20 @@ def _fault(package: PackageFacts, run: Run, goal: Goal, params: ActionResultPara
 
 
 def _how_to_fill(got: Mapping[str, Any], wanted: Mapping[str, Any], hint: str) -> str:
-    """Return the advice on a result with other fields: that of one which nothing was written into, is to do so."""
-    if not any(got.values()):
+    """Return the advice on a result with other values; one in which all are 0 was never filled in."""
+    if _is_empty(got):
         return f"fill in the result before you send it: {hint}"
     numbers = [(name, got.get(name), value) for name, value in wanted.items() if type(value) is int]
     for name, came, value in numbers:
         if type(came) is int and abs(came - value) == 1:
             side = "high" if came > value else "low"
-            return (
-                f"{name} is one too {side}: look at the condition of the loop, and at where {name} is counted"
-            )
+            look = f"look at the condition of the loop, and at where {name} is counted"
+            return f"{name} is one too {side}: if it counts something, {look}"
     return f"look at where {join_words(list(wanted))} is worked out"
+
+
+def _is_empty(value: object) -> bool:
+    return all(map(_is_empty, value.values())) if isinstance(value, Mapping) else not value
 
 
 def _passed(run: Run, goal: Goal, params: ActionResultParams) -> Verdict:

@@ -57,6 +57,8 @@ from grader.wording import join_words, plural, significant
 LINES_MAX, LINE_CHARS_MAX = 20_000, 1_000
 """A text is looked for in so much of each stream."""
 ROUNDING = 1e-9
+CAUSES = frozenset({"publish", "call", "goal", "set_param", "play"})
+"""What the grader does in a run that a node may log something upon."""
 
 
 class PrintsParams(Record):
@@ -307,8 +309,9 @@ def logs(package: PackageFacts, run: Run, params: LogsParams) -> Verdict:
     How it is measured
         By the messages on /rosout, where every `rospy.loginfo(…)`, `logwarn(…)` and `logerr(…)` goes. The
         text has to be in one of them letter by letter, including capitals and punctuation; there may be
-        more text around it. Other words of the same kind (`Hello ROS!` for `Hello World!`) at the right
-        level earn half of the points.
+        more text around it. What a line behind `rospy.spin()` logs counts only where a step stops the node:
+        at the end of the run it is too late. Other words of the same kind (`Hello ROS!` for `Hello World!`)
+        at the right level earn half of the points.
 
     How to fix
         `rospy.loginfo("…")` after `rospy.init_node(…)` for the level INFO. `print(…)` does not log.
@@ -459,7 +462,10 @@ def _silent(package: PackageFacts, run: Run, nodes: tuple[str, ...], params: Log
         return failed(message, hint=f"on line {slip.line}, {_call(params)}", citations=(slip.place,))
     if slip := _hindered(package, run, params):
         message = f"{message}: line {slip.line} of {slip.file} would, and it is not reached"
-        return failed(message, hint=f"in {slip.file}, {slip.fix}", citations=(slip.place,))
+        hint = f"in {slip.file}, {slip.fix}"
+        if " out of " in slip.fix and any(e.action in CAUSES for _, e in run.actors):
+            hint = f"in {slip.file}, see why the condition above line {slip.line} never holds"
+        return failed(message, hint=hint, citations=(slip.place,))
     return failed(message, hint=f"{_call(params)} below {INIT}: above it, nothing is sent")
 
 

@@ -495,12 +495,12 @@ def _in_order(
 
 
 def _said_again(found: Sequence[Reading], params: FieldEqualsParams) -> Verdict | None:
-    """Messages that say what the one before has said, where one may come only when the value changes."""
+    """Messages that repeat the one before, where one may come only when the value changes."""
     again = [one for before, one in pairwise(found) if one.values == before.values]
     if params.repeats or not again:
         return None
     count = f"{len(again)} of {plural(len(found), 'message')}"
-    told = f"{count} on {params.topic} say what the one before has said: {params.field} {_values(again[:1])}"
+    told = f"{count} on {params.topic} repeat the one before: {params.field} {_values(again[:1])}"
     hint = f"keep the value that was published last, and publish on {params.topic} only when it changes"
     return failed(told, hint=hint)
 
@@ -526,7 +526,7 @@ def _other_value(
     beside = "" if other else set_beside(own, first.time_ns, params.field, params.value, params.tolerance)
     if beside:
         seen = f"{seen}; {beside} is {value_text(params.value)}"
-        hint = f"set {params.field} in place of {beside}"
+        hint += f": is {beside} set in its place?"
     if params.when == "any":
         message = (
             f"{params.field} of {params.topic} is {params.words} in none of {plural(len(found), 'message')}"

@@ -372,7 +372,7 @@ def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
     lines = tuple(FileCitation(file=found.file, line=d.line) for d in misspelt or at_build)
     if joined := _in_one_tag(found, missing):
         return joined
-    hints = [f"write {n} instead of {d.name} on line {d.line}" for n, deps in slips.items() for d in deps]
+    hints = [_respell(n, d, deps) for n, deps in slips.items() for d in deps]
     if absent := [n for n in missing if n not in slips]:
         hints.append(f"add {' '.join(f'<{tag}>{n}</{tag}>' for n in absent)} below line {last}")
     verdict = failed(
@@ -391,6 +391,13 @@ def _misspelt(found: Manifest, missing: Sequence[str], names: Sequence[str]) -> 
     slips = {n: [d for d in at_run_time if d.name in near_names(n, declared)] for n in missing}
     apart = {n: [d for d in at_run_time if is_word_of(d.name, n, declared)] for n in missing}
     return {n: deps for n in missing if (deps := apart[n] or (slips[n] if len(slips[n]) == 1 else []))}
+
+
+def _respell(name: str, one: Dependency, slips: Sequence[Dependency]) -> str:
+    """Return what to do with one of a name's slips: catkin refuses a <depend> beside another tag for that name."""
+    if one is not slips[0] and "depend" in {d.kind for d in slips}:
+        return f"delete <{one.kind}>{one.name}</{one.kind}> on line {one.line}"
+    return f"write {name} instead of {one.name} on line {one.line}"
 
 
 def _in_one_tag(found: Manifest, missing: Sequence[str]) -> Verdict | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import pairwise
 from typing import Annotated, Any
@@ -165,14 +165,11 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
         message = "rates are judged in real time only, and this run was warped"
         return inconclusive(message, expected=expected, hint="give the criterion a scenario with clock: real")
     channels = sent_by(run, params.topic, params.of)
-    found = rhythms_to_judge(run, params, channels)
-    if found:
-        verdicts = [_judge(one, run, package, params) for one in found]
-        verdict = next((one for one in verdicts if one.status is not Status.PASS), verdicts[0])
-    elif params.cause is None or not any(c.messages for c in channels):
-        verdict = nothing_sent(package, run, params.topic, params.of)
-    else:
-        verdict = _no_stretch(run, params, params.cause)
+    verdicts = [_judge(one, run, package, params) for one in rhythms_to_judge(run, params, channels)]
+    if params.cause is not None and any(c.messages for c in channels):
+        verdicts += _without_messages(run, params, params.cause, channels, is_all=not verdicts)
+    verdicts = verdicts or [nothing_sent(package, run, params.topic, params.of)]
+    verdict = next((one for one in verdicts if one.status is not Status.PASS), verdicts[0])
     return verdict.about(expected=expected)
 
 
@@ -193,17 +190,20 @@ def _judge(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     return verdict.about(measured=measured, citations=citations)
 
 
-def _no_stretch(run: Run, params: RateParams, cause: Condition) -> Verdict:
-    """Return the verdict where messages came, and none of them when they would count."""
-    readings, topic = cause.come_in(run), params.topic
-    longest_ns = max((until_ns - from_ns for from_ns, until_ns in _spans(run, params, cause)), default=0)
+def _without_messages(
+    run: Run, params: RateParams, cause: Condition, channels: Sequence[Channel], *, is_all: bool
+) -> Iterator[Verdict]:
+    """Yield the verdict on the stretches without a message. If they are all there is, none may be long enough."""
+    silent = [one for one in _spans(run, params, cause) if _rhythm(channels, one, params) is None]
+    longest_ns = max((until_ns - from_ns for from_ns, until_ns in silent), default=0)
     if longest_ns >= max(params.min_window_s * 1e9, SILENT_PERIODS * params.period_ns):
-        message = f"no message came on {topic} for {seconds(longest_ns)} with {cause.words}"
-        return failed(message, hint=f"publish on {topic} all the time, also then").if_repeated()
-    if any(map(cause.holds, readings)):
-        return grade_again(f"{cause.words} lasted too short a time to judge the rate of {topic}")
-    hint = f"`rostopic echo {cause.topic}` shows what comes while your node runs"
-    return unjudged(f"{cause.words} never came in this run", hint=hint).if_repeated()
+        message = f"no message came on {params.topic} for {seconds(longest_ns)} with {cause.words}"
+        yield failed(message, hint=f"publish on {params.topic} all the time, also then").if_repeated()
+    elif is_all and any(map(cause.holds, cause.come_in(run))):
+        yield grade_again(f"{cause.words} lasted too short a time to judge the rate of {params.topic}")
+    elif is_all:
+        hint = f"`rostopic echo {cause.topic}` shows what comes while your node runs"
+        yield unjudged(f"{cause.words} never came in this run", hint=hint).if_repeated()
 
 
 def _excuse_lateness(

@@ -46,8 +46,8 @@ ORDER_S = 0.1
 """Two topics come over two connections: so much earlier a message may be recorded than what it answers."""
 
 TURNED_MIN, TURNED_SHARE = 2, 0.2
-"""A node does the opposite: seen so often both ways, and otherwise in no more than this share of its messages, as what
-it publishes may be a little older than what it has just heard."""
+"""A node does the opposite if it did so at least so often each way, and was right in no more than this share of its
+messages: what it publishes may be a little older than what it has just heard."""
 
 
 class Condition(Record):
@@ -278,9 +278,7 @@ def _early(
         message = f"every message has {params.effect.words}, also those before {params.trigger.words}"
         hint = f"give {params.effect.field} another value until the message comes that calls for this one"
     elif _is_turned_round(causes, effects, params):
-        message = (
-            f"{params.effect.words} comes where it is not so that {params.trigger.words}, and not where it is"
-        )
+        message = f"{params.effect.words} comes without {params.trigger.words}, and not with it"
         hint = "turn the condition around, or swap its two branches"
     verdict = failed(message, hint=hint, measured=f"{plural(len(too_early), 'message')} too early")
     return _unless_late(verdict, too_early[-1], (causes[0].time_ns, first_ns), run, params)

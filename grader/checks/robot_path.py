@@ -290,12 +290,11 @@ def _wrong_turn(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
             return None  # it turns later
         hint = "publish an angular.z that is not 0, for as long as it takes: an angle is angular.z times time"
         return Words(f"it drives straight on at {name}, and never turns", hint)
-    message = (
-        f"at {name} it turns by {abs(turned):.0f}°{_side(turned)} instead of {abs(asked):.0f}°{_side(asked)}"
-    )
-    return Words(
-        message, f"turn by {abs(asked):.0f}° there: an angle is angular.z times time, and 180° are math.pi"
-    )
+    right, hint = "driving straight on", "publish an angular.z of 0 there"
+    if round(asked):
+        right = f"{abs(asked):.0f}°{_side(asked)}"
+        hint = f"turn by {abs(asked):.0f}° there: an angle is angular.z times time, and 180° are math.pi"
+    return Words(f"at {name} it turns by {abs(turned):.0f}°{_side(turned)} instead of {right}", hint)
 
 
 def _direction(start: Point, end: Point) -> float:

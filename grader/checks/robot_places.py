@@ -61,6 +61,8 @@ STEER = (
     "the angle to turn by, towards a point, is math.atan2(dy, dx) minus the heading, both in radians, brought between "
     "-pi and pi: math.remainder(angle, 2 * math.pi); dx and dy are the point minus the robot's place"
 )
+FASTER = "drive faster, or take a shorter way"
+IN_ITS_WAY = "see on the map what is in its way, and turn away from that before you drive on"
 SEE = "see on the map where it leaves its way, and what it does there"
 """For a robot that knows no position: it steers by what it sees."""
 STRAIGHT = 2.0
@@ -249,9 +251,10 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
         if params.asked_on is None:  # it may be a place on its way
             hint = f"see on the map where it goes on; if it has to stop there, {hint}"
         return failed(message, hint=hint)
-    speed_m_s, told = _speed_m_s(judged), [one for one in _told(run, asked)[-1:] if one.speed]
-    if speed_m_s > SLOW_M_S or told:
-        still = f"on its way at {speed_m_s:.2f} m/s" if speed_m_s > SLOW_M_S else "told to drive"
+    speed_m_s, hold_s = _speed_m_s(judged), math.inf if params.hold_s is None else params.hold_s
+    moves = speed_m_s > SLOW_M_S
+    if moves or any(one.speed and asked.to_s - one.time_s <= hold_s for one in _told(run, asked)[-1:]):
+        still = f"on its way at {speed_m_s:.2f} m/s" if moves else "told to drive"
         message = f"{at}, and is still {still}"
         nearer_m = math.dist(judged[0].point, params.goal) - math.dist(last.point, params.goal)
         around, strays = turned_rad(judged) / math.tau, length_m(judged) > STRAIGHT * nearer_m
@@ -259,7 +262,7 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
         driven = driven if strays else f"it turns around {around:.1f} times on its way"
         turn = f"{'it drives away' if nearer_m < 0 else driven}: {_steer(run, params)}"
         strays = strays or around > 1
-        return failed(message, hint=turn if strays else "drive faster, or take a shorter way")
+        return failed(message, hint=turn if strays else FASTER if moves else IN_ITS_WAY)
     if turned_rad(judged, STILL_S) > TURNING_RAD:
         return failed(f"{at}, and turns on the spot", hint=_steer(run, params))
     hint = f"stop only where the distance is less than {significant(params.tolerance_m)} m"
@@ -275,12 +278,13 @@ def _steer(run: Run, params: EndsAtParams) -> str:
 
 
 def _told(run: Run, asked: Stretch) -> list[Command]:
-    """Return the velocities of the student's nodes in the time of a goal."""
-    to_s = run_seconds(run)
+    """Return the velocities of the student's nodes in the time of a goal, but for those that no node hears."""
+    to_s, heard = run_seconds(run), topics_with(run, "subscribers", lambda _: True)
     if to_s is None:
         return []
-    sent = sorted(pair for c in run.student_channels() for pair in commands_of(c))
-    return [command for t, command in sent if asked.from_s <= to_s(t) <= asked.to_s]
+    channels = (c for c in run.student_channels() if c.topic in heard or not heard)
+    sent = [one._replace(time_s=to_s(t)) for c in channels for t, one in commands_of(c)]
+    return sorted(one for one in sent if asked.from_s <= one.time_s <= asked.to_s)
 
 
 def _never_moves(
@@ -292,8 +296,7 @@ def _never_moves(
         return unjudged(f"{message}, and turns on the spot", hint=_steer(run, params))
     sent = _told(run, asked)
     if any(command.forward for command in sent):
-        hint = "see on the map what is in its way, and turn away from that before you drive on"
-        return unjudged(f"{message}, though it is told to drive", hint=hint)
+        return unjudged(f"{message}, though it is told to drive", hint=IN_ITS_WAY)
     if not sent or any(command.speed or command.turn for command in sent):
         return only_sideways(unjudged(message, hint=DRIVE), run)
     message += f": {plural(len(sent), 'velocity', 'velocities')} came, and {'all are' if len(sent) > 1 else 'it is'} 0"

@@ -65,6 +65,8 @@ OF_NUMBERS = re.compile(r"%[-+0-9.]*[dioxXeEfFgG]\b")
 """What takes no text in place of it."""
 CALL_LINES = 2
 """How many more lines a call that prints may have."""
+CALL_CHARS = 200
+"""How long a call of `Subscriber(…)` is up to its callback: a search without an end takes ages on a hostile line."""
 OF_DATA = re.compile(r"String|Bool|Byte|Char|U?Int\d+|Float\d+")
 """Types of std_msgs with one plain value, `data`."""
 
@@ -288,7 +290,7 @@ class Later:
         lines = self._build.file_lines(slip.file) if self._build is not None else []
         body = "\n".join(lines[max(self._function_at(slip) - 1, 0) : slip.line + CALL_LINES])
         named = re.match(r"\s*def (\w+)\((?:self, *)?(\w+)\)", body)
-        call = rf"Subscriber\(.*[ ,.=]{named[1]} *[,)]" if named else "(?!)"
+        call = rf"Subscriber\(.{{0,{CALL_CHARS}}}[ ,.=]{named[1]} *[,)]" if named else "(?!)"
         is_callback = any(re.search(call, line) for line in lines)
         return is_callback and named is not None and not re.search(rf"\b{named[2]}\.|= *{named[2]}\b", body)
 

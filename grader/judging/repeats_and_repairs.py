@@ -257,7 +257,8 @@ def _scripts_named(package: PackageFacts, build: Run) -> dict[str, set[str]]:
         lines = build.file_lines(file.path)
         if not lines and file.size_bytes:
             return {}
-        said = words_of(" ".join(lines).replace(".", " "))
+        # who imports a package runs its `__init__.py`, and does not name it
+        said = {"__init__", *words_of(" ".join(lines).replace(".", " "))}
         words.setdefault(PurePosixPath(file.path).name, set()).update(said)
     named = {name: {one for one in words if one.removesuffix(".py") in said} for name, said in words.items()}
     for name, found in named.items():  # with what those name, and so on

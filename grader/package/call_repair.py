@@ -193,6 +193,7 @@ def with_lines_turned(text: str) -> Iterator[Step]:
 
 
 NUMBERS = re.compile(r"U?Int\d+|Float\d+|Byte|Char")
+PLACES = re.compile(r"%[-+#0-9.]*[sridxXfFeEgGc]")
 LOGS = re.compile(r"log(debug|info|warn|err|fatal)")
 
 
@@ -308,11 +309,16 @@ def _published_together(call: ast.Call, kind: str) -> Iterator[Argument]:
     text, values, why = next(iter(call.args), None), call.args[1:], "`publish(…)` takes one value"
     if NUMBERS.fullmatch(kind) and len(values) == 1 and _is_text(text):
         yield Argument([(call, f"{ast.unparse(call.func)}({ast.unparse(values[0])})")], why)
-    elif kind == "String" and values and _is_text(text) and text.value.count("%") in {0, len(values)}:
+    elif kind == "String" and values and _is_text(text) and _has_no_other_places(text.value, len(values)):
         given = ", ".join(map(ast.unparse, values))
         given = given if isinstance(values[0], ast.Name | ast.Call) and not values[1:] else f"({given})"
         places = repr(text.value) if "%" in text.value else _with_places(text.value, len(values))
         yield Argument([(call, f"{ast.unparse(call.func)}({places} % {given})")], why)
+
+
+def _has_no_other_places(text: str, count: int) -> bool:
+    """Return whether a text has no `%` at all, or places for so many values and no other `%` (`100%`)."""
+    return "%" not in text or text.count("%") == len(PLACES.findall(text)) == count
 
 
 def _names_beside(function: ast.FunctionDef, call: ast.Call) -> set[str]:

@@ -338,7 +338,8 @@ def read_packages(submission: Submission, rubric: Rubric) -> PackageFacts:
     given = (
         (PurePosixPath(s.launch).name, tuple(a for a in s.args if ":=" in a)) for s in starts if s.launch
     )
-    commands = {(name, args) for name, args in given if args}
+    # in the rubric's order: facts are evidence, and the same files give the same bytes
+    commands = tuple(dict.fromkeys((name, args) for name, args in given if args))
     facts = read_package(submission.package, hints=submission.hints, commands=commands)
     also = tuple(read_package(one, commands=commands) for one in submission.also)
     return facts.model_copy(update={"also": also})

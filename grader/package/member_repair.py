@@ -52,10 +52,21 @@ Edit = tuple[tuple[int, int, int], str]
 
 
 class Known(NamedTuple):
-    """The names that rospy has, and the fields of the messages that the package defines, by class."""
+    """The names that rospy has, and the fields of the messages that packages of the submission define: by package, and
+    in each by class."""
 
     of_rospy: Collection[str]
-    fields: Mapping[str, Collection[str]]
+    defined: Mapping[str, Mapping[str, Collection[str]]]
+
+    def fields(self, tree: ast.Module) -> dict[str, Collection[str]]:
+        """Return the fields by class, without the classes of such a name that the script imports from elsewhere."""
+        imports = (n for n in nodes_in(tree) if isinstance(n, ast.Import | ast.ImportFrom))
+        names = [(getattr(n, "module", None) or a.name, a.asname or a.name) for n in imports for a in n.names]
+        roots = {name.partition(".")[0] for of, name in names if of.partition(".")[0] not in self.defined}
+        dotted = (ast.unparse(n) for n in nodes_in(tree) if isinstance(n, ast.Attribute))
+        others = roots | {name.rpartition(".")[2] for name in dotted if name.partition(".")[0] in roots}
+        every = (pair for classes in self.defined.values() for pair in classes.items())
+        return {} if "*" in roots else {name: fields for name, fields in every if name not in others}
 
 
 def with_members(text: str, known: Known) -> Iterator[Step]:
@@ -166,13 +177,14 @@ def _misspelt_members(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
         id(n): name for one in tree.body if (name := getattr(one, "name", "")) in own for n in nodes_in(one)
     }
     stored = {n.attr for n in nodes_in(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
-    messages = _messages_of_callbacks(tree, known.fields)
+    fields_of = known.fields(tree)
+    messages = _messages_of_callbacks(tree, fields_of)
     for node in (n for n in nodes_in(tree) if isinstance(n, ast.Attribute)):
         members: Collection[str] = messages.get(id(node.value), ())
         of_text = isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
         owner = ast.unparse(node.value)
         kind = inside.get(id(node), "") if owner == "self" else kinds.get(owner, owner.removesuffix("()"))
-        fields = known.fields.get(kind, ()) if kind not in own else ()
+        fields = fields_of.get(kind, ()) if kind not in own else ()
         members = OF_TEXTS if of_text else own.get(kind) or MEMBERS.get(kind) or fields or members
         right = (
             _near(node.attr, members) if node.attr not in {*members, *(stored if not fields else ())} else ""
@@ -199,7 +211,7 @@ def _messages_of_callbacks(
     """Return what belongs to the messages, requests and goals in callbacks, by the identity of each use: `data` where
     they are of std_msgs, else the fields that the package gives them."""
     imports = [n for n in nodes_in(tree) if isinstance(n, ast.ImportFrom) and n.module == "std_msgs.msg"]
-    of_std = {a.asname or a.name: MEMBERS["message"] for n in imports for a in n.names}
+    members = {**{a.asname or a.name: MEMBERS["message"] for n in imports for a in n.names}, **fields}
     named: dict[str, Collection[str]] = {}
     for call in (n for n in nodes_in(tree) if isinstance(n, ast.Call) and len(n.args) > 1):
         given = {str(k.arg): k.value for k in call.keywords} | dict(
@@ -208,7 +220,7 @@ def _messages_of_callbacks(
         kind, part = last_name(given["type"]), GIVES.get(last_name(call.func))
         callback = given.get("callback") or given.get("handler") or given.get("execute_cb")
         if part is not None and callback is not None:
-            named[last_name(callback)] = {**of_std, **fields}.get(f"{kind.removesuffix('Action')}{part}", ())
+            named[last_name(callback)] = members.get(f"{kind.removesuffix('Action')}{part}", ())
     return {
         id(use): named[function.name]
         for function in nodes_in(tree)
@@ -220,9 +232,10 @@ def _messages_of_callbacks(
 
 def _misspelt_keywords(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
     """Yield `Publisher(…, quue_size=10)`, and `queue_size10`."""
-    lines = text.split("\n")
-    for call in (n for n in nodes_in(tree_of(text)) if isinstance(n, ast.Call)):
-        keywords = KEYWORDS.get(last_name(call.func)) or tuple(known.fields.get(last_name(call.func), ()))
+    tree, lines = tree_of(text), text.split("\n")
+    taken = {**known.fields(tree), **KEYWORDS}
+    for call in (n for n in nodes_in(tree) if isinstance(n, ast.Call)):
+        keywords = tuple(taken.get(last_name(call.func), ()))
         for one in (k for k in call.keywords if keywords and k.arg and k.arg not in keywords):
             right, at = _near(str(one.arg), keywords), one.lineno - 1
             if right and at < len(lines) and (found := re.search(rf"\b{one.arg}(?=\s*=)", lines[at])):

@@ -76,10 +76,10 @@ ROLES = {
 
 
 def examine(
-    files: list[list[str]], types: list[str], fields: dict[str, list[str]], site: str
+    files: list[list[str]], types: list[str], fields: dict[str, dict[str, list[str]]], site: str
 ) -> Iterator[dict[str, Any]]:
     """Yield for each pair of name and text its steps and its names. `types` are message types that the lab uses,
-    `fields` are those of the package's own messages by class, `site` is the folder that has fissix."""
+    `fields` are those of the submission's own messages, by package and class, `site` is the folder that has fissix."""
     warnings.simplefilter("ignore")
     sys.path.append(site)
     for file, text in files:

@@ -138,12 +138,13 @@ def _only_tabs(text: str, error: Error) -> bool:
 
 
 def _first_version(text: str) -> str:
-    """Return the text with empty lines in place of git's merge markers and of the version behind `=======`."""
+    """Return the text with empty lines in place of git's merge markers and of all versions but the first. The others
+    stand behind `=======` and, for the one that both come from, behind `|||||||`."""
     kept, part = [], ""
     for line in text.split("\n"):
         marker = MERGE_MARKER.match(line)
         part = marker[1][0] if marker and (part or line[0] == "<") else part
-        kept.append("" if part and (marker or part == "=") else line)
+        kept.append("" if part and (marker or part in "|=") else line)
         part = "" if part == ">" else part
     return "\n".join(kept)
 

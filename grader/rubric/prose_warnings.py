@@ -42,7 +42,12 @@ PRIMITIVE = re.compile(r"(?:std_msgs/)?([Uu]?[Ii]nt|[Ff]loat)(8|16|32|64)")
 OLD_NAMES = {"byte": "int8", "char": "uint8"}
 TEXTS = {"prints": ("text", "template"), "logs": ("text", "template"), "definition": ("file",)}
 """By check, the parameters that the handout has as text."""
-LEVEL = re.compile(r"\b(warn|error|debug)(?:s|ing|ings)?\b", re.IGNORECASE)
+SENTENCE_END = re.compile(r"(?<=[.;])\s+")
+LEVEL = re.compile(
+    r"\blog(info|warn|err|debug)|\blevel `?(info|warn|error|debug)|\bas an? (warning|error)\b|\b(warning|error) `…`",
+    re.IGNORECASE,
+)
+"""Where a level is asked for: other sentences may have an error in them, or warn of something."""
 VALUES = ("value", "values", "expect", "result")
 """Keys of texts that a node has to publish or to answer."""
 FIELD = re.compile(r"^\s*([a-z]+\d*)\s+(\w+)\s*(?:#.*)?$", re.MULTILINE)
@@ -181,13 +186,10 @@ def _of_another_topic(index: int, criterion: dict[str, Any], rubric: dict[str, A
 
 def _other_level(at: KeyPath, given: dict[str, Any], title: str, handout: str) -> Iterator[Fault]:
     """Yield the level of a log message for which the title, or the handout's sentence about its text, has another."""
-    said = {level.lower() for level in LEVEL.findall(title)}
-    for sentence in re.split(r"(?<=[.;])\s+", handout):
-        said |= (
-            {one.lower() for one in LEVEL.findall(sentence)}
-            if f"`{given.get('text')}`" in sentence
-            else set()
-        )
+    text = f"`{given.get('text')}`"
+    about = [title, *(one for one in SENTENCE_END.split(handout) if text in one)]
+    found = {"".join(groups).lower() for one in about for groups in LEVEL.findall(one.replace(text, "`…`"))}
+    said = {{"err": "error", "warning": "warn"}.get(one, one) for one in found}
     if len(said) == 1 and given.get("level", "info") not in said:
         yield (*at, "level"), f"is {given.get('level', 'info')}, and the rubric's text has {said.pop()}"
 
@@ -309,8 +311,10 @@ def _numbers_of_title(
     others = [as_map(one.get("with")) for _, one in as_maps(rubric.get("criteria"))]
     known = {one.get("rate_hz") for one in others if one.get("topic") == given.get("topic")}
     is_told = "cause" not in given and len(known) > 1  # said of the two criteria
+    run = as_map(scenarios.get(str(criterion.get("scenario"))))
+    is_told = is_told or rate_hz in _numbers_within([run.get("start"), run.get("params")])  # by a parameter
     if not rates and not is_told and "made_up" not in rubric and is_number(rate_hz):
-        sentences = re.split(r"(?<=[.;])\s+", str(rubric.get("handout", "")))
+        sentences = SENTENCE_END.split(str(rubric.get("handout", "")))
         about = [one for one in sentences if re.search(rf"{re.escape(str(given.get('topic')))}(?!\w)", one)]
         rates = _rates(" ".join(about))
     if any(is_number(rate_hz) and round(rate_hz / by, 9) in rates for by in SHIFTS):
@@ -322,14 +326,19 @@ def _numbers_of_title(
         return
     numbers = [float(one) for one in PLAIN_NUMBER.findall(title)]
     runs = list(scenarios.values())
-    there = {abs(number) for _, number in numbers_in((), [given, runs])}
-    texts = " ".join(text for _, text in texts_in((), [given, runs]))
-    there |= {abs(float(one)) for one in re.findall(r"\d+(?:\.\d+)?", texts)}
+    there, texts = _numbers_within([given, runs]), " ".join(text for _, text in texts_in((), [given, runs]))
     is_open = "made_up" in texts or not any(key in given for key in EXPECTED) or "launch" in given
     own = {number for _, number in numbers_in((), given)}
     is_open = is_open or any(round(number * by, 9) in own for number in numbers for by in SHIFTS)
     if len(numbers) == 1 and not rates and not is_open and abs(numbers[0]) not in there:
         yield (*at, "title"), f"has {numbers[0]:g}, and neither the criterion nor a run has it"
+
+
+def _numbers_within(value: object) -> set[float]:
+    """Return all numbers of a part of the rubric, without their signs, also those within its texts."""
+    texts = " ".join(text for _, text in texts_in((), value))
+    inside = {float(one) for one in re.findall(r"\d+(?:\.\d+)?", texts)}
+    return inside | {abs(number) for _, number in numbers_in((), value)}
 
 
 def _other_text(at: KeyPath, given: dict[str, Any], handout: str, keys: tuple[str, ...]) -> Iterator[Fault]:

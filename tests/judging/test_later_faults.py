@@ -297,7 +297,9 @@ def test_a_text_that_another_function_prints_is_not_the_messages() -> None:
         ("def callback(msg):\n    rospy.loginfo('I heard %s',\n        msg.data)\n", False),
         ("def callback(msg):\n    said = msg\n    print('I heard', said.data)\n", False),
         ("def show(text):\n    print('I heard', text)\n", False),
+        (f"def show(text):\n    print('I heard', text)\n# {20_000 * 'Subscriber('}\n", False),
     ],
+    ids=["whole", "its data", "by another name", "another function", "a hostile line"],
 )
 def test_a_message_that_is_printed_whole_is_named_behind_another_mistake(callback: str, told: bool) -> None:
     heard = [NODE | ROOT, HEARS | {"requires": ["node"]}]

@@ -556,20 +556,21 @@ def test_what_no_repair_helps_is_told_with_all_of_its_faults() -> None:
 
 
 @pytest.mark.parametrize(
-    ("talker", "helper", "uses"),
+    ("talker", "module", "named", "uses"),
     [
-        ("import rospy\n", "", False),
-        ("import other\n", "", True),
-        ("from lab1 import helper\n", "import other\n", True),
-        ("", "import other\n", True),
+        ("import rospy\n", "helper", "", False),
+        ("import other\n", "helper", "", True),
+        ("from lab1 import helper\n", "helper", "import other\n", True),
+        ("from lab1 import work\n", "lab1/__init__", "from .other import work\n", True),
+        ("", "helper", "import other\n", True),
     ],
 )
-def test_a_module_concerns_the_scripts_that_name_it(talker: str, helper: str, uses: bool) -> None:
+def test_a_module_concerns_the_scripts_that_name_it(talker: str, module: str, named: str, uses: bool) -> None:
     asked = rubric(*ALL, scenarios={"talker": SCENARIO})
     repair = Repair(
         kind="python-syntax", file="src/other.py", line=1, before="a", after="b", message="m", fix="b"
     )
-    texts = {str(SCRIPT["path"]): talker, "src/helper.py": helper or "pass\n", "src/other.py": "a\n"}
+    texts = {str(SCRIPT["path"]): talker, f"src/{module}.py": named or "pass\n", "src/other.py": "a\n"}
     files = [{"path": path, "size_bytes": 9} for path in texts]
     package = complete_facts({**PACKAGE, "name": "lab1", "files": files})
     build = cast("Run", SimpleNamespace(file_lines=lambda path: texts[path].splitlines()))

@@ -187,6 +187,19 @@ def test_a_line_of_the_build_is_repaired_whatever_number_of_scripts_lines_are() 
     assert most_of([*lines, project]) == [*lines[:REPAIRS_MAX], project]
 
 
+@pytest.mark.parametrize(
+    "tags", [("depend", "depend"), ("depend", "exec_depend"), ("exec_depend", "depend")], ids=" and ".join
+)
+def test_a_name_that_is_written_apart_does_not_come_twice_where_catkin_refuses_that(
+    tags: tuple[str, str], tmp_path: Path
+) -> None:
+    apart = "\n".join(f"<{tag}>{word}</{tag}>" for tag, word in zip(tags, ("std", "msgs"), strict=True))
+    folder = package(tmp_path, {"package.xml": MANIFEST.replace("</package>", f"{apart}\n</package>")})
+    found = repair_all(folder, asking(dependencies=("std_msgs",)))
+    assert [one.fix for one in found][1] == f"delete <{tags[1]}>msgs</{tags[1]}> on line 10"
+    assert (folder / "package.xml").read_text().count("std_msgs") == 1
+
+
 def test_a_name_that_is_written_apart_is_put_together_in_each_tag(tmp_path: Path) -> None:
     apart = "<build_depend>std</build_depend><build_depend>msgs</build_depend><exec_depend>std</exec_depend>"
     manifest = MANIFEST.replace("</package>", f"{apart}</package>")

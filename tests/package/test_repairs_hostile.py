@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from grader.package.repairs import NotRepairable, Repair, apply_repair, find_repairs
-from tests.package.repairing import SCRIPT, TALKER, WANTED, package, repair_all, swapped
+from grader.package.repairs.manifest import SLIPS_MAX
+from tests.package.repairing import MANIFEST, SCRIPT, TALKER, WANTED, XML, package, repair_all, swapped
 from tests.package.trees import facts_of
 
 
@@ -86,6 +87,13 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
     for repair in (misspelt(), Repair(kind="executable-bit", file=TALKER, message="x", fix="x")):
         with pytest.raises((OSError, NotRepairable)):
             apply_repair(folder, repair)
+
+
+def test_no_more_slips_of_a_name_are_corrected_than_a_student_makes(tmp_path: Path) -> None:
+    many = "  <depend>rospi</depend>\n" * 1_000
+    folder = package(tmp_path, {XML: MANIFEST.replace("</package>", f"{many}</package>")})
+    found = [r for r in find_repairs(folder, facts_of(folder), WANTED) if r.file == XML]
+    assert len(found) == SLIPS_MAX
 
 
 def test_a_huge_file_is_left_as_it_is_but_for_its_bit(tmp_path: Path) -> None:

@@ -25,6 +25,7 @@ if __name__ == '__main__':
 TWICE = "class A:\n    n = 1\n    def g(self, x): return x\n"
 DEEPER = "        if late:\n            wait()\n"
 OTHER = "rospy.Publisher('numeric_chatter2', Int8, queue_size=10)"
+OWN_POINT = {"msg/Point.msg": "int8 X\n"}
 
 CASES = {
     "crlf": Case({TALKER: SCRIPT.replace("\n", "\r\n")}, ["line-ends"], "has Windows line endings"),
@@ -37,12 +38,33 @@ CASES = {
                 ("        rate", "=======\n        publisher.publish(2)\n>>>>>>> 3f2a9c1 (second try)\n        rate")),
         ["python-syntax"], "git's merge markers",
     ),
+    "merge-markers-with-the-base": Case(
+        swapped(TALKER, ("        publisher.pub", "<<<<<<< HEAD\n        publisher.pub"),
+                ("        rate", "||||||| 1d0c2fe\n        w()\n=======\n        go()\n>>>>>>> 3f2a9c1\n        rate")),
+        ["python-syntax"], "for the first one, delete lines 10 and 12 to 16",
+        after={TALKER: "is_shutdown():\n\n        publisher.publish(1)\n\n\n\n\n\n        rate"},
+    ),
+    "field-of-an-own-message": Case(
+        OWN_POINT | swapped(TALKER, ("\ndef main", "from lab.msg import Point\nPoint().x = 1\n\ndef main")),
+        [*3 * ["build-line"], "missing-call"], "`x` is called `X`",
+    ),
+    "field-of-a-message-of-the-same-name": Case(
+        OWN_POINT | swapped(TALKER, ("\ndef main", "from geometry_msgs.msg import Point\nPoint().x = 1\n\ndef main")),
+        [],
+    ),
+    "field-of-a-message-by-its-module": Case(
+        OWN_POINT | swapped(TALKER, ("\ndef main", "import nav_msgs.msg\nnav_msgs.msg.Point(x=1)\n\ndef main")),
+        [],
+    ),
     "module-for-a-type": Case(
         swapped(TALKER, ("from std_msgs.msg import Int8", "import std_msgs.msg"), ("Int8, ", "std_msgs.msg, ")),
         ["missing-call"], "`std_msgs.msg` is a module, and no type",
     ),
     "two-values-published": Case(
         swapped(TALKER, ("publisher.publish(", "publisher.publish('count', ")), ["missing-call"], "takes one value"),
+    "a-per-cent-sign-beside-a-value": Case(
+        swapped(TALKER, ("numeric_chatter', Int8", "numeric_chatter', String"), ("import Int8", "import String"),
+                ("publisher.publish(", "publisher.publish('100%', ")), []),
     "latin-1": Case({TALKER: SCRIPT.replace("import rospy\n", "import rospy  # caf\u00e9\n").encode("latin-1")},
                 ["encoding"], "not saved as UTF-8"),
     "no-shebang-and-a-slip": Case(

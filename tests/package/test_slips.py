@@ -36,6 +36,22 @@ def test_values_that_are_none(text: str, said: tuple[str, str] | None, tmp_path:
 
 
 @pytest.mark.parametrize(
+    ("head", "fixes"),
+    [
+        ("def heard(msg):", ["pass it: `rospy.Subscriber(…, heard)`"]),
+        ("def heard(msg, /):", []),
+        ("def heard(*, msg):", []),
+    ],
+)
+def test_a_function_that_reads_messages_and_has_no_subscriber(
+    head: str, fixes: list[str], tmp_path: Path
+) -> None:
+    (tmp_path / "a.py").write_text(f"{head}\n    print(msg.data)\n", encoding="utf-8")
+    found = [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "callback-missing"]
+    assert found == fixes
+
+
+@pytest.mark.parametrize(
     ("head", "fix"),
     [
         ("def heard(msg):", "pass it to what calls it: `rospy.Subscriber(…, heard)`"),

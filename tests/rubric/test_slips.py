@@ -557,3 +557,22 @@ def test_the_handout_says_which_type_a_topic_has(tmp_path: Path) -> None:
     path.write_text(THERMOSTAT.replace("[false, true, false]", "[0, 1, 0]"), encoding="utf-8")
     fault = "22: criteria[1].with.field: data of std_msgs/Bool is true or false, not 0"
     assert faults(path) == [f"lab.yaml:{fault}"]
+
+
+def test_a_title_may_speak_of_an_error_that_is_no_level(examples: Path) -> None:
+    title = ("battery", "title: It says that the battery is low", "title: It says how large the error is")
+    path = _spoiled(examples, *title)
+    assert warnings_of(load_rubric(str(path)), path.name) == []
+
+
+def test_a_rate_may_be_that_of_a_parameter_which_the_run_sets(examples: Path) -> None:
+    path = _spoiled(
+        examples,
+        "battery",
+        "script: scripts/battery_monitor.py}",
+        'script: scripts/battery_monitor.py, args: ["_hz:=4"]}',
+    )
+    text = path.read_text(encoding="utf-8").replace("rate_hz: 5, cause", "rate_hz: 4, cause")
+    path.write_text(text, encoding="utf-8")
+    told = warnings_of(load_rubric(str(path)), path.name)
+    assert [one for one in told if "rate_hz" in one] == []

@@ -75,10 +75,11 @@ def spare_callbacks(tree, functions):
     }
     data = {dotted(n.value) for n in walk(tree) if isinstance(n, ast.Attribute) and n.attr == "data"}
     spare = [f for name, f in functions.items() if name not in read and takes(f, "self" in read) == (1, 1)]
-    spare = [f for f in spare if f.args.args[-1].arg in data]
+    spare = [f for f in spare if [a for a in f.args.args[-1:] if a.arg in data]]
     if len(spare) == 1:
         name = ("self." if len(spare[0].args.args) > 1 else "") + spare[0].name
-        yield slip(spare[0].lineno, "callback-missing", "no Subscriber is given `%s`" % name, name=name)
+        message, fix = "no Subscriber is given `%s`" % name, "pass it: `rospy.Subscriber(…, %s)`" % name
+        yield slip(spare[0].lineno, "callback-missing", message, fix=fix, name=name)
 
 
 def wrong_callback(own, call, functions, bound, values):

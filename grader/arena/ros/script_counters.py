@@ -329,10 +329,12 @@ TELLS = ("publish", "print")
 
 def published_unchanged(tree):
     """Loops that publish in each turn what a line above them made, and do nothing else with it than to print it."""
-    set_at = {}
+    set_at, made = {}, {}
     for n in walk(tree):
         if isinstance(getattr(n, "ctx", None), ast.Store):
             set_at.setdefault(dotted(n).partition(".")[0], []).append(n.lineno)
+        if isinstance(n, ast.Assign):
+            made.update((dotted(t), n) for t in n.targets)
     plain = {dotted(t) for t in constants_in(walk(tree))}
     for loop in walk(tree):
         inside = [n for one in loop.body for n in ast.walk(one)] if isinstance(loop, ast.While) else []
@@ -346,15 +348,32 @@ def published_unchanged(tree):
         for call in (n for n in told if called_name(n) == "publish" and len(n.args) == 1):
             name = dotted(call.args[0])
             lines = set_at.get(name, [])
-            if name in plain or name in used or len(lines) != 1 or lines[0] >= loop.lineno:
+            if (
+                name in plain
+                or name in used
+                or len(lines) != 1
+                or lines[0] >= loop.lineno
+                or name not in made
+            ):
                 continue
-            line = lines[0]
-            fix = "move line %d into that loop, above line %d" % (line, loop.body[0].lineno)
-            fix = "on line %d, publish `%s`" % (call.lineno, min(fresh)) if len(fresh) == 1 else fix
+            line, last = lines[0], made[name].end_lineno
+            fix = "lines %d to %d" % (line, last) if last > line else "line %d" % line
+            fix = "move %s into that loop, above line %d" % (fix, loop.body[0].lineno)
+            # another number that the loop works out, such as the time alone, is no text to be published
+            alike = [one for one in fresh if one in made and alike_made(made[one].value, made[name].value)]
+            fix = (
+                "on line %d, publish `%s`" % (call.lineno, alike[0]) if len(fresh) == len(alike) == 1 else fix
+            )
             message = (
                 "each pass through the loop on line %d publishes `%s`, which only line %d makes, above it"
             )
             yield slip(call.lineno, "no-effect", message % (loop.lineno, name, line), fix=fix, name=name)
+
+
+def alike_made(one, other):
+    """Return whether two values are worked out the same way: by one function, by the same `%`, or both as a text."""
+    kinds = [(type(n), type(getattr(n, "op", None)), called_name(n)) for n in (one, other)]
+    return kinds[0] == kinds[1]
 
 
 class Source:

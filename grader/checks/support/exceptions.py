@@ -166,11 +166,8 @@ def _value(message: str, source: str, _marked: tuple[int, int] | None) -> Meanin
         hint = f"check how many there are before you unpack them: {NUMBER_OF_PARTS}"
         return f"{plural(int(found[2]), 'value')} are expected on the right of `=`{came}", hint
     if found := _NO_ITEMS.search(message):
-        said = f"the list that {found[1]}() looks through has no item"
-        return (
-            said,
-            f"check first that it has one, or write what the result is then: `{found[1]}(…, default=…)`",
-        )
+        hint = f"check first that it is not empty, or say what the result is then: `{found[1]}(…, default=…)`"
+        return f"the list that is given to {found[1]}() is empty", hint
     if (found := _NO_NUMBER.search(message)) and found[1].endswith(".py'"):
         return _program(source)
     if found:

@@ -33,7 +33,7 @@ from grader.checks.support.missing_names import (
     unmade,
     unused_import,
 )
-from grader.checks.support.processes import Life, early_end, lives
+from grader.checks.support.processes import Life, early_end, lives, nodes_of
 from grader.checks.support.rospy_calls import (
     other_items,
     part_of_action,
@@ -186,7 +186,7 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
         said = (known for line in printed for text, known in OF_ROSCPP.items() if text in line)
         return Ending(*next(said, (f"{_signal_name(life.end.signal)} ended it", RUN_IT)))
     if code == 0:
-        return _not_run(life, package) or _ran_to_the_end(printed)
+        return _not_run(life, run, package) or _ran_to_the_end(printed)
     exceptions = [line for line in printed if line.startswith("RLException: ")]
     last = next(iter(exceptions or printed[::-1]), "")
     words = f"; its last output: {shown(last)}" if last else ""
@@ -218,10 +218,11 @@ def _ran_to_the_end(printed: Sequence[str]) -> Ending:
     return Ending(f"its script ran to the end, and printed last: {shown(last)}", hint, by_itself=True)
 
 
-def _not_run(life: Life, package: PackageFacts) -> Ending | None:
+def _not_run(life: Life, run: Run, package: PackageFacts) -> Ending | None:
     """Explain a script that comes to its end because nothing calls what it defines, or because its loop is left."""
     script = package.file(life.start.script or "")
-    if script is not None and (other := _real_copy(script, package)):
+    is_node = bool(nodes_of(run, life.name))  # also by a name that no line of it says
+    if script is not None and not is_node and (other := _real_copy(script, package)):
         cause = f"its script ran to the end: it makes no node, but {other}, which has the same name, does"
         hint = without_git(move_hint(package, other, script.path), package)
         return Ending(cause, hint, by_itself=True)

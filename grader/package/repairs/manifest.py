@@ -29,6 +29,8 @@ RUN_NEEDS = re.compile(r"<(?:depend|run_depend|exec_depend|build_export_depend)>
 ALL_NEEDS = re.compile(r"<(build_depend|depend|run_depend|exec_depend)>\s*([\w-]+)\s*<")
 
 
+SLIPS_MAX = 20
+"""Of one dependency's name: more are not a student's."""
 OF_ROS = {"rospy", "roscpp", "catkin", "message_generation", "message_runtime", "tf", "tf2"}
 """Packages that every ROS has, besides those with messages."""
 
@@ -112,11 +114,22 @@ def _spell_dependency(files: Files, name: str) -> None:
         one for one in given if is_one_edit(one, name) or one.lower() == name or is_word_of(one, name, given)
     }
     slips = near - {name, *known_packages(), *noetic_messages(), *OF_ROS}
-    while found := next((one for one in tags.finditer(_blank_comments(text)) if one[2] in slips), None):
+    for _ in range(SLIPS_MAX):  # each change reads the file anew
+        found = next((one for one in tags.finditer(_blank_comments(text)) if one[2] in slips), None)
+        if found is None:
+            return
         line = text.count("\n", 0, found.start(2)) + 1
-        message = f"line {line} of {MANIFEST}: there is no package {found[2]}"
-        text = f"{text[: found.start(2)]}{name}{text[found.end(2) :]}"
-        files.change("manifest-line", MANIFEST, text, message)
+        message, fix = f"line {line} of {MANIFEST}: there is no package {found[2]}", ""
+        begin, end, new = (*found.span(2), name)
+        there = {one[1] for one in tags.finditer(_blank_comments(text)) if one[2] == name}
+        if "depend" in there or (there and found[1] == "depend"):
+            begin, end, new = (
+                *found.span(),
+                "",
+            )  # catkin refuses a <depend> beside another tag for the same package
+            fix = f"delete <{found[1]}>{found[2]}</{found[1]}> on line {line}"
+        text = f"{text[:begin]}{new}{text[end:]}"
+        files.change("manifest-line", MANIFEST, text, message, fix)
 
 
 def _add_dependency(files: Files, name: str) -> None:

@@ -90,8 +90,10 @@ def repair_python(
     _spell_package(files, scripts, package)
     texts = {script: text for script in scripts if (text := files.text(script))}
     names: dict[str, tuple[Name, ...]] = {}
-    interfaces = [one for each in (package, *package.also) for one in each.interfaces]
-    fields = {name: names for one in interfaces for name, names in one.members.items()}
+    fields = {
+        each.name: {name: names for one in each.interfaces for name, names in one.members.items()}
+        for each in (package, *package.also)
+    }
     for entry in _examine(texts, types, fields):
         for cause, steps in _join_steps(entry.steps):
             _change(files, entry.file, cause, steps)
@@ -195,7 +197,9 @@ def _unknown_message(line: str) -> str:
     return f"{wrong[0]} in {found[1]}.msg" if wrong and not meant else ""
 
 
-def _examine(texts: dict[str, str], types: Sequence[str], fields: dict[str, list[str]]) -> Iterator[_Entry]:
+def _examine(
+    texts: dict[str, str], types: Sequence[str], fields: dict[str, dict[str, list[str]]]
+) -> Iterator[_Entry]:
     deadline, left = time.monotonic() + WALL_S, list(texts)
     for _ in range(ATTEMPTS):
         wall_s = deadline - time.monotonic()
@@ -337,7 +341,7 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
 BELOW = "{place}: `global {word}` comes after a line that uses {word}"
 WORDS: dict[Cause, tuple[str, str]] = {
     "merged": ("{place}: git's merge markers (`<<<<<<<`) are still in the file",
-     "keep one of the two versions: delete the other one and the markers, such as {emptied}"),
+     "keep one of the two versions; for the first one, delete {emptied}"),
     "tabs": ("{place}: tabs and spaces are mixed in the indentation", "replace the tabs: "),
     "level": ("{place}: {told}", "change the indentation: "),
     "indent": ("{place}: the line after a `:` must be indented", "indent line {line} by {further} more spaces"),
