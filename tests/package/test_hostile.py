@@ -456,3 +456,22 @@ def _opened_by_somebody(root, workdir):
     except SubmissionError as error:
         return "refused" if "Permission denied" in error.message else error.message
     return "left out" if any("not readable here" in hint for hint in hints) else str(hints)
+
+
+SCRIPT = "import rospy\nrospy.init_node('x')\npub = rospy.Publisher('c', String, queue_size=1)\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        SCRIPT + "while not rospy.is_shutdown():\n" + "    if a: pub.publish(b)\n" * 400,
+        SCRIPT + "while not rospy.is_shutdown():\n" + "    a = a + 1\n    pub.publish(a)\n" * 400,
+        "".join(f"def f{number}():\n    pub.publish(x)\n" for number in range(400)),
+        SCRIPT + "while a:\n    pub.publish(b)\n" * 400,
+        SCRIPT + "rospy.spin()\n" * 2000,
+    ],
+)
+def test_lines_that_all_have_to_do_with_each_other(tmp_path, text) -> None:
+    """Where each is compared with all the others, these took up to twenty seconds."""
+    facts = facts_of(tmp_path, {"src/a.py": text})
+    assert any(slip.file == "src/a.py" for slip in facts.slips)

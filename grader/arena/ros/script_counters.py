@@ -160,10 +160,11 @@ def counter_starts(tree):
 def added_first(body):
     """Where a loop adds one to a counter above the line that publishes it, or makes a message of it."""
     sent = [i for i, one in enumerate(body) if calls_in(one, "publish")]
+    put = [put_in_messages(one) for one in body] if sent else []
     for at, one in enumerate(body):
         nodes = ast.walk(one) if isinstance(one, ast.If) else [one]
         for name in dict.fromkeys(dotted(t) for node in nodes for t in increments(node)):
-            used = [i for i, other in enumerate(body) if i != at and puts_in_message(other, name)]
+            used = [i for i, names in enumerate(put) if i != at and name in names]
             first = (used or sent or [at])[0]
             below = [body[i] for i in sent if i >= first]
             if at < first and below:
@@ -173,12 +174,12 @@ def added_first(body):
                 yield slip(one.lineno, "added-first", "", fix=fix, name=name)
 
 
-def puts_in_message(node, name):
-    """Whether a statement publishes what a counter stands at, or keeps it elsewhere: `msg.data = n`."""
-    if any(name in names_in(call) for call in calls_in(node, "publish")):
-        return True
-    kept = isinstance(node, ast.Assign) and name not in {dotted(t) for t in node.targets}
-    return kept and name in names_in(node.value)
+def put_in_messages(node):
+    """Return the names of which a statement publishes what they stand at, or keeps it elsewhere: `msg.data = n`."""
+    found = {name for call in calls_in(node, "publish") for name in names_in(call)}
+    if isinstance(node, ast.Assign):
+        found |= names_in(node.value) - {dotted(t) for t in node.targets}
+    return found
 
 
 def uncounted(tree):
@@ -274,8 +275,8 @@ RANDOM = {
     "getrandbits",
     "urandom",
 }
-IFS_LIMIT = 20
-"""Of a loop."""
+IFS_LIMIT = CALLS_LIMIT = 20
+"""Of a loop, and of a file."""
 CLOCK_METHODS = {"to_sec", "to_nsec"}
 
 
@@ -294,7 +295,7 @@ def sends_no_time(tree):
 def clock_values(tree):
     """Topics whose values are read from a clock in each turn, or made up at random, and not counted."""
     source = Source(tree)
-    for node in calls_in(tree, "publish"):
+    for node in calls_in(tree, "publish")[:CALLS_LIMIT]:
         found, topic = source.reached(node.args), source.topic(node)
         if topic and not found.counts and found.random:
             yield slip(node.lineno, "clock-value", topic, name="random")

@@ -102,6 +102,7 @@ def never_reached(tree):
                     fix = "move line %d above line %d" % (behind[0].lineno, loop.lineno)
                     fix = "" if word(behind[0]) == "publish" else fix
                     yield slip(loop.lineno, "never-reached", message, fix=fix)
+                break  # nothing behind it in the block runs
 
 
 def loop_ends(test):

@@ -10,6 +10,8 @@ import difflib
 
 TEXT_LIMIT = 300
 NAMES_LIMIT = 500
+USES_LIMIT = 40
+"""So many uses of unknown names are explained in a file: each takes a look at all of it."""
 MODULE_NAMES = {"__file__", "__builtins__", "__annotations__", "WindowsError", "exit", "quit"}
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
@@ -20,6 +22,13 @@ def walk(tree):
     if not hasattr(tree, "all_nodes"):
         tree.all_nodes = list(ast.walk(tree))
     return tree.all_nodes
+
+
+def parents_of(tree):
+    """Return the node around each node of a module: kept, as above."""
+    if not hasattr(tree, "all_parents"):
+        tree.all_parents = {child: node for node in walk(tree) for child in ast.iter_child_nodes(node)}
+    return tree.all_parents
 
 
 def is_call(node, *names):
@@ -152,7 +161,9 @@ def misspelt(tree):
     unbound = unbound_names(tree, known)
     keys, texts = without_quotes(tree, known), where_texts_stand(tree)
     stored = {n.id for n in names if isinstance(n.ctx, ast.Store)}
-    for node in names:
+    odd = {*keys, *unbound, *outside}
+    unknown = [n for n in names if n.id not in known or id(n) in odd]
+    for node in unknown[:USES_LIMIT]:
         if id(node) in outside and (node.id == "self" or node.id not in known):
             message = "line %d is in the class, but in none of its methods, so it runs before them"
             fix = "indent line %d like the lines of the method above it, or delete it" % node.lineno
@@ -281,12 +292,17 @@ def is_guard(node, tree):
 
 def unread_argument(node, tree):
     """Return a function and its only argument, which it never reads, where it takes a field of `node` instead."""
-    for function in walk(tree):
-        inside = list(ast.walk(function)) if isinstance(function, ast.FunctionDef) else []
-        if not any(isinstance(n, ast.Attribute) and n.value is node for n in inside):
-            continue
+    parents, functions = parents_of(tree), []
+    one = parents.get(node)
+    while isinstance(parents.get(node), ast.Attribute) and one is not None:
+        functions += [one] if isinstance(one, ast.FunctionDef) else []
+        one = parents.get(one)
+    for function in reversed(functions):
         given = [one.arg for one in function.args.args if one.arg != "self"]
-        if len(given) == 1 and not any(isinstance(n, ast.Name) and n.id == given[0] for n in inside):
+        read = len(given) == 1 and any(
+            isinstance(n, ast.Name) and n.id == given[0] for n in ast.walk(function)
+        )
+        if len(given) == 1 and not read:
             return function.name, given[0]
     return None
 
@@ -425,9 +441,9 @@ def undefined(node, tree):
     """Return why a name is not there that the file gives no value anywhere, and what to do."""
     name = node.id
     why = "nothing in the file gives `%s` a value" % name
-    uses = [n for n in walk(tree) if node in (getattr(n, "value", None), getattr(n, "func", None))]
-    used = uses[0] if uses else None
-    calls = [n for n in walk(tree) if isinstance(n, ast.Call) and node in n.args]
+    around = parents_of(tree).get(node)
+    used = around if node in (getattr(around, "value", None), getattr(around, "func", None)) else None
+    calls = [around] if isinstance(around, ast.Call) and node in around.args else []
     if name in GIVEN_BY_NAME and calls:
         return "`%s` is named here without its value" % name, "write `%s=%s`" % (name, GIVEN_BY_NAME[name])
     if any(called_name(n) == "Publisher" and node in n.args[2:] for n in calls):
@@ -444,19 +460,19 @@ def what_to_write(node, used, tree):
     used in."""
     name, line = node.id, node.lineno
     inner = used.attr if isinstance(used, ast.Attribute) else ""
-    takers = [n for n in walk(tree) if isinstance(n, ast.Call) and node in n.args[1:]]
-    types = {published_type(n) for n in walk(tree) if called_name(n) == "Publisher"} - {""}
+    around = parents_of(tree).get(node)
     if name[:1].isupper():
         return line, "define %s or import it (a message: `from <package>.msg import %s`)" % (name, name)
     if isinstance(used, ast.Call):
         return line, "define it with `def %s(…):`, or import it" % name
-    if any(called_name(n) in CALL_BACK for n in takers):
+    if called_name(around) in CALL_BACK and node in around.args[1:]:
         return line, "define it with `def %s(…):`" % name
     if inner in MADE:
         loops = [n.lineno for n in walk(tree) if isinstance(n, (ast.While, ast.For)) and node in ast.walk(n)]
         return min([line, *loops]), "write `%s = %s`" % (name, MADE[inner])
     sent = {one.id for n in calls_in(tree, "publish") for one in n.args if isinstance(one, ast.Name)}
     if name in sent or (isinstance(used, ast.Attribute) and isinstance(used.ctx, ast.Store)):
+        types = {published_type(n) for n in walk(tree) if called_name(n) == "Publisher"} - {""}
         return line, "create the message: `%s = %s()`" % (name, types.pop() if len(types) == 1 else "<Type>")
     return line, "write `%s = …`, with the value that it should have" % name
 
