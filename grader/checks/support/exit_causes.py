@@ -67,7 +67,7 @@ OTHER_NAMES_SHOWN = 3
 """Names of the same script that are not defined either."""
 MAIN = "`if __name__ == '__main__':`"
 RUN_IT = "run it by itself with rosrun, and read what it prints last"
-RACE = "publish() to a closed topic"
+RACES = ("publish() to a closed topic", "topic was closed during publish()")
 ARGUMENT_HINT = (
     "put the value in the code, or use a default where `len(sys.argv)` is 1: nothing passes arguments"
 )
@@ -546,7 +546,7 @@ def is_rospys_own(found: Traceback) -> bool:
     how a service refuses a call."""
     if found.own_frames and found.own_frames[-1].source.startswith("raise ") and _is_answer(found):
         return True
-    race = found.kind == "ROSException" and RACE in found.message
+    race = found.kind == "ROSException" and any(said in found.message for said in RACES)
     if found.kind == "TypeError" and _ARITY.match(found.message):
         return False  # a callback that takes other values: rospy's line calls it
     return race or (bool(found.frames) and not found.own_frames)
