@@ -274,6 +274,7 @@ def explain_by_overwritten_parameter(
     if not is_unexplained(check, verdict) or package is None or not isinstance(run, Run):
         return verdict
     given, nodes = {name: one.value for name, one in params_given(run).items()}, run.student_nodes()
+    found: dict[str, Verdict] = {}  # by the node that sets it
     for _, event in run.params:
         name = absolute_name(event.name)
         param = where_given(package, name)
@@ -290,8 +291,10 @@ def explain_by_overwritten_parameter(
             )
             hint = "read it with `rospy.get_param(…)`, and do not set it"
             hint = f"on {where}, write `get_param` instead of `set_param`" if slips else hint
-            return verdict.explained(why, hint, tuple(s.place for s in slips[:1]), cause=name)
-    return verdict
+            places = tuple(s.place for s in slips[:1])
+            found.setdefault(event.caller_id, verdict.explained(why, hint, places, cause=name))
+    judged = _publishing(verdict, run)  # of two nodes that do so, the one whose messages are wrong
+    return min(found.items(), key=lambda one: one[0] not in judged, default=("", verdict))[1]
 
 
 def _is_too_early(run: Run) -> bool:
