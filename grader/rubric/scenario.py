@@ -159,7 +159,7 @@ class Served(Record):
     """The fields of each goal's result; those that it lacks are zero."""
     ends: GoalEnd | Annotated[tuple[GoalEnd, ...], Field(min_length=1)] = "succeeded"
     """The state in which goals end, or a list of states in turn, of which the last one is repeated: `[aborted,
-    succeeded]`. A goal that the client cancels before is preempted."""
+    succeeded]`. A goal that the client cancels before is preempted, and counts as one of them."""
     answer: dict[str, Any] | None = None
     """The fields of each answer; those that it lacks are zero."""
     answers: tuple[dict[str, Any], ...] = ()
