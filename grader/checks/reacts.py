@@ -109,7 +109,7 @@ class Condition(Record):
         return sorted(Reading(t, (), "") for c in channels for t in c.times_ns)
 
     def come_in(self, run: Run) -> list[Reading]:
-        """Return the same of all messages on the topic, whoever sent them."""
+        """Return the same of all messages on the topic, from any node."""
         return self.read([c for c in run.channels if c.topic == self.topic])
 
     def holds(self, reading: Reading) -> bool:

@@ -114,7 +114,7 @@ def _spell_dependency(files: Files, name: str) -> None:
         one for one in given if is_one_edit(one, name) or one.lower() == name or is_word_of(one, name, given)
     }
     slips = near - {name, *known_packages(), *noetic_messages(), *OF_ROS}
-    for _ in range(SLIPS_MAX):  # each change reads the file anew
+    for _ in range(SLIPS_MAX):  # each change reads the file again
         found = next((one for one in tags.finditer(_blank_comments(text)) if one[2] in slips), None)
         if found is None:
             return
