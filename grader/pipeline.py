@@ -235,7 +235,7 @@ def recording_job(
 ) -> RecordingJob:
     """Return what is to be recorded into the folder `evidence`, with what the files say; none of them is executed."""
     progress.step("package", "running", "reading its files")
-    facts = read_packages(submission, rubric.rubric)
+    facts = read_packages(submission, rubric.rubric.launch_commands)
     progress.step("package", "done")
     return RecordingJob(
         submission=submission,

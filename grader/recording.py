@@ -189,7 +189,7 @@ def record_other_runs(job: RecordingJob, recorder: Recorder | StaticRecorder, ju
         of_copy = replace(
             job,
             submission=copy,
-            facts=read_packages(copy, job.rubric.rubric),
+            facts=read_packages(copy, job.rubric.rubric.launch_commands),
             evidence=job.evidence / copies.REPAIRED,
             options=replace(job.options, reused={}),
             progress=copies.CopyProgress(job.progress),

@@ -159,7 +159,9 @@ def test_what_is_advised_by_the_files_is_true(lab, name, tmp_path) -> None:
     submission = open_submission(
         str(source), package=wanted_package(rubric.rubric, ""), workdir=tmp_path, submission_id=name
     )
-    found = judge_files(rubric.rubric, read_packages(submission, rubric.rubric), rubric.checks)
+    found = judge_files(
+        rubric.rubric, read_packages(submission, rubric.rubric.launch_commands), rubric.checks
+    )
     assert faulty_advice([verdict.criterion for verdict in found], source) == []
 
 

@@ -125,7 +125,7 @@ def test_repairs_are_made_on_a_copy_of_their_own_package(copy, tmp_path):
     script = copy / STATION / "scripts" / "sensor.py"
     script.write_text(script.read_text().replace("rospy.Rate(10)", "rospy.Rate(10"))
     submission, rubric = opened(copy, tmp_path), loaded(LAB).rubric
-    facts = read_packages(submission, rubric)
+    facts = read_packages(submission, rubric.launch_commands)
     lost = [c.model_copy(update={"status": Status.FAIL}) for c in judged(copy, tmp_path).values()]
     repairs, scenarios = choose_repairs(submission, facts, rubric, lost, built=True)
     assert [one.file for one in repairs] == [f"../{STATION}/scripts/sensor.py"]

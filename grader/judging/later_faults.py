@@ -441,7 +441,7 @@ class Later:
         template, said = str(self._wanted.get("template", VALUE)), self._of("prints")
         wanted = f"print '{in_words(template)}'"
         if len(heard) > 1 and ", callback)" in self._verdict.hint and self._lacks_words("def callback("):
-            yield Fix(f"write `def callback(msg):` above it, which {wanted.replace('print', 'prints', 1)}")
+            yield Fix(f"write `def callback(msg):` above it, which prints '{in_words(template)}'")
             return
         said = [one for one in said if SAID_DATA in one.message]
         unheard = not self._ran or not (isinstance(self._run, Run) and probes_on(self._run, self._topic))
@@ -461,10 +461,8 @@ class Later:
             yield Fix(f"{wanted} {there}", general=f"{wanted}, {IN_OWN_WORDS}")
         elif self._lacks_words(template.partition(VALUE)[0]):
             yield Fix(f"{wanted}{' first in the callback' if other_type else ''}")
-        elif (
-            other_type and not said and len(self._of("prints")) == 1
-        ):  # a field that the right type does not have
-            only = self._of("prints")[0]
+        elif other_type and not said and len(self._of("prints")) == 1:
+            only = self._of("prints")[0]  # it prints a field that the right type does not have
             says_it = " ".join(template.partition(VALUE)[0].split()) in " ".join(only.message.split())
             what = "the `data` of the message" if says_it else f"'{in_words(template)}'"
             yield Fix(f"print {what} on {_line(only)}", general=f"print {what}, {IN_OWN_WORDS}")

@@ -35,7 +35,6 @@ from grader.package.reading import (
     regular_file,
 )
 from grader.portable import system
-from grader.rubric.model import Rubric
 
 _CHUNK_BYTES = 1 << 20
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
@@ -307,12 +306,9 @@ def read_package(
 
         manifest, manifest_fault = read_manifest(package.folder)
         cmake = read_cmake(package.folder, package.name, trace=cmake_trace, root=cmake_root)
-        launch_files = read_launch_files(
-            package.folder,
-            ((e.file.path, e.path) for e in _readable(entries)),
-            (manifest.name if manifest else package.name, package.name),
-            commands,
-        )
+        names = (manifest.name if manifest else package.name, package.name)
+        readable = [(entry.file.path, entry.path) for entry in _readable(entries)]
+        launch_files = read_launch_files(package.folder, readable, names, commands)
         report = asked.result()
     faults = report.faults if python_faults is None else python_faults
     files = tuple(entry.file for entry in entries)
@@ -332,14 +328,8 @@ def read_package(
     )
 
 
-def read_packages(submission: Submission, rubric: Rubric) -> PackageFacts:
-    """Return the facts of a submission's main package, with those of the others."""
-    starts = (start for scenario in rubric.scenarios.values() for start in scenario.start)
-    given = (
-        (PurePosixPath(s.launch).name, tuple(a for a in s.args if ":=" in a)) for s in starts if s.launch
-    )
-    # in the rubric's order: facts are evidence, and the same files give the same bytes
-    commands = tuple(dict.fromkeys((name, args) for name, args in given if args))
+def read_packages(submission: Submission, commands: Collection[tuple[str, tuple[str, ...]]]) -> PackageFacts:
+    """Return the facts of a submission's main package, with those of the others; `commands` as in `read_package`."""
     facts = read_package(submission.package, hints=submission.hints, commands=commands)
     also = tuple(read_package(one, commands=commands) for one in submission.also)
     return facts.model_copy(update={"also": also})

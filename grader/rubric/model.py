@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from datetime import datetime
+from pathlib import PurePosixPath
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, AwareDatetime, Field, PrivateAttr
@@ -239,6 +240,17 @@ class Rubric(Record):
     def share_of(self, kind: RepairKind) -> float:
         """Return the share of its points, 0 to 1, that a criterion earns on a copy with such a repair."""
         return self.repairs.get(kind, DEFAULT_SHARES[kind])
+
+    @property
+    def launch_commands(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
+        """The launch files that scenarios start with arguments, and these: `robot:=tb3`.
+
+        They are in the rubric's order, so that the same files give the same evidence.
+        """
+        starts = (start for scenario in self.scenarios.values() for start in scenario.start)
+        named = ((PurePosixPath(s.launch).name, s.args) for s in starts if s.launch)
+        given = ((name, tuple(word for word in args if ":=" in word)) for name, args in named)
+        return tuple(dict.fromkeys((name, args) for name, args in given if args))
 
     @property
     def max_points(self) -> float:

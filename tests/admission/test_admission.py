@@ -282,7 +282,7 @@ def test_runs_of_a_later_loop_wait_for_each_other_as_those_of_the_first(
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0})
     rubric = load_rubric("leeds-comp3631-lab1").rubric
     submission = open_submission(str(REFERENCE), package=rubric.package, workdir=tmp_path / "opened")
-    facts = read_packages(submission, rubric)
+    facts = read_packages(submission, rubric.launch_commands)
     with Recorder(
         submission, facts, rubric, tmp_path / "evidence", mode="auto", progress=Silence()
     ) as recorder:

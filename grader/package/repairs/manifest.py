@@ -123,10 +123,8 @@ def _spell_dependency(files: Files, name: str) -> None:
         begin, end, new = (*found.span(2), name)
         there = {one[1] for one in tags.finditer(_blank_comments(text)) if one[2] == name}
         if "depend" in there or (there and found[1] == "depend"):
-            begin, end, new = (
-                *found.span(),
-                "",
-            )  # catkin refuses a <depend> beside another tag for the same package
+            # catkin refuses a <depend> beside another tag for the same package
+            begin, end, new = (*found.span(), "")
             fix = f"delete <{found[1]}>{found[2]}</{found[1]}> on line {line}"
         text = f"{text[:begin]}{new}{text[end:]}"
         files.change("manifest-line", MANIFEST, text, message, fix)
