@@ -25,9 +25,10 @@ from process_tree import (
 )
 
 WATCH_S = 0.5
-ENDS_COMPUTING_S, STILL_COMPUTES_S = 1.0, 0.2
-"""A program that computes for so many CPU seconds behind a signal will not end by it: the second, where it did so
-before."""
+ENDS_COMPUTING, STILL_COMPUTES = 0.2, 0.1
+"""A program that computes behind Ctrl-C for so large a part of the time that it has to end in, will not end by it: the
+second, where it computed before. `roslaunch`, whose nodes hear of it later, has more time than a script."""
+COMPUTES_BEHIND_TERM_S = 0.2
 WORDS_BYTES = 200
 INFO_BYTES_MAX = 4096
 LINE_BYTES_MAX = 4096
@@ -83,7 +84,8 @@ class Process:
             return
         self._stopped_by = "INT"
         computed = self._rest_told[0] in ("computes", "stuck")
-        self._rest, self._ends_within_s = TreeRest(), STILL_COMPUTES_S if computed else ENDS_COMPUTING_S
+        self._rest = TreeRest()
+        self._ends_within_s = int_s * (STILL_COMPUTES if computed else ENDS_COMPUTING)
         self._signal_group(signal.SIGINT)
         self.loop.call_later(int_s, self._terminate)
         self.loop.call_later(int_s + term_s, self.kill)
@@ -195,7 +197,7 @@ class Process:
     def _terminate(self):
         if self.alive and self._stopped_by != "KILL":
             self._stopped_by = "TERM"
-            self._rest, self._ends_within_s = TreeRest(), STILL_COMPUTES_S
+            self._rest, self._ends_within_s = TreeRest(), COMPUTES_BEHIND_TERM_S
             for pid in self._tree():
                 _kill(pid, signal.SIGTERM)
 
