@@ -17,7 +17,6 @@ from grader.checks.support.exit_causes import (
     explain_error,
     explain_traceback,
     is_rospys_own,
-    lifetime_text,
     process_tracebacks,
 )
 from grader.checks.support.fields import unit_slip
@@ -263,7 +262,7 @@ def callbacks_clean(package: PackageFacts, run: Run, params: CallbacksCleanParam
     ended = next((one for one in asked if one.ended_early and one.end and one.end.exit_code != 0), None)
     if ended is not None and (len(found) <= 1 or found[0][0] != ended):
         end = explain_end(ended, run, package)
-        message = f"{ended.name} ended by itself after {lifetime_text(ended)}: {end.cause}"
+        message = f"{ended.name} ended by itself after {ended.lasted}: {end.cause}"
         verdict = end.verdict(unjudged, message)
     elif found:
         end = explain_traceback(found[0][1], package)

@@ -11,7 +11,6 @@ from grader.checks.support.exit_causes import (
     explain_end,
     explain_traceback,
     is_rospys_own,
-    lifetime_text,
     process_tracebacks,
 )
 from grader.checks.support.processes import (
@@ -149,7 +148,7 @@ def _nameless(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdic
     if one is None or not one.ended_early:
         return unjudged(message, measured="no node", hint=hint)
     end = explain_end(one, run, package)
-    message = f"{_script(one)} ended by itself after {lifetime_text(one)}, before it was a node: {end.cause}"
+    message = f"{_script(one)} ended by itself after {one.lasted}, before it was a node: {end.cause}"
     return end.verdict(unjudged, message, measured="no node")
 
 
@@ -200,7 +199,7 @@ def _early_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
     if not one.ended_early:
         return None
     end = explain_end(one, run, package)
-    return end.verdict(failed, f"{_script(one)} ended by itself after {lifetime_text(one)}: {end.cause}")
+    return end.verdict(failed, f"{_script(one)} ended by itself after {one.lasted}: {end.cause}")
 
 
 def _registration(one: Life, run: Run, nodes: tuple[str, ...]) -> Verdict | None:

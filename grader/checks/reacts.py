@@ -482,10 +482,11 @@ def _judge_unanswered(
         return None
     reaction, times = f"{params.effect.words} {{}} {params.trigger.words}", plural(len(answers), "time")
     late = max((one.after_s for one in slow if one.after_s is not None), default=None)
+    due = [(one.at_ns, one.at_ns + round((params.within_s + ORDER_S) * 1e9)) for one in slow]
     if late is None and len(slow) == len(answers):
         seen, hint = (f"; {instead[0]}", instead[1]) if instead else ("", hint)
-        verdict = failed(f"{reaction.format('never follows')}, which came {times}{seen}", hint=hint).late()
+        verdict = failed(f"{reaction.format('never follows')}, which came {times}{seen}", hint=hint).late(due)
         return verdict.if_repeated() if len(answers) == 1 else verdict
     how = "does not follow" if late is None else f"comes up to {late:.2f} s after"
-    verdict = failed(f"{len(slow)} of {times} {reaction.format(how)}", hint=hint).late().if_repeated()
+    verdict = failed(f"{len(slow)} of {times} {reaction.format(how)}", hint=hint).late(due).if_repeated()
     return excused(verdict, run, slow[0].at_ns, run.end_ns, why_late)

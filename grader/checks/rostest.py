@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError
 
 from grader.checks.registry import Refers, check
 from grader.checks.support.clocks import Lateness, excused, why_late
-from grader.checks.support.exit_causes import Ending, explain_end, explain_error, lifetime_text
+from grader.checks.support.exit_causes import Ending, explain_end, explain_error
 from grader.checks.support.processes import Life, lives, not_started
 from grader.checks.support.topics import cite, nodes_on, published_topics
 from grader.evidence.run import Run
@@ -228,7 +228,7 @@ def _error_behind(verdict: Verdict, package: PackageFacts, run: Run) -> Ending |
 def _with_cause(verdict: Verdict, dead: Life, run: Run, package: PackageFacts) -> Verdict:
     """Return the same with what ended the student's process, on whose messages the tests may have waited."""
     end = explain_end(dead, run, package)
-    message = f"{verdict.message}; {dead.name} ended by itself after {lifetime_text(dead)}: {end.cause}"
+    message = f"{verdict.message}; {dead.name} ended by itself after {dead.lasted}: {end.cause}"
     if end.of_machine:
         return machine_lacks(message, hint=end.hint)
     about = {"message": message, "hint": end.hint, "citations": end.citations, "cause": end.cause}

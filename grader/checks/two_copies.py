@@ -9,7 +9,7 @@ from pydantic import Field
 
 from grader.checks.registry import ProcessName, check
 from grader.checks.support.console_output import LOOKED_AT, both_from_ns, heard_of, printed_times, sent_by
-from grader.checks.support.exit_causes import explain_end, lifetime_text
+from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.processes import (
     NO_SCRIPT_HINT,
     GlobalName,
@@ -170,7 +170,7 @@ def _not_both_alive(package: PackageFacts, run: Run, trio: Trio) -> Verdict | No
     if len(gone) > 1:
         message = f"both copies ended by themselves: {end.cause}"
         return (machine_lacks if end.of_machine else unjudged)(message, hint=end.hint, citations=cited)
-    message = f"the {word} copy ended by itself after {lifetime_text(one)}, while the other kept running: {end.cause}"
+    message = f"the {word} copy ended by itself after {one.lasted}, while the other kept running: {end.cause}"
     if word == "second":
         hint = (
             end.hint

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import posixpath
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from enum import Enum
 from typing import Literal, Protocol
 
@@ -131,6 +131,10 @@ class Sought(Record):
     name: str
 
 
+Span = tuple[int, int]
+"""From when until when, in ns since the epoch."""
+
+
 class Verdict(Record):
     """One check's judgement.
 
@@ -146,7 +150,8 @@ class Verdict(Record):
     in its place, or a service's callback returns nothing. `callbacks`: a callback came too `late` to what was sent, or
     never; or it is about what came `before` any callback could keep the node waiting. `excused`: what would be lost if
     the machine had not been late; `own_load`: it was late by the run's own doing. `dropped`: so much came on its topics
-    that the recorder dropped some.
+    that the recorder dropped some. `due`: the stretches of time (ns) in which what is missing had to come: an exception
+    at another time does not explain that.
     """
 
     status: Status
@@ -173,6 +178,7 @@ class Verdict(Record):
     excused: str = ""
     own_load: bool = False
     dropped: bool = False
+    due: tuple[Span, ...] = ()
 
     def about(
         self,
@@ -232,9 +238,9 @@ class Verdict(Record):
         """Return the verdict marked as one on a wrong value; `nan`: it is NaN, or should be."""
         return self.model_copy(update={"wrong": "nan" if nan else "value"})
 
-    def late(self) -> Verdict:
-        """Return the verdict marked as one that shows a callback which came too late, or never."""
-        return self.model_copy(update={"callbacks": "late"})
+    def late(self, due: Iterable[Span] = ()) -> Verdict:
+        """Return the verdict marked as one that shows a callback which came too late, or never, when it was `due`."""
+        return self.model_copy(update={"callbacks": "late", "due": tuple(due)})
 
     def if_repeated(self) -> Verdict:
         """Return the verdict as a loss that counts only if it is repeated: one run's timing could have made it, so its

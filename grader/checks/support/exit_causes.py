@@ -59,9 +59,9 @@ from grader.installable import (
 )
 from grader.model.package import Fault, PackageFacts, SourceFile
 from grader.model.python_slip import PythonSlip
-from grader.model.verdict import Citations, FileCitation, Verdict, machine_lacks
+from grader.model.verdict import Citations, FileCitation, Span, Verdict, machine_lacks
 from grader.syntax_fixes import COMMENTED_OUT, corrected, without_brace
-from grader.wording import join_words, seconds
+from grader.wording import join_words
 
 OTHER_NAMES_SHOWN = 3
 """Names of the same script that are not defined either."""
@@ -267,14 +267,17 @@ def _in_comments(slips: Sequence[PythonSlip]) -> dict[str, str]:
     return {"message": f"{listed} are commented out", "fix": f"remove the `#` from {listed}"}
 
 
-def explain_error(package: PackageFacts, run: Run, *, only: Collection[str] | None = None) -> Ending | None:
-    """Return the last traceback before Ctrl-C of the student's processes, or of those of these names; None where there
-    is none."""
+def explain_error(
+    package: PackageFacts, run: Run, *, only: Collection[str] | None = None, during: Sequence[Span] = ()
+) -> Ending | None:
+    """Return the last traceback before Ctrl-C, or `during` these stretches, of the student's processes, or of those of
+    these names; None where there is none."""
     found = [
         t
         for one in lives(run)
         if only is None or one.name in only
-        for t in process_tracebacks(run, one.name, after_ns=one.start_ns, before_ns=one.interrupt_ns)
+        for from_ns, until_ns in during or [(one.start_ns, one.interrupt_ns or run.end_ns + 1)]
+        for t in process_tracebacks(run, one.name, after_ns=from_ns, before_ns=until_ns)
         if not is_rospys_own(t)
     ]
     return explain_traceback(found[-1], package) if found else None
@@ -283,13 +286,17 @@ def explain_error(package: PackageFacts, run: Run, *, only: Collection[str] | No
 def explain_by_exception(
     check: Check, package: PackageFacts | None, run: object, verdict: Verdict
 ) -> Verdict:
-    """Return a lost mark with the exception that a callback raised, which rospy prints and outlives."""
+    """Return a lost mark with the exception that a callback raised, which rospy prints and outlives. One when nothing
+    was due need not be why."""
     unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
     if not unexplained or package is None or not isinstance(run, Run) or early_end(run):
         return verdict
-    end = explain_error(package, run)
+    end = explain_error(package, run, during=verdict.due)
     if end is None:
-        return verdict
+        if not (verdict.due and (other := explain_error(package, run))):
+            return verdict
+        why, hint = f"at another time, a callback fails: {other.cause}", f"{verdict.hint}; {other.hint}"
+        return verdict.explained(why, hint, other.citations)
 
     def lost(message: str, *, hint: str, citations: Citations, measured: str) -> Verdict:
         update = {"message": message, "hint": hint, "citations": (*citations, *verdict.citations)}
@@ -550,10 +557,6 @@ def is_rospys_own(found: Traceback) -> bool:
     if found.kind == "TypeError" and _ARITY.match(found.message):
         return False  # a callback that takes other values: rospy's line calls it
     return race or (bool(found.frames) and not found.own_frames)
-
-
-def lifetime_text(life: Life) -> str:
-    return seconds((life.end_ns or life.start_ns) - life.start_ns)
 
 
 def _lines_added(package: PackageFacts, path: str) -> int:

@@ -54,6 +54,11 @@ class Life(NamedTuple):
         """It ended before the grader pressed Ctrl-C: by itself, or because it broke a limit."""
         return self.end is not None and self.interrupt_ns is None and self.end.stopped_by in {None, "KILL"}
 
+    @property
+    def lasted(self) -> str:
+        """`2.0 s`: how long it ran before it ended."""
+        return seconds((self.end_ns or self.start_ns) - self.start_ns)
+
     def until_ns(self, run: Run) -> int:
         """Return up to when it could act freely: Ctrl-C, its own end, or the recording's."""
         times = (t for t in (self.interrupt_ns, self.end_ns) if t is not None)
