@@ -208,6 +208,12 @@ class RunState:
             self.at_rest[process] = Rest(since_s, lost_s, programs, rest)
 
     @property
+    def shared(self) -> AbstractSet[str]:
+        """The topics on which one node publishes and another one hears."""
+        both = (self.published.keys() & self.listened.keys()) - {ROSOUT}
+        return {topic for topic in both if len(self.published[topic] | self.listened[topic]) > 1}
+
+    @property
     def subscribed(self) -> AbstractSet[str]:
         """The topics of the grader's to which a node has subscribed."""
         return self.subscribers.keys()

@@ -17,7 +17,7 @@ from grader.arena.outcome import describe_wait, find_outcome, next_look_s, waits
 from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.sandbox_files import FUNCTIONS, ROSTESTS
 from grader.arena.scenario_inputs import OVER, make_shots, settings
-from grader.arena.session import ArenaSession
+from grader.arena.session import GRAPH_EVERY_S, ArenaSession
 from grader.arena.static_recorder import RunCost
 from grader.arena.steps import CTRL_C_S, LAUNCH_CTRL_C_S, TERM_S, ProcessSpec, StepRunner, Tell
 from grader.errors import ArenaError
@@ -47,7 +47,6 @@ UNFOLLOWED_S = 2.0
 UNFOLLOWED_HZ = 15.0
 REGISTERED_S = 1.0
 HEARD_SETTLE_S = 0.3
-GRAPH_EVERY_S, GRAPH_S = 0.25, 5.0
 STARTING_S = 1.5
 EXPECTED_HZ = 10.0
 WATCHED_MORE_S = 0.5
@@ -183,6 +182,8 @@ async def _run(
                 continue
             if start.after is not None:
                 await _await_node(start.after, scenario, arena, tell)
+                if start.program is not None:
+                    await arena.await_connections()
             arena.start(spec)
         await runner.run()
         await _await_rostests(scenario, arena, tell)
@@ -251,7 +252,8 @@ async def _observe(scenario: Scenario, arena: ArenaSession, tell: Tell) -> tuple
             detail = "the node does not follow the simulated clock; the run goes on in real time"
             arena.send(do="rewarp", warp=1, detail=detail)
         if until.connected:
-            await _look_at_connections(arena)
+            await arena.look_at_connections()
+            await arena.wait(lambda: not live.running, GRAPH_EVERY_S)
         else:
             await arena.wait(
                 lambda: find_outcome(live, until, time.monotonic()) is not None,
@@ -269,13 +271,6 @@ def _does_not_follow(scenario: Scenario, arena: ArenaSession, now_s: float) -> b
         if seen.count and seen_s - lost_s > UNFOLLOWED_S:
             return seen.count / seen_s < UNFOLLOWED_HZ
     return False
-
-
-async def _look_at_connections(arena: ArenaSession) -> None:
-    looks = arena.live.graphs
-    arena.send(do="graph")
-    await arena.wait(lambda: arena.live.graphs > looks or not arena.live.running, GRAPH_S)
-    await arena.wait(lambda: not arena.live.running, GRAPH_EVERY_S)
 
 
 def process_specs(start: Start, place: ProcessEnvironment, numbers: Iterator[int]) -> Iterator[ProcessSpec]:
@@ -364,9 +359,7 @@ async def stop(starts: tuple[Start, ...], arena: ArenaSession, *, warped: bool) 
         arena.send(do="hold_clock")
         await arena.wait(lambda: not arena.live.running, HELD_S)
     if arena.live.running:
-        looks = arena.live.graphs
-        arena.send(do="graph")
-        await arena.wait(lambda: arena.live.graphs > looks, GRAPH_S)
+        await arena.look_at_connections()
     launched = {start.name for start in starts if start.launch is not None}
     for names in (arena.live.running, arena.live.helpers):
         stops = [

@@ -45,6 +45,9 @@ NS = 1_000_000_000
 READY_S = 15.0
 END_S = 5.0
 GROUPS_S, LOOK_S = 2.0, 0.02
+GRAPH_S, GRAPH_EVERY_S = 5.0, 0.25
+CONNECTING_S = 3.0
+"""So long at most nodes are waited for that have a topic in common and may yet connect over it."""
 STUCK_S = 0.5
 """So long a call is waited for at least, though the programs only compute."""
 PORT = 11311
@@ -165,6 +168,22 @@ class ArenaSession:
         self._killed.stopping(name)
         self.send(do="interrupt", name=name, int_s=int_s, term_s=term_s, action=action)
         await self.wait(lambda: name in self.exit_codes, int_s + term_s + END_S)
+
+    async def look_at_connections(self) -> None:
+        """Have the connections between nodes recorded as they are now."""
+        looks = self.live.graphs
+        self.send(do="graph")
+        await self.wait(lambda: self.live.graphs > looks or not self.live.running, GRAPH_S)
+
+    async def await_connections(self) -> None:
+        """Wait until the nodes that have a topic in common are connected over it, or have had their time to: what one
+        sends before that, the other never hears."""
+        live, until_s = self.live, time.monotonic() + CONNECTING_S
+        while live.shared and live.running and time.monotonic() < until_s:
+            await self.look_at_connections()
+            if live.shared <= live.connected_s.keys():
+                return
+            await self.wait(lambda: not live.running, GRAPH_EVERY_S)
 
     def watch(self, topic: str) -> deque[bytes]:
         """Return where the latest messages on a topic will be, as they come; whose the last is, `last_from` says."""

@@ -220,6 +220,7 @@ class StepRunner:
         await self._come(lambda: bool(live.subscribed & topics), patience_s, topics=topics)
         patience_s = SUBSCRIBE_S if live.subscribed & topics else 0.0
         await self._arena.wait(lambda: topics <= live.subscribed or not live.running, patience_s)
+        await self._arena.await_connections()
         self._tell("sending it messages")
         for shot in make_shots(self._scenario.probes):
             if not live.running:
@@ -276,6 +277,7 @@ class StepRunner:
             settled = live.subscribed & self._types.keys() and live.running <= live.registered
             patience_s = SUBSCRIBE_S if settled else self._scenario.until.first_message_s
             await self._come(lambda: topic in live.subscribed, patience_s, topics={topic})
+            await self._arena.await_connections()
         if topic in live.subscribed:
             self._deaf.discard(topic)
             return True

@@ -67,6 +67,8 @@ def drive(seconds, forward, turning):
         pub.publish(twist)
         rate.sleep()
     pub.publish(Twist())
+    while seen["pose"].linear_velocity or seen["pose"].angular_velocity:
+        rospy.sleep(0.02)
 
 def call(service, type_, *args):
     rospy.wait_for_service(service, 5)
