@@ -32,8 +32,10 @@ from grader.evidence.message_values import ServiceTypes
 from grader.evidence.reader import load_run, package_facts
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceStream
-from grader.intake import IntakeLimits, open_submission, safe_name
 from grader.intake.find import manifest_name
+from grader.intake.limits import IntakeLimits
+from grader.intake.names import safe_name
+from grader.intake.open import open_submission
 from grader.intake.repository import choose_ref, parse_refs
 from grader.intake.source import parse_source
 from grader.model.message_definitions import parse_interface
