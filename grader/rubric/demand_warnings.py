@@ -75,12 +75,6 @@ def demand_warnings(rubric: dict[str, Any], criteria: Criteria, scenarios: Scena
             yield from _never_set(criterion)
 
 
-def _conditions(criterion: WrittenCriterion) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
-    """Yield where a criterion may ask for a value of a field, and what is written there."""
-    yield criterion.at, criterion.given
-    yield from (((*criterion.at, key), as_map(criterion.given.get(key))) for key in ("cause", "effect"))
-
-
 def _hard(criterion: WrittenCriterion) -> Iterator[Fault]:
     """Yield demands that a correct node may miss."""
     at, check, given = criterion.at, criterion.check, criterion.given
@@ -112,7 +106,7 @@ def _easy(criterion: WrittenCriterion) -> Iterator[Fault]:
     if check == "action-result" and given.get("feedback") == 0:
         fault = "asks for none: leave it out, or give how many messages of feedback have to come"
         yield (*at, "feedback"), fault
-    for place, asked in _conditions(criterion):
+    for place, asked in criterion.conditions:
         value, off = asked.get("value"), asked.get("tolerance")
         if is_number(value) and is_number(off) and off >= abs(value) > 0 and "field" in asked:
             fault = f"is as large as the value, {value:g}: a field that is always 0 passes"
@@ -174,7 +168,7 @@ def _not_its_name(criterion: WrittenCriterion, rubric: dict[str, Any]) -> Iterat
 
 def _never_set(criterion: WrittenCriterion) -> Iterator[Fault]:
     """Yield fields of velocities that a robot on wheels leaves at 0, and of which 0 is asked."""
-    for at, asked in _conditions(criterion):
+    for at, asked in criterion.conditions:
         field, value = asked.get("field"), asked.get("value")
         least, most = asked.get("min", 0), asked.get("max", 0)
         bounded = is_number(least) and is_number(most) and least <= 0 <= most
@@ -395,7 +389,7 @@ def _unlike_others(criteria: Criteria) -> Iterator[Fault]:
     """Yield values of a field that are ten or a hundred times what other criteria want of it."""
     wanted: list[tuple[KeyPath, tuple[str, str], float]] = []
     for criterion in criteria:
-        for at, asked in _conditions(criterion):
+        for at, asked in criterion.conditions:
             if is_number(asked.get("value")) and "field" in asked:
                 place = str(asked.get("topic")), str(asked["field"])
                 wanted.append(((*at, "value"), place, float(asked["value"])))

@@ -153,6 +153,12 @@ class WrittenCriterion(NamedTuple):
     def requires(self) -> list[str]:
         return [name for _, name in as_texts(self.data.get("requires"))]
 
+    @property
+    def conditions(self) -> tuple[tuple[KeyPath, dict[str, Any]], ...]:
+        """Where a value of a field may be asked for, and what is written there: the parameters, a cause, an effect."""
+        parts = (((*self.at, key), as_map(self.given.get(key))) for key in ("cause", "effect"))
+        return ((self.at, self.given), *parts)
+
 
 def criteria_of(rubric: dict[str, Any]) -> list[WrittenCriterion]:
     """Return the criteria of a rubric in their order."""
