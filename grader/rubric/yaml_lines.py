@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import date
@@ -160,7 +160,7 @@ class WrittenCriterion(NamedTuple):
         return ((self.at, self.given), *parts)
 
 
-def criteria_of(rubric: dict[str, Any]) -> list[WrittenCriterion]:
+def criteria_of(rubric: Mapping[str, Any]) -> list[WrittenCriterion]:
     """Return the criteria of a rubric in their order."""
     scenarios = as_map(rubric.get("scenarios"))
     return [
