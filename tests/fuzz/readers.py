@@ -161,7 +161,7 @@ def python_causes(data: bytes) -> None:
 
 def source_file(data: bytes) -> None:
     for path in ("src/talker.py", "src/talker", "run.sh"):
-        _text_facts(data, path, executable=path == "run.sh", interpreters=lambda _: True)
+        _text_facts(data, path, executable=path == "run.sh")
 
 
 def parameters(data: bytes) -> None:
