@@ -20,10 +20,8 @@ from __future__ import annotations
 import os
 import signal
 import sys
-import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, TypeAlias, TypeVar, get_args
 
@@ -34,7 +32,7 @@ from grader.files import check_writable
 from grader.model import SandboxMode
 from grader.model.progress import Progress, Silence, StepState
 from grader.model.result import NO_TIME, GradingResult, SubmissionInfo
-from grader.portable import wait_for_children
+from grader.portable import on_interrupt, wait_for_children
 from grader.results import RESULT, read_result_file
 from grader.rubric.load import LoadedRubric
 from grader.rubric.load import load_rubric as load_file
@@ -191,24 +189,12 @@ def _run_beside_loop(work: Callable[[], T], stop: Callable[[], None]) -> T:
     with ThreadPoolExecutor(1, thread_name_prefix="grader") as executor:
         future = executor.submit(work)
         try:
-            with _interruptible():
+            # asyncio's own handler takes effect when its loop goes on, which is too late
+            with on_interrupt(signal.default_int_handler):
                 return future.result()
         except KeyboardInterrupt:
             stop()
             raise
-
-
-@contextmanager
-def _interruptible() -> Iterator[None]:
-    """Let Ctrl-C interrupt at once: asyncio's own handler takes effect when its loop goes on, which is too late."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before or signal.default_int_handler)
 
 
 def _loop_runs_here() -> bool:

@@ -107,11 +107,16 @@ def find_host_program(name: str) -> str | None:
 
 def git_user() -> str:
     """What git calls the person; empty where it does not."""
+    return git_setting("user.name", with_absolute_paths(os.environ), Path("/"))
+
+
+def git_setting(name: str, environment: Mapping[str, str], cwd: Path) -> str:
+    """Return what the user's git has for a setting in that folder; empty where it has nothing."""
     with suppress(OSError, subprocess.SubprocessError, UnicodeDecodeError):
         done = subprocess.run(
-            [find_user_program("git") or "/usr/bin/git", "config", "user.name"],
-            env=with_absolute_paths(os.environ),
-            cwd="/",
+            [find_user_program("git") or "/usr/bin/git", "config", "--get", name],
+            env=environment,
+            cwd=cwd,
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,

@@ -27,8 +27,8 @@ from grader.errors import GraderError, UsageError
 from grader.evidence.run import Run, console_log
 from grader.faults import GradingContext, classify_errors
 from grader.files import temporary_folder
-from grader.intake import open_recorded, open_recording, open_submission
 from grader.intake.choose import WantedPackage
+from grader.intake.open import open_recorded, open_recording, open_submission
 from grader.intake.source import Source, local_path
 from grader.judging.judge import judge_files
 from grader.judging.summary import assemble_result, environment_info

@@ -10,9 +10,10 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from typing import IO
+from types import FrameType
+from typing import IO, Any
 
 from grader.errors import HostError
 
@@ -85,6 +86,19 @@ def own_session(
     finally:
         if process is not None:
             _end_group(process)
+
+
+@contextmanager
+def on_interrupt(handler: Callable[[int, FrameType | None], Any] | signal.Handlers) -> Iterator[None]:
+    """Let Ctrl-C do this in the block. Only the main thread hears of one, and can say what it does."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before or signal.default_int_handler)
 
 
 @contextmanager

@@ -13,7 +13,9 @@ from grader.evidence.reader import SUFFIXES, load_evidence
 from grader.evidence.run import LESS
 from grader.evidence.writer import EvidenceWriter
 from grader.files import unwritable
-from grader.intake import IntakeLimits, find_recordings, safe_name
+from grader.intake.limits import IntakeLimits
+from grader.intake.names import safe_name
+from grader.intake.open import find_recordings
 from grader.model.progress import Progress
 from grader.model.submission import RecordedSubmission, Submission
 from grader.rubric.model import Rubric

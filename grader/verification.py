@@ -28,7 +28,7 @@ from grader.evidence.reader import load_evidence
 from grader.evidence.run import Run
 from grader.files import atomic_write, open_untrusted, read_untrusted
 from grader.host_programs import find_user_program, with_absolute_paths
-from grader.intake import safe_name
+from grader.intake.names import safe_name
 from grader.judging import judge
 from grader.judging.settle import awarded, settle
 from grader.judging.summary import overall_status, total_fields

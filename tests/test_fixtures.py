@@ -13,7 +13,7 @@ import pytest
 
 from fixtures.make import faulty_package, labs
 from grader.authoring.mutation.package_tree import read_tree
-from grader.intake import open_submission
+from grader.intake.open import open_submission
 from grader.judging.judge import judge_files
 from grader.model.result import GradingResult
 from grader.model.verdict import FileCitation

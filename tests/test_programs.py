@@ -51,9 +51,6 @@ STARTS = {
     "rubric/pytest_check.py:_run": Start(
         "_environment()", "folder", "a copy of the evidence, and values of its functions, as JSON"
     ),
-    "intake/git.py:_configured_ssh": Start(
-        "environment", "cwd", "nothing: the settings of the user who grades"
-    ),
     "intake/git.py:_start": Start(
         "environment", "cwd", "its repository's data; no setting, hook or filter of it"
     ),
@@ -78,7 +75,9 @@ STARTS = {
         "'/'",
         "the signature and the sums beside a result, which a student's CI job may have written",
     ),
-    "host_programs.py:git_user": Start("with_absolute_paths(os.environ)", "'/'", "nothing"),
+    "host_programs.py:git_setting": Start(
+        "environment", "cwd", "nothing: the settings of the user who grades"
+    ),
 }
 REPLACED = {
     "arena/ros/namespaces.py:<module>": "becomes the program of the probe: arena/sandbox.py",

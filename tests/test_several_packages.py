@@ -11,7 +11,7 @@ from grader import pipeline
 from grader.cli.fixing import fix_packages
 from grader.cli.select_rubric import choose_all, only
 from grader.errors import PackageNotFound, RubricError
-from grader.intake import open_submission
+from grader.intake.open import open_submission
 from grader.model.progress import Silence
 from grader.model.result import CriterionResult
 from grader.model.submission import Submission

@@ -35,7 +35,7 @@ from grader.errors import RosMissing, SubmissionError
 from grader.evidence.reader import load_evidence, package_facts
 from grader.evidence.run import Run
 from grader.files import temporary_folder
-from grader.intake import open_submission
+from grader.intake.open import open_submission
 from grader.model.package import Interface, PackageFacts
 from grader.model.progress import Progress
 from grader.model.verdict import Status

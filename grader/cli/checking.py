@@ -28,8 +28,8 @@ from grader.cli.output import say, say_beside
 from grader.cli.select_rubric import Chosen, only
 from grader.errors import ExitCode, HostError, OutputError, UsageError
 from grader.files import atomic_write, check_writable, temporary_folder
-from grader.intake import safe_name
 from grader.intake.gitdir import write_staged
+from grader.intake.names import safe_name
 from grader.model.progress import Progress, Silence
 from grader.model.result import GitStatus, GradingResult, Point
 from grader.report.losses import arrange

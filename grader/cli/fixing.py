@@ -19,7 +19,7 @@ from grader.cli.output import say
 from grader.cli.select_rubric import Chosen
 from grader.errors import OutputError, UsageError
 from grader.files import temporary_folder
-from grader.intake import open_submission
+from grader.intake.open import open_submission
 from grader.model.repair import Repair
 from grader.model.submission import SourcePackage
 from grader.package import read_package

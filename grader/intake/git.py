@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from grader.host_programs import find_user_program, loading_environment, with_absolute_paths
+from grader.host_programs import find_user_program, git_setting, loading_environment, with_absolute_paths
 from grader.intake.credentials import Access, is_refusal, scrubbed
 from grader.portable import own_session
 
@@ -229,7 +229,9 @@ class Git:
         """Return the user's ssh command, told to fail where it would ask and to leave no connection open."""
         if self._ssh_command is None:
             self._ssh_command = (
-                environment.get("GIT_SSH_COMMAND") or _configured_ssh(environment, cwd) or "ssh"
+                environment.get("GIT_SSH_COMMAND")
+                or git_setting("core.sshCommand", environment, cwd)
+                or "ssh"
             )
         try:
             program = Path(shlex.split(self._ssh_command)[0]).name
@@ -276,17 +278,3 @@ def _limits() -> tuple[str, ...]:
         "--core=0",
         "--",
     )
-
-
-def _configured_ssh(environment: dict[str, str], cwd: Path) -> str:
-    command = [find_user_program("git") or "git", "config", "--get", "core.sshCommand"]
-    found = subprocess.run(
-        command,
-        cwd=cwd,
-        env=environment,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    return found.stdout.strip()

@@ -45,18 +45,13 @@ _Commands = dict[tuple[int, str], list[tuple[str, ...] | None]]
 """By line and name: the arguments, None where something in them is expanded."""
 
 
-def read_cmake(
-    folder: Path, name: str, *, trace: Path | None = None, root: str | None = None
-) -> CMakeFacts | None:
+def read_cmake(folder: Path, name: str) -> CMakeFacts | None:
     """Return the calls of the package's CMake files; None where there is no `CMakeLists.txt`.
 
-    `name` is the package's name for variables that catkin sets. For `trace` and `root` see `refine_cmake`.
+    `name` is the package's name for variables that catkin sets.
     """
     facts = parse_cmake(folder, name)
-    if facts is None:
-        return None
-    facts = facts.model_copy(update={"calls": _without_left_out(facts.calls)})
-    return facts if trace is None else refine_cmake(facts, (name, folder.name), trace=trace, root=root)
+    return facts and facts.model_copy(update={"calls": _without_left_out(facts.calls)})
 
 
 def refine_cmake(

@@ -14,7 +14,7 @@ import shlex
 import shutil
 import stat
 import tokenize
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
 from pathlib import Path, PurePosixPath
@@ -40,7 +40,6 @@ _CHUNK_BYTES = 1 << 20
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 _SCRIPTS = frozenset({".py", ".sh", ".bash"})
 
-Interpreters = Callable[[str], bool]
 SYSTEM_PATH = "/usr/local/bin:/usr/bin:/bin"
 _LENGTH_LIMIT_BYTES = 255
 _LOOKED_AT_BYTES = 1 << 14
@@ -64,14 +63,14 @@ class Entry(NamedTuple):
     path: str
 
 
-def read_files(package: SourcePackage, interpreters: Interpreters | None = None) -> tuple[Entry, ...]:
+def read_files(package: SourcePackage) -> tuple[Entry, ...]:
     """Return all regular files and links of the package, by path; no link is followed out of it.
 
     What catkin and git leave behind (`build/`, `devel/`, `install/`, `.git/`, …), pipes and devices are left
     out.
     """
     paths = sorted(_paths(package.folder))
-    return tuple(Entry(_source_file(package, path, interpreters), path) for path in paths)
+    return tuple(Entry(_source_file(package, path), path) for path in paths)
 
 
 def _paths(folder: Path) -> Iterator[str]:
@@ -85,7 +84,7 @@ def _paths(folder: Path) -> Iterator[str]:
                 yield path.relative_to(folder).as_posix()
 
 
-def _source_file(package: SourcePackage, path: str, interpreters: Interpreters | None) -> SourceFile:
+def _source_file(package: SourcePackage, path: str) -> SourceFile:
     common: dict[str, Any] = {"path": printable(path), "mode_source": package.mode_source}
     file = package.folder / path
     if file.is_symlink():
@@ -112,7 +111,7 @@ def _source_file(package: SourcePackage, path: str, interpreters: Interpreters |
         return SourceFile(**common, size_bytes=0, sha256="", executable=executable)
     if path in package.right_in_git:
         head = head.replace(b"\r\n", b"\n")
-    text = _text_facts(head, path, executable=executable, interpreters=interpreters)
+    text = _text_facts(head, path, executable=executable)
     return SourceFile(**common, size_bytes=size, sha256=digest, executable=executable, **text)
 
 
@@ -136,16 +135,14 @@ def _contents(file: Path) -> tuple[int, str, bytes]:
     return size, digest.hexdigest(), head
 
 
-def _text_facts(
-    data: bytes, path: str, *, executable: bool | None, interpreters: Interpreters | None
-) -> dict[str, Any]:
+def _text_facts(data: bytes, path: str, *, executable: bool | None) -> dict[str, Any]:
     utf16 = data.startswith(_UTF16)
     binary = b"\0" in data and not utf16
     suffix = PurePosixPath(path).suffix.lower()
     python = suffix == ".py" or is_near_python(data)
     # of UTF-16, the first line that it has once it is saved as UTF-8
     text = data.decode("utf-16", "replace").encode() if utf16 else data
-    shebang, fault, problem = read_shebang(text, interpreters)
+    shebang, fault, problem = read_shebang(text)
     if not (suffix in _SCRIPTS or ((executable or shebang is not None or python) and not binary)):
         fault, problem = "", ""
     return {
@@ -185,22 +182,16 @@ def on_system(program: str) -> bool:
     return shutil.which(program, path=SYSTEM_PATH) is not None
 
 
-def read_shebang(
-    data: bytes, interpreters: Interpreters | None = None
-) -> tuple[Shebang | None, ShebangFault, str]:
+def read_shebang(data: bytes) -> tuple[Shebang | None, ShebangFault, str]:
     """Return the shebang of a file that begins with `data`, and why the system cannot use it ("" where it can): as a
-    kind, and in words.
-
-    `interpreters` is asked for absolute paths and names behind `env`; `python` and `python3` are always
-    there.
-    """
+    kind, and in words."""
     if not data.startswith(b"#!"):
         return None, *_near(data)
     line = data[: data.find(b"\n")] if b"\n" in data else data
     crlf = line.endswith(b"\r")
     text = line[2 : _LENGTH_LIMIT_BYTES + 1].decode("utf-8", "replace").rstrip("\r").strip(" \t")
     interpreter, program, problem = resolve(text)
-    found = not problem and (program in _PYTHONS or (interpreters or on_system)(program))
+    found = not problem and (program in _PYTHONS or on_system(program))
     if crlf:
         problem = (
             f"line 1 has a Windows line ending (CRLF), and there is no `{interpreter}\\r`: save it with LF"
@@ -280,21 +271,14 @@ def read_package(
     package: SourcePackage,
     *,
     hints: tuple[str, ...] = (),
-    cmake_trace: Path | None = None,
-    cmake_root: str | None = None,
-    python_faults: Mapping[str, Fault] | None = None,
-    interpreters: Interpreters | None = None,
     commands: Collection[tuple[str, tuple[str, ...]]] = (),
 ) -> PackageFacts:
-    """Return the facts of one package.
+    """Return the facts of one package, as they are before a build (`with_build_facts`).
 
-    `cmake_trace` is a file that CMake wrote by `--trace-expand --trace-format=json-v1`, `cmake_root` the
-    package's folder as CMake saw it; without a trace, a parser reads `CMakeLists.txt`. `python_faults` are
-    those that ROS's own Python found, by path; without them, this Python looks, in a process of its own.
-    `interpreters` tells whether a program of a shebang is on ROS's machine (an absolute path, or a name
-    behind `env`). `commands` are launch files with the arguments that scenarios give them.
+    A parser reads `CMakeLists.txt`, and this Python looks at the sources, in a process of its own. `commands` are
+    launch files with the arguments that scenarios give them.
     """
-    entries = read_files(package, interpreters)
+    entries = read_files(package)
     with ThreadPoolExecutor(1) as beside:
         asked = beside.submit(
             check_syntax, package.folder, [entry.path for entry in entries if _to_check(entry.file)]
@@ -305,12 +289,11 @@ def read_package(
         from grader.package.manifest import read_manifest  # noqa: PLC0415
 
         manifest, manifest_fault = read_manifest(package.folder)
-        cmake = read_cmake(package.folder, package.name, trace=cmake_trace, root=cmake_root)
+        cmake = read_cmake(package.folder, package.name)
         names = (manifest.name if manifest else package.name, package.name)
         readable = [(entry.file.path, entry.path) for entry in _readable(entries)]
         launch_files = read_launch_files(package.folder, readable, names, commands)
         report = asked.result()
-    faults = report.faults if python_faults is None else python_faults
     files = tuple(entry.file for entry in entries)
     return PackageFacts(
         name=package.name,
@@ -318,7 +301,7 @@ def read_package(
         manifest=manifest,
         manifest_fault=manifest_fault,
         cmake=cmake,
-        files=_with_faults(files, faults),
+        files=_with_faults(files, report.faults),
         launch_files=tuple(one for one in launch_files if not one.given),
         launched=tuple(one for one in launch_files if one.given),
         hints=hints,
@@ -345,8 +328,9 @@ def with_build_facts(
 ) -> PackageFacts:
     """Return `facts` refined by what the build showed: CMake's own trace, and ROS's own Python on the sources.
 
-    What is None stays as it was. `python_faults` replace the faults of all `python_paths`, and `python_slips` the slips
-    of all but C++.
+    `cmake_trace` is a file that CMake wrote by `--trace-expand --trace-format=json-v1`, `cmake_root` the package's
+    folder as CMake saw it. `python_faults` replace the faults of all `python_paths`, and `python_slips` the slips of
+    all but C++. What is None stays as it was.
     """
     changes: dict[str, object] = {}
     if cmake_trace is not None and facts.cmake is not None:

@@ -54,11 +54,8 @@ def argument_warnings(rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
                     yield at, f"ROS reads {value} as text: a decimal number has a point, no comma"
                 elif start.get("script") and re.match(r"_(?!_)\w+:=", text) and name[1:] not in named:
                     said = join_words([f"~{one}" for one in sorted(known.params)])
-                    yield (
-                        at,
-                        f"nothing else in the rubric names ~{name[1:]}"
-                        + (f": it has {said}" if said else ""),
-                    )
+                    fault = f"nothing else in the rubric names ~{name[1:]}"
+                    yield at, f"{fault}: it has {said}" if said else fault
 
 
 def _blanks(text: str) -> str:

@@ -26,7 +26,18 @@ from grader.rubric.step_faults import (
     slash,
     step_faults,
 )
-from grader.rubric.yaml_lines import Fault, KeyPath, as_list, as_map, as_maps, as_texts, packages_in
+from grader.rubric.yaml_lines import (
+    Fault,
+    KeyPath,
+    WrittenCriterion,
+    as_list,
+    as_map,
+    as_maps,
+    as_texts,
+    criteria_of,
+    dotted,
+    packages_in,
+)
 from grader.wording import did_you_mean, join_words
 
 TOTAL_POINTS = 100
@@ -56,15 +67,14 @@ def cross_faults(
     """
     rubric = as_map(data)
     scenarios = as_map(rubric.get("scenarios"))
-    criteria = as_maps(rubric.get("criteria"))
+    criteria = criteria_of(rubric)
     faults = [f for name, s in scenarios.items() for f in scenario_faults(("scenarios", name), as_map(s))]
     if not isinstance(rubric.get("criteria"), list):
         return faults  # that is what is wrong; what else would not fit, follows from it
-    for index, criterion in criteria:
-        path = ("criteria", index)
-        faults += _check(path, criterion, checks, complete=complete)
-        faults += _place(path, criterion, scenarios, checks)
-        faults += _uncalled_faults(path, criterion, scenarios)
+    for criterion in criteria:
+        faults += _check(criterion, checks, complete=complete)
+        faults += _place(criterion, scenarios, checks)
+        faults += _uncalled_faults(criterion, scenarios)
     faults += _names(criteria)
     faults += _circles(criteria)
     faults += _points(rubric, criteria)
@@ -85,7 +95,7 @@ def swallowed_keys(rubric: dict[str, Any]) -> Iterator[Fault]:
 
 
 def _packages(
-    rubric: dict[str, Any], scenarios: dict[str, Any], criteria: list[tuple[int, dict[str, Any]]]
+    rubric: dict[str, Any], scenarios: dict[str, Any], criteria: list[WrittenCriterion]
 ) -> Iterator[Fault]:
     """Each package is named once, none is the course's, and starts and criteria name those that there are."""
     known = packages_in(rubric)
@@ -95,8 +105,8 @@ def _packages(
     for index, name in as_texts(rubric.get("packages")):
         if name in known[1:]:
             yield ("packages", index), f'"{name}" is one that students hand in: take it out of one of the two'
-    for path, one in criteria:
-        yield from _of_known(("criteria", path, "package"), one, known)
+    for criterion in criteria:
+        yield from _of_known((*criterion.place, "package"), criterion.data, known)
     for scenario, one in scenarios.items():
         for index, start in as_maps(as_map(one).get("start")):
             at = ("scenarios", scenario, "start", index, "package")
@@ -112,80 +122,76 @@ def _of_known(path: KeyPath, one: dict[str, Any], known: list[str]) -> Iterator[
         yield path, f'the lab has no package "{name}"{near}'
 
 
-def _check(
-    path: KeyPath, criterion: dict[str, Any], checks: Mapping[str, Check], *, complete: bool
-) -> Iterator[Fault]:
-    name = criterion.get("check")
+def _check(criterion: WrittenCriterion, checks: Mapping[str, Check], *, complete: bool) -> Iterator[Fault]:
+    name = criterion.data.get("check")
     if not isinstance(name, str):
         return
     if name == MANUAL:
-        yield from model_faults(ManualParams, as_map(criterion.get("with")), (*path, "with"))
+        yield from model_faults(ManualParams, criterion.given, criterion.at)
         return
     if name not in checks:
         near = did_you_mean(name, [*checks, MANUAL])
         if complete or near:
-            yield (*path, "check"), f'there is no check "{name}"{near}'
+            yield (*criterion.place, "check"), f'there is no check "{name}"{near}'
         return
-    parameters = criterion.get("with", {})
-    if isinstance(parameters, dict):
-        yield from model_faults(checks[name].params, parameters, (*path, "with"))
+    if isinstance(criterion.data.get("with", {}), dict):
+        yield from model_faults(checks[name].params, criterion.given, criterion.at)
 
 
 def _place(
-    path: KeyPath, criterion: dict[str, Any], scenarios: dict[str, Any], checks: Mapping[str, Check]
+    criterion: WrittenCriterion, scenarios: dict[str, Any], checks: Mapping[str, Check]
 ) -> Iterator[Fault]:
-    scenario, check = criterion.get("scenario"), criterion.get("check")
-    if scenario is None:
-        if isinstance(check, str) and check in checks and checks[check].needs_run:
-            yield (*path, "scenario"), f'is missing: "{check}" judges a run'
-    elif isinstance(scenario, str) and scenario not in scenarios:
-        yield (*path, "scenario"), f'there is no scenario "{scenario}"{did_you_mean(scenario, scenarios)}'
-    elif isinstance(scenario, str) and isinstance(check, str) and check in checks:
-        recorded = as_map(scenarios[scenario]).get("recording") is not None
-        if recorded and checks[check].needs_run and not checks[check].messages_only:
-            yield (*path, "check"), f'"{check}" judges more than messages, and a recording holds no more'
+    place, name, check = criterion.place, criterion.run, checks.get(criterion.check)
+    needs_run = check is not None and check.needs_run
+    is_recorded = criterion.scenario.get("recording") is not None
+    if not criterion.has_run and needs_run:
+        yield (*place, "scenario"), f'is missing: "{criterion.check}" judges a run'
+    elif isinstance(criterion.data.get("scenario"), str) and name not in scenarios:
+        yield (*place, "scenario"), f'there is no scenario "{name}"{did_you_mean(name, scenarios)}'
+    elif is_recorded and check is not None and needs_run and not check.messages_only:
+        fault = f'"{criterion.check}" judges more than messages, and a recording holds no more'
+        yield (*place, "check"), fault
 
 
-def _uncalled_faults(path: KeyPath, criterion: dict[str, Any], scenarios: dict[str, Any]) -> Iterator[Fault]:
+def _uncalled_faults(criterion: WrittenCriterion, scenarios: dict[str, Any]) -> Iterator[Fault]:
     """Answers can only be judged to calls that the scenario makes."""
-    given, scenario = as_map(criterion.get("with")), str(criterion.get("scenario"))
-    expect, service = given.get("expect"), given.get("service")
-    if criterion.get("check") != ANSWERS or not isinstance(expect, list) or scenario not in scenarios:
+    if criterion.check != ANSWERS or criterion.run not in scenarios:
         return
-    run = as_map(scenarios[scenario])
+    run, service = criterion.scenario, criterion.given.get("service")
+    asked = len(as_list(criterion.given.get("expect")))
     made_calls = [*(call for _, call in as_maps(run.get("calls"))), *given_steps(run, "call")]
     calls = [call for call in made_calls if call.get("service") == service]
-    if len(calls) < len(expect):
+    if len(calls) < asked:
         made = f"{len(calls)} of them" if calls else "none"
-        yield (*path, "with", "expect"), f"asks for {len(expect)} calls of {service}; {scenario} makes {made}"
+        yield (*criterion.at, "expect"), f"asks for {asked} calls of {service}; {criterion.run} makes {made}"
 
 
-def _names(criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
-    first: dict[str, int] = {}
-    for index, criterion in criteria:
-        name = criterion.get("id")
-        if isinstance(name, str) and first.setdefault(name, index) != index:
-            yield ("criteria", index, "id"), f'"{name}" is the id of criteria[{first[name]}] already'
-    for index, criterion in criteria:
-        required = as_texts(criterion.get("requires"))
+def _names(criteria: list[WrittenCriterion]) -> Iterator[Fault]:
+    first: dict[str, KeyPath] = {}
+    for criterion in criteria:
+        name = criterion.data.get("id")
+        if isinstance(name, str) and first.setdefault(name, criterion.place) != criterion.place:
+            yield (*criterion.place, "id"), f'"{name}" is the id of {dotted(first[name])} already'
+    for criterion in criteria:
+        required = as_texts(criterion.data.get("requires"))
         for position, name in required:
-            path = ("criteria", index, "requires", position)
+            path = (*criterion.place, "requires", position)
             if name not in first:
                 yield path, f'there is no criterion "{name}"{did_you_mean(name, first)}'
             elif any(name == other for earlier, other in required if earlier < position):
                 yield path, f'"{name}" is listed already'
 
 
-def _circles(criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
+def _circles(criteria: list[WrittenCriterion]) -> Iterator[Fault]:
     """Yield each circle once, named from the criterion of it that comes first."""
-    needs = {str(c.get("id")): [name for _, name in as_texts(c.get("requires"))] for _, c in criteria}
-    places = {str(c.get("id")): index for index, c in reversed(criteria)}
+    needs = {criterion.id: criterion.requires for criterion in criteria}
+    places = {criterion.id: criterion.place for criterion in reversed(criteria)}
     told: set[frozenset[str]] = set()
-    for name, index in sorted(places.items(), key=lambda item: item[1]):
+    for name, place in sorted(places.items(), key=lambda item: item[1]):
         circle = _circle(name, needs)
         if circle and frozenset(circle) not in told:
             told.add(frozenset(circle))
-            yield ("criteria", index, "requires"), "goes in a circle: " + " → ".join([*circle, name])
+            yield (*place, "requires"), "goes in a circle: " + " → ".join([*circle, name])
 
 
 def _circle(start: str, needs: dict[str, list[str]]) -> list[str]:
@@ -201,17 +207,15 @@ def _circle(start: str, needs: dict[str, list[str]]) -> list[str]:
     return []
 
 
-def _points(rubric: dict[str, Any], criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
-    for index, criterion in criteria:
-        given = [key for key in KINDS_OF_POINTS if criterion.get(key) is not None]
+def _points(rubric: dict[str, Any], criteria: list[WrittenCriterion]) -> Iterator[Fault]:
+    for criterion in criteria:
+        given = [key for key in KINDS_OF_POINTS if criterion.data.get(key) is not None]
         if not given:
-            yield ("criteria", index, "points"), "is missing (or bonus, or penalty)"
+            yield (*criterion.place, "points"), "is missing (or bonus, or penalty)"
         elif len(given) > 1:
-            yield (
-                ("criteria", index, given[1]),
-                f"give one of points, bonus and penalty, not {' and '.join(given)}",
-            )
-    given_points = [c.get("points", 0) for _, c in criteria]
+            fault = f"give one of points, bonus and penalty, not {' and '.join(given)}"
+            yield (*criterion.place, given[1]), fault
+    given_points = [criterion.data.get("points", 0) for criterion in criteria]
     if not all(is_number(points) for points in given_points):
         return
     total = _total(rubric, criteria)
@@ -224,9 +228,9 @@ def _points(rubric: dict[str, Any], criteria: list[tuple[int, dict[str, Any]]]) 
         yield ("pass_mark",), f"{mark:g} is more than all the points, {total:g}"
 
 
-def _total(rubric: dict[str, Any], criteria: list[tuple[int, dict[str, Any]]]) -> float:
+def _total(rubric: dict[str, Any], criteria: list[WrittenCriterion]) -> float:
     """Return the most points that can be reached: those of a group in place of its criteria's."""
-    worth = {str(c.get("id")): float(c.get("points", 0)) for _, c in criteria}
+    worth = {criterion.id: float(criterion.data.get("points", 0)) for criterion in criteria}
     total = 0.0
     for group in map(as_map, as_map(rubric.get("groups")).values()):
         found = [worth.pop(name, 0.0) for _, name in as_texts(group.get("criteria"))]
@@ -236,9 +240,9 @@ def _total(rubric: dict[str, Any], criteria: list[tuple[int, dict[str, Any]]]) -
     return total + sum(worth.values())
 
 
-def _groups(rubric: dict[str, Any], criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
+def _groups(rubric: dict[str, Any], criteria: list[WrittenCriterion]) -> Iterator[Fault]:
     """A criterion is in one group at most, and those of which the best count are alike."""
-    known = {str(c.get("id")): c for _, c in criteria}
+    known = {criterion.id: criterion.data for criterion in criteria}
     other: dict[str, str] = {}
     for name, group in as_map(rubric.get("groups")).items():
         members = as_texts(as_map(group).get("criteria"))
@@ -272,26 +276,22 @@ def _best(
             yield (*path, "criteria"), f"need the same {key}, for only the best of them count"
 
 
-def _gates(rubric: dict[str, Any], criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
-    known = {str(c.get("id")): c for _, c in criteria}
+def _gates(rubric: dict[str, Any], criteria: list[WrittenCriterion]) -> Iterator[Fault]:
+    known = {criterion.id: criterion.data for criterion in criteria}
     for index, gate in as_maps(rubric.get("gates")):
         name, at_most = gate.get("criterion"), gate.get("at_most")
         if isinstance(name, str) and name not in known:
             near = did_you_mean(name, known)
             yield ("gates", index, "criterion"), f'there is no criterion "{name}"{near}'
         elif isinstance(name, str) and known[name].get("visibility") == "hidden":
-            yield (
-                ("gates", index, "criterion"),
-                f'"{name}" is hidden: students could not see why points are missing',
-            )
+            fault = f'"{name}" is hidden: students could not see why points are missing'
+            yield ("gates", index, "criterion"), fault
         if is_number(at_most) and 0 < at_most < 1:
             fault = f"is in points, not a share: write {at_most * TOTAL_POINTS:g}, or 0 for none"
             yield ("gates", index, "at_most"), fault
         if isinstance(at_most, int | float) and at_most >= TOTAL_POINTS:
-            yield (
-                ("gates", index, "at_most"),
-                f"{at_most:g} keeps nothing away: the rubric has {TOTAL_POINTS} points",
-            )
+            fault = f"{at_most:g} keeps nothing away: the rubric has {TOTAL_POINTS} points"
+            yield ("gates", index, "at_most"), fault
 
 
 def _late(rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -303,10 +303,8 @@ def _late(rubric: dict[str, Any]) -> Iterator[Fault]:
             yield ("late", key), f"is in percent, not a share: write {late[key] * 100:g}"
     grace, cut_off = late.get("grace_minutes"), late.get("cut_off_days")
     if isinstance(grace, int | float) and isinstance(cut_off, int | float) and grace > cut_off * 24 * 60:
-        yield (
-            ("late", "grace_minutes"),
-            f"is longer than cut_off_days, after which nothing counts: {cut_off:g}",
-        )
+        fault = f"is longer than cut_off_days, after which nothing counts: {cut_off:g}"
+        yield ("late", "grace_minutes"), fault
 
 
 def scenario_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:

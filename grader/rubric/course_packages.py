@@ -13,7 +13,7 @@ from typing import Any
 
 from grader.model.package import MANIFEST
 from grader.rubric.scenario import FOLDER_PATTERN, ROSTEST_ENDING
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, criteria_of, packages_in
 from grader.wording import did_you_mean
 
 FILES_MAX = 500
@@ -113,13 +113,12 @@ def _unknown_tests(rubric: dict[str, Any], start: KeyPath, name: str, text: str)
     tests = set(_TEST_NAME.findall(text))
     scenario = as_map(as_map(rubric.get("scenarios")).get(str(start[1])))
     process = next((one.get("name") for n, one in as_maps(scenario.get("start")) if n == start[3]), None)
-    for index, criterion in as_maps(rubric.get("criteria")):
-        given = as_map(criterion.get("with"))
-        test = given.get("test")
-        is_asked = criterion.get("scenario") == start[1] and given.get("process") == process
+    for criterion in criteria_of(rubric):
+        test = criterion.given.get("test")
+        is_asked = criterion.run == start[1] and criterion.given.get("process") == process
         if is_asked and isinstance(test, str) and test and "$(" not in text and test not in tests:
             fault = f'{name} has no <test test-name="{test}">{did_you_mean(test, tests)}'
-            yield ("criteria", index, "with", "test"), fault
+            yield (*criterion.at, "test"), fault
 
 
 def _started_programs(rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:

@@ -18,7 +18,7 @@ from grader.evidence.definitions import Field, Types, parse
 from grader.evidence.message_values import ANGLES, CLOCKS, FORMS, NOW, MessageType
 from grader.model.message_definitions import DIVIDER, PARTS
 from grader.ros_packages import ros_packages
-from grader.rubric.yaml_lines import KeyPath, as_map, as_maps, packages_in
+from grader.rubric.yaml_lines import KeyPath, as_map, as_maps, criteria_of, packages_in
 from grader.wording import closest, did_you_mean, is_one_edit, join_words
 
 ALMOST = 0.87
@@ -237,18 +237,18 @@ class Definitions:
 
 def own_texts(rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str, str, OwnText]]:
     """Yield each definition of a type that the rubric has: where, its type, the ending of its file."""
-    for index, criterion in as_maps(rubric.get("criteria")):
-        given = as_map(criterion.get("with"))
-        if criterion.get("check") == "topic-type" and isinstance(given.get("definition"), str):
-            path: KeyPath = ("criteria", index, "with", "definition")
+    for criterion in criteria_of(rubric):
+        given = criterion.given
+        if criterion.check == "topic-type" and isinstance(given.get("definition"), str):
+            path: KeyPath = (*criterion.at, "definition")
             yield path, str(given.get("type")), ".msg", OwnText(given["definition"], whole=True)
-        if criterion.get("check") == "definition":
+        if criterion.check == "definition":
             file = PurePosixPath(str(given.get("file")))
-            package = criterion.get("package") or next(iter(packages_in(rubric)), "")
+            package = criterion.data.get("package") or next(iter(packages_in(rubric)), "")
             text = given.get("text")
             own = OwnText(text, whole=True) if isinstance(text, str) and text else _of_fields(file, given)
             if file.suffix in PARTS:
-                path = ("criteria", index, "with", "text" if own.whole else "fields")
+                path = (*criterion.at, "text" if own.whole else "fields")
                 yield path, f"{package}/{file.stem}", file.suffix, own
     for name, scenario in as_map(rubric.get("scenarios")).items():
         for at, _, one in services_in(as_map(scenario)):

@@ -13,10 +13,19 @@ from grader.rubric.definitions import services_in
 from grader.rubric.simulators import set_in
 from grader.rubric.started import starts_of
 from grader.rubric.step_faults import count_causes, given_steps
-from grader.rubric.yaml_lines import Fault, KeyPath, as_list, as_map, as_maps, as_texts, texts_in
+from grader.rubric.yaml_lines import (
+    Fault,
+    KeyPath,
+    WrittenCriterion,
+    as_list,
+    as_map,
+    as_maps,
+    as_texts,
+    texts_in,
+)
 from grader.wording import join_words, plural
 
-Criteria = Sequence[tuple[int, dict[str, Any]]]
+Criteria = Sequence[WrittenCriterion]
 Scenarios = Mapping[str, dict[str, Any]]
 
 SHORTEST_S = {"reacts": 0.1, "action-result": 0.2, "stamps": 0.02}
@@ -37,7 +46,7 @@ def demand_warnings(rubric: dict[str, Any], criteria: Criteria, scenarios: Scena
     handout = str(rubric.get("handout") or "")
     yield from _ends_and_lives(criteria, scenarios)
     yield from _answers_waited_for(scenarios, handout)
-    yield from _more_values(criteria, scenarios, handout)
+    yield from _more_values(criteria, handout)
     yield from _left_out(scenarios)
     yield from _fewer_arguments(scenarios)
     yield from _numbers_as_text(scenarios)
@@ -52,38 +61,31 @@ def demand_warnings(rubric: dict[str, Any], criteria: Criteria, scenarios: Scena
     yield from _without_its_node(rubric, scenarios)
     yield from _silent_anyway(criteria)
     yield from _other_ends(criteria)
-    yield from _other_rows(criteria, scenarios)
+    yield from _other_rows(criteria)
     yield from _launched_nodes(criteria, scenarios)
     yield from _other_transforms(criteria, scenarios)
-    for index, criterion in criteria:
-        at, given, check = (
-            ("criteria", index, "with"),
-            as_map(criterion.get("with")),
-            str(criterion.get("check")),
-        )
-        scenario = scenarios.get(str(criterion.get("scenario")), {})
-        yield from _hard(at, check, given)
-        yield from _easy(at, check, given, scenario)
-        yield from _impossible(at, check, given)
-        yield from _not_its_name(at, given, rubric)
-        if check == "service-answers":
-            yield from _any_answer(at, given, scenario)
-        if check in OF_VALUES and not SIDEWAYS.search(handout):
-            yield from _never_set(at, given)
+    for criterion in criteria:
+        yield from _hard(criterion)
+        yield from _easy(criterion)
+        yield from _impossible(criterion)
+        yield from _not_its_name(criterion, rubric)
+        if criterion.check == "service-answers":
+            yield from _any_answer(criterion)
+        if criterion.check in OF_VALUES and not SIDEWAYS.search(handout):
+            yield from _never_set(criterion)
 
 
-def _hard(at: KeyPath, check: str, given: dict[str, Any]) -> Iterator[Fault]:
+def _hard(criterion: WrittenCriterion) -> Iterator[Fault]:
     """Yield demands that a correct node may miss."""
+    at, check, given = criterion.at, criterion.check, criterion.given
     within_s, least_s = given.get("within_s"), SHORTEST_S.get(check)
     if is_number(within_s) and least_s is not None and within_s < least_s:
         fault = f"{within_s:g} s is very short: on a busy machine a correct package may need more"
         yield (*at, "within_s"), fault
     tolerance, tolerance_m = given.get("tolerance"), given.get("tolerance_m")
     if check == "rate" and is_number(tolerance) and tolerance < STRICT:
-        yield (
-            (*at, "tolerance"),
-            f"{tolerance:g} is very strict: on a busy machine a correct package may miss it",
-        )
+        fault = f"{tolerance:g} is very strict: on a busy machine a correct package may miss it"
+        yield (*at, "tolerance"), fault
     for key in ("heading_tolerance_deg", "tolerance_deg"):
         if is_number(given.get(key)) and given[key] < CLOSE_DEG:
             yield (*at, key), f"{given[key]:g} is very strict: it is in degrees"
@@ -91,65 +93,57 @@ def _hard(at: KeyPath, check: str, given: dict[str, Any]) -> Iterator[Fault]:
         yield (*at, "tolerance_m"), f"{tolerance_m:g} m is very strict: no robot keeps it"
 
 
-def _easy(at: KeyPath, check: str, given: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:
+def _easy(criterion: WrittenCriterion) -> Iterator[Fault]:
     """Yield demands that a wrong node meets too."""
+    at, check, given = criterion.at, criterion.check, criterion.given
     tolerance = given.get("tolerance")
     if check == "rate" and is_number(tolerance) and tolerance >= LAX and is_number(given.get("rate_hz")):
         rates = [given["rate_hz"] * (1 + sign * tolerance) for sign in (-1, 1)]
-        yield (
-            (*at, "tolerance"),
-            f"all rates from {rates[0]:g} to {rates[1]:g} Hz pass: it is a share of the rate",
-        )
+        fault = f"all rates from {rates[0]:g} to {rates[1]:g} Hz pass: it is a share of the rate"
+        yield (*at, "tolerance"), fault
     if check == "node-lives" and given.get("min_s") == 0:
         yield (*at, "min_s"), "is 0 s: a node that ends at once passes"
     if check == "action-result" and given.get("feedback") == 0:
-        yield (
-            (*at, "feedback"),
-            "asks for none: leave it out, or give how many messages of feedback have to come",
-        )
-    for part in ((), ("cause",), ("effect",)):
-        asked = as_map(given.get(part[0])) if part else given
+        fault = "asks for none: leave it out, or give how many messages of feedback have to come"
+        yield (*at, "feedback"), fault
+    for place, asked in criterion.conditions:
         value, off = asked.get("value"), asked.get("tolerance")
         if is_number(value) and is_number(off) and off >= abs(value) > 0 and "field" in asked:
-            yield (
-                (*at, *part, "tolerance"),
-                f"is as large as the value, {value:g}: a field that is always 0 passes",
-            )
+            fault = f"is as large as the value, {value:g}: a field that is always 0 passes"
+            yield (*place, "tolerance"), fault
     if check == "field-bounds" and is_number(given.get("min")) and given.get("min") == given.get("max"):
         yield (*at, "max"), f"is min, too: only {given['min']:g} is within these bounds"
     if check == "stamps" and is_number(within_s := given.get("within_s")):
-        lasting_s = as_map(scenario.get("until")).get("window_s")
+        lasting_s = as_map(criterion.scenario.get("until")).get("window_s")
         if is_number(lasting_s) and within_s >= lasting_s:
-            yield (
-                (*at, "within_s"),
-                f"the run's window is {lasting_s:g} s: the time of the first message passes for all",
-            )
+            fault = f"the run's window is {lasting_s:g} s: the time of the first message passes for all"
+            yield (*at, "within_s"), fault
 
 
 def _silent_anyway(criteria: Criteria) -> Iterator[Fault]:
     """Yield silence that is asked of a node, without a criterion that has to see it publish on this topic."""
-    known = {str(one.get("id")): one for _, one in criteria}
-    for index, criterion in criteria:
-        given = as_map(criterion.get("with"))
-        topic = as_map(given.get("effect")).get("topic")
-        if criterion.get("check") != "reacts" or given.get("never") is not True:
+    known = {one.id: one for one in criteria}
+    for criterion in criteria:
+        topic = as_map(criterion.given.get("effect")).get("topic")
+        if criterion.check != "reacts" or criterion.given.get("never") is not True:
             continue
-        needed = [name for _, name in as_texts(criterion.get("requires"))]
+        needed = [name for name in criterion.requires if name in known]
         for name in needed:
-            needed += [n for _, n in as_texts(known.get(name, {}).get("requires")) if n not in needed]
-        if not any(_sees(known.get(name, {}), topic) for name in needed):
+            needed += [n for n in known[name].requires if n in known and n not in needed]
+        if not any(_sees(known[name], topic) for name in needed):
             fault = f"a node that never publishes on {topic} passes: let it require a criterion that sees it publish"
-            yield ("criteria", index, "with", "never"), f"{fault} there"
+            yield (*criterion.at, "never"), f"{fault} there"
 
 
-def _sees(criterion: dict[str, Any], topic: object) -> bool:
+def _sees(criterion: WrittenCriterion, topic: object) -> bool:
     """Return whether a criterion wants messages of the student's on the topic."""
-    given = as_map(criterion.get("with"))
+    given = criterion.given
     return topic in {given.get("topic"), as_map(given.get("effect")).get("topic")} and not given.get("never")
 
 
-def _impossible(at: KeyPath, check: str, given: dict[str, Any]) -> Iterator[Fault]:
+def _impossible(criterion: WrittenCriterion) -> Iterator[Fault]:
     """Yield bounds within which no robot drives forward, and constants that cannot be told from each other."""
+    at, check, given = criterion.at, criterion.check, criterion.given
     is_forward = given.get("field") == "linear.x" and str(given.get("topic")).endswith("cmd_vel")
     if check == "field-bounds" and is_forward and is_number(given.get("max")) and given["max"] <= 0:
         yield (*at, "max"), f"is {given['max']:g}: no robot may drive forward"
@@ -160,53 +154,47 @@ def _impossible(at: KeyPath, check: str, given: dict[str, Any]) -> Iterator[Faul
             yield (*at, "constants", name), f"has the value of {same}"
 
 
-def _not_its_name(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+def _not_its_name(criterion: WrittenCriterion, rubric: dict[str, Any]) -> Iterator[Fault]:
     """Yield names that end in digits, where the rubric has parameters or services below the name without them."""
-    names = (
-        [name.strip("/") for _, name in as_texts(given.get("names"))]
-        if given.get("anonymous") == "required"
-        else []
-    )
+    if criterion.given.get("anonymous") != "required":
+        return
+    names = [name.strip("/") for _, name in as_texts(criterion.given.get("names"))]
     texts = [text for path, text in texts_in((), rubric) if path[:1] in {("scenarios",), ("criteria",)}]
     below = next((text for text in texts for name in names if re.fullmatch(rf"/{name}/\w+", text)), None)
     if below is not None:
-        yield (
-            (*at, "anonymous"),
-            f"is required, and the rubric names {below}, which is below a name without digits",
-        )
+        fault = f"is required, and the rubric names {below}, which is below a name without digits"
+        yield (*criterion.at, "anonymous"), fault
 
 
-def _never_set(at: KeyPath, given: dict[str, Any]) -> Iterator[Fault]:
+def _never_set(criterion: WrittenCriterion) -> Iterator[Fault]:
     """Yield fields of velocities that a robot on wheels leaves at 0, and of which 0 is asked."""
-    for part in ((), ("effect",)):
-        asked = as_map(given.get(part[0])) if part else given
+    for at, asked in criterion.conditions:
         field, value = asked.get("field"), asked.get("value")
         least, most = asked.get("min", 0), asked.get("max", 0)
         bounded = is_number(least) and is_number(most) and least <= 0 <= most
         is_zero = value == 0 if "value" in asked else bounded
-        if field in UNSET and str(asked.get("topic")).endswith("cmd_vel") and is_zero:
+        is_velocity = field in UNSET and str(asked.get("topic")).endswith("cmd_vel")
+        if is_velocity and is_zero and at[-1] != "cause":
             fault = f"{field} is 0 in each message of a robot on wheels: a node that never sets it passes"
-            yield (*at, *part, "field"), fault
+            yield (*at, "field"), fault
 
 
-def _any_answer(at: KeyPath, given: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:
-    expect, service = given.get("expect"), given.get("service")
-    kinds = {str(one.get("type")) for _, _, one in services_in(scenario) if one.get("service") == service}
+def _any_answer(criterion: WrittenCriterion) -> Iterator[Fault]:
+    expect, service = criterion.given.get("expect"), criterion.given.get("service")
+    services = services_in(criterion.scenario)
+    kinds = {str(one.get("type")) for _, _, one in services if one.get("service") == service}
     if isinstance(expect, list) and expect and not any(expect) and kinds - {EMPTY}:
-        yield (*at, "expect"), "is right for any answer: give the fields that it has to have"
+        yield (*criterion.at, "expect"), "is right for any answer: give the fields that it has to have"
 
 
 def _ends_and_lives(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
     """Yield runs that wait for the end of a process, while a criterion wants the same one to stay alive."""
     lives: dict[str, str] = {}
-    for _, criterion in criteria:
-        run, process = (
-            scenarios.get(str(criterion.get("scenario")), {}),
-            as_map(criterion.get("with")).get("process"),
-        )
-        if criterion.get("check") == "node-lives":
-            found = (start for start in starts_of(run) if start.get("name") == process)
-            lives.update({_what(start): str(criterion.get("id")) for start in found})
+    for criterion in criteria:
+        if criterion.check == "node-lives":
+            process = criterion.given.get("process")
+            found = (start for start in starts_of(criterion.scenario) if start.get("name") == process)
+            lives.update({_what(start): criterion.id for start in found})
     for name, scenario in scenarios.items():
         starts = {str(start.get("name")): start for start in starts_of(scenario)}
         for index, ended in as_texts(as_map(scenario.get("until")).get("ended")):
@@ -242,57 +230,50 @@ def _answers_waited_for(scenarios: Scenarios, handout: str) -> Iterator[Fault]:
                 yield ("scenarios", name, "until", "messages", topic), fault
 
 
-def _more_values(criteria: Criteria, scenarios: Scenarios, handout: str) -> Iterator[Fault]:
+def _more_values(criteria: Criteria, handout: str) -> Iterator[Fault]:
     """Yield more values than the run sends messages, where the node answers each with one, or has causes to change."""
-    paced = {
-        as_map(one.get("with")).get("topic") for _, one in criteria if "rate_hz" in as_map(one.get("with"))
-    }
-    for index, criterion in criteria:
-        name = str(criterion.get("scenario"))
-        sent, given = _sent(scenarios.get(name, {})), as_map(criterion.get("with"))
-        values = given.get("values")
-        count = len(values) if isinstance(values, list) else 0
-        causes = count_causes(scenarios.get(name, {}))
-        if causes is not None and count - 1 > causes and given.get("topic") not in paced:
-            gives = f"the steps of {name} give the node {plural(causes, 'cause')} to change it"
-            yield (
-                ("criteria", index, "with", "values"),
-                f"are {count}, and {gives}: does it change by itself?",
-            )
+    paced = {one.given.get("topic") for one in criteria if "rate_hz" in one.given}
+    for criterion in criteria:
+        sent, count = _sent(criterion.scenario), len(as_list(criterion.given.get("values")))
+        causes = count_causes(criterion.scenario)
+        if causes is not None and count - 1 > causes and criterion.given.get("topic") not in paced:
+            gives = f"the steps of {criterion.run} give the node {plural(causes, 'cause')} to change it"
+            yield (*criterion.at, "values"), f"are {count}, and {gives}: does it change by itself?"
             continue
         if sent and count == sent + 1 and not PERIODIC.search(handout) and re.search(r"\beach\b", handout):
-            fault = f"are {count}, and {criterion.get('scenario')} sends {plural(sent, 'message')}"
-            yield ("criteria", index, "with", "values"), fault
+            fault = f"are {count}, and {criterion.run} sends {plural(sent, 'message')}"
+            yield (*criterion.at, "values"), fault
 
 
 def _other_ends(criteria: Criteria) -> Iterator[Fault]:
     """Yield ends of a path that have the numbers of the same run's goal, with other signs or in another order."""
-    goals = [(one, as_map(one.get("with"))) for _, one in criteria if one.get("check") == "ends-at"]
-    for index, criterion in criteria:
-        path, judged = as_map(criterion.get("with")), criterion.get("scenario")
-        points = as_list(path.get("points")) if criterion.get("check") == "path" else []
-        for other, asked in goals if points else ():
-            end, goal = as_list(points[-1]), as_list(asked.get("goal"))
-            is_same = (other.get("scenario"), asked.get("topic")) == (judged, path.get("topic"))
-            if "asked_on" in asked or not is_same or not all(map(is_number, (*end, *goal))) or end == goal:
+    goals = [one for one in criteria if one.check == "ends-at"]
+    for criterion in criteria:
+        points = as_list(criterion.given.get("points")) if criterion.check == "path" else []
+        for other in goals if points else ():
+            end, goal = as_list(points[-1]), as_list(other.given.get("goal"))
+            is_same = other.run == criterion.run and other.given.get("topic") == criterion.given.get("topic")
+            if (
+                "asked_on" in other.given
+                or not is_same
+                or not all(map(is_number, (*end, *goal)))
+                or end == goal
+            ):
                 continue
             if sorted(map(abs, end)) == sorted(map(abs, goal)):
-                fault = f"is {end}, and {other.get('id')} wants it to end at {goal}"
-                yield ("criteria", index, "with", "points", len(points) - 1), fault
+                fault = f"is {end}, and {other.id} wants it to end at {goal}"
+                yield (*criterion.at, "points", len(points) - 1), fault
 
 
-def _other_rows(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
+def _other_rows(criteria: Criteria) -> Iterator[Fault]:
     """Yield more rows than the run sends messages, of which the program is to write each; and bounds that what it sends
     is not within."""
-    for index, criterion in criteria:
-        given, scenario = as_map(criterion.get("with")), scenarios.get(str(criterion.get("scenario")), {})
-        rows, count, at = given.get("rows_at_least"), _sent(scenario), ("criteria", index, "with")
+    for criterion in criteria:
+        at, scenario = criterion.at, criterion.scenario
+        rows, count = criterion.given.get("rows_at_least"), _sent(scenario)
         if is_number(rows) and 0 < count < rows <= 2 * count and len(starts_of(scenario)) == 1:
-            yield (
-                (*at, "rows_at_least"),
-                f"is {rows}, and {criterion.get('scenario')} sends {plural(count, 'message')}",
-            )
-        bounds = as_map(given.get("bounds"))
+            yield (*at, "rows_at_least"), f"is {rows}, and {criterion.run} sends {plural(count, 'message')}"
+        bounds = as_map(criterion.given.get("bounds"))
         sent = [one for step in given_steps(scenario, "publish") for one in as_list(step.get("values"))]
         for column, bound in bounds.items() if len(bounds) == 1 and all(map(is_number, sent)) else ():
             low, high = (as_map(bound).get(key) for key in ("min", "max"))
@@ -300,7 +281,7 @@ def _other_rows(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
                 one for one in sent if (is_number(low) and one < low) or (is_number(high) and one > high)
             ]
             if 0 < len(outside) < len(sent):
-                fault = f"{criterion.get('scenario')} sends {outside[0]:g}, which is not within them"
+                fault = f"{criterion.run} sends {outside[0]:g}, which is not within them"
                 yield (*at, "bounds", column), fault
 
 
@@ -369,42 +350,37 @@ def _numbers_as_text(scenarios: Scenarios) -> Iterator[Fault]:
 def _other_lengths(criteria: Criteria) -> Iterator[Fault]:
     """Yield lists of another length than an earlier criterion wants of the same field in the same run."""
     first: dict[tuple[str, ...], tuple[str, int]] = {}
-    for index, criterion in criteria:
-        given = as_map(criterion.get("with"))
+    for criterion in criteria:
+        given = criterion.given
         value = given.get("value")
-        if criterion.get("check") == "field-equals" and isinstance(value, list):
-            key = tuple(
-                str(one) for one in (criterion.get("scenario"), given.get("topic"), given.get("field"))
-            )
-            earlier, length = first.setdefault(key, (str(criterion.get("id")), len(value)))
+        if criterion.check == "field-equals" and isinstance(value, list):
+            key = (criterion.run, str(given.get("topic")), str(given.get("field")))
+            earlier, length = first.setdefault(key, (criterion.id, len(value)))
             if length != len(value):
                 fault = (
                     f"has {plural(len(value), 'item')}, and {earlier} has {length} for {key[2]} of {key[1]}"
                 )
-                yield ("criteria", index, "with", "value"), fault
+                yield (*criterion.at, "value"), fault
 
 
 def _other_counters(criteria: Criteria) -> Iterator[Fault]:
     """Yield ends of a counter that an earlier criterion has otherwise."""
     first: dict[tuple[str, str], tuple[str, object]] = {}
-    for index, criterion in criteria:
-        given = as_map(criterion.get("with"))
-        for key in ("minimum", "maximum") if str(criterion.get("check")).startswith("counter-") else ():
+    for criterion in criteria:
+        given = criterion.given
+        for key in ("minimum", "maximum") if criterion.check.startswith("counter-") else ():
             if key in given:
-                earlier, value = first.setdefault(
-                    (str(given.get("topic")), key), (str(criterion.get("id")), given[key])
-                )
+                topic = str(given.get("topic"))
+                earlier, value = first.setdefault((topic, key), (criterion.id, given[key]))
                 if value != given[key]:
-                    yield ("criteria", index, "with", key), f"is {given[key]}, and {earlier} has {value}"
+                    yield (*criterion.at, key), f"is {given[key]}, and {earlier} has {value}"
 
 
 def _late(late: dict[str, Any]) -> Iterator[Fault]:
     lost, cap = late.get("lost"), late.get("cap", 100)
     if is_number(lost) and is_number(cap) and cap < lost:
-        yield (
-            ("late", "cap"),
-            f"{cap:g} is less than the {lost:g} that are lost for the first {late.get('per', 'day')}",
-        )
+        fault = f"{cap:g} is less than the {lost:g} that are lost for the first {late.get('per', 'day')}"
+        yield ("late", "cap"), fault
     if late.get("cut_off_days") == 0 and lost:
         yield ("late", "cut_off_days"), "with 0 nothing counts that is late: lost and per then mean nothing"
 
@@ -412,13 +388,11 @@ def _late(late: dict[str, Any]) -> Iterator[Fault]:
 def _unlike_others(criteria: Criteria) -> Iterator[Fault]:
     """Yield values of a field that are ten or a hundred times what other criteria want of it."""
     wanted: list[tuple[KeyPath, tuple[str, str], float]] = []
-    for index, criterion in criteria:
-        given = as_map(criterion.get("with"))
-        for part in ((), ("cause",), ("effect",)):
-            asked = as_map(given.get(part[0])) if part else given
+    for criterion in criteria:
+        for at, asked in criterion.conditions:
             if is_number(asked.get("value")) and "field" in asked:
                 place = str(asked.get("topic")), str(asked["field"])
-                wanted.append((("criteria", index, "with", *part, "value"), place, float(asked["value"])))
+                wanted.append(((*at, "value"), place, float(asked["value"])))
     for number, (at, place, value) in enumerate(wanted):
         others = [other for n, (_, there, other) in enumerate(wanted) if there == place and n != number]
         near = [other for other in others if other and round(value / other, 6) in {10, 100, 0.1, 0.01}]
@@ -429,19 +403,16 @@ def _unlike_others(criteria: Criteria) -> Iterator[Fault]:
 def _never_changed(criteria: Criteria) -> Iterator[Fault]:
     """Yield values of the first and of the last message that are the same: a node that never changes them passes."""
     first: dict[tuple[str, ...], tuple[str, object]] = {}
-    for index, criterion in criteria:
-        given = as_map(criterion.get("with"))
+    for criterion in criteria:
+        given = criterion.given
         when, value = given.get("when"), given.get("value")
-        key = tuple(map(str, (criterion.get("scenario"), given.get("topic"), given.get("field"))))
-        if criterion.get("check") == "field-equals" and when in ("first", "last"):
-            earlier, other = first.setdefault(key, (str(criterion.get("id")), value))
-            if (
-                earlier != criterion.get("id")
-                and value == other
-                and isinstance(value, bool | int | float | str)
-            ):
+        key = (criterion.run, str(given.get("topic")), str(given.get("field")))
+        if criterion.check == "field-equals" and when in ("first", "last"):
+            earlier, other = first.setdefault(key, (criterion.id, value))
+            is_same = value == other and isinstance(value, bool | int | float | str)
+            if earlier != criterion.id and is_same:
                 fault = f"{earlier} wants {json.dumps(value)} too: a node that never changes it passes both"
-                yield ("criteria", index, "with", "value"), fault
+                yield (*criterion.at, "value"), fault
 
 
 def _in_another_order(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
@@ -454,10 +425,10 @@ def _in_another_order(criteria: Criteria, scenarios: Scenarios) -> Iterator[Faul
         for at, part, one in services_in(scenario):
             if part == "request":
                 found.append((("scenarios", name, *at, part), _as_arguments(one.get(part))))
-    for index, criterion in criteria:
-        if criterion.get("check") == "calls":
-            expect = as_map(criterion.get("with")).get("expect")
-            found.append((("criteria", index, "with", "expect"), _as_arguments(expect)))
+    for criterion in criteria:
+        if criterion.check == "calls":
+            expect = criterion.given.get("expect")
+            found.append(((*criterion.at, "expect"), _as_arguments(expect)))
     for number, (at, values) in enumerate(found):
         others = [
             other for n, (_, other) in enumerate(found) if n != number and sorted(other) == sorted(values)
@@ -483,17 +454,13 @@ def _other_owners(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
     for name, scenario in scenarios.items():
         given = [(at, str(one.get("name")).strip("/").split("/")) for at, one in set_in(scenario)]
         owners = [parts[0] for _, parts in given if len(parts) > 1]
-        about = [as_map(one.get("with")) for _, one in criteria if one.get("scenario") == name]
+        about = [one.given for one in criteria if one.run == name]
         nodes = {node for one in about for _, node in as_texts(one.get("names"))}
         programs = {str(start.get("program")).rpartition("/")[2] for start in starts_of(scenario)}
         for at, parts in given:
             others = {owner for owner in owners if owner != parts[0]}
-            if (
-                len(parts) > 1
-                and owners.count(parts[0]) == 1
-                and len(others) == 1
-                and others <= nodes - programs
-            ):
+            is_alone = len(parts) > 1 and owners.count(parts[0]) == 1
+            if is_alone and len(others) == 1 and others <= nodes - programs:
                 fault = (
                     f"is below {parts[0]}, and the node is called {min(others)}, as for the other parameters"
                 )
@@ -511,16 +478,13 @@ def _waited_for_nothing(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fa
         waited: dict[str, KeyPath] = {topic: ("messages", topic) for topic in as_map(until.get("messages"))}
         waited |= {topic: (key, n) for key in TOPICS_WAITED for n, topic in as_texts(until.get(key))}
         named = {text for key, part in scenario.items() for _, text in texts_in((), part)}
-        about = [as_map(one.get("with")) for _, one in criteria if one.get("scenario") == name]
+        about = [one.given for one in criteria if one.run == name]
         judged = {text for one in about for _, text in texts_in((), one)}
         topics = sorted({str(one["topic"]) for one in about if "topic" in one} - named)
+        has_program = any(start.get("program") for start in starts_of(scenario))
         for topic, at in waited.items():
             near = [one for one in topics if _is_beside(topic, one) or _is_elsewhere(topic, one)]
-            if (
-                topic not in judged
-                and near
-                and not any(start.get("program") for start in starts_of(scenario))
-            ):
+            if topic not in judged and near and not has_program:
                 fault = f"no criterion of {name} is about {topic}, and one is about {near[0]}: is that meant?"
                 yield ("scenarios", name, "until", *at), fault
 
@@ -560,19 +524,16 @@ def _launched_nodes(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]
     rubric's among these that another run starts from another package."""
     programs = [str(start.get("program")) for one in scenarios.values() for start in starts_of(one)]
     owners = {PurePosixPath(program).stem: program.partition("/")[0] for program in programs}
-    for index, criterion in criteria:
-        name, nodes = str(criterion.get("scenario")), as_map(as_map(criterion.get("with")).get("nodes"))
-        scenario = scenarios.get(name, {})
+    for criterion in criteria:
+        nodes, scenario = as_map(criterion.given.get("nodes")), criterion.scenario
         for node, package in nodes.items():
             owner = owners.get(str(node).rpartition("/")[2])
             if owner and isinstance(package, str) and package != owner:
-                yield ("criteria", index, "with", "nodes", node), f"is of {owner} elsewhere in the rubric"
+                yield (*criterion.at, "nodes", node), f"is of {owner} elsewhere in the rubric"
         count = as_map(scenario.get("until")).get("nodes")
         if nodes and isinstance(count, int) and count > len(nodes) and len(starts_of(scenario)) == 1:
-            fault = (
-                f"{criterion.get('id')} names {plural(len(nodes), 'node')}: the run waits for more than these"
-            )
-            yield ("scenarios", name, "until", "nodes"), fault
+            fault = f"{criterion.id} names {plural(len(nodes), 'node')}: the run waits for more than these"
+            yield ("scenarios", criterion.run, "until", "nodes"), fault
 
 
 def _other_transforms(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
@@ -581,20 +542,17 @@ def _other_transforms(criteria: Criteria, scenarios: Scenarios) -> Iterator[Faul
     for scenario in scenarios.values():
         for one in given_steps(scenario, "transform"):
             sent[(str(one.get("parent")), str(one.get("child")))] = one.get("static") is True
-    for index, criterion in criteria:
-        given = as_map(criterion.get("with"))
+    for criterion in criteria:
+        given = criterion.given
         is_static = sent.get((str(given.get("parent")), str(given.get("child"))))
-        asked = given.get("static") if criterion.get("check") == "transform" else None
+        asked = given.get("static") if criterion.check == "transform" else None
         if is_static is not None and isinstance(asked, bool) and asked != is_static:
             kind = "static" if is_static else "not static"
-            yield (
-                ("criteria", index, "with", "static"),
-                f"elsewhere the rubric sends this transform, and it is {kind}",
-            )
+            yield (*criterion.at, "static"), f"elsewhere the rubric sends this transform, and it is {kind}"
         parents = {parent for parent, child in sent if child == given.get("child")} - {given.get("parent")}
-        is_direct = criterion.get("check") == "transform" and given.get("through") is not True
+        is_direct = criterion.check == "transform" and given.get("through") is not True
         if is_direct and is_static is None and parents:
             fault = (
                 f"elsewhere {given.get('child')} is in {join_words(sorted(parents))}: a frame has one parent"
             )
-            yield ("criteria", index, "with", "parent"), fault
+            yield (*criterion.at, "parent"), fault

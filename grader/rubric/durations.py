@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -14,7 +14,7 @@ from grader.checks.reacts import Condition
 from grader.checks.support.fields import Reading, is_number
 from grader.rubric.scenario import ROSTEST_ENDING, Action, Probe, Scenario, Step, Until
 from grader.rubric.step_faults import ROWS_PER_MESSAGE, given_steps
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps
+from grader.rubric.yaml_lines import Fault, KeyPath, WrittenCriterion, as_map, as_maps
 from grader.wording import plural, significant
 
 FASTEST_HZ = 100
@@ -25,16 +25,6 @@ SUBSCRIBE_S, ANSWER_S = 6.0, 10.0
 """How long a run waits for a subscriber of one more topic, and for the answer of a service."""
 SEEN = ("messages", "connected", "heard", "nodes", "opened")
 """Conditions of `until` that hold soon after the grader's last message, or not at all."""
-
-
-class Asked(NamedTuple):
-    """A criterion: the place of its parameters, its check, they, its scenario's name, and that."""
-
-    path: KeyPath
-    check: str
-    given: dict[str, Any]
-    name: str
-    scenario: dict[str, Any]
 
 
 LASTING = ("window_s", "alive_s")
@@ -142,11 +132,11 @@ def _waits_s(step: Step, first_s: float) -> float:
     return first_s if step.published is not None else 0.0
 
 
-def often_faults(about: Asked) -> Iterator[Fault]:
+def often_faults(about: WrittenCriterion) -> Iterator[Fault]:
     """Yield rows and feedback of which more are asked for than come in that time, however fast a node is."""
     rows = about.given.get("rows_at_least")
     if about.check == "file-left" and is_number(rows):
-        yield from (((*about.path, "rows_at_least"), fault) for fault in _too_many_rows(rows, about))
+        yield from (((*about.at, "rows_at_least"), fault) for fault in _too_many_rows(rows, about))
     goal = _goal(about)
     asked = about.given.get("feedback")
     if goal is not None and is_number(asked):
@@ -155,10 +145,10 @@ def often_faults(about: Asked) -> Iterator[Fault]:
         )
         if asked > FASTEST_HZ * lasting_s:
             fault = f"{asked} in {lasting_s:g} s, which the step gives the goal, are more than {FASTEST_HZ} a second"
-            yield (*about.path, "feedback"), fault
+            yield (*about.at, "feedback"), fault
 
 
-def _goal(about: Asked) -> dict[str, Any] | None:
+def _goal(about: WrittenCriterion) -> dict[str, Any] | None:
     """Return the step that sends the goal of which an action-result speaks."""
     number = about.given.get("goal", 1)
     goals = [
@@ -172,17 +162,17 @@ def _limit_s(goal: dict[str, Any]) -> Any:  # noqa: ANN401 - whatever the rubric
     return goal.get("limit_s", Action.model_fields["limit_s"].default)
 
 
-def _too_many_rows(rows: float, about: Asked) -> Iterator[str]:
+def _too_many_rows(rows: float, about: WrittenCriterion) -> Iterator[str]:
     most_s = longest_s(about.scenario)
     if most_s and rows > FASTEST_HZ * most_s:
-        yield f"{rows} rows in {most_s:g} s, which {about.name} lasts at most, are more than {FASTEST_HZ} a second"
+        yield f"{rows} rows in {most_s:g} s, which {about.run} lasts at most, are more than {FASTEST_HZ} a second"
         return
     fed = _fed(about.scenario)
     if fed is None:
         return
     count, lasting_s = fed
     if count and rows > ROWS_PER_MESSAGE * count + ROWS_HZ * (lasting_s + ROWS_LONGER_S):
-        sends = f"{about.name} sends the node {plural(count, 'message')}, and is over {lasting_s + ROWS_LONGER_S:.2g} s"
+        sends = f"{about.run} sends the node {plural(count, 'message')}, and is over {lasting_s + ROWS_LONGER_S:.2g} s"
         yield f"{sends} after its start: so many rows never come"
 
 
@@ -203,10 +193,10 @@ def _fed(scenario: dict[str, Any]) -> tuple[int, float] | None:
     return count, probed_s + sum(step.lasts_s for step in steps) + max(lasting)
 
 
-def within_faults(about: Asked) -> Iterator[Fault]:
+def within_faults(about: WrittenCriterion) -> Iterator[Fault]:
     """Yield times in which something has to come, and that are longer than the run waits for it."""
     within_s, goal, most_s = about.given.get("within_s"), _goal(about), longest_s(about.scenario)
-    at = (*about.path, "within_s")
+    at = (*about.at, "within_s")
     if not is_number(within_s):
         return
     if goal is not None and is_number(limit_s := _limit_s(goal)) and within_s > limit_s:
@@ -223,10 +213,10 @@ def within_faults(about: Asked) -> Iterator[Fault]:
             )
             yield at, f"{fault}: give it a longer limit_s"
     if about.check in {"reacts", "ends-at"} and most_s is not None and within_s >= most_s:
-        yield at, f"{about.name} lasts {most_s:g} s at most: what comes later is not seen"
+        yield at, f"{about.run} lasts {most_s:g} s at most: what comes later is not seen"
 
 
-def stretch_faults(about: Asked) -> Iterator[Fault]:
+def stretch_faults(about: WrittenCriterion) -> Iterator[Fault]:
     """Yield rates that are judged while something is so that the run's steps keep up for too short a time."""
     try:
         params = RateParams.model_validate(about.given) if about.check == "rate" else None
@@ -237,9 +227,9 @@ def stretch_faults(about: Asked) -> Iterator[Fault]:
     longest = _kept_up_s(params.cause, about.scenario)
     needs_s = params.within_s + params.min_window_s
     if longest and longest < needs_s:
-        keeps = f"{about.name} keeps {params.cause.words} up for {significant(longest)} s at most"
+        keeps = f"{about.run} keeps {params.cause.words} up for {significant(longest)} s at most"
         takes = f"within_s and min_window_s are {significant(needs_s)} s"
-        yield (*about.path, "within_s"), f"{keeps}, and {takes}: let a step wait for longer"
+        yield (*about.at, "within_s"), f"{keeps}, and {takes}: let a step wait for longer"
 
 
 def _kept_up_s(cause: Condition, scenario: dict[str, Any]) -> float | None:

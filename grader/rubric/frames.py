@@ -10,7 +10,15 @@ from typing import Any
 from grader.checks.support.fields import is_number
 from grader.rubric.message_fields import POSES, types_of
 from grader.rubric.step_faults import given_steps
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, own_packages
+from grader.rubric.yaml_lines import (
+    Fault,
+    KeyPath,
+    WrittenCriterion,
+    as_map,
+    as_maps,
+    criteria_of,
+    own_packages,
+)
 
 FRAME_KEYS = frozenset({"frame_id", "child_frame_id"})
 ANGLES = frozenset({"rotation_deg", "rpy_deg", "heading_deg"})
@@ -26,33 +34,24 @@ ROUNDED = 0.004
 
 def frame_faults(rubric: dict[str, Any]) -> Iterator[Fault]:
     """Yield frames that begin with a slash, angles in the other unit, and parents that are children elsewhere."""
-    scenarios, criteria = as_map(rubric.get("scenarios")), list(as_maps(rubric.get("criteria")))
-    for name, scenario in scenarios.items():
+    criteria = criteria_of(rubric)
+    for name, scenario in as_map(rubric.get("scenarios")).items():
         for index, step in as_maps(as_map(scenario).get("steps")):
             for key in ("parent", "child"):
-                at = ("scenarios", name, "steps", index, "transform", key)
-                yield from _slash(at, as_map(step.get("transform")).get(key))
+                place = ("scenarios", name, "steps", index, "transform", key)
+                yield from _slash(place, as_map(step.get("transform")).get(key))
         yield from _in_values(("scenarios", name), scenario)
         yield from _two_parents(("scenarios", name), as_map(scenario))
-        asked = [
-            pair
-            for n, one in criteria
-            if one.get("scenario") != name and not any(_swapped_frames(n, criteria, _run_of(one, scenarios)))
-            for pair in _asked_frames([one])
-        ]
-        yield from _swapped_steps(("scenarios", name), as_map(scenario), asked)
+        others = [one for one in criteria if one.run != name and not any(_swapped_frames(one, criteria))]
+        yield from _swapped_steps(("scenarios", name), as_map(scenario), _asked_frames(others))
         yield from _sent_turns(("scenarios", name), as_map(scenario), rubric)
-    for index, criterion in criteria:
-        scenario, given = _run_of(criterion, scenarios), as_map(criterion.get("with"))
-        yield from _in_values(("criteria", index, "with"), given)
-        yield from _judged_turns(("criteria", index, "with"), given, rubric, scenario)
-        if criterion.get("check") == "transform":
-            yield from _swapped_frames(index, criteria, scenario)
-            yield from _no_pose(("criteria", index, "with"), criterion, rubric, scenario)
-
-
-def _run_of(criterion: dict[str, Any], scenarios: dict[str, Any]) -> dict[str, Any]:
-    return as_map(scenarios.get(str(criterion.get("scenario"))))
+    for criterion in criteria:
+        yield from _in_values(criterion.at, criterion.given)
+        for at, asked in criterion.conditions:
+            yield from _judged_turns(at, asked, rubric, criterion.scenario)
+        if criterion.check == "transform":
+            yield from _swapped_frames(criterion, criteria)
+            yield from _no_pose(criterion, rubric)
 
 
 def _sent_turns(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -85,15 +84,13 @@ def _judged_turns(
 ) -> Iterator[Fault]:
     """Yield angles in degrees that a criterion asks for in a field of one of ROS's own types."""
     field, topic = str(given.get("field")), str(given.get("topic"))
+    if not field.startswith("angular.") and field.partition(".")[0].partition("[")[0] not in IN_RADIANS:
+        return
     types = [str(kind) for kind in types_of(topic, rubric, scenario)]
     own = [kind for kind in types if kind.partition("/")[0] in own_packages(rubric)]
-    is_turn = field.startswith("angular.") or field.partition(".")[0].partition("[")[0] in IN_RADIANS
-    if is_turn and not own and (types or field.startswith("angular.")):
+    if not own and (types or field.startswith("angular.")):
         for key in ("value", "values", "min", "max"):
             yield from _turns((*path, key), given.get(key), is_angle=True)
-    for key in ("cause", "effect"):
-        if isinstance(given.get(key), dict):
-            yield from _judged_turns((*path, key), given[key], rubric, scenario)
 
 
 def _two_parents(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
@@ -107,23 +104,20 @@ def _two_parents(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
             yield (*path, "steps", index, "transform", "child"), fault
 
 
-def _no_pose(
-    path: KeyPath, criterion: dict[str, Any], rubric: dict[str, Any], scenario: dict[str, Any]
-) -> Iterator[Fault]:
+def _no_pose(criterion: WrittenCriterion, rubric: dict[str, Any]) -> Iterator[Fault]:
     """Yield a topic of poses that has none, and poses of the grader's that no transform can follow."""
-    given = as_map(criterion.get("with"))
-    topic = given.get("pose_of")
+    scenario, topic = criterion.scenario, criterion.given.get("pose_of")
     if not isinstance(topic, str):
         return
     types = {str(kind) for kind in types_of(topic, rubric, scenario)}
     known = {kind for kind in types if kind.partition("/")[0] not in own_packages(rubric)}
     if known and known.isdisjoint(POSES):
-        yield (*path, "pose_of"), f"{topic} carries {min(known)}, which has no pose"
+        yield (*criterion.at, "pose_of"), f"{topic} carries {min(known)}, which has no pose"
     for index, step in as_maps(scenario.get("steps")):
         publish = as_map(step.get("publish"))
         if publish.get("topic") == topic and publish.get("type") == POSES[0]:
-            at = ("scenarios", str(criterion.get("scenario")), "steps", index, "publish", "value")
-            faults = _unlike(as_map(publish.get("value")), given, str(criterion.get("id")))
+            at = ("scenarios", criterion.run, "steps", index, "publish", "value")
+            faults = _unlike(as_map(publish.get("value")), criterion.given, criterion.id)
             yield from (((*at, *key), fault) for key, fault in faults)
 
 
@@ -132,10 +126,10 @@ def _unlike(value: dict[str, Any], given: dict[str, Any], name: str) -> Iterator
     it."""
     pose, header = as_map(as_map(value.get("pose")).get("pose")), as_map(value.get("header"))
     if not pose.get("orientation"):
-        yield (
-            ("pose", "pose"),
-            "has no orientation, and tf takes none that is all zero: write {w: 1}, or {rpy_deg: [0, 0, 90]}",
+        fault = (
+            "has no orientation, and tf takes none that is all zero: write {w: 1}, or {rpy_deg: [0, 0, 90]}"
         )
+        yield ("pose", "pose"), fault
     found = (header.get("frame_id"), value.get("child_frame_id"))
     if given.get("through") is True or found == (given.get("child"), given.get("parent")):
         return
@@ -176,10 +170,10 @@ def _no_rotation(path: KeyPath, value: object) -> Iterator[Fault]:
     numbers = [one for one in given.values() if is_number(one)]
     length = math.hypot(*numbers)
     if set(given) <= set("xyzw") and len(numbers) == len(given) and length and abs(length - 1) > UNEQUAL:
-        yield (
-            path,
-            f"is a quaternion, whose length is 1, not {length:.3g}: write {{rpy_deg: [0, 0, 90]}}, in degrees",
+        fault = (
+            f"is a quaternion, whose length is 1, not {length:.3g}: write {{rpy_deg: [0, 0, 90]}}, in degrees"
         )
+        yield path, fault
 
 
 def _numbers(value: object) -> Iterator[float]:
@@ -197,32 +191,29 @@ def _in_degrees(angle: float) -> int:
     return 45 * eighths if is_one and not angle.is_integer() else 0
 
 
-def _swapped_frames(
-    index: int, criteria: list[tuple[int, dict[str, Any]]], scenario: dict[str, Any]
-) -> Iterator[Fault]:
+def _swapped_frames(criterion: WrittenCriterion, criteria: list[WrittenCriterion]) -> Iterator[Fault]:
     """Yield a transform whose parent is its child for what the scenario sends, or for an earlier criterion."""
-    given = as_map(next(one for n, one in criteria if n == index).get("with"))
+    given, scenario = criterion.given, criterion.scenario
     parent, child = given.get("parent"), given.get("child")
     if given.get("through") is True:
         return
     sent = [(one.get("parent"), one.get("child")) for one in given_steps(scenario, "transform")]
-    sent += _asked_frames([one for n, one in criteria if n < index])
-    equal = [as_map(one.get("with")) for _, one in criteria if one.get("check") == "field-equals"]
-    named = {
-        str(one.get("field")): one.get("value") for one in equal if one.get("topic") == given.get("pose_of")
-    }
+    sent += _asked_frames(one for one in criteria if one.place < criterion.place)
+    equal = [one.given for one in criteria if one.check == "field-equals"]
+    of_pose = [one for one in equal if one.get("topic") == given.get("pose_of")]
+    named = {str(one.get("field")): one.get("value") for one in of_pose}
     sent.append((named.get("header.frame_id"), named.get("child_frame_id")))
     for publish in given_steps(scenario, "publish"):
         value = as_map(publish.get("value"))
         if publish.get("topic") == given.get("pose_of"):
             sent.append((as_map(value.get("header")).get("frame_id"), value.get("child_frame_id")))
     if parent and child and (child, parent) in sent:
-        yield ("criteria", index, "with", "parent"), _swapped(parent, child)
+        yield (*criterion.at, "parent"), _swapped(parent, child)
 
 
-def _asked_frames(criteria: Iterable[dict[str, Any]]) -> list[tuple[object, object]]:
+def _asked_frames(criteria: Iterable[WrittenCriterion]) -> list[tuple[object, object]]:
     """Return the parents and children for which criteria ask, but for those with other frames between them."""
-    asked = [as_map(one.get("with")) for one in criteria if one.get("check") == "transform"]
+    asked = [one.given for one in criteria if one.check == "transform"]
     return [(one.get("parent"), one.get("child")) for one in asked if one.get("through") is not True]
 
 

@@ -21,7 +21,7 @@ from pydantic import Field, ValidationError
 
 from grader.errors import EvidenceError
 from grader.model.record import Record
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, dotted
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, criteria_of, dotted
 from grader.wording import did_you_mean, join_words
 
 if TYPE_CHECKING:
@@ -361,13 +361,11 @@ def made_up_faults(data: Mapping[str, Any]) -> Iterator[Fault]:
     yield from (
         ((KEY, name), "is used nowhere: remove it, or use it") for name in declared if name not in used
     )
-    for index, criterion in as_maps(data.get("criteria")):
-        scenario = as_map(as_map(data.get("scenarios")).get(str(criterion.get("scenario"))))
-        for path, name in places(criterion.get("with"), ("criteria", index, "with")):
-            if name in declared and not inputs_with_values(
-                scenario, {name, *operands_of(name, declared)}, {}
-            ):
-                run = criterion.get("scenario") or "a criterion without a scenario"
+    for criterion in criteria_of(data):
+        run = criterion.data.get("scenario") or "a criterion without a scenario"
+        for path, name in places(criterion.data.get("with"), criterion.at):
+            names = {name, *operands_of(name, declared)}
+            if name in declared and not inputs_with_values(criterion.scenario, names, {}):
                 yield path, f'{run} gives programs no "{name}": they could not know it'
 
 

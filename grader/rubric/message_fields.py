@@ -32,7 +32,17 @@ from grader.rubric.definitions import (
     slip_of,
 )
 from grader.rubric.simulators import set_in, topics_of_programs
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in, texts_in
+from grader.rubric.yaml_lines import (
+    Fault,
+    KeyPath,
+    WrittenCriterion,
+    as_map,
+    as_maps,
+    criteria_of,
+    own_packages,
+    packages_in,
+    texts_in,
+)
 from grader.wording import did_you_mean, join_words
 
 USUAL_PACKAGES = ("std_msgs", "geometry_msgs", "sensor_msgs", "nav_msgs")
@@ -74,28 +84,24 @@ def field_faults(rubric: dict[str, Any], known: Definitions) -> Iterator[Fault]:
     yield from _no_types(rubric, known)
     yield from _quoted_params(rubric)
     other_kinds = list(_other_kinds(rubric))
-    scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
-    for index, criterion in as_maps(rubric.get("criteria")):
-        scenario = scenarios.get(str(criterion.get("scenario")), {})
-        given, path = as_map(criterion.get("with")), ("criteria", index, "with")
-        if criterion.get("check") == "stamps":
+    for criterion in criteria_of(rubric):
+        path, given = criterion.at, criterion.given
+        if criterion.check == "stamps":
             given = {"field": "header", STAMPED: True, **given}
-        judged = list(_judged_fields(path, given, known, rubric, scenario))
+        judged = list(_judged_fields(path, given, known, rubric, criterion.scenario))
         yield from judged or (one for one in other_kinds if one[0][: len(path)] == path)
-        if str(criterion.get("check")) in PLACES:
-            yield from _no_place(path, given, rubric, scenario)
-        if criterion.get("check") == "topic-type":
-            yield from _other_type(path, given, rubric)
-        yield from _expected(path, criterion, known, scenario)
-        yield from _other_definitions(path, criterion, known, rubric)
-    for name, scenario in scenarios.items():
-        for at, fault in _sent_fields(scenario, known):
-            yield ("scenarios", name, *at), fault
+        if criterion.check in PLACES:
+            yield from _no_place(criterion, rubric)
+        if criterion.check == "topic-type":
+            yield from _other_type(criterion, rubric)
+        yield from _expected(criterion, known)
+        yield from _other_definitions(criterion, known, rubric)
+    for name, scenario in as_map(rubric.get("scenarios")).items():
+        yield from ((("scenarios", name, *at), fault) for at, fault in _sent_fields(as_map(scenario), known))
 
 
 def _no_types(rubric: dict[str, Any], known: Definitions) -> Iterator[Fault]:
     """Yield types of fields in the rubric's definitions that there are not, or not without their package."""
-    own_packages = {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
     for path, type_ in texts_in((), rubric):
         package, _, name = type_.partition("/")
         there = [one.partition("/")[2] for one in known.of_course if one.startswith(f"{package}/")]
@@ -108,7 +114,7 @@ def _no_types(rubric: dict[str, Any], known: Definitions) -> Iterator[Fault]:
             kind = one.type.partition("[")[0]
             at = path if own.whole else (*path, one.path)
             if "/" in kind:
-                fault = ros_packages().type_fault(kind, "msg", own_packages) if own.whole else ""
+                fault = ros_packages().type_fault(kind, "msg", own_packages(rubric)) if own.whole else ""
             elif kind.islower() or kind in {*BUILT_IN, *FULL_NAMES, *messages}:
                 fault = ""  # one that is none is said where it stands
             else:
@@ -153,20 +159,14 @@ def _judged_fields(
             yield from _judged_fields((*path, key), inner, known, rubric, scenario)
 
 
-def _no_place(
-    path: KeyPath, given: dict[str, Any], rubric: dict[str, Any], scenario: dict[str, Any]
-) -> Iterator[Fault]:
+def _no_place(criterion: WrittenCriterion, rubric: dict[str, Any]) -> Iterator[Fault]:
     """Yield topics of which no place of a robot can be read."""
-    types = {str(kind) for kind in types_of(str(given.get("topic")), rubric, scenario)}
-    own = {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
-    is_known = (
-        types and all(kind.partition("/")[0] in noetic_messages() for kind in types) and not own & types
-    )
-    if is_known and "fields" not in given and types.isdisjoint({*POSES, *VELOCITIES}):
-        yield (
-            (*path, "topic"),
-            f"{given['topic']} carries {min(types)}, which has neither a pose nor a velocity",
-        )
+    given = criterion.given
+    types = {str(kind) for kind in types_of(str(given.get("topic")), rubric, criterion.scenario)}
+    are_known = types and all(kind.partition("/")[0] in noetic_messages() for kind in types)
+    if are_known and "fields" not in given and types.isdisjoint({*POSES, *VELOCITIES, *own_packages(rubric)}):
+        fault = f"{given['topic']} carries {min(types)}, which has neither a pose nor a velocity"
+        yield (*criterion.at, "topic"), fault
 
 
 def _counted(path: KeyPath, given: dict[str, Any], types: list[str]) -> Iterator[Fault]:
@@ -206,12 +206,12 @@ def _quoted_params(rubric: dict[str, Any]) -> Iterator[Fault]:
     for name, scenario in as_map(rubric.get("scenarios")).items():
         for at, one in set_in(as_map(scenario)):
             given.append((("scenarios", name, *at, "value"), one.get("name"), one.get("value")))
-    for index, criterion in as_maps(rubric.get("criteria")):
-        asked, path = as_map(criterion.get("with")), ("criteria", index, "with")
-        if str(criterion.get("check")) in {"param-value", "params-set"}:
-            given.append(((*path, "value"), asked.get("name"), asked.get("value")))
-        elif criterion.get("check") == "launch-runs":
-            given += [((*path, "params", key), key, one) for key, one in as_map(asked.get("params")).items()]
+    for criterion in criteria_of(rubric):
+        at, asked = criterion.at, criterion.given
+        if criterion.check in {"param-value", "params-set"}:
+            given.append(((*at, "value"), asked.get("name"), asked.get("value")))
+        elif criterion.check == "launch-runs":
+            given += [((*at, "params", key), key, one) for key, one in as_map(asked.get("params")).items()]
     numbers = {str(name).strip("/") for _, name, value in given if is_number(value)}
     for at, param, value in given:
         yield from _quoted(at, value)
@@ -224,18 +224,15 @@ def _quoted_params(rubric: dict[str, Any]) -> Iterator[Fault]:
 def _other_kinds(rubric: dict[str, Any]) -> Iterator[Fault]:
     """Yield values of a field that are of another kind than those which earlier criteria ask for in it."""
     first: dict[tuple[str, str], tuple[str, str]] = {}
-    for index, criterion in as_maps(rubric.get("criteria")):
-        given, name = as_map(criterion.get("with")), str(criterion.get("id"))
-        parts: list[tuple[KeyPath, dict[str, Any]]] = [((), given)]
-        parts += [((key,), as_map(given.get(key))) for key in ("cause", "effect")]
-        for at, asked in parts:
+    for criterion in criteria_of(rubric):
+        for at, asked in criterion.conditions:
             for key in ("value", "min", "max"):
                 kind, place = _kind_of(asked.get(key)), (str(asked.get("topic")), str(asked.get("field")))
                 if kind and "field" in asked and "*" not in place[1]:
-                    earlier, other = first.setdefault(place, (name, kind))
+                    earlier, other = first.setdefault(place, (criterion.id, kind))
                     if other != kind:
                         fault = f"is {kind}, and {earlier} has {other} for {place[1]} of {place[0]}"
-                        yield ("criteria", index, "with", *at, key), fault
+                        yield (*at, key), fault
 
 
 def _kind_of(value: object) -> str:
@@ -253,15 +250,17 @@ def _kind_of(value: object) -> str:
     return kinds.get(type(value), "")
 
 
-def _other_type(path: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+def _other_type(criterion: WrittenCriterion, rubric: dict[str, Any]) -> Iterator[Fault]:
     """Yield a type that a topic has not elsewhere in the rubric: two types on one topic are never connected."""
-    topic, kind = given.get("topic"), str(given.get("type"))
-    own = {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
+    topic, kind, own = criterion.given.get("topic"), str(criterion.given.get("type")), own_packages(rubric)
     there = {str(one) for one in (kind, *types_of(str(topic), rubric))}
     there = {one for one in there if not ros_packages().type_fault(one, "msg", own)}
     others = sorted(there - {kind})
     if isinstance(topic, str) and kind in there and others:
-        yield (*path, "type"), f"elsewhere in the rubric {topic} carries {join_words(others)}, not {kind}"
+        yield (
+            (*criterion.at, "type"),
+            f"elsewhere in the rubric {topic} carries {join_words(others)}, not {kind}",
+        )
 
 
 def _no_such(shape: Shape, path: object, given: dict[str, Any]) -> str:
@@ -302,12 +301,11 @@ def types_of(topic: str, rubric: dict[str, Any], scenario: dict[str, Any] | None
     yield from (SYSTEM_TYPES[topic],) if topic in SYSTEM_TYPES else ()
     programs = topics_of_programs(scenario or {})
     yield from (programs[topic],) if topic in programs else ()
-    for _, criterion in as_maps(rubric.get("criteria")):
-        given = as_map(criterion.get("with"))
-        if criterion.get("check") == "topic-type" and given.get("topic") == topic:
-            yield given.get("type")
-        yield from (left["type"] for name, left in as_map(given.get("topics")).items()
-                    if name == topic and as_map(left).get("type"))  # fmt: skip
+    for criterion in criteria_of(rubric):
+        if criterion.check == "topic-type" and criterion.given.get("topic") == topic:
+            yield criterion.given.get("type")
+        left = as_map(as_map(criterion.given.get("topics")).get(topic)).get("type")
+        yield from (left,) if left else ()
     yield from said_types(topic, str(rubric.get("handout") or ""))
     for one in as_map(rubric.get("scenarios")).values():
         sent = [probe for _, probe in as_maps(as_map(one).get("probes"))]
@@ -327,20 +325,17 @@ def said_types(topic: str, handout: str) -> Iterator[str]:
                 yield f"{package}/{message}"
 
 
-def _asked(criterion: dict[str, Any], scenario: dict[str, Any]) -> tuple[str, dict[str, Any] | None, bool]:
+def _asked(
+    check: str, given: dict[str, Any], scenario: dict[str, Any]
+) -> tuple[str, dict[str, Any] | None, bool]:
     """Return the part of a service or action that a criterion judges, what the scenario says of that, None where it
     has nothing of the name, and whether it is an action."""
-    given, check = as_map(criterion.get("with")), criterion.get("check")
-    part = {"calls": "request", "service-answers": "response", "action-result": "result"}.get(str(check), "")
+    part = {"calls": "request", "service-answers": "response", "action-result": "result"}.get(check, "")
     name = given.get("action" if part == "result" else "service")
     services = [(one.get("service"), one) for _, _, one in services_in(scenario)]
-    actions = [
-        (one.get("name") or one.get("action"), one)
-        for one in (
-            *(as_map(step.get("action")) for _, step in as_maps(scenario.get("steps"))),
-            *(one for _, one in as_maps(scenario.get("serves")) if one.get("action")),
-        )
-    ]
+    of_actions = [as_map(step.get("action")) for _, step in as_maps(scenario.get("steps"))]
+    of_actions += [one for _, one in as_maps(scenario.get("serves")) if one.get("action")]
+    actions = [(one.get("name") or one.get("action"), one) for one in of_actions]
     of_action = part == "request" and any(name == called for called, _ in actions)
     about = next((one for called, one in (*services, *actions) if called == name and name), None)
     return part, about if part else None, of_action
@@ -349,27 +344,24 @@ def _asked(criterion: dict[str, Any], scenario: dict[str, Any]) -> tuple[str, di
 def type_judged(criterion: dict[str, Any], rubric: dict[str, Any]) -> str:
     """Return the type of the service or action whose fields a criterion judges; "" where the rubric says none."""
     scenario = as_map(as_map(rubric.get("scenarios")).get(str(criterion.get("scenario"))))
-    _, about, _ = _asked(criterion, scenario)
+    _, about, _ = _asked(str(criterion.get("check")), as_map(criterion.get("with")), scenario)
     return str((about or {}).get("type") or "")
 
 
-def _expected(
-    path: KeyPath, criterion: dict[str, Any], known: Definitions, scenario: dict[str, Any]
-) -> Iterator[Fault]:
+def _expected(criterion: WrittenCriterion, known: Definitions) -> Iterator[Fault]:
     """Yield fields of requests, answers, goals and results that their types do not have."""
-    given = as_map(criterion.get("with"))
-    part, about, of_action = _asked(criterion, scenario)
+    part, about, of_action = _asked(criterion.check, criterion.given, criterion.scenario)
     key = "result" if part == "result" else "expect"
     if about is None:
         return
     shape = known.shape(str(about.get("type")), "goal" if of_action else part)
-    expected = given.get(key)
+    expected = criterion.given.get(key)
     each = [((), expected)] if isinstance(expected, dict) else [((n,), one) for n, one in as_maps(expected)]
     for at, one in each:
         if shape is None:
-            yield from _quoted((*path, key, *at), one)
+            yield from _quoted((*criterion.at, key, *at), one)
         elif fault := shape.misfit(one) or _of_other_part(one, str(about.get("type")), shape, known):
-            yield (*path, key, *at), fault
+            yield (*criterion.at, key, *at), fault
 
 
 def _of_other_part(value: dict[str, Any], kind: str, shape: Shape, known: Definitions) -> str:
@@ -410,11 +402,8 @@ def _sent_fields(scenario: dict[str, Any], known: Definitions) -> Iterator[tuple
         own = known.text(kind, SUFFIXES[part])
         is_known = own or part in PARTS[".action"]  # other types are looked at where they are sent
         shape = known.shape(kind, part) if is_known and isinstance(value, dict | list) else None
-        if (
-            shape is not None
-            and isinstance(value, list)
-            and "data" not in {one.name for one in shape.types[kind]}
-        ):
+        names = {one.name for one in shape.types[kind]} if shape and isinstance(value, list) else {"data"}
+        if "data" not in names:
             yield at, f"is one message, a map of the fields of {kind}: several are values"
         elif shape is not None and (fault := shape.misfit(value)):
             yield at, fault
@@ -423,13 +412,13 @@ def _sent_fields(scenario: dict[str, Any], known: Definitions) -> Iterator[tuple
 
 
 def _other_definitions(
-    path: KeyPath, criterion: dict[str, Any], known: Definitions, rubric: dict[str, Any]
+    criterion: WrittenCriterion, known: Definitions, rubric: dict[str, Any]
 ) -> Iterator[Fault]:
     """Yield fields that a criterion asks of a definition, and that another place in the rubric defines otherwise."""
-    given, file = as_map(criterion.get("with")), PurePosixPath(str(as_map(criterion.get("with")).get("file")))
-    if criterion.get("check") != "definition" or file.suffix not in PARTS:
+    file = PurePosixPath(str(criterion.given.get("file")))
+    if criterion.check != "definition" or file.suffix not in PARTS:
         return
-    package = criterion.get("package") or next(iter(packages_in(rubric)), "")
+    package = criterion.data.get("package") or next(iter(packages_in(rubric)), "")
     type_ = f"{package}/{file.stem}"
     own = known.text(type_, file.suffix)
     if own is None or not own.whole or not all(known.shape(type_, part) for part in PARTS[file.suffix]):
@@ -438,12 +427,9 @@ def _other_definitions(
         found = {one.path: one.type for one in parse_definition(own.text, file.suffix)}
     except ValueError:  # said where it stands
         return
-    for name, kind in as_map(given.get("fields")).items():
+    for name, kind in as_map(criterion.given.get("fields")).items():
+        at = (*criterion.at, "fields", name)
         if name not in found:
-            fault = f"the rubric's definition of {type_} has no {name}{instead_of(str(name), found)}"
-            yield (*path, "fields", name), fault
+            yield at, f"the rubric's definition of {type_} has no {name}{instead_of(str(name), found)}"
         elif found[name] != kind:
-            yield (
-                (*path, "fields", name),
-                f"is {found[name]} in the rubric's definition of {type_}, not {kind}",
-            )
+            yield at, f"is {found[name]} in the rubric's definition of {type_}, not {kind}"

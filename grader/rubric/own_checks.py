@@ -26,7 +26,7 @@ from grader.model.verdict import Verdict
 from grader.rubric.course_packages import read_packages, read_starter
 from grader.rubric.pytest_check import BAG, PYTHON, FileFault, pytest_check, read_beside, select_faults
 from grader.rubric.step_faults import bag_faults, played_bags, topics_named
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, criteria_of
 from grader.untrusted_text import visible
 
 PYTEST = "pytest"
@@ -52,11 +52,8 @@ def read_instructor(data: object, folder: Path) -> Beside:
     """Read what the rubric names beside it (checks, packages, a starter, tests, bags), and run the file of checks."""
     rubric = as_map(data)
     named: list[tuple[KeyPath, object]] = [(("checks",), rubric["checks"])] if "checks" in rubric else []
-    named += [
-        (("criteria", index, "with", "file"), as_map(criterion.get("with")).get("file"))
-        for index, criterion in as_maps(rubric.get("criteria"))
-        if criterion.get("check") == PYTEST
-    ]
+    of_tests = [criterion for criterion in criteria_of(rubric) if criterion.check == PYTEST]
+    named += [((*criterion.at, "file"), criterion.given.get("file")) for criterion in of_tests]
     named += [
         (("scenarios", name, "start", index, "tests"), start.get("tests"))
         for name, scenario in as_map(rubric.get("scenarios")).items()

@@ -16,7 +16,17 @@ from grader.rubric.simulators import set_in
 from grader.rubric.spelling import is_slip
 from grader.rubric.started import starts_of
 from grader.rubric.unknown_names import topics_in
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in, texts_in
+from grader.rubric.yaml_lines import (
+    Fault,
+    KeyPath,
+    WrittenCriterion,
+    as_map,
+    as_maps,
+    as_texts,
+    criteria_of,
+    packages_in,
+    texts_in,
+)
 from grader.wording import join_words
 
 WORDS = {
@@ -59,43 +69,38 @@ def prose_warnings(rubric: dict[str, Any]) -> Iterator[Fault]:
     scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
     handout = str(rubric.get("handout") or "")
     yield from _sent_otherwise(scenarios, handout)
-    for index, criterion in as_maps(rubric.get("criteria")):
-        at, given, check = (
-            ("criteria", index, "with"),
-            as_map(criterion.get("with")),
-            str(criterion.get("check")),
-        )
-        name = str(criterion.get("scenario"))
-        scenario = scenarios.get(name, {})
-        yield from _shifted_numbers(index, criterion, rubric)
-        yield from _numbers_of_title(index, criterion, scenarios, rubric)
-        yield from _other_node(at, check, given, scenario, handout)
-        yield from _other_number(at, check, given, scenario, name)
+    criteria = criteria_of(rubric)
+    for criterion in criteria:
+        at, given, check = criterion.at, criterion.given, criterion.check
+        yield from _shifted_numbers(criterion, rubric)
+        yield from _numbers_of_title(criterion, criteria, rubric)
+        yield from _other_node(criterion, handout)
+        yield from _other_number(criterion)
         yield from _other_types(at, given, handout)
         yield from _misspelt_keys(at, given, rubric)
         if check in {"node-lives", "node-name", "launch-runs"}:
             yield from _unsaid_node(at, given, rubric, handout)
         yield from _other_text(at, given, handout, TEXTS.get(check, VALUES))
-        yield from _of_another_topic(index, criterion, rubric)
+        yield from _of_another_topic(criterion, criteria)
         if check == "logs":
-            yield from _other_level(at, given, str(criterion.get("title")), handout)
+            yield from _other_level(criterion, handout)
         parent, child = (rf"`?{re.escape(str(given.get(key)))}`?(?!\w)" for key in ("parent", "child"))
         is_back = check == "transform" and re.search(rf"from {child}\s+to {parent}", handout)
         if is_back and not re.search(rf"from {parent}\s+to {child}", handout):
             yield (*at, "parent"), f"the handout has it from {given.get('child')} to {given.get('parent')}"
 
 
-def _shifted_numbers(index: int, criterion: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+def _shifted_numbers(criterion: WrittenCriterion, rubric: dict[str, Any]) -> Iterator[Fault]:
     """Yield numbers that only this line has, and that the criterion's title or the handout has with another sign, or
     ten times as large or as small."""
-    about = [str(criterion.get(key, "")) for key in ("title", "hint")]
+    about = [str(criterion.data.get(key, "")) for key in ("title", "hint")]
     prose = " ".join([*about, str(rubric.get("handout", ""))])
     said = {float(number) for number in PLAIN_NUMBER.findall(prose)}
     said_hz = _rates(prose)
     there = [number for at, number in numbers_in((), rubric) if not _is_setting(at)]
-    own = {number for _, number in numbers_in((), criterion.get("with"))}
+    own = {number for _, number in numbers_in((), criterion.given)}
     for key in EXPECTED:
-        for at, number in numbers_in((key,), as_map(criterion.get("with")).get(key)):
+        for at, number in numbers_in((key,), criterion.given.get(key)):
             known = said_hz if key == "rate_hz" else said
             shifts = SHIFTS[:-1] if at[-1] in {"min", "max"} else SHIFTS
             meant = next((number / by for by in shifts if round(number / by, 9) in known), None)
@@ -105,7 +110,7 @@ def _shifted_numbers(index: int, criterion: dict[str, Any], rubric: dict[str, An
                 continue
             if at[-1] != "tolerance" and (known is said or len(known) == 1):
                 fault = f"{number:g} is on no other line, and the rubric's text has {meant:g}"
-                yield ("criteria", index, "with", *at), fault
+                yield (*criterion.at, *at), fault
 
 
 def _rates(text: str) -> set[float]:
@@ -128,24 +133,18 @@ def numbers_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, float]]:
             yield from numbers_in((*path, key), inner)
 
 
-def _other_node(
-    at: KeyPath, check: str, given: dict[str, Any], scenario: dict[str, Any], handout: str
-) -> Iterator[Fault]:
+def _other_node(criterion: WrittenCriterion, handout: str) -> Iterator[Fault]:
     """Yield the name of a process in place of its node's."""
-    names = [name for _, name in as_texts(given.get("names"))]
-    starts = [start for start in starts_of(scenario) if start.get("name") == given.get("process")]
-    if check not in {"node-lives", "node-name"} or len(names) != 1 or len(starts) != 1 or not handout:
+    names = [name for _, name in as_texts(criterion.given.get("names"))]
+    process, is_node = criterion.given.get("process"), criterion.check in {"node-lives", "node-name"}
+    starts = [start for start in starts_of(criterion.scenario) if start.get("name") == process]
+    if not is_node or len(names) != 1 or len(starts) != 1 or not handout:
         return
     script, name = PurePosixPath(str(starts[0].get("script"))).stem, names[0]
     quoted = re.findall(r"`[/~]?(\w+)`", handout)
-    if (
-        name == given.get("process")
-        and script != name
-        and script in quoted
-        and not re.search(rf"\b{name}\b", handout)
-    ):
+    if name == process and script != name and script in quoted and not re.search(rf"\b{name}\b", handout):
         fault = f"{name} is what the rubric calls the process, and the handout has `{script}`: is that the node's name?"
-        yield (*at, "names", 0), fault
+        yield (*criterion.at, "names", 0), fault
 
 
 def _unsaid_node(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any], handout: str) -> Iterator[Fault]:
@@ -171,27 +170,23 @@ def _unsaid_node(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any], han
             yield (*at, "nodes", name), f"is no node of the handout, which has {join_words(sorted(others))}"
 
 
-def _of_another_topic(index: int, criterion: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+def _of_another_topic(criterion: WrittenCriterion, criteria: list[WrittenCriterion]) -> Iterator[Fault]:
     """Yield a topic that the title does not name, where it names another one of the rubric."""
-    given = as_map(criterion.get("with"))
-    own, title = {*topics_in(given)}, str(criterion.get("title"))
-    named = {*re.findall(r"(?<![\w/])/[\w/]*\w", title)}
-    others = {topic for _, one in as_maps(rubric.get("criteria")) for topic in topics_in(one.get("with"))}
-    if isinstance(given.get("topic"), str) and named and named <= others and not named & own:
-        yield (
-            ("criteria", index, "with", "topic"),
-            f"is not what the title has: {join_words(sorted(named))}",
-        )
+    own = {*topics_in(criterion.given)}
+    named = {*re.findall(r"(?<![\w/])/[\w/]*\w", str(criterion.data.get("title")))}
+    others = {topic for one in criteria for topic in topics_in(one.given)}
+    if isinstance(criterion.given.get("topic"), str) and named and named <= others and not named & own:
+        yield (*criterion.at, "topic"), f"is not what the title has: {join_words(sorted(named))}"
 
 
-def _other_level(at: KeyPath, given: dict[str, Any], title: str, handout: str) -> Iterator[Fault]:
+def _other_level(criterion: WrittenCriterion, handout: str) -> Iterator[Fault]:
     """Yield the level of a log message for which the title, or the handout's sentence about its text, has another."""
-    text = f"`{given.get('text')}`"
-    about = [title, *(one for one in SENTENCE_END.split(handout) if text in one)]
+    text, level = f"`{criterion.given.get('text')}`", criterion.given.get("level", "info")
+    about = [str(criterion.data.get("title")), *(one for one in SENTENCE_END.split(handout) if text in one)]
     found = {"".join(groups).lower() for one in about for groups in LEVEL.findall(one.replace(text, "`…`"))}
     said = {{"err": "error", "warning": "warn"}.get(one, one) for one in found}
-    if len(said) == 1 and given.get("level", "info") not in said:
-        yield (*at, "level"), f"is {given.get('level', 'info')}, and the rubric's text has {said.pop()}"
+    if len(said) == 1 and level not in said:
+        yield (*criterion.at, "level"), f"is {level}, and the rubric's text has {said.pop()}"
 
 
 def _sent_otherwise(scenarios: Mapping[str, dict[str, Any]], handout: str) -> Iterator[Fault]:
@@ -217,21 +212,20 @@ def _sent_otherwise(scenarios: Mapping[str, dict[str, Any]], handout: str) -> It
                 yield ("scenarios", name, *at), fault
 
 
-def _other_number(
-    at: KeyPath, check: str, given: dict[str, Any], scenario: dict[str, Any], name: str
-) -> Iterator[Fault]:
+def _other_number(criterion: WrittenCriterion) -> Iterator[Fault]:
     """Yield a value of a field that is named as a parameter of the run, and that the run sets otherwise."""
-    last, value = re.split(r"[.\[]", str(given.get("field")))[-1], given.get("value")
-    if check != "field-equals" or not is_number(value):
+    last, value = re.split(r"[.\[]", str(criterion.given.get("field")))[-1], criterion.given.get("value")
+    if criterion.check != "field-equals" or not is_number(value):
         return
-    for _, one in set_in(scenario):
+    for _, one in set_in(criterion.scenario):
         param = str(one.get("name"))
         if param.rpartition("/")[2] != last or not is_number(one.get("value")):
             continue
         is_float = isinstance(one["value"], float) and isinstance(value, int)
         if one["value"] != value or is_float:
             no_int = ", which is no whole number for ROS" if one["value"] == value else ""
-            yield (*at, "value"), f"{name} sets {param} to {json.dumps(one['value'])}{no_int}"
+            fault = f"{criterion.run} sets {param} to {json.dumps(one['value'])}{no_int}"
+            yield (*criterion.at, "value"), fault
             return
 
 
@@ -254,12 +248,8 @@ def _other_types(at: KeyPath, given: dict[str, Any], handout: str) -> Iterator[F
         kind = OLD_NAMES.get(plain, plain)
         if bracket and plain in said and not re.search(rf"\b{plain}\b.?\[", handout):
             yield path, f"is a list, and the handout has {plain}"
-        is_number_type = PRIMITIVE.fullmatch(str(kind))
-        if (
-            is_number_type
-            and str(kind) not in said
-            and not (str(kind).partition("/")[2] and _plain(kind) in map(_plain, said))
-        ):
+        is_said = str(kind) in said or ("/" in str(kind) and _plain(kind) in map(_plain, said))
+        if PRIMITIVE.fullmatch(str(kind)) and not is_said:
             near = [one for one in sorted(said) if ("/" in one) == ("/" in str(kind))]
             if near:
                 yield path, f"the handout has {join_words(near)}, and not {written}"
@@ -294,24 +284,20 @@ def _misspelt_keys(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -
                 near = next(alike, "")
                 times = sum(len(re.findall(rf"\b{re.escape(part)}\b", text)) for text in texts)
                 if part not in words and near and times == 1:
-                    yield (
-                        (*at, key, name),
-                        f'{part} is on no other line: did you mean "{near}", as in the handout?',
-                    )
+                    fault = f'{part} is on no other line: did you mean "{near}", as in the handout?'
+                    yield (*at, key, name), fault
 
 
 def _numbers_of_title(
-    index: int, criterion: dict[str, Any], scenarios: Mapping[str, dict[str, Any]], rubric: dict[str, Any]
+    criterion: WrittenCriterion, criteria: list[WrittenCriterion], rubric: dict[str, Any]
 ) -> Iterator[Fault]:
     """Yield numbers of a criterion's title that neither the criterion nor a run has, where they have others; and a rate
     that is not the title's, or where that has none, the handout's."""
-    given, title = as_map(criterion.get("with")), str(criterion.get("title"))
-    at, rate_hz = ("criteria", index), given.get("rate_hz")
-    rates = _rates(title)
-    others = [as_map(one.get("with")) for _, one in as_maps(rubric.get("criteria"))]
-    known = {one.get("rate_hz") for one in others if one.get("topic") == given.get("topic")}
+    given, title = criterion.given, str(criterion.data.get("title"))
+    rate_hz, rates = given.get("rate_hz"), _rates(title)
+    known = {one.given.get("rate_hz") for one in criteria if one.given.get("topic") == given.get("topic")}
     is_told = "cause" not in given and len(known) > 1  # said of the two criteria
-    run = as_map(scenarios.get(str(criterion.get("scenario"))))
+    run = criterion.scenario
     is_told = is_told or rate_hz in _numbers_within([run.get("start"), run.get("params")])  # by a parameter
     if not rates and not is_told and "made_up" not in rubric and is_number(rate_hz):
         sentences = SENTENCE_END.split(str(rubric.get("handout", "")))
@@ -322,16 +308,16 @@ def _numbers_of_title(
     if rates and is_number(rate_hz) and rate_hz not in rates:
         said = join_words([f"{one:g}" for one in sorted(rates)])
         where = "title" if _rates(title) else "handout"
-        yield (*at, "with", "rate_hz"), f"{rate_hz:g} is not what the {where} has: {said}"
+        yield (*criterion.at, "rate_hz"), f"{rate_hz:g} is not what the {where} has: {said}"
         return
     numbers = [float(one) for one in PLAIN_NUMBER.findall(title)]
-    runs = list(scenarios.values())
+    runs = [as_map(one) for one in as_map(rubric.get("scenarios")).values()]
     there, texts = _numbers_within([given, runs]), " ".join(text for _, text in texts_in((), [given, runs]))
     is_open = "made_up" in texts or not any(key in given for key in EXPECTED) or "launch" in given
     own = {number for _, number in numbers_in((), given)}
     is_open = is_open or any(round(number * by, 9) in own for number in numbers for by in SHIFTS)
     if len(numbers) == 1 and not rates and not is_open and abs(numbers[0]) not in there:
-        yield (*at, "title"), f"has {numbers[0]:g}, and neither the criterion nor a run has it"
+        yield (*criterion.place, "title"), f"has {numbers[0]:g}, and neither the criterion nor a run has it"
 
 
 def _numbers_within(value: object) -> set[float]:

@@ -25,7 +25,7 @@ from grader.checks.registry import parts
 from grader.files import temporary_folder
 from grader.model.verdict import Status
 from grader.portable import own_session
-from grader.rubric.yaml_lines import Fault, as_map, as_maps
+from grader.rubric.yaml_lines import Fault, criteria_of
 from grader.wording import join_words
 
 HINTS = 4
@@ -70,15 +70,9 @@ class _Test(NamedTuple):
 
 def select_faults(rubric: dict[str, Any], files: Mapping[str, bytes]) -> Iterator[Fault]:
     """Yield what criteria select of an instructor's tests, and none of them is called."""
-    for index, criterion in as_maps(rubric.get("criteria")):
-        given = as_map(criterion.get("with"))
-        file, select = str(given.get("file")), given.get("select")
-        if (
-            criterion.get("check") == "pytest"
-            and file in files
-            and isinstance(select, str)
-            and select.strip()
-        ):
+    for criterion in criteria_of(rubric):
+        file, select = str(criterion.given.get("file")), criterion.given.get("select")
+        if criterion.check == "pytest" and file in files and isinstance(select, str) and select.strip():
             tests = _tests_in(files[file])
             try:
                 expression = ast.parse(select.strip(), mode="eval").body
@@ -87,7 +81,7 @@ def select_faults(rubric: dict[str, Any], files: Mapping[str, bytes]) -> Iterato
                 continue
             if not fits:
                 there = join_words(sorted({test.name for test in tests}))
-                yield ("criteria", index, "with", "select"), f"fits no test of {file}: there is {there}"
+                yield (*criterion.at, "select"), f"fits no test of {file}: there is {there}"
 
 
 def _tests_in(raw: bytes) -> list[_Test]:

@@ -15,13 +15,21 @@ from grader.checks.registry import Check
 from grader.checks.support.fields import Reading, is_number
 from grader.evidence.message_values import ANGLES, FORMS
 from grader.rubric.definitions import PATH_PARTS
-from grader.rubric.durations import Asked, late_faults, longest_s, often_faults, stretch_faults, within_faults
+from grader.rubric.durations import late_faults, longest_s, often_faults, stretch_faults, within_faults
 from grader.rubric.room import pair, room_faults, start_faults
 from grader.rubric.scenario import Scenario, Until
 from grader.rubric.simulators import FIELD_M, PROGRAMS, TRUE_POSE, robot_of
 from grader.rubric.started import starts_of
 from grader.rubric.step_faults import given_steps
-from grader.rubric.yaml_lines import Fault, KeyPath, as_list, as_map, as_maps
+from grader.rubric.yaml_lines import (
+    Fault,
+    KeyPath,
+    WrittenCriterion,
+    as_list,
+    as_map,
+    as_maps,
+    criteria_of,
+)
 from grader.wording import plural
 
 WRAPS = {"minimum": 0, "maximum": 127, "wraps": 2}
@@ -38,20 +46,15 @@ def reach_faults(
     rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
 ) -> Iterator[Fault]:
     """Yield what the runs of a rubric's scenarios cannot show."""
-    yield from _too_many(rubric, scenarios, checks)
-    yield from _too_few(rubric, scenarios)
+    criteria = criteria_of(rubric)
+    yield from _too_many(criteria, scenarios, checks)
+    yield from _too_few(criteria)
     yield from _too_many_nodes(scenarios)
     yield from late_faults(scenarios)
     for name, scenario in scenarios.items():
         yield from start_faults(("scenarios", name), scenario)
-    criteria = list(as_maps(rubric.get("criteria")))
-    for index, criterion in criteria:
-        path, given = ("criteria", index, "with"), as_map(criterion.get("with"))
-        scenario = scenarios.get(str(criterion.get("scenario")), {})
-        others = [
-            one for n, one in criteria if n != index and one.get("scenario") == criterion.get("scenario")
-        ]
-        about = Asked(path, str(criterion.get("check")), given, str(criterion.get("scenario")), scenario)
+    for about in criteria:
+        others = [one for one in criteria if one is not about and one.run == about.run]
         yield from often_faults(about)
         yield from within_faults(about)
         yield from stretch_faults(about)
@@ -59,18 +62,18 @@ def reach_faults(
         yield from _never_sent(about, others)
         if about.check in {"ends-at", "path", "stays-within"}:
             yield from _too_far(about, others)
-    yield from _contradictions(criteria, scenarios)
-    yield from _other_effects(criteria, scenarios)
+    yield from _contradictions(criteria)
+    yield from _other_effects(criteria)
     yield from _other_ends(criteria)
 
 
 def _too_many(
-    rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
+    criteria: Sequence[WrittenCriterion], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
 ) -> Iterator[Fault]:
     """Yield counts of messages that cannot come before the run's limit, at the rate that a criterion asks for."""
     rates: dict[str, float] = {}
-    for _, criterion in as_maps(rubric.get("criteria")):
-        given, check = as_map(criterion.get("with")), checks.get(str(criterion.get("check")))
+    for criterion in criteria:
+        given, check = criterion.given, checks.get(criterion.check)
         topic, rate_hz = given.get("topic"), given.get("rate_hz")
         of_rate = check is not None and hasattr(check.params, "rate_bounds")
         if of_rate and isinstance(rate_hz, int | float) and rate_hz > 0:
@@ -100,13 +103,13 @@ def _too_many_nodes(scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
             yield ("scenarios", name, "until", "nodes"), fault
 
 
-def _too_few(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
+def _too_few(criteria: Sequence[WrittenCriterion]) -> Iterator[Fault]:
     """Yield wraps, recordings and rates that a scenario with so few messages cannot show."""
-    for index, criterion in as_maps(rubric.get("criteria")):
-        name, path = str(criterion.get("scenario")), ("criteria", index, "with")
-        given, until = as_map(criterion.get("with")), as_map(scenarios.get(name, {}).get("until"))
+    for criterion in criteria:
+        name, path = criterion.run, criterion.at
+        given, until = criterion.given, as_map(criterion.scenario.get("until"))
         counts = {} if {"window_s", "alive_s", "quiet_s"} & until.keys() else as_map(until.get("messages"))
-        if criterion.get("check") == "counter-wrap":
+        if criterion.check == "counter-wrap":
             least, most, wraps = (given.get(key, default) for key, default in WRAPS.items())
             count = counts.get(str(given.get("topic")))
             numbers = all(isinstance(n, int) for n in (least, most, wraps, count))
@@ -118,7 +121,7 @@ def _too_few(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> It
             if isinstance(count, int) and isinstance(least, int) and least > MANY * count:
                 yield (*path, "topics", topic, "at_least"), f"{name} ends after {count} messages on {topic}"
         window_s, rate_hz = until.get("window_s"), given.get("rate_hz")
-        if criterion.get("check") == "rate" and is_number(window_s) and is_number(rate_hz):
+        if criterion.check == "rate" and is_number(window_s) and is_number(rate_hz):
             yield from (((*path, "rate_hz"), fault) for fault in _seldom(rate_hz, window_s))
 
 
@@ -176,11 +179,11 @@ def _values_at(value: object, parts: Sequence[str]) -> list[Any] | None:
     return _values_at(items[int(part[1:-1])], parts[1:])
 
 
-def _never_sent(about: Asked, others: Sequence[dict[str, Any]]) -> Iterator[Fault]:
+def _never_sent(about: WrittenCriterion, others: Sequence[WrittenCriterion]) -> Iterator[Fault]:
     """Yield items that no list has which the grader sends, and causes of which none is ever sent."""
     for key, asked in (("", about.given), ("cause", as_map(about.given.get("cause")))):
         topic, field = asked.get("topic"), asked.get("field")
-        at = (*about.path, key) if key else about.path
+        at = (*about.at, key) if key else about.at
         if not isinstance(topic, str) or not isinstance(field, str):
             continue
         parts = PATH_PARTS.findall(field)
@@ -192,17 +195,17 @@ def _never_sent(about: Asked, others: Sequence[dict[str, Any]]) -> Iterator[Faul
         found = [_values_at(one, parts) if n is None else [] for one, n in zip(sent, lengths, strict=True)]
         if None not in lengths:
             most = plural(max(n for n in lengths if n is not None), "item")
-            yield (*at, "field"), f"what {about.name} sends on {topic} has {most} there, counted from 0"
+            yield (*at, "field"), f"what {about.run} sends on {topic} has {most} there, counted from 0"
             continue
         cause = _condition(asked) if key == "cause" and None not in found else None
         plain = all(is_number(one) for values in found for one in values or ())
         if cause and plain and not any(cause.holds(Reading(0, tuple(values or ()), "")) for values in found):
-            yield at, f"nothing that {about.name} sends on {topic} is so: {cause.words}"
+            yield at, f"nothing that {about.run} sends on {topic} is so: {cause.words}"
 
 
-def _is_published(topic: str, criterion: dict[str, Any]) -> bool:
+def _is_published(topic: str, criterion: WrittenCriterion) -> bool:
     """Whether a criterion may ask the student for messages on this topic; one that is heard, the grader sends."""
-    return as_map(criterion.get("with")).get("topic") == topic and criterion.get("check") != "hears"
+    return criterion.given.get("topic") == topic and criterion.check != "hears"
 
 
 def _length(value: object, parts: Sequence[str]) -> int | None:
@@ -268,7 +271,7 @@ class _Robot(NamedTuple):
     field_m: float | None = None
 
 
-def _robot(about: Asked, others: Sequence[dict[str, Any]]) -> _Robot:
+def _robot(about: WrittenCriterion, others: Sequence[WrittenCriterion]) -> _Robot:
     topic = str(about.given.get("topic"))
     if world := robot_of(about.scenario):
         fastest = world.get("max_linear")
@@ -276,7 +279,7 @@ def _robot(about: Asked, others: Sequence[dict[str, Any]]) -> _Robot:
         return _Robot(start if topic == TRUE_POSE else (0, 0), fastest if is_number(fastest) else None)
     if not topic.startswith("/turtle1/"):
         return _Robot(None)
-    bounds = [as_map(one.get("with")) for one in others if one.get("check") == "field-bounds"]
+    bounds = [one.given for one in others if one.check == "field-bounds"]
     speeds = [b["max"] for b in bounds if b.get("topic") == "/turtle1/cmd_vel" and b.get("field") == "linear.x"
               and is_number(b.get("max"))]  # fmt: skip
     is_moved = "calls" in about.scenario or given_steps(about.scenario, "call")
@@ -284,7 +287,7 @@ def _robot(about: Asked, others: Sequence[dict[str, Any]]) -> _Robot:
     return _Robot(middle, min(speeds, default=None), FIELD_M if topic == "/turtle1/pose" else None)
 
 
-def _too_far(about: Asked, others: Sequence[dict[str, Any]]) -> Iterator[Fault]:
+def _too_far(about: WrittenCriterion, others: Sequence[WrittenCriterion]) -> Iterator[Fault]:
     """Yield places that the robot of the scenario cannot come to."""
     given, robot, most_s = about.given, _robot(about, others), longest_s(about.scenario)
     farthest_m = robot.fastest_m_s * most_s if robot.fastest_m_s and most_s else math.inf
@@ -292,7 +295,7 @@ def _too_far(about: Asked, others: Sequence[dict[str, Any]]) -> Iterator[Fault]:
     least_m, tolerance_m = given.get("least_m"), given.get("tolerance_m")
     if about.check == "stays-within":
         if is_number(least_m) and least_m > farthest_m:
-            yield (*about.path, "least_m"), f"it cannot come so far: {limit}"
+            yield (*about.at, "least_m"), f"it cannot come so far: {limit}"
         return
     if not is_number(tolerance_m):
         return
@@ -303,12 +306,12 @@ def _too_far(about: Asked, others: Sequence[dict[str, Any]]) -> Iterator[Fault]:
     relative = given.get("relative", True)
     length_m = sum(math.dist(a, b) for a, b in pairwise(way))
     if length_m - 2 * tolerance_m * len(way) > farthest_m:
-        yield (*about.path, "points"), f"it cannot come so far: the way is {length_m:.3g} m, and {limit}"
+        yield (*about.at, "points"), f"it cannot come so far: the way is {length_m:.3g} m, and {limit}"
     shift = (robot.start or (0, 0)) if relative else (0, 0)
     if robot.field_m is not None and (robot.start or not relative):
         for number, (x, y) in enumerate(way):
             if not _is_inside((x + shift[0], y + shift[1]), robot.field_m, tolerance_m):
-                yield (*about.path, "points", number), _outside(x + shift[0], y + shift[1])
+                yield (*about.at, "points", number), _outside(x + shift[0], y + shift[1])
 
 
 def _is_inside(spot: tuple[float, float], field_m: float, tolerance_m: float) -> bool:
@@ -320,13 +323,13 @@ def _outside(x: float, y: float) -> str:
 
 
 def _goal_faults(
-    about: Asked, others: Sequence[dict[str, Any]], robot: _Robot, farthest_m: float, limit: str
+    about: WrittenCriterion, others: Sequence[WrittenCriterion], robot: _Robot, farthest_m: float, limit: str
 ) -> Iterator[Fault]:
     given, goal, tolerance_m = about.given, _spot(about.given.get("goal")), about.given["tolerance_m"]
     number = given.get("number", 1)
     if goal is None or given.get("relative") is True:
         return
-    at = (*about.path, "goal")
+    at = (*about.at, "goal")
     asked = _asked_spots(given.get("asked_on"), about.scenario)
     start = robot.start
     if isinstance(number, int) and 0 < number <= len(asked):
@@ -347,15 +350,15 @@ def _goal_faults(
     else:
         yield from _too_soon(about, robot, away_m, f"{away_m:.3g} m from {pair(start or goal)}")
     for one in others if not given.get("relative") else ():
-        kept = as_map(one.get("with"))
+        kept = one.given
         corners = [_spot(corner) for corner in as_list(kept.get("box"))]
-        same = one.get("check") == "stays-within" and kept.get("topic") == given.get("topic")
+        same = one.check == "stays-within" and kept.get("topic") == given.get("topic")
         known = len(corners) == 2 and None not in corners and not kept.get("relative")
         if same and known and not _is_between(goal, corners, tolerance_m):
-            yield at, f"is outside of the box that {one.get('id')} keeps it in"
+            yield at, f"is outside of the box that {one.id} keeps it in"
 
 
-def _too_soon(about: Asked, robot: _Robot, away_m: float, way: str) -> Iterator[Fault]:
+def _too_soon(about: WrittenCriterion, robot: _Robot, away_m: float, way: str) -> Iterator[Fault]:
     """Yield a goal that the robot cannot come to before the next one is asked for, or within the time."""
     within_s, fastest, until_s = about.given.get("within_s"), robot.fastest_m_s, _until_next_s(about)
     if not fastest:
@@ -363,12 +366,12 @@ def _too_soon(about: Asked, robot: _Robot, away_m: float, way: str) -> Iterator[
     needed = f"{way} at {fastest:g} m/s take longer than"
     if until_s is not None and away_m > fastest * until_s:
         after = f"the {until_s:g} s until the next message on {about.given['asked_on']}"
-        yield (*about.path, "goal"), f"{needed} {after} asks for another place"
+        yield (*about.at, "goal"), f"{needed} {after} asks for another place"
     elif is_number(within_s) and away_m > fastest * within_s:
-        yield (*about.path, "within_s"), f"{needed} {within_s:g} s"
+        yield (*about.at, "within_s"), f"{needed} {within_s:g} s"
 
 
-def _until_next_s(about: Asked) -> float | None:
+def _until_next_s(about: WrittenCriterion) -> float | None:
     """Return how long after the message that a goal is asked with the next one is sent; None where that is not known,
     or it is the last."""
     passed_s, number = None, 0
@@ -387,10 +390,10 @@ def _until_next_s(about: Asked) -> float | None:
     return None
 
 
-def _not_last(about: Asked, others: Sequence[dict[str, Any]], goal: tuple[float, float]) -> str:
+def _not_last(about: WrittenCriterion, others: Sequence[WrittenCriterion], goal: tuple[float, float]) -> str:
     """Return that the robot is judged at the end of the run, and its last goal is another; empty where it may be this
     one."""
-    topics = {as_map(one.get("with")).get("asked_on") for one in others if one.get("check") == about.check}
+    topics = {one.given.get("asked_on") for one in others if one.check == about.check}
     spots = {topic: _asked_spots(topic, about.scenario) for topic in topics if isinstance(topic, str)}
     last = {topic: found[-1] for topic, found in spots.items() if found and found[-1] is not None}
     if about.given.get("asked_on") is not None or not last:
@@ -409,24 +412,22 @@ def _is_between(spot: tuple[float, float], corners: Sequence[Any], tolerance_m: 
     )
 
 
-def _other_effects(
-    criteria: Sequence[tuple[int, dict[str, Any]]], scenarios: dict[str, dict[str, Any]]
-) -> Iterator[Fault]:
+def _other_effects(criteria: Sequence[WrittenCriterion]) -> Iterator[Fault]:
     """Yield causes that one message shows together with the cause of an earlier criterion, which wants another effect
     of it."""
     before: list[tuple[str, str, dict[str, Any]]] = []
-    for index, criterion in criteria:
-        given, name = as_map(criterion.get("with")), str(criterion.get("scenario"))
-        if criterion.get("check") != "reacts" or given.get("never") is True:
+    for criterion in criteria:
+        given, name = criterion.given, criterion.run
+        if criterion.check != "reacts" or given.get("never") is True:
             continue
         for run, earlier, other in before:
             causes, effects = ([as_map(g.get(key)) for g in (given, other)] for key in ("cause", "effect"))
-            shown = _shown_by_both(causes[0], causes[1], scenarios.get(name, {}))
+            shown = _shown_by_both(causes[0], causes[1], criterion.scenario)
             if run == name and _differ(effects[0], effects[1]) and (number := next(shown, 0)):
                 message = f"message {number} that {name} sends on {causes[0].get('topic')}"
                 fault = f"{message} is a cause for {earlier} too, which wants another effect"
-                yield ("criteria", index, "with", "cause"), fault
-        before.append((name, str(criterion.get("id")), given))
+                yield (*criterion.at, "cause"), fault
+        before.append((name, criterion.id, given))
 
 
 def _differ(effect: dict[str, Any], other: dict[str, Any]) -> bool:
@@ -460,26 +461,22 @@ def _is_so(cause: dict[str, Any], value: object) -> bool:
     )
 
 
-def _other_ends(criteria: Sequence[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
+def _other_ends(criteria: Sequence[WrittenCriterion]) -> Iterator[Fault]:
     """Yield goals of actions for which an earlier criterion wants another status, or another result."""
     before: dict[tuple[str, ...], tuple[str, dict[str, Any]]] = {}
-    for index, criterion in criteria:
-        given = as_map(criterion.get("with"))
-        if criterion.get("check") != "action-result" or given.keys() <= {
-            "action",
-            "goal",
-            "feedback",
-            "tolerance",
-        }:
+    for criterion in criteria:
+        given = criterion.given
+        is_of_end = not given.keys() <= {"action", "goal", "feedback", "tolerance"}
+        if criterion.check != "action-result" or not is_of_end:
             continue
-        key = tuple(map(str, (criterion.get("scenario"), given.get("action"), given.get("goal", 1))))
-        earlier, other = before.setdefault(key, (str(criterion.get("id")), given))
+        key = tuple(map(str, (criterion.run, given.get("action"), given.get("goal", 1))))
+        earlier, other = before.setdefault(key, (criterion.id, given))
         status, other_status = (one.get("status", "SUCCEEDED") for one in (given, other))
         if status != other_status:
             fault = (
                 f"{earlier} wants this goal, number {key[2]}, {other_status}: give one of them another goal"
             )
-            yield ("criteria", index, "with", "status" if "status" in given else "goal"), fault
+            yield (*criterion.at, "status" if "status" in given else "goal"), fault
 
 
 class _Demand(NamedTuple):
@@ -512,23 +509,20 @@ def _may_be_equal(one: tuple[Any, ...], other: tuple[Any, ...], tolerances: tupl
     return all(abs(a - b) <= sum(tolerances) for a, b in pairs)
 
 
-def _contradictions(
-    criteria: Sequence[tuple[int, dict[str, Any]]], scenarios: dict[str, dict[str, Any]]
-) -> Iterator[Fault]:
+def _contradictions(criteria: Sequence[WrittenCriterion]) -> Iterator[Fault]:
     """Yield criteria that no run passes which passes an earlier one."""
     before: dict[tuple[str, ...], list[tuple[str, _Demand]]] = {}
-    for index, criterion in criteria:
-        name = str(criterion.get("scenario"))
-        for part, asked, demand in _demanded(criterion, scenarios.get(name, {})):
-            at = ("criteria", index, "with", *part)
+    for criterion in criteria:
+        for part, asked, demand in _demanded(criterion):
+            at = (*criterion.at, *part)
             of = asked.get("of", "student")
-            key = tuple(map(str, (name, asked.get("topic"), asked.get("field"), of)))
+            key = tuple(map(str, (criterion.run, asked.get("topic"), asked.get("field"), of)))
             for earlier, other in before.get(key, ()):
                 if demand.excludes(other):
                     wants = f"{earlier} wants {asked.get('field')} of {asked.get('topic')} otherwise in the same run"
                     both = (demand.every and other.every) or demand.when == other.when != ""
                     yield at, wants if both else f"{wants}: {_way_out(demand, other)}"
-            before.setdefault(key, []).append((str(criterion.get("id")), demand))
+            before.setdefault(key, []).append((criterion.id, demand))
 
 
 def _way_out(*demands: _Demand) -> str:
@@ -536,22 +530,20 @@ def _way_out(*demands: _Demand) -> str:
     return "so the cause never comes" if is_cause else "give one of them when: first, last or any"
 
 
-def _demanded(
-    criterion: dict[str, Any], scenario: dict[str, Any]
-) -> Iterator[tuple[KeyPath, dict[str, Any], _Demand]]:
+def _demanded(criterion: WrittenCriterion) -> Iterator[tuple[KeyPath, dict[str, Any], _Demand]]:
     """Yield what a criterion wants of a run's messages: where it says so, its parameters there, and the demand.
 
     A cause is one where the grader sends none on its topic: the student's node has to.
     """
-    given, check = as_map(criterion.get("with")), str(criterion.get("check"))
-    if "scenario" not in criterion:
+    given, check = criterion.given, criterion.check
+    if "scenario" not in criterion.data:
         return
     parts: list[tuple[KeyPath, dict[str, Any]]] = [((), given)]
     if check == "reacts":
         wanted = ("cause",) if given.get("never") is True else ("cause", "effect")
         parts = [((key,), as_map(given.get(key))) for key in wanted]
     for part, asked in parts:
-        if part != ("cause",) or _sent_on(str(asked.get("topic")), scenario) == []:
+        if part != ("cause",) or _sent_on(str(asked.get("topic")), criterion.scenario) == []:
             is_cause = part == ("cause",)
             yield from ((part, asked, one._replace(is_cause=is_cause)) for one in _demands(check, asked))
 
@@ -560,9 +552,8 @@ def _demands(check: str, asked: dict[str, Any]) -> Iterator[_Demand]:
     low, high, value = asked.get("min", -math.inf), asked.get("max", math.inf), asked.get("value")
     tolerance = asked.get("tolerance", 0)
     every = check == "field-bounds" and asked.get("share", 1) == 1
-    when = (
-        str(asked.get("when")) if check == "field-equals" and asked.get("when") in ("first", "last") else ""
-    )
+    is_one = check == "field-equals" and asked.get("when") in ("first", "last")
+    when = str(asked.get("when")) if is_one else ""
     if check == "field-equals":
         every = asked.get("when", "every") == "every" and "values" not in asked
     elif check not in {"field-bounds", "reacts"} or asked.get("items") == "any":

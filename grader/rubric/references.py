@@ -25,7 +25,17 @@ from grader.rubric.simulators import PROGRAMS, asked_faults, only_publisher, par
 from grader.rubric.started import started_faults, starts_of
 from grader.rubric.step_faults import given_steps
 from grader.rubric.unknown_names import SURE, topics_in, unknown_names, values_of, with_other_topics
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in, texts_in
+from grader.rubric.yaml_lines import (
+    Fault,
+    KeyPath,
+    WrittenCriterion,
+    as_map,
+    as_maps,
+    as_texts,
+    criteria_of,
+    packages_in,
+    texts_in,
+)
 from grader.wording import closest, did_you_mean, join_words
 
 LAUNCH_ENDINGS = (".launch", ".xml")
@@ -55,13 +65,12 @@ def reference_faults(
         yield from _type_faults(("scenarios", name), scenario, rubric)
         found = (*parameter_faults(scenario), *argument_faults(scenario, rubric))
         yield from ((("scenarios", name, *at), fault) for at, fault in found)
-    for index, criterion, others in with_other_topics(rubric):
-        check = checks.get(str(criterion.get("check")))
+    for criterion, others in with_other_topics(rubric):
+        check, judged = checks.get(criterion.check), criterion.scenario
         if check is not None:
-            judged = scenarios.get(str(criterion.get("scenario")))
-            yield from _criterion_faults(("criteria", index), criterion, check, judged, rubric)
-            asked = asked_faults(as_map(criterion.get("with")), judged or {}, others | set(topics_in(judged)))
-            yield from ((("criteria", index, "with", *at), fault) for at, fault in asked)
+            yield from _criterion_faults(criterion, check, rubric)
+            asked = asked_faults(criterion.given, judged, others | set(topics_in(judged)))
+            yield from (((*criterion.at, *at), fault) for at, fault in asked)
     for index, package in as_texts(as_map(rubric.get("needs")).get("ros")):
         if package in packages_in(rubric):
             yield ("needs", "ros", index), "is the package that students hand in: no machine has it before"
@@ -76,11 +85,11 @@ def reference_faults(
     yield from started_faults(rubric, scenarios, checks)
     yield from unknown_names(rubric, scenarios, checks)
     yield from reach_faults(rubric, scenarios, checks)
-    criteria = list(as_maps(rubric.get("criteria")))
+    criteria = criteria_of(rubric)
     yield from _of_grader(criteria, scenarios)
     yield from _forgotten_topics(criteria)
     yield from _same_names(criteria, scenarios)
-    yield from _other_goals_and_types(rubric, scenarios)
+    yield from _other_goals_and_types(criteria)
 
 
 def _no_debian_package(package: str) -> str:
@@ -103,10 +112,8 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
             fault = f"is the file alone, without its package: {launch.split()[-1]}"
             yield (*path, "start", index, "launch"), fault
         elif isinstance(launch, str) and not launch.endswith(LAUNCH_ENDINGS):
-            yield (
-                (*path, "start", index, "launch"),
-                f'roslaunch takes the file\'s whole name: "{launch}.launch"',
-            )
+            fault = f'roslaunch takes the file\'s whole name: "{launch}.launch"'
+            yield (*path, "start", index, "launch"), fault
         for key, file in (("script", start.get("script")), ("load", start.get("load"))):
             if isinstance(file, str) and (fault := _file_fault(file, rubric)):
                 yield (*path, "start", index, key), fault
@@ -174,9 +181,8 @@ def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -
         meant = "" if value in own else closest(value, own, cutoff=SURE)
         fault = f'there is no package "{value}" (did you mean "{meant}"?)' if meant else ""
         fault = fault or ("" if value in own else ros_packages().misspelt(value))
-        if (
-            not fault and "nodes" in path and value not in own
-        ):  # a launch file's pkg, and none of rosdep's keys
+        of_node = "nodes" in path  # a launch file's pkg, and none of rosdep's keys
+        if not fault and of_node and value not in own:
             fault = ros_packages().package_fault(value)
     elif to == "package" and value not in packages_in(rubric):
         fault = f'the lab has no package "{value}"{_instead(value, packages_in(rubric))}'
@@ -186,26 +192,19 @@ def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -
         yield path, fault
 
 
-def _criterion_faults(
-    path: KeyPath,
-    criterion: dict[str, Any],
-    check: Check,
-    scenario: dict[str, Any] | None,
-    rubric: dict[str, Any],
-) -> Iterator[Fault]:
-    given = as_map(criterion.get("with"))
-    for one in check.references(given):
-        at = (*path, "with", *one.path)
+def _criterion_faults(criterion: WrittenCriterion, check: Check, rubric: dict[str, Any]) -> Iterator[Fault]:
+    scenario = criterion.scenario
+    for one in check.references(criterion.given):
+        at = (*criterion.at, *one.path)
         yield from _of_machine(at, one.to, one.value, rubric)
         if scenario and check.needs_run and scenario.get("recording") is None:
-            yield from ((at, fault) for fault in _misfits(one, check, criterion, scenario))
+            yield from ((at, fault) for fault in _misfits(one, check, criterion))
 
 
-def _misfits(
-    one: Reference, check: Check, criterion: dict[str, Any], scenario: dict[str, Any]
-) -> Iterator[str]:
+def _misfits(one: Reference, check: Check, criterion: WrittenCriterion) -> Iterator[str]:
     """Yield why the scenario does not have what a parameter refers to."""
-    name, value, starts = criterion.get("scenario"), one.value, starts_of(scenario)
+    name, scenario, value = criterion.run, criterion.scenario, one.value
+    starts = starts_of(scenario)
     if one.to == "watched_s":
         yield from _too_short(one, check, scenario)
     elif not isinstance(value, str) or not value:
@@ -218,16 +217,16 @@ def _misfits(
         if value not in (there := sorted(listed(scenario))):
             yield words.format(name=name, value=value, instead=_instead(value, there))
     elif one.to == "kept":
-        yield from _not_kept(str(name), value, _kept_patterns(scenario))
+        yield from _not_kept(name, value, [kept for _, kept in as_texts(scenario.get("keeps")) if kept])
     elif one.to == "set" and not _is_set(value, scenario):
         there = [str(param.get("name")) for _, param in as_maps(scenario.get("params"))]
         yield f"{name} sets no parameter {value}{did_you_mean(value, there)}: add it to its params"
     elif one.to == "node":
-        process = as_map(criterion.get("with")).get("process")
+        process = criterion.given.get("process")
         of_process = [start for start in starts if start.get("name") == process or not process]
         yield from _named_otherwise(value, of_process if len(of_process) == 1 else [])
     elif one.to == "published":
-        yield from _wrong_sender(value, as_map(criterion.get("with")).get("of"), check, scenario)
+        yield from _wrong_sender(value, criterion.given.get("of"), check, scenario)
 
 
 def _not_kept(scenario: str, file: str, kept: list[str]) -> Iterator[str]:
@@ -246,12 +245,8 @@ def _wrong_sender(topic: str, says_of: object, check: Check, scenario: dict[str,
         yield f"{program} publishes on {topic}, and {check.name} judges the student's messages: give it of: program"
     given = _sent_by_grader(scenario)
     until = as_map(scenario.get("until"))
-    if (
-        says_of is None
-        and "of" in check.params.model_fields
-        and topic in given
-        and topic not in topics_in(until)
-    ):
+    may_be_either = says_of is None and "of" in check.params.model_fields
+    if may_be_either and topic in given and topic not in topics_in(until):
         yield (
             f"the grader itself sends on {topic}, and {check.name} judges the student's messages: if students publish "
             "there too, write of: student"
@@ -260,24 +255,16 @@ def _wrong_sender(topic: str, says_of: object, check: Check, scenario: dict[str,
         yield f"the scenario starts no program, and {check.name} judges the messages of one (of: program)"
 
 
-def _of_grader(
-    criteria: list[tuple[int, dict[str, Any]]], scenarios: dict[str, dict[str, Any]]
-) -> Iterator[Fault]:
+def _of_grader(criteria: list[WrittenCriterion], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
     """Yield services and messages of the grader's that are taken for the student's."""
     for name, scenario in scenarios.items():
         for at, part, one in services_in(scenario):
             if part == "request" and one.get("service") in _served_names(scenario):
                 fault = f"the grader offers {one['service']} itself (serves): a student's node should call it"
                 yield ("scenarios", name, *at, "service"), fault
-    asked = [
-        str(as_map(c.get("with")).get("topic"))
-        for _, c in criteria
-        if str(c.get("check")) in ASKED_OF_STUDENT
-    ]
-    for index, criterion in criteria:
-        path, given = ("criteria", index, "with"), as_map(criterion.get("with"))
-        scenario = scenarios.get(str(criterion.get("scenario")), {})
-        check = str(criterion.get("check"))
+    asked = [str(one.given.get("topic")) for one in criteria if one.check in ASKED_OF_STUDENT]
+    for criterion in criteria:
+        path, check, given, scenario = criterion.at, criterion.check, criterion.given, criterion.scenario
         is_place = check in WHERE_IT_IS and given.get("of") is None
         for at, topic in (
             (("effect",), as_map(given.get("effect")).get("topic")),
@@ -294,46 +281,40 @@ def _of_grader(
                 )
                 yield (*path, *at, "topic"), fault
         service = given.get("service")
-        if criterion.get("check") == "service" and service in _served_names(scenario):
+        if check == "service" and service in _served_names(scenario):
             fault = f"the grader offers {service} itself (serves), and service judges the student's"
             yield (*path, "service"), f"{fault}: calls judges what was asked"
 
 
-def _forgotten_topics(criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
+def _forgotten_topics(criteria: list[WrittenCriterion]) -> Iterator[Fault]:
     """Yield what only-topics forbids and another criterion of the same run asks the student to publish."""
-    for index, criterion in criteria:
-        if criterion.get("check") != "only-topics":
+    for criterion in criteria:
+        if criterion.check != "only-topics":
             continue
-        allowed = [topic for _, topic in as_texts(as_map(criterion.get("with")).get("topics"))]
-        for _, other in criteria:
-            given = as_map(other.get("with"))
+        allowed = [topic for _, topic in as_texts(criterion.given.get("topics"))]
+        for other in criteria:
+            given = other.given
             topic = str(as_map(given.get("effect")).get("topic") or given.get("topic"))
-            is_asked = str(other.get("check")) in ASKED_OF_STUDENT and given.get("of", "student") == "student"
+            is_asked = other.check in ASKED_OF_STUDENT and given.get("of", "student") == "student"
             is_asked = is_asked and given.get("never") is not True
-            if not is_asked or other.get("scenario") != criterion.get("scenario") or topic in SYSTEM_TOPICS:
+            if not is_asked or other.run != criterion.run or topic in SYSTEM_TOPICS:
                 continue
             is_allowed = any(fnmatchcase(topic, one) for one in allowed)
             if not is_allowed and not closest(topic, allowed, cutoff=SURE):  # a slip, which is told
-                yield ("criteria", index, "with", "topics"), f"{other.get('id')} asks for {topic}: add it"
+                yield (*criterion.at, "topics"), f"{other.id} asks for {topic}: add it"
 
 
-def _same_names(
-    criteria: list[tuple[int, dict[str, Any]]], scenarios: dict[str, dict[str, Any]]
-) -> Iterator[Fault]:
+def _same_names(criteria: list[WrittenCriterion], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
     """Yield starts of one script that would give two nodes the same name, of which the second one ends the first."""
-    strict = [c for _, c in criteria if as_map(c.get("with")).get("anonymous") == "forbidden"]
-    for name in sorted({str(c.get("scenario")) for c in strict if c.get("check") == "node-lives"}):
+    strict = [c for c in criteria if c.check == "node-lives" and c.given.get("anonymous") == "forbidden"]
+    for name in sorted({criterion.run for criterion in strict}):
         first: dict[str, int] = {}
-        started = [step for _, step in as_maps(scenarios.get(name, {}).get("steps")) if "start" in step]
+        if given_steps(scenarios.get(name, {}), "start"):
+            continue
         for index, start in as_maps(scenarios.get(name, {}).get("start")):
             named = any(text.startswith(("__ns:=", "__name:=")) for _, text in as_texts(start.get("args")))
             script = start.get("script")
-            if (
-                isinstance(script, str)
-                and not named
-                and not started
-                and first.setdefault(script, index) != index
-            ):
+            if isinstance(script, str) and not named and first.setdefault(script, index) != index:
                 fault = (
                     f"a second node of {script} ends the first, which has its name: give it args, __name:=…"
                 )
@@ -405,23 +386,22 @@ def _unused_faults(
 ) -> Iterator[Fault]:
     """Yield scenarios that are run for nothing; a check that sees all of them may ask for any."""
     used: set[str] = set()
-    for _, criterion in as_maps(rubric.get("criteria")):
-        check = checks.get(str(criterion.get("check")))
-        if (check is None and criterion.get("check") != "manual") or (check and "evidence" in check.facts):
+    for criterion in criteria_of(rubric):
+        check = checks.get(criterion.check)
+        if (check is None and criterion.check != "manual") or (check and "evidence" in check.facts):
             return
-        used.add(str(criterion.get("scenario")))
+        used.add(criterion.run)
     for name in scenarios:
         if name not in used:
             yield ("scenarios", name), "no criterion judges this scenario: remove it, or name it in one"
 
 
-def _other_goals_and_types(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
+def _other_goals_and_types(criteria: list[WrittenCriterion]) -> Iterator[Fault]:
     """Yield goals that a scenario does not send, and types of services that are not those that it calls."""
-    for index, criterion in as_maps(rubric.get("criteria")):
-        given, name = as_map(criterion.get("with")), str(criterion.get("scenario"))
-        scenario, path = scenarios.get(name, {}), ("criteria", index, "with")
-        steps = [as_map(step.get("action")) for _, step in as_maps(scenario.get("steps"))]
-        goals, goal = [a for a in steps if a.get("name") == given.get("action", "")], given.get("goal")
+    for criterion in criteria:
+        path, given, name, scenario = criterion.at, criterion.given, criterion.run, criterion.scenario
+        steps, goal = given_steps(scenario, "action"), given.get("goal")
+        goals = [one for one in steps if one.get("name") == given.get("action", "")]
         if isinstance(goal, int) and 0 < len(goals) < goal:
             yield (*path, "goal"), f"{name} sends {len(goals)} goals to {given['action']}"
         place = goal - 1 if isinstance(goal, int) else 0
@@ -431,9 +411,8 @@ def _other_goals_and_types(rubric: dict[str, Any], scenarios: dict[str, dict[str
             yield (*path, "status"), fault
         number, asked_on = given.get("number"), given.get("asked_on")
         sent = [s for s in given_steps(scenario, "publish") if s.get("topic") == asked_on]
-        singly = bool(sent) and not any(
-            {"count", "duration_s", "values", "background"} & s.keys() for s in sent
-        )
+        together = {"count", "duration_s", "values", "background"}
+        singly = bool(sent) and not any(together & one.keys() for one in sent)
         if singly and isinstance(number, int) and number > len(sent) and not scenario.get("probes"):
             yield (*path, "number"), f"{name} sends {len(sent)} messages on {asked_on}"
         service, kind = given.get("service", ""), given.get("type")
@@ -462,15 +441,7 @@ def _sent_topics(scenario: dict[str, Any]) -> set[str]:
 
 
 def _actions(scenario: dict[str, Any]) -> list[str]:
-    return [
-        str(as_map(step.get("action")).get("name"))
-        for _, step in as_maps(scenario.get("steps"))
-        if "action" in step
-    ]
-
-
-def _kept_patterns(scenario: dict[str, Any]) -> list[str]:
-    return [pattern for _, pattern in as_texts(scenario.get("keeps")) if pattern]
+    return [str(one.get("name")) for one in given_steps(scenario, "action")]
 
 
 def _served_names(scenario: dict[str, Any]) -> list[str]:

@@ -8,9 +8,9 @@ from itertools import pairwise
 from typing import Any
 
 from grader.checks.support.fields import is_number
-from grader.rubric.durations import Asked, longest_s
+from grader.rubric.durations import longest_s
 from grader.rubric.simulators import FORMS, TRUE_POSE, robot_of, set_in
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map
+from grader.rubric.yaml_lines import Fault, KeyPath, WrittenCriterion, as_map
 
 Spot = tuple[float, float]
 AHEAD_M = 0.3
@@ -18,7 +18,7 @@ AHEAD_M = 0.3
 SCANS = frozenset({"/scan", "/base_scan"})
 
 
-def room_faults(about: Asked) -> Iterator[Fault]:
+def room_faults(about: WrittenCriterion) -> Iterator[Fault]:
     """Yield distances from walls that the robot does not have at its start, walls that it cannot come near to in the
     run, and goals outside of a closed room."""
     robot = robot_of(about.scenario)
@@ -108,7 +108,7 @@ def pair(spot: Spot) -> str:
     return f"({spot[0]:g}, {spot[1]:g})"
 
 
-def _too_near(about: Asked, away_m: float) -> Iterator[Fault]:
+def _too_near(about: WrittenCriterion, away_m: float) -> Iterator[Fault]:
     given = about.given
     if given.get("walls") or given.get("from_s") or given.get("share", 1) != 1:
         return
@@ -119,10 +119,10 @@ def _too_near(about: Asked, away_m: float) -> Iterator[Fault]:
     }
     for key, is_wrong in wrong.items():
         if is_wrong:
-            yield (*about.path, key), f"the robot starts {away_m:.2g} m from the nearest wall"
+            yield (*about.at, key), f"the robot starts {away_m:.2g} m from the nearest wall"
 
 
-def _never_near(about: Asked, robot: dict[str, Any], away_m: float) -> Iterator[Fault]:
+def _never_near(about: WrittenCriterion, robot: dict[str, Any], away_m: float) -> Iterator[Fault]:
     """Yield causes that need a wall nearer than any that the robot can come to."""
     cause, most_s, fastest = (
         as_map(about.given.get("cause")),
@@ -136,10 +136,10 @@ def _never_near(about: Asked, robot: dict[str, Any], away_m: float) -> Iterator[
     if nearest_m > cause["max"]:
         far = f"{most_s:g} s at {fastest:g} m/s are {fastest * most_s:.3g} m"
         fault = f"the nearest wall is {away_m:.3g} m away, and {far}"
-        yield (*about.path, "cause", "max"), f"{fault}: the cause never comes"
+        yield (*about.at, "cause", "max"), f"{fault}: the cause never comes"
 
 
-def _outside(about: Asked, lines: list[list[Spot]], start: Spot, goal: Spot) -> Iterator[Fault]:
+def _outside(about: WrittenCriterion, lines: list[list[Spot]], start: Spot, goal: Spot) -> Iterator[Fault]:
     """Yield a goal that is beyond the walls of a closed room in which the robot starts, or in a box."""
     tolerance_m, most_s = about.given.get("tolerance_m"), longest_s(about.scenario)
     fastest = robot_of(about.scenario).get("max_linear")
@@ -151,5 +151,5 @@ def _outside(about: Asked, lines: list[list[Spot]], start: Spot, goal: Spot) -> 
         away_m = min(_distance(goal, *ends) for ends in pairwise(line))
         is_apart = line[0] == line[-1] and _is_inside(start, line) != _is_inside(goal, line)
         if is_apart and away_m > tolerance_m:
-            yield (*about.path, "goal"), f"walls are between the start, {pair(start)}, and {pair(goal)}"
+            yield (*about.at, "goal"), f"walls are between the start, {pair(start)}, and {pair(goal)}"
             return

@@ -11,7 +11,7 @@ from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.installable import noetic_messages
 from grader.rubric.message_fields import type_judged, types_of
 from grader.rubric.simulators import TRUE_POSE
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, own_packages, texts_in
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, criteria_of, own_packages, texts_in
 from grader.wording import is_one_edit
 
 ONE_NAME = re.compile(
@@ -204,8 +204,7 @@ def _is_known_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
 
 def _judged(path: KeyPath, rubric: dict[str, Any]) -> dict[str, Any]:
     """Return what the criterion at a place asks for."""
-    criterion = next((one for index, one in as_maps(rubric.get("criteria")) if index == path[1]), {})
-    return as_map(criterion.get("with"))
+    return next((one.given for one in criteria_of(rubric) if one.place == path[:2]), {})
 
 
 def _is_own_field(path: KeyPath, rubric: dict[str, Any]) -> bool:

@@ -10,7 +10,7 @@ from typing import Any
 from grader.checks.registry import Check
 from grader.rubric.scenario import ROSTEST_ENDING
 from grader.rubric.simulators import PROGRAMS, asked_topics
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, packages_in
+from grader.rubric.yaml_lines import Fault, KeyPath, as_maps, criteria_of, packages_in
 from grader.wording import join_words
 
 KINDS_OF_FILES = ("script", "launch", "load")
@@ -27,7 +27,7 @@ def started_faults(
     yield from _nothing_of_students(rubric, scenarios, checks)
     yield from _tests_without_run(rubric, scenarios)
     yield from _other_packages(rubric, scenarios)
-    yield from _without_program(rubric, scenarios)
+    yield from _without_program(rubric)
 
 
 def starts_of(scenario: dict[str, Any]) -> list[dict[str, Any]]:
@@ -39,11 +39,8 @@ def _nothing_of_students(
     rubric: dict[str, Any], scenarios: Mapping[str, dict[str, Any]], checks: Mapping[str, Check]
 ) -> Iterator[Fault]:
     """Yield runs that start the grader's programs only, and by which a criterion judges the student's package."""
-    judged = {
-        str(one.get("scenario"))
-        for _, one in as_maps(rubric.get("criteria"))
-        if (check := checks.get(str(one.get("check")))) and check.needs_run
-    }
+    of_runs = {name for name, check in checks.items() if check.needs_run}
+    judged = {criterion.run for criterion in criteria_of(rubric) if criterion.check in of_runs}
     for name, scenario in scenarios.items():
         starts = starts_of(scenario)
         programs = [str(start["program"]) for start in starts if start.get("program") is not None]
@@ -63,10 +60,10 @@ def _tests_without_run(rubric: dict[str, Any], scenarios: Mapping[str, dict[str,
         for start in starts_of(scenario)
         if start.get("tests") is not None
     }
-    for index, criterion in as_maps(rubric.get("criteria")):
-        file = str(as_map(criterion.get("with")).get("file"))
-        if criterion.get("check") == "pytest" and criterion.get("scenario") is None and file in runs:
-            yield ("criteria", index, "scenario"), f"is missing: {runs[file]} runs {file}"
+    for criterion in criteria_of(rubric):
+        file = str(criterion.given.get("file"))
+        if criterion.check == "pytest" and not criterion.has_run and file in runs:
+            yield (*criterion.place, "scenario"), f"is missing: {runs[file]} runs {file}"
 
 
 def _other_packages(rubric: dict[str, Any], scenarios: Mapping[str, dict[str, Any]]) -> Iterator[Fault]:
@@ -78,58 +75,48 @@ def _other_packages(rubric: dict[str, Any], scenarios: Mapping[str, dict[str, An
         for index, start in as_maps(scenario.get("start")):
             for key in KINDS_OF_FILES:
                 if isinstance(start.get(key), str):
+                    owner, is_given = str(start.get("package") or first), start.get("package") is not None
                     at: KeyPath = ("scenarios", name, "start", index, key)
-                    named.append(
-                        (
-                            at,
-                            _plain(start[key]),
-                            str(start.get("package") or first),
-                            start.get("package") is not None,
-                        )
-                    )
-    for index, criterion in as_maps(rubric.get("criteria")):
-        given, owner = as_map(criterion.get("with")), str(criterion.get("package") or first)
-        at, is_given = ("criteria", index, "with"), criterion.get("package") is not None
-        if criterion.get("check") == "executable" and isinstance(given.get("path"), str):
-            named.append(((*at, "path"), _plain(given["path"]), owner, is_given))
-        asked = given.get("name")
-        if str(criterion.get("check")) in NAMED_AS_PACKAGE and asked in packages and asked != owner:
+                    named.append((at, _plain(start[key]), owner, is_given))
+    for criterion in criteria_of(rubric):
+        given, package = criterion.given, criterion.data.get("package")
+        owner, asked = str(package or first), given.get("name")
+        if criterion.check == "executable" and isinstance(given.get("path"), str):
+            named.append(((*criterion.at, "path"), _plain(given["path"]), owner, package is not None))
+        if criterion.check in NAMED_AS_PACKAGE and asked in packages and asked != owner:
             fault = (
                 f"this criterion judges {owner}: write name: {owner}, or package: {asked} beside its check"
             )
-            yield (*at, "name"), fault
+            yield (*criterion.at, "name"), fault
     for at, file, owner, is_given in named:
         others = {other for _, same, other, is_said in named if same == file and other != owner and is_said}
         if not is_given and others:
             elsewhere = join_words(sorted(others))
-            yield (
-                at,
-                f"is looked for in {owner}, and elsewhere it is in {elsewhere}: write package: {elsewhere}",
+            fault = (
+                f"is looked for in {owner}, and elsewhere it is in {elsewhere}: write package: {elsewhere}"
             )
+            yield at, fault
 
 
 def _plain(path: str) -> str:
     return PurePosixPath(path).name
 
 
-def _without_program(rubric: dict[str, Any], scenarios: Mapping[str, dict[str, Any]]) -> Iterator[Fault]:
+def _without_program(rubric: dict[str, Any]) -> Iterator[Fault]:
     """Yield topics of the turtle simulator's and the robot world's that nothing in the run publishes."""
-    for index, criterion in as_maps(rubric.get("criteria")):
-        name = str(criterion.get("scenario"))
-        starts = starts_of(scenarios.get(name, {}))
+    for criterion in criteria_of(rubric):
+        starts = starts_of(criterion.scenario)
         programs = [str(start.get("program")) for start in starts if start.get("program") is not None]
-        is_open = any(
-            {"launch", "built"} & start.keys() or str(start.get("script")) in PROGRAMS for start in starts
-        ) or any(
-            program.endswith(OPEN_ENDINGS) or program.partition("/")[0] not in OWNERS for program in programs
-        )
-        for at, topic in asked_topics(as_map(criterion.get("with"))):
+        are_others = [one.endswith(OPEN_ENDINGS) or one.partition("/")[0] not in OWNERS for one in programs]
+        may_start_others = [
+            {"launch", "built"} & one.keys() or str(one.get("script")) in PROGRAMS for one in starts
+        ]
+        is_open = any(are_others) or any(may_start_others)
+        for at, topic in asked_topics(criterion.given):
             owner = next((known for known, one in PROGRAMS.items() if one.published.fullmatch(topic)), "")
             if starts and not is_open and owner and owner not in programs and _is_own(topic, owner):
-                yield (
-                    ("criteria", index, "with", *at),
-                    f"{name} does not start {owner}, which publishes {topic}",
-                )
+                fault = f"{criterion.run} does not start {owner}, which publishes {topic}"
+                yield (*criterion.at, *at), fault
 
 
 OWNERS = frozenset(program.partition("/")[0] for program in PROGRAMS)

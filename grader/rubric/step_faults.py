@@ -22,7 +22,7 @@ from grader.rubric.fault_words import model_faults
 from grader.rubric.scenario import STEP_S_MAX, Action, Step, Transform, Until
 from grader.rubric.spelling import is_slip
 from grader.rubric.started import starts_of
-from grader.rubric.yaml_lines import Fault, KeyPath, as_list, as_map, as_maps, as_texts, texts_in
+from grader.rubric.yaml_lines import Fault, KeyPath, as_list, as_map, as_maps, as_texts, criteria_of, texts_in
 from grader.wording import did_you_mean
 
 KINDS = tuple(Step.model_fields)
@@ -91,16 +91,15 @@ def bag_faults(
 
 def _rows_faults(path: KeyPath, name: str, times_ns: list[int], rubric: dict[str, Any]) -> Iterator[Fault]:
     """Yield tables with more rows than can come of so many messages, or in that time."""
-    until = as_map(as_map(as_map(rubric.get("scenarios")).get(str(path[1]))).get("until"))
-    limit_s = until.get("limit_s", Until.model_fields["limit_s"].default)
     lasts_s = (max(times_ns, default=0) - min(times_ns, default=0)) / 1e9
-    for index, criterion in as_maps(rubric.get("criteria")):
-        rows = as_map(criterion.get("with")).get("rows_at_least")
-        if criterion.get("scenario") != path[1] or not is_number(rows) or not is_number(limit_s):
+    for criterion in criteria_of(rubric):
+        until, rows = as_map(criterion.scenario.get("until")), criterion.given.get("rows_at_least")
+        limit_s = until.get("limit_s", Until.model_fields["limit_s"].default)
+        if criterion.run != path[1] or not is_number(rows) or not is_number(limit_s):
             continue
         if rows > ROWS_PER_MESSAGE * len(times_ns) + ROWS_PER_S * (lasts_s + limit_s):
             fault = f"{name} has {len(times_ns)} messages in {lasts_s:.3g} s: so many rows never come"
-            yield ("criteria", index, "with", "rows_at_least"), fault
+            yield (*criterion.at, "rows_at_least"), fault
 
 
 def step_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
@@ -156,10 +155,8 @@ def _action(at: KeyPath, given: dict[str, Any], types: dict[str, str]) -> Iterat
     types.setdefault(name, kind)
     for one, other in ((kind, types[name]), (types[name], kind)):
         if one != other and re.sub(r"(Action)?(Goal|Result|Feedback)$", "", one) == other:
-            yield (
-                (*at, "type"),
-                f"has to be the same for all goals of {name}, that of the .action file: {other}",
-            )
+            fault = f"has to be the same for all goals of {name}, that of the .action file: {other}"
+            yield (*at, "type"), fault
     yield from _cancelled_late(at, given)
 
 
@@ -229,10 +226,8 @@ def misfits(
     if not names and kind not in OTHER_TEXTS:
         return
     if names and name not in names:
-        yield (
-            at,
-            f"ROS Noetic has no message type {kind}{did_you_mean(kind, [f'{package}/{n}' for n in names])}",
-        )
+        near = did_you_mean(kind, [f"{package}/{one}" for one in names])
+        yield at, f"ROS Noetic has no message type {kind}{near}"
         return
     message_type, first = MessageType(kind), FIRST._replace(total=None if endless else 1)
     for place, value in values:
@@ -298,11 +293,7 @@ def _processes(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
             elif kind == "start" and runs.get(name, False):
                 yield at, f'"{name}" runs already: stop it before, or restart it'
             elif kind in {"stop", "kill", "type"} and not runs.get(name, True):
-                why = (
-                    "an earlier step has stopped it"
-                    if name not in later
-                    else "no earlier step has started it"
-                )
+                why = "no earlier step has started it" if name in later else "an earlier step has stopped it"
                 yield at, f'"{name}" does not run: {why}'
             if kind != "type":
                 later.discard(name)
@@ -322,10 +313,8 @@ def _after_the_last(
         living -= {ended} if not any({"start", "restart"} & one.keys() for _, one in rest) else set()
         kind = next((key for key in FOR_NODES if key in step), "")
         if not living and starts and kind and as_map(step.get("wait")).get("seconds") is None:
-            yield (
-                (*path, "steps", index, kind),
-                "nothing runs any more that could take part: it has been stopped",
-            )
+            fault = "nothing runs any more that could take part: it has been stopped"
+            yield (*path, "steps", index, kind), fault
             return
 
 

@@ -9,8 +9,18 @@ from typing import Any
 
 from grader.checks.registry import Check
 from grader.checks.support.topics import READ_TOO, SYSTEM_TOPICS
+from grader.rubric.simulators import set_in
 from grader.rubric.started import starts_of
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
+from grader.rubric.yaml_lines import (
+    Fault,
+    KeyPath,
+    WrittenCriterion,
+    as_map,
+    as_maps,
+    as_texts,
+    criteria_of,
+    packages_in,
+)
 from grader.wording import closest, join_words
 
 LIKELY, SURE = 0.6, 0.85
@@ -24,7 +34,7 @@ def unknown_names(
 ) -> Iterator[Fault]:
     """Yield a fault for each of them."""
     yield from _unknown_topics(rubric, scenarios, checks)
-    yield from _unknown_causes(rubric, scenarios, checks)
+    yield from _unknown_causes(rubric, checks)
     yield from _misspelt_nodes(rubric, scenarios)
     yield from _own_types(rubric)
     yield from _misspelt_scripts(rubric, scenarios)
@@ -37,10 +47,10 @@ def _unknown_topics(
 
     Programs, launch files and checks of the instructor's own may know others: then only a near miss is a fault.
     """
-    criteria = [criterion for _, criterion in as_maps(rubric.get("criteria"))]
-    named = {topic for criterion in criteria for topic in topics_in(criterion.get("with"))}
-    named |= {topic for criterion in criteria for topic in READ_TOO.get(str(criterion.get("check")), ())}
-    found = [checks.get(str(criterion.get("check"))) for criterion in criteria]
+    criteria = criteria_of(rubric)
+    named = {topic for criterion in criteria for topic in topics_in(criterion.given)}
+    named |= {topic for criterion in criteria for topic in READ_TOO.get(criterion.check, ())}
+    found = [checks.get(criterion.check) for criterion in criteria]
     own = any(check is None or check.source or "evidence" in check.facts for check in found)
     for name, scenario in scenarios.items():
         until = as_map(scenario.get("until"))
@@ -60,16 +70,13 @@ def _unknown_topics(
                 yield ("scenarios", name, *at), f'no criterion names {topic} (did you mean "{near}"?)'
 
 
-def _unknown_causes(
-    rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
-) -> Iterator[Fault]:
+def _unknown_causes(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Iterator[Fault]:
     """Yield causes on topics that nothing in the scenario sends on, and that no other criterion names."""
-    for index, criterion, others in with_other_topics(rubric):
-        check, name = checks.get(str(criterion.get("check"))), str(criterion.get("scenario"))
-        scenario = scenarios.get(name, {})
+    for criterion, others in with_other_topics(rubric):
+        check, name, scenario = checks.get(criterion.check), criterion.run, criterion.scenario
         sent = {*SYSTEM_TOPICS, *topics_in(scenario), *_of_actions(scenario)}
         open_ = any(start.get("script") is None for start in starts_of(scenario)) or "recording" in scenario
-        for one in check.references(as_map(criterion.get("with"))) if check else ():
+        for one in check.references(criterion.given) if check else ():
             at = one.path if isinstance(one.value, str) else (*one.path, "topic")
             topic = one.value if isinstance(one.value, str) else as_map(one.value).get("topic")
             if one.to not in {"cause", "heard"} or not isinstance(topic, str) or topic in sent | others:
@@ -78,7 +85,7 @@ def _unknown_causes(
             if near or not open_:
                 meant = f' (did you mean "{near}"?)' if near else ""
                 fault = f"nothing in {name} sends on {topic}, and no other criterion names it{meant}"
-                yield ("criteria", index, "with", *at), fault
+                yield (*criterion.at, *at), fault
 
 
 def _of_actions(scenario: dict[str, Any]) -> Iterator[str]:
@@ -91,20 +98,14 @@ def _of_actions(scenario: dict[str, Any]) -> Iterator[str]:
 
 def _own_types(rubric: dict[str, Any]) -> Iterator[Fault]:
     """Yield types of the student's package that are all but one whose file a criterion asks for."""
-    criteria = list(as_maps(rubric.get("criteria")))
-    files = [str(as_map(c.get("with")).get("file")) for _, c in criteria if c.get("check") == "definition"]
-    names, own = {PurePosixPath(file).stem for file in files}, packages_in(rubric)
+    criteria, own = criteria_of(rubric), packages_in(rubric)
     defined = {
-        (
-            str(c.get("package") or next(iter(own), "")),
-            PurePosixPath(str(as_map(c.get("with")).get("file"))).stem,
-        )
-        for _, c in criteria
-        if c.get("check") == "definition"
+        (str(c.data.get("package") or next(iter(own), "")), PurePosixPath(str(c.given.get("file"))).stem)
+        for c in criteria
+        if c.check == "definition"
     }
-    typed: list[tuple[KeyPath, dict[str, Any]]] = [
-        (("criteria", n, "with"), as_map(c.get("with"))) for n, c in criteria
-    ]
+    names = {stem for _, stem in defined}
+    typed = [(criterion.at, criterion.given) for criterion in criteria]
     for scenario, one in as_map(rubric.get("scenarios")).items():
         steps = [(n, key, as_map(step[key])) for n, step in as_maps(as_map(one).get("steps")) for key in step]
         typed += [(("scenarios", scenario, "steps", n, key), given) for n, key, given in steps]
@@ -122,33 +123,26 @@ def _own_types(rubric: dict[str, Any]) -> Iterator[Fault]:
 
 def _misspelt_scripts(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
     """Yield scripts that nothing starts, and that are all but one that is started and that no criterion names."""
-    criteria = list(as_maps(rubric.get("criteria")))
-    paths = {n: as_map(c.get("with")).get("path") for n, c in criteria if c.get("check") == "executable"}
-    named = {n: PurePosixPath(path).name for n, path in paths.items() if isinstance(path, str)}
+    paths = {c.at: c.given.get("path") for c in criteria_of(rubric) if c.check == "executable"}
+    named = {at: PurePosixPath(path).name for at, path in paths.items() if isinstance(path, str)}
     starts = [start for scenario in scenarios.values() for start in starts_of(scenario)]
     started = {PurePosixPath(script).name for script in values_of(starts, "script")}
-    for index, name in named.items():
+    for at, name in named.items():
         near = "" if name in started else _near(name, started - {*named.values()}, cutoff=SURE)
         if near:
-            yield ("criteria", index, "with", "path"), f'no scenario starts {name} (did you mean "{near}"?)'
+            yield (*at, "path"), f'no scenario starts {name} (did you mean "{near}"?)'
 
 
 def _misspelt_nodes(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
     """Yield private parameters of a node whose name is all but one that a criterion asks for."""
     asked: dict[str, set[str]] = {}
-    for _, criterion in as_maps(rubric.get("criteria")):
-        names = as_texts(as_map(criterion.get("with")).get("names"))
-        asked.setdefault(str(criterion.get("scenario")), set()).update(n.strip("/") for _, n in names)
+    for criterion in criteria_of(rubric):
+        names = as_texts(criterion.given.get("names"))
+        asked.setdefault(criterion.run, set()).update(n.strip("/") for _, n in names)
     for name, scenario in scenarios.items():
         programs = values_of(starts_of(scenario), "program")
         asked.setdefault(name, set()).update(program.rpartition("/")[2] for program in programs)
-        given: list[tuple[KeyPath, dict[str, Any]]] = [
-            (("params", n), one) for n, one in as_maps(scenario.get("params"))
-        ]
-        given += [
-            (("steps", n, "set_param"), as_map(s.get("set_param"))) for n, s in as_maps(scenario.get("steps"))
-        ]
-        for at, one in given:
+        for at, one in set_in(scenario):
             node, _, private = str(one.get("name", "")).strip("/").partition("/")
             nodes = asked.get(name, set())
             near = _near(node, nodes, cutoff=SURE) if private and node not in nodes else ""
@@ -170,12 +164,12 @@ def _waited_for(until: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
     yield from ((("messages", topic), topic) for topic in as_map(until.get("messages")))
 
 
-def with_other_topics(rubric: dict[str, Any]) -> Iterator[tuple[int, dict[str, Any], set[str]]]:
-    """Yield each criterion with its place, and the topics that the others name."""
-    criteria = list(as_maps(rubric.get("criteria")))
-    named = [set(topics_in(criterion.get("with"))) for _, criterion in criteria]
-    for place, (index, criterion) in enumerate(criteria):
-        yield index, criterion, set().union(*named[:place], *named[place + 1 :])
+def with_other_topics(rubric: dict[str, Any]) -> Iterator[tuple[WrittenCriterion, set[str]]]:
+    """Yield each criterion, and the topics that the others name."""
+    criteria = criteria_of(rubric)
+    named = [set(topics_in(criterion.given)) for criterion in criteria]
+    for place, criterion in enumerate(criteria):
+        yield criterion, set().union(*named[:place], *named[place + 1 :])
 
 
 def topics_in(value: object) -> Iterator[str]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
-from typing import Any, TypeAlias, cast
+from typing import Any, NamedTuple, TypeAlias, cast
 
 import yaml
 from yaml.composer import Composer
@@ -124,6 +124,57 @@ def source_of(raw: bytes, name: str, form: Form) -> Source:
         line = raw.count(b"\n", 0, error.start) + 1
         raise RubricError([f"{name}:{line}: the file is not UTF-8: save it as UTF-8"]) from error
     return _compose(text, raw, name, form)
+
+
+class WrittenCriterion(NamedTuple):
+    """A criterion as it is written, with all faults that it may have.
+
+    `place` is where it is, `at` where its parameters are, which are `given`. `run` is the name of its scenario, and
+    `scenario` what is written there: empty where the criterion names none, or one that is not there.
+    """
+
+    data: dict[str, Any]
+    place: KeyPath
+    id: str
+    check: str
+    given: dict[str, Any]
+    run: str
+    scenario: dict[str, Any]
+
+    @property
+    def at(self) -> KeyPath:
+        return (*self.place, "with")
+
+    @property
+    def has_run(self) -> bool:
+        return self.data.get("scenario") is not None
+
+    @property
+    def requires(self) -> list[str]:
+        return [name for _, name in as_texts(self.data.get("requires"))]
+
+    @property
+    def conditions(self) -> tuple[tuple[KeyPath, dict[str, Any]], ...]:
+        """Where a value of a field may be asked for, and what is written there: the parameters, a cause, an effect."""
+        parts = (((*self.at, key), as_map(self.given.get(key))) for key in ("cause", "effect"))
+        return ((self.at, self.given), *parts)
+
+
+def criteria_of(rubric: Mapping[str, Any]) -> list[WrittenCriterion]:
+    """Return the criteria of a rubric in their order."""
+    scenarios = as_map(rubric.get("scenarios"))
+    return [
+        WrittenCriterion(
+            data=one,
+            place=("criteria", index),
+            id=str(one.get("id")),
+            check=str(one.get("check")),
+            given=as_map(one.get("with")),
+            run=str(one.get("scenario")),
+            scenario=as_map(scenarios.get(str(one.get("scenario")))),
+        )
+        for index, one in as_maps(rubric.get("criteria"))
+    ]
 
 
 def packages_in(rubric: dict[str, Any]) -> list[str]:

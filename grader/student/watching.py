@@ -24,8 +24,8 @@ from grader.arena.workspace import needed_packages
 from grader.errors import ExitCode, GraderError, SubmissionError, UsageError
 from grader.faults import error_result
 from grader.files import temporary_folder
-from grader.intake import open_submission
 from grader.intake.choose import WantedPackage
+from grader.intake.open import open_submission
 from grader.intake.source import identify
 from grader.model.package import SourceFile
 from grader.model.progress import Progress

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from grader.errors import SubmissionError
-from grader.intake import open_submission
+from grader.intake.open import open_submission
 from grader.integrations.autograde import find_upload
 from grader.model.submission import Submission
 

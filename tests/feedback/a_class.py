@@ -11,7 +11,7 @@ from grader.classes.batch.regrade import regrade
 from grader.classes.overrides import FILE as OVERRIDES
 from grader.classes.overrides.write import write_override
 from grader.cli.main import run
-from grader.intake import safe_name
+from grader.intake.names import safe_name
 from grader.model.batch import Sent
 from grader.model.result import GradingResult, Override
 from grader.report.files import result_bytes

@@ -10,7 +10,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 from grader.classes.fetching import Obtained, Patience, Rule, obtain
-from grader.intake import open_submission
+from grader.intake.open import open_submission
 from grader.model.batch import Entry
 from grader.model.submission import Submission
 from tests.intake.samples import git, lab, write

@@ -9,8 +9,7 @@ import pytest
 
 from grader.classes.fetching import Rule
 from grader.errors import SubmissionError, UsageError
-from grader.intake import without_password
-from grader.intake.credentials import Access, accesses, split_address
+from grader.intake.credentials import Access, accesses, split_address, without_password
 from grader.intake.source import parse_source
 from tests.fetching.forge import certificate_in, forge
 from tests.fetching.samples import DEADLINE

@@ -9,7 +9,7 @@ import pytest
 
 from grader.classes.fetching import Rule
 from grader.errors import SubmissionError, UsageError
-from grader.intake import open_submission
+from grader.intake.open import open_submission
 from grader.intake.source import identify
 from tests.fetching.samples import DEADLINE, HOST, commit_at, entry
 from tests.intake.samples import git, lab, lab_zip, repository, write

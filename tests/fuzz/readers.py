@@ -32,8 +32,10 @@ from grader.evidence.message_values import ServiceTypes
 from grader.evidence.reader import load_run, package_facts
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceStream
-from grader.intake import IntakeLimits, open_submission, safe_name
 from grader.intake.find import manifest_name
+from grader.intake.limits import IntakeLimits
+from grader.intake.names import safe_name
+from grader.intake.open import open_submission
 from grader.intake.repository import choose_ref, parse_refs
 from grader.intake.source import parse_source
 from grader.model.message_definitions import parse_interface
@@ -159,7 +161,7 @@ def python_causes(data: bytes) -> None:
 
 def source_file(data: bytes) -> None:
     for path in ("src/talker.py", "src/talker", "run.sh"):
-        _text_facts(data, path, executable=path == "run.sh", interpreters=lambda _: True)
+        _text_facts(data, path, executable=path == "run.sh")
 
 
 def parameters(data: bytes) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from grader.intake import open_submission
+from grader.intake.open import open_submission
 from grader.model.submission import Submission
 
 _IDENTITY = {

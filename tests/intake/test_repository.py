@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from grader.errors import PackageNotFound, SubmissionError
-from grader.intake import open_recorded, open_recording, open_submission
 from grader.intake.limits import IntakeLimits
+from grader.intake.open import open_recorded, open_recording, open_submission
 from grader.intake.source import identify, parse_source
 from tests.intake.samples import commit, git, lab, opened, repository, write
 from tests.support.processes import lives, until

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from grader.checks.registry import collecting
-from grader.intake import open_submission
+from grader.intake.open import open_submission
 from grader.judging.judge import judge_files
 from grader.model.package import CMakeCall, CMakeFacts, Fault, PackageFacts
 from grader.model.python_slip import PythonSlip

@@ -9,7 +9,7 @@ import pytest
 
 from grader.classes.overrides import FILE, Overrides, read_overrides
 from grader.errors import RubricError
-from grader.intake import safe_name
+from grader.intake.names import safe_name
 from grader.model.result import Override
 from tests.overrides.samples import IDS, rubric
 

@@ -8,14 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.model.package import meant_command
-from grader.package.cmake import read_cmake, split_lists
+from grader.package.cmake import read_cmake, refine_cmake, split_lists
 from grader.package.cmake_parse import parse_tree_of
 
 
-def facts_of(tmp_path, text, **fields):
+def facts_of(tmp_path, text, *, trace=None, root=None):
     data = text if isinstance(text, bytes) else text.encode()
     (tmp_path / "CMakeLists.txt").write_bytes(data)
-    return read_cmake(tmp_path, "lab1", **fields)
+    facts = read_cmake(tmp_path, "lab1")
+    return facts if trace is None else refine_cmake(facts, ("lab1",), trace=trace, root=root)
 
 
 def calls_of(facts, name):

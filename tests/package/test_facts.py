@@ -53,12 +53,10 @@ def test_an_empty_folder_is_no_crash(tmp_path):
 def test_ros_python_has_the_last_word(tmp_path):
     package = make_package(tmp_path / "lab1", FILES)
     fault = Fault(file="src/a.py", line=1, kind="SyntaxError", message="invalid syntax")
-    given = read_package(package, python_faults={"src/a.py": fault})
-    later = with_build_facts(read_package(package), python_faults={"src/a.py": fault}, python_slips=())
-    for facts in (given, later):
-        assert facts.file("src/a.py").python_fault == fault
-        assert facts.file("src/bad.py").python_fault is None
-    assert later.slips == ()
+    facts = with_build_facts(read_package(package), python_faults={"src/a.py": fault}, python_slips=())
+    assert facts.file("src/a.py").python_fault == fault
+    assert facts.file("src/bad.py").python_fault is None
+    assert facts.slips == ()
 
 
 def test_what_ros_python_was_not_asked_keeps_its_fault(tmp_path):
@@ -98,7 +96,8 @@ def test_cmake_says_what_it_was_told(tmp_path, stops):
     )
     static = read_package(package)
     facts = with_build_facts(static, cmake_trace=trace)
-    assert facts.cmake == read_package(package, cmake_trace=trace, cmake_root=str(package.folder)).cmake
+    by_root = with_build_facts(static, cmake_trace=trace, cmake_root=str(package.folder))
+    assert facts.cmake == by_root.cmake
     assert facts.cmake.source == "trace"
     assert facts.cmake.stopped_line == (5 if stops else None)
     calls = [(c.name, c.args, c.line) for c in facts.cmake.calls]

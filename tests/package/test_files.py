@@ -5,14 +5,18 @@ import os
 
 import pytest
 
+from grader.package import facts
 from grader.package.facts import on_system, read_files, read_shebang
 from tests.package.trees import NODE, make_package
 
 
-def none_found(_program):
-    return False
+@pytest.fixture
+def none_found(monkeypatch):
+    """A machine on which no program is."""
+    monkeypatch.setattr(facts, "on_system", lambda _program: False)
 
 
+@pytest.mark.usefixtures("none_found")
 @pytest.mark.parametrize(
     ("text", "interpreter"),
     [
@@ -30,7 +34,7 @@ def none_found(_program):
     ],
 )
 def test_usable_shebangs_of_python(text, interpreter):
-    shebang, fault, problem = read_shebang(text.encode() + b"\nimport rospy\n", none_found)
+    shebang, fault, problem = read_shebang(text.encode() + b"\nimport rospy\n")
     assert (shebang.interpreter, shebang.found, shebang.crlf) == (interpreter, True, False)
     assert (fault, problem) == ("", "")
     assert shebang.text == text[2:].strip()
@@ -51,8 +55,9 @@ def test_usable_shebangs_of_python(text, interpreter):
         (b"#!usr/bin/env python\n", "env", "not an absolute path"),
     ],
 )
+@pytest.mark.usefixtures("none_found")
 def test_interpreters_that_are_not_there(data, interpreter, problem):
-    shebang, fault, said = read_shebang(data, none_found)
+    shebang, fault, said = read_shebang(data)
     assert (shebang.interpreter, shebang.found, fault) == (interpreter, False, "other")
     assert problem in said
 
@@ -92,10 +97,11 @@ def test_why_there_is_no_shebang(data, problem):
     assert problem in f"{fault}: {said}"
 
 
-def test_the_machine_is_asked_for_other_programs():
+def test_the_machine_is_asked_for_other_programs(monkeypatch):
     asked = []
-    read_shebang(b"#!/bin/bash\n", lambda program: bool(asked.append(program)))
-    read_shebang(b"#!/usr/bin/env bash\n", lambda program: bool(asked.append(program)))
+    monkeypatch.setattr(facts, "on_system", lambda program: bool(asked.append(program)))
+    read_shebang(b"#!/bin/bash\n")
+    read_shebang(b"#!/usr/bin/env bash\n")
     assert asked == ["/bin/bash", "bash"]
     assert on_system("sh")
     assert on_system("/bin/sh")

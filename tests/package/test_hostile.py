@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import pytest
 
 from grader.errors import SubmissionError
-from grader.intake import open_submission
+from grader.intake.open import open_submission
 from grader.package import read_package
 from grader.package.cmake import read_trace
 from grader.package.facts import read_shebang

@@ -15,7 +15,7 @@ from grader import __version__
 from grader.classes.batch.folder import BatchFolder, write_run
 from grader.classes.batch.run import describe_rubric, write_books
 from grader.evidence.reader import load_evidence
-from grader.intake import safe_name
+from grader.intake.names import safe_name
 from grader.judging import judge
 from grader.model.batch import BatchRun, Entry, RosterFault
 from grader.model.result import CriterionResult, GradingResult

@@ -22,7 +22,8 @@ from grader.classes.fetching import NothingInTime, Obtained, Rule, obtain
 from grader.errors import GraderError, SubmissionError, UsageError
 from grader.faults import GradingContext, classify_errors, fault_of
 from grader.files import temporary_folder
-from grader.intake import safe_name, without_password
+from grader.intake.credentials import without_password
+from grader.intake.names import safe_name
 from grader.judging.settle import settle
 from grader.judging.summary import NOTHING_RUN, passed
 from grader.model import SandboxMode

@@ -32,7 +32,7 @@ from grader.classes.overrides import FILE as OVERRIDES
 from grader.classes.overrides import read_overrides
 from grader.errors import GraderError
 from grader.files import FILE, atomic_write, open_untrusted, unwritable
-from grader.intake import safe_name
+from grader.intake.names import safe_name
 from grader.judging.summary import overall_status, total_fields
 from grader.model import SandboxMode
 from grader.model.batch import Entry, Roster

@@ -24,7 +24,7 @@ from grader.classes.overrides import FILE as OVERRIDES
 from grader.classes.overrides import read_overrides
 from grader.errors import Busy, GraderError, UsageError
 from grader.files import check_writable, keep_private, make_folder, try_lock
-from grader.intake import without_password
+from grader.intake.credentials import without_password
 from grader.intake.names import folder_key
 from grader.judging.summary import passed
 from grader.model import SandboxMode

@@ -20,6 +20,7 @@ from typing import Any
 from grader.classes.cluster import worker
 from grader.errors import HostError, UsageError
 from grader.installable import install_extra
+from grader.portable import on_interrupt
 from grader.ros_env import INSTALL_HINT
 
 CONNECT_S = 15.0
@@ -75,7 +76,9 @@ def connect(address: str) -> Iterator[Any]:
     from grader.classes.cluster.local import own_cluster  # noqa: PLC0415 - slow to load
 
     with ExitStack() as stack:
-        with _not_interrupted():
+        with on_interrupt(
+            signal.SIG_IGN
+        ):  # its processes are ended in order, and not by the terminal's Ctrl-C
             cluster = stack.enter_context(own_cluster())
         yield stack.enter_context(Client(cluster, set_as_default=False))
 
@@ -155,19 +158,6 @@ def _silence() -> None:
     """What Dask logs about lost connections, the grader says where it matters."""
     for name in LOGGERS:
         logging.getLogger(name).setLevel(logging.CRITICAL)
-
-
-@contextmanager
-def _not_interrupted() -> Iterator[None]:
-    """Processes that are started in this block do not hear a Ctrl-C on the terminal: they are ended in order."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def is_encrypted(address: str) -> bool:

@@ -36,7 +36,7 @@ from grader.classes.cluster.exchange import (
 )
 from grader.errors import GraderError, HostError
 from grader.files import temporary_folder
-from grader.intake import safe_name
+from grader.intake.names import safe_name
 from grader.results import RESULT, Results
 from grader.rubric.load import LoadedRubric, needs_ros, read_beside_rubric
 

@@ -24,7 +24,7 @@ from grader.classes.batch.job import GradingJob, SubmissionOutcome, grade_job, o
 from grader.classes.cluster.exchange import Exchange, GradeRequest, Parcel, Report, is_machines, pack, unpack
 from grader.errors import GraderError, HostError
 from grader.files import temporary_folder
-from grader.intake import safe_name
+from grader.intake.names import safe_name
 from grader.ros_env import find_ros
 from grader.workers import Worker, WorkerEnded, WorkerLimits
 

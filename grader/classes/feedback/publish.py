@@ -23,7 +23,7 @@ from grader.classes.batch.run import hold_folder
 from grader.classes.gradebook import GradebookRow
 from grader.errors import EvidenceError, GraderError, UsageError
 from grader.files import atomic_write, make_folder
-from grader.intake import safe_name
+from grader.intake.names import safe_name
 from grader.model.batch import UNPUBLISHED, Entry, Publication
 from grader.model.result import AppliedOverride, GradingResult
 from grader.model.version import PUBLISHED as FORMAT

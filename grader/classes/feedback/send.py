@@ -37,7 +37,7 @@ from grader.classes.feedback.publish import (
 from grader.errors import NotSent, UsageError
 from grader.files import FILE as PRIVATE
 from grader.files import temporary_folder, unwritable
-from grader.intake import safe_name
+from grader.intake.names import safe_name
 from grader.model.batch import Entry, Publication, Sent, SentState
 from grader.model.version import SENT, UPDATE
 from grader.portable import BINARY, CLOEXEC, NOFOLLOW

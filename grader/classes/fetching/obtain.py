@@ -29,10 +29,9 @@ from grader.classes.fetching.mirror import (
 )
 from grader.errors import SubmissionError
 from grader.files import temporary_folder
-from grader.intake import unreadable
 from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch
 from grader.intake.names import brief, printable
-from grader.intake.open import new_folder
+from grader.intake.open import new_folder, unreadable
 from grader.intake.repository import WantedRevision, choose_ref, no_such_ref, served
 from grader.intake.source import Source, as_repository, parse_source, with_ref
 from grader.intake.tree import is_there

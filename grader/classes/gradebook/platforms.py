@@ -340,17 +340,13 @@ def wanted_columns(book: Book, column: str, *, per_criterion: bool) -> tuple[Poi
         names = (column,) if column else (book.title, book.rubric_id)
         return (PointsColumn(title=base, names=names, max_points=book.max_points),)
     worth = [criterion for criterion in book.criteria if criterion.max_points > 0 or criterion.extra]
-    titles = [criterion.title for criterion in worth]
-    return tuple(
-        PointsColumn(
-            title=f"{base} - {c.title}" + (f" ({c.id})" if titles.count(c.title) > 1 else ""),
-            names=(f"{base} - {c.title}", f"{base} - {c.id}", c.id)
-            if titles.count(c.title) == 1
-            else (f"{base} - {c.title} ({c.id})", f"{base} - {c.id}", c.id),
-            max_points=c.max_points,
-        )
-        for c in worth
-    )
+    alike = Counter(criterion.title for criterion in worth)
+    columns = []
+    for one in worth:
+        title = f"{base} - {one.title}" + (f" ({one.id})" if alike[one.title] > 1 else "")
+        called = (title, f"{base} - {one.id}", one.id)
+        columns.append(PointsColumn(title=title, names=called, max_points=one.max_points))
+    return tuple(columns)
 
 
 def marks_of(book: Book, rows: Iterable[GradebookRow], *, per_criterion: bool) -> list[Mark]:

@@ -19,7 +19,7 @@ from pydantic import ValidationError
 
 from grader.classes.batch.folder import RUN, BatchFolder, open_batch
 from grader.classes.gradebook import GradebookRow
-from grader.intake import safe_name
+from grader.intake.names import safe_name
 from grader.judging.settle import awarded
 from grader.model.batch import MISSING, ROSTER, Entry
 from grader.model.record import Record

@@ -9,8 +9,8 @@ from pathlib import Path
 from grader.errors import HostError, SubmissionError, UsageError
 from grader.files import atomic_write, temporary_folder
 from grader.installable import install_extra
-from grader.intake import IntakeLimits
 from grader.intake.archive import unpack
+from grader.intake.limits import IntakeLimits
 from grader.model.batch import Lines, Pair, Similarity
 from grader.model.record import Record
 from grader.report.text import csv_text, json_text

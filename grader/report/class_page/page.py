@@ -290,8 +290,8 @@ class _Kind:
     title: str
     advice: str
     holds: Callable[[SubmissionRow], bool]
-    text: Callable[[SubmissionRow], str]
     command: Callable[[BatchRun, Path], Markup]
+    text: Callable[[SubmissionRow], str] = lambda _: ""
 
 
 def _problem(found: SubmissionRow) -> str:
@@ -308,7 +308,6 @@ KINDS = (
         title="Not graded yet",
         advice="The batch continues where it stopped:",
         holds=lambda found: found.state == "missing",
-        text=lambda _: "",
         command=again,
     ),
     _Kind(
@@ -332,7 +331,6 @@ KINDS = (
         title="Points that a person awards",
         advice="Everything that can be checked is checked. Award the points in your browser:",
         holds=lambda found: found.state == "manual",
-        text=lambda _: "",
         command=lambda _, out: review(out),
     ),
     _Kind(
@@ -340,7 +338,6 @@ KINDS = (
         title="Decided by a person, and the check says something else now",
         advice="Check whether the points are still right:",
         holds=lambda found: found.look_again > 0,
-        text=lambda _: "",
         command=lambda _, out: review(out),
     ),
 )
