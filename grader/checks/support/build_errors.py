@@ -469,9 +469,8 @@ def _build_dependency(found: re.Match[str], _package: PackageFacts, _lines: Sequ
 
 def _unused_argument(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     why = f"catkin_package(…) does not know what to do with {shown(found[1].replace(';', ' '))}"
-    return Explained(
-        why, "write it after INCLUDE_DIRS, LIBRARIES, CATKIN_DEPENDS or DEPENDS, spelt like this"
-    )
+    hint = "write it after INCLUDE_DIRS, LIBRARIES, CATKIN_DEPENDS or DEPENDS, spelt like this"
+    return Explained(why, hint)
 
 
 FIXES_MAX = 4
@@ -483,7 +482,8 @@ NO_TARGET = r'dependency target "([^"]+)" of target "([^"]+)" does not exist'
 
 def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
     text = f"{found[1]}/{found[2]}.h does not exist when the program is compiled"
-    made = {f"{folder}/{found[2]}.{folder}" for folder in ("msg", "srv")}
+    action = re.sub("(Action)?(Goal|Result|Feedback)?$", "", found[2])
+    made = {f"msg/{found[2]}.msg", f"srv/{found[2]}.srv", f"action/{action}.action"}
     if found[1] != package.name or not made & {f.path for f in package.files}:
         own = [PurePosixPath(f.path).stem for f in package.files if f.path.endswith(tuple(MADE))]
         there = own if found[1] == package.name else noetic_messages().get(found[1], ())
