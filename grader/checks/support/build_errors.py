@@ -12,7 +12,6 @@ from grader.checks.support.build_output import FIRST_ERROR_HINT, BuildError, Exp
 from grader.checks.support.cpp_errors import (
     CPP_ERRORS,
     CPP_SUFFIXES,
-    call_below,
     missing_header,
     missing_link,
     other_namespace,
@@ -526,8 +525,9 @@ def _unwaited(package: PackageFacts, text: str, what: str, targets: str, lines: 
         for call in cmake_calls(package, "add_executable")
         if call.args and call.args[0] in waiting
     ]
-    other = f"write {call_below('<program>', 'add_dependencies', targets)}"
-    return Explained(why, "; ".join(fixes[:FIXES_MAX]) or other)
+    programs = join_words(waiting, most=len(waiting)) or "each program"
+    other = f"write add_dependencies(<program> {targets}) below the add_executable(…) of {programs}"
+    return Explained(why, "; ".join(fixes) if 0 < len(fixes) <= FIXES_MAX else other)
 
 
 def _unknown_command(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
