@@ -107,6 +107,10 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
         verdict = failed(message, hint="print each number once, in the callback")
     elif missing:
         verdict = _judge_missing(package, run, probes, missing, params)
+        if verdict.hint == CALLBACK_HINT and params.template != VALUE:
+            said = f"'{in_words(params.template)}'"
+            hint = CALLBACK_HINT.replace("the message's .data", said, 1)
+            verdict = verdict.model_copy(update={"hint": hint})
     elif not in_order(places):
         message = f"what came on {params.topic} is printed, but not in the order in which it was sent"
         verdict = failed(
@@ -144,6 +148,8 @@ def _other_words(
         hint = f"put a space between the words and the message: '{wanted}'"
     elif said and (mark := _mark_between(said[0], missing[0], params.template)):
         hint = f"print '{wanted}', with ' ' in place of {mark!r} between the words and the message"
+        if UNFILLED in mark:
+            hint = f"print '{wanted}': write % in place of the + before the message, which fills the {UNFILLED} in"
     share = 1 - (1 - OTHER_WORDS_SHARE) * len(missing) / len(probes)
     all_of = plural(len(probes), "message")
     measured = f"{len(probes)} of {all_of} printed, {len(missing)} of them in other words"
@@ -155,7 +161,12 @@ def _mark_between(said: str, probe: Probe, template: str) -> str:
     """Return what stands between the template's words and the message on a line, "" if it is not just marks."""
     before, _, _ = said.partition(str(probe.value))
     _, words, mark = before.casefold().rpartition(template.partition(VALUE)[0].strip().casefold())
-    return mark if words and mark.strip() and not any(c.isalnum() for c in mark) else ""
+    plain = not any(c.isalnum() for c in mark.replace(UNFILLED, ""))
+    return mark if words and mark.strip() and plain else ""
+
+
+UNFILLED = "%s"
+"""What is printed as it is where the message is only joined to it."""
 
 
 def _some_in_other_words(

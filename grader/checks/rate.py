@@ -25,7 +25,7 @@ from grader.checks.support.processes import (
     run_scripts,
     slips_of,
 )
-from grader.checks.support.text import LOOP, both, loop_rate
+from grader.checks.support.text import LOOP, SPIN, both, loop_rate
 from grader.checks.support.topics import (
     SYSTEM_TOPICS,
     Sender,
@@ -210,7 +210,7 @@ def _excuse_lateness(
     uneven: Verdict | None, found: Rhythm, run: Run, package: PackageFacts, params: RateParams
 ) -> Verdict | None:
     """The verdict, unless the machine was late itself: a rate that a script asks for is none of the machine's."""
-    if uneven is None or _asked_number(found.mean_hz, run, package, params) is not None:
+    if uneven is None or _asked_number(found, run, package, params) is not None:
         return uneven
     why = partial(_why_late, found, params=params)
     return excused(uneven, run, found.times_ns[0], found.until_ns, why)
@@ -311,7 +311,8 @@ def _short(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
         if not end.by_itself or run.foreign or _has_rate(package, run):
             return verdict
         paced = f"rate = rospy.Rate({significant(params.rate_hz)}) above the loop, rate.sleep() in it"
-        return verdict.model_copy(update={"hint": f"{verdict.hint}; then let it wait: {paced}"})
+        hint = f"publish in a loop `{LOOP}`" if SPIN in verdict.hint else verdict.hint
+        return verdict.model_copy(update={"hint": f"{hint}; then let it wait: {paced}"})
     message = f"only {seen} on {params.topic}, a rate needs {params.min_window_s:g} s"
     return inconclusive(message, hint="record for longer" if run.foreign else "grade again")
 
@@ -340,7 +341,7 @@ def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) 
         or (_by_slip(wrong, "publish-twice", run, package, params) if mean_hz > params.high_hz else None)
         or _bursts(found, outside, even, params)
         or (_by_slip(wrong, "sleep-twice", run, package, params) if mean_hz < params.rate_hz else None)
-        or _by_number(wrong, mean_hz, run, package, params)
+        or _by_number(wrong, found, run, package, params)
         or _left_out(wrong, mean_hz, run, package, params)
         or _by_parameter(wrong, run, package, params, mean_hz)
     )
@@ -443,10 +444,10 @@ def _wrong_mean(found: Rhythm, params: RateParams) -> Verdict:
 
 
 def _by_number(
-    verdict: Verdict, mean_hz: float, run: Run, package: PackageFacts, params: RateParams
+    verdict: Verdict, found: Rhythm, run: Run, package: PackageFacts, params: RateParams
 ) -> Verdict | None:
     """Name the line where the node's script asks for the rate that was measured."""
-    slip = _asked_number(mean_hz, run, package, params)
+    slip = _asked_number(found, run, package, params)
     return None if slip is None else _with_line(verdict, slip, params)
 
 
@@ -470,14 +471,12 @@ def _slips(run: Run, package: PackageFacts, params: RateParams, *kinds: SlipKind
     return [s for c in channels for s in slips_of(package, run, c.callerid, *kinds)]
 
 
-def _asked_number(mean_hz: float, run: Run, package: PackageFacts, params: RateParams) -> PythonSlip | None:
+def _asked_number(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> PythonSlip | None:
     """Return where a script asks for the rate that was measured, which is not the right one."""
-    wrong = (
-        s
-        for s in _slips(run, package, params, "rate-number")
-        if not params.low_hz <= float(s.message) <= params.high_hz
-    )
-    return next((s for s in wrong if abs(float(s.message) - mean_hz) < NUMBER_SHARE * mean_hz), None)
+    asked = _slips(run, package, params, "rate-number")
+    wrong = [s for s in asked if not params.low_hz <= float(s.message) <= params.high_hz]
+    seen_hz = (found.mean_hz, found.between_hz)
+    return next((s for s in wrong for hz in seen_hz if abs(float(s.message) - hz) < NUMBER_SHARE * hz), None)
 
 
 def _by_parameter(

@@ -435,6 +435,8 @@ class Later:
             yield self._retype("subscribe with", sent[0], types[0])
         other_type = types[0].message if other else ""
         yield from self._printed(heard, other_type, of_text=own == "String")
+        for slip in self._of("takes-number") if other and own == "String" else ():
+            yield Fix(f"{slip.fix} of {slip.file}, which needs a number")
 
     def _printed(self, heard: Sequence[PythonSlip], other_type: str, *, of_text: bool) -> Iterator[Fix]:
         """Yield what is wrong in what is printed of what these subscribe to, with what other type if there is one."""

@@ -53,6 +53,12 @@ class Rhythm(Record):
         """Gaps over time; 0 where there is no gap."""
         return len(self.gaps_ns) * 1e9 / self.span_ns if self.span_ns > 0 else 0.0
 
+    @property
+    def between_hz(self) -> float:
+        """The mean of the gaps between messages alone: what a pause does not change in which the run ended."""
+        lasted_ns = self.times_ns[-1] - self.times_ns[0]
+        return (len(self.times_ns) - 1) * 1e9 / lasted_ns if lasted_ns else 0.0
+
     def outside(self, low_ns: float, high_ns: float) -> list[int]:
         """Return the indices of the gaps shorter than `low_ns` or longer than `high_ns`; a bound itself is inside."""
         slack = high_ns * ROUNDING

@@ -17,7 +17,7 @@ SlipKind = Literal[
     "subscriber", "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes",
     "prints", "argument-text", "unused-import", "lacking-import", "unregistered", "not-started", "start-value",
     "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed", "printed-in-part",
-    "published-in-part", "never-published",
+    "published-in-part", "never-published", "takes-number",
 ]  # fmt: skip
 
 
@@ -66,6 +66,8 @@ class PythonSlip(Placed, Record):
     - `never-published`: a publisher of the topic `name` that nothing in the script uses.
     - `published-in-part`: a loop that publishes on the topic `name` only in some of its turns, though it counts in each
       or counts nothing.
+    - `takes-number`: a loop that computes with what a topic's callback keeps of its message, or publishes it as a
+      number: a slip only if that message has to be a text.
     - `wrong-value`: a value that is none: a comparison with NaN, the sine of an angle in degrees, a service's answer
       that is made and not returned (`name`: `nan`, `degrees`, `return`).
 

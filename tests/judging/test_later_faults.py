@@ -281,6 +281,14 @@ def test_what_a_callback_does_besides_comes_after_the_print() -> None:
     assert hint.endswith("not Int32 and print 'I heard <message>' first in the callback")
 
 
+def test_a_loop_that_needs_a_number_gives_way_to_spin_where_a_text_is_asked_for() -> None:
+    heard = [NODE | ROOT, HEARS | {"requires": ["node"]}]
+    loop = slip("takes-number", "line 7 needs a number", 6, fix="write `rospy.spin()` in place of the loop")
+    for kind, told in (("Int32", True), ("String", False)):
+        slips = [slip("subscriber", "chatter"), slip("subscriber-type", kind), loop]
+        assert hint_of("node", DIES, heard, *slips, source=LACKS).endswith("needs a number") == told
+
+
 def test_a_text_that_another_function_prints_is_not_the_messages() -> None:
     heard = [NODE | ROOT, HEARS | {"requires": ["node"]}]
     slips = [

@@ -202,6 +202,8 @@ COUNTERS = {
     "sleeps-apart": (f"{LOOP}    r.sleep()\n    p.publish(c)\n    r.sleep()\n", ("sleep-twice", 5, "delete line 5")),
     "sleeps-between-topics": (f"{LOOP}    p.publish(c)\n    r.sleep()\n    q.publish(c)\n    r.sleep()\n",
                               ("sleep-twice", 6, "delete line 6")),
+    "sleeps-in-a-function-too": (f"def turn():\n    p.publish(1)\n    r.sleep()\n{LOOP}    turn()\n    r.sleep()\n",
+                                 ("sleep-twice", 7, "delete line 7")),
     "same-message-again": (f"{LOOP}    p.publish(c)\n    p.publish(c)\n    r.sleep()\n",
                            ("publish-twice", 4, "delete line 4")),
     "three-messages": (f"{LOOP}    p.publish(a)\n    b = 1\n    p.publish(b)\n    p.publish(c)\n    r.sleep()\n",

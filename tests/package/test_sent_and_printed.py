@@ -109,12 +109,62 @@ LOOP = "pub = rospy.Publisher('n', Int8)\nn = 0\nwhile not rospy.is_shutdown():\
          "line 6 publishes only under the condition on line 4"),
         ("    if pub.get_num_connections():\n        pub.publish(n)\n    n += 1\n", ""),
         ("    if n > 127:\n        n = 0\n    pub.publish(n)\n    n += 1\n", ""),
+        ("    if word == 'a':\n        pub.publish(1)\n    elif word == 'b':\n        pub.publish(2)\n",
+         "lines 5 to 7 publish only under the conditions of the `if` on line 4"),
+        ("    if n:\n        if w: pub.publish(1)\n        else: pub.publish(2)\n    else: pub.publish(3)\n", ""),
     ],
 )  # fmt: skip
 def test_a_loop_that_counts_more_than_it_publishes(turn: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(LOOP + turn, encoding="utf-8")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "published-in-part"]
     assert [(s.message, s.name) for s in slips] == ([(message, "n")] if message else [])
+
+
+@pytest.mark.parametrize(("text", "line"), [
+    ("m = 'one'\nwhile on():\n    p.publish(m)\n", 3),
+    ("while on():\n    m = 'one'\n    p.publish(m)\n", 2),
+    ("m = 'one'\np.publish(m)\n", 1),
+    ("m = String()\nm.data = 'one'\nfor i in range(9):\n    p.publish(m)\n", 4),
+])  # fmt: skip
+def test_a_text_is_published_where_it_can_change(text: str, line: int, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    assert [s.line for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "publishes"] == [line]
+
+
+KEEPS = "def cb(m):\n    global n\n    n = m.data * 2\nrospy.Subscriber('c', Int32, cb)\n"
+
+
+@pytest.mark.parametrize(
+    ("turn", "found"),
+    [
+        ("pub.publish(n)", True), ("texts.publish(n)", False), ("pub.publish(5)", False), ("print(n)", False),
+        ("if n % 3 == 0: print('x')", True), ("print('got %s' % n)", False), ("if n > 4: print('x')", True),
+        ("if n == 4: print('x')", False), ("print(-n)", True), ("print(not n)", False), ("print(n + 1)", True),
+        ("print('a' + n)", False), ("print(n * 2)", False), ("print(n * 0.5)", True),
+        ("area = n ** 2", True), ("print(math.sqrt(n))", True), ("print(other - 1)", False),
+    ],
+)  # fmt: skip
+def test_a_loop_that_needs_a_number_of_a_message(turn: str, found: bool, tmp_path: Path) -> None:
+    made = "pub = rospy.Publisher('a', Int32)\ntexts = rospy.Publisher('b', String)\n"
+    text = f"{KEEPS}{made}while not rospy.is_shutdown():\n    {turn}\n    rate.sleep()\n"
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    fixes = [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "takes-number"]
+    assert fixes == (["write `rospy.spin()` in place of the loop on lines 7 to 9"] if found else [])
+
+
+@pytest.mark.parametrize(
+    ("below", "fix"),
+    [
+        ("    if n == 1:\n        pub.publish(1)\n    rate.sleep()\n", "publish … in place of lines 2 to 4"),
+        ("    pub.publish(n)\n", ""),
+        ("    if n == 1:\n        print(1)\n    pub.publish(n)\n", ""),
+        ("    if n == 1:\n        print(1)\n", ""),
+    ],
+)
+def test_a_question_whose_answer_decides_what_is_published(below: str, fix: str, tmp_path: Path) -> None:
+    text = f"while not rospy.is_shutdown():\n    n = int(input())\n{below}"
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "input"] == [fix]
 
 
 @pytest.mark.parametrize(

@@ -201,6 +201,9 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("callback-values", 1, "write `def f(m, args):`")]),
         ("def hear(m):\n    print(m)\ndef run():\n    rospy.Subscriber('a', A, run)\n    rospy.spin()\nrun()\n",
          [("callback-values", 3, "is the function that makes this call, not its callback: on line 4, write hear")]),
+        ("def run(m):\n    rospy.Subscriber('a', A, run)\n    rospy.init_node('a')\n    print(m)\nrun()\n",
+         [("callback-called", 5, "callback, which ROS gives each message: move lines 2 and 3 out of `run`, to where")]),
+        ("def run(m):\n    rospy.Subscriber('a', A, run)\nrospy.init_node('a')\nrun(None)\n", []),
     ],
 )  # fmt: skip
 def test_what_never_runs_is_known(tmp_path, text, found):

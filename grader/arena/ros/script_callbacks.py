@@ -28,6 +28,7 @@ def callbacks(tree):
     yield from ending_callbacks(tree)
     functions = functions_in(tree)
     yield from spare_callbacks(tree, functions)
+    yield from own_callbacks(tree, functions)
     for node in walk(tree):
         name = called_name(node)
         if name not in CALLBACKS:
@@ -64,6 +65,27 @@ def callbacks(tree):
                 message, fix = wrong_callback(own, node, functions, isinstance(meant, ast.Attribute), values)
                 message = message or "`%s` takes %d arguments, but ROS passes it %s" % (own.name, least, what)
                 yield slip(own.lineno, "callback-values", message, fix=fix, name=own.name)
+
+
+SETS_UP = ("init_node", "Publisher", "Subscriber", "spin")
+
+
+def own_callbacks(tree, functions):
+    """Calls, without a message, of a function that sets the node up and is the callback of its own Subscriber."""
+    for node in walk(tree):
+        own = functions.get(called_name(node))
+        if own is None or node.args or node.keywords or takes(own, False) != (1, 1):
+            continue
+        given = [one for call in calls_in(own, "Subscriber") for one in argument(call, 2, "callback")]
+        if own.name not in map(dotted, given):
+            continue
+        lines = [str(one.lineno) for one in own.body if calls_in(one, *SETS_UP)]
+        where = "line" if len(lines) == 1 else "lines"
+        message = "`%s` sets the node up, and is also the callback, which ROS gives each message" % own.name
+        fix = "move %s %s out of `%s`, to where line %d is, in its place"
+        fix %= (where, " and ".join(lines), own.name, node.lineno)
+        fix += "" if calls_in(own, "spin") else ", with `rospy.spin()` below"
+        yield slip(node.lineno, "callback-called", message, fix=fix, name=own.name)
 
 
 def spare_callbacks(tree, functions):

@@ -310,19 +310,35 @@ def values_left_out(tree):
         body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
         deciding = [one for one in body if isinstance(one, ast.If) and calls_in(one, "publish")][:IFS_LIMIT]
         for one in deciding:
-            sent = [n for part in one.body for n in calls_in(part, "publish")]
+            chain = [n for part in [*one.body, *one.orelse] for n in calls_in(part, "publish")]
+            sent = [n for part in one.body for n in calls_in(part, "publish")] or chain
             inside = set(ast.walk(one))
             counted = {dotted(t) for n in ast.walk(loop) if n not in inside for t in increments(n)}
-            others = {ast.dump(n.func) for n in calls_in(loop, "publish") if n not in sent}
+            outside = {ast.dump(n.func) for n in calls_in(loop, "publish") if n not in chain}
             asks = names_in(one.test) & counted if counted else not calls_in(one.test, "is_shutdown")
-            if sent and asks and ast.dump(sent[0].func) not in others:
-                lines = (sent[0].lineno, one.lineno)
-                message = "line %d publishes only under the condition on line %d" % lines
-                fix = (
-                    "move line %d out of the `if` on line %d, so that it runs each time around the loop"
-                    % lines
-                )
-                yield slip(sent[0].lineno, "published-in-part", message, fix=fix, name=source.topic(sent[0]))
+            if not asks or ast.dump(sent[0].func) in outside or publishes_always([one], sent[0]):
+                continue
+            lines = (sent[0].lineno, one.lineno)
+            message = "line %d publishes only under the condition on line %d" % lines
+            fix = "move line %d out of the `if` on line %d, so that it runs each time around the loop" % lines
+            if len(chain) > 1:
+                numbers = sorted({n.lineno for n in chain})
+                lines = (numbers[0], numbers[-1], one.lineno)
+                message = "lines %d to %d publish only under the conditions of the `if` on line %d" % lines
+                fix = "publish outside the `if` on line %d, so that it happens each time around the loop"
+                fix %= one.lineno
+            yield slip(sent[0].lineno, "published-in-part", message, fix=fix, name=source.topic(sent[0]))
+
+
+def publishes_always(block, call):
+    """Return whether a block calls the same `publish(…)` whichever way its `if`s go."""
+    for one in block:
+        if isinstance(one, ast.If):
+            if publishes_always(one.body, call) and publishes_always(one.orelse, call):
+                return True
+        elif any(ast.dump(n.func) == ast.dump(call.func) for n in calls_in(one, "publish")):
+            return True
+    return False
 
 
 TELLS = ("publish", "print")

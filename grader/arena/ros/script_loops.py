@@ -13,6 +13,7 @@ from script_names import (
     dotted,
     functions_in,
     is_call,
+    published_type,
     slip,
     text_of,
     walk,
@@ -221,9 +222,13 @@ def sleeps_in_if(loop):
 
 
 def sleeps_twice(tree):
-    """Loops that wait twice in each of their turns, and publish once on each topic."""
+    """Loops that wait twice in each of their turns, once maybe in a function that they call, and publish once on each
+    topic."""
+    functions = functions_in(tree)
     for loop in walk(tree):
         body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
+        called = [functions.get(called_name(getattr(n, "value", None))) for n in body]
+        body = [one for i, n in enumerate(body) for one in (called[i].body if called[i] else [n])]
         at = [i for i, n in enumerate(body) if isinstance(n, ast.Expr) and called_name(n.value) == "sleep"]
         if len(at) != 2:
             continue
@@ -232,7 +237,7 @@ def sleeps_twice(tree):
             {ast.dump(n.func) for one in part for n in calls_in(one, "publish")} for part in (between, around)
         ]
         if any(sent) and sent[0].isdisjoint(sent[1]):
-            lines = (body[at[0]].lineno, body[at[1]].lineno)
+            lines = tuple(sorted(body[i].lineno for i in at))
             message = "the loop sleeps on line %d and again on line %d" % lines
             yield slip(lines[1], "sleep-twice", message, fix="delete line %d" % lines[1])
 
@@ -284,6 +289,57 @@ def waiting_callbacks(tree):
                 inner.lineno, "callback-waits", message % (own.name, inner.lineno), fix=fix, name=own.name
             )
             break
+
+
+def loops_of_numbers(tree):
+    """Loops outside the callbacks that compute with what a topic's callback keeps of its message, or publish it as a
+    number: neither is possible with a text."""
+    functions = functions_in(tree)
+    given = [one for call in calls_in(tree, "Subscriber") for one in argument(call, 2, "callback")]
+    called = [functions[name] for name in {dotted(n).rpartition(".")[2] for n in given} if name in functions]
+    inside = {n for function in called for n in ast.walk(function)}
+    kept = {arg.arg + ".data" for function in called for arg in function.args.args}
+    assigned = [n for n in walk(tree) if isinstance(n, ast.Assign)]
+    for _ in range(KEPT_STEPS):
+        kept |= {dotted(t) for n in assigned if reads(n.value, kept) for t in n.targets}
+    types = {dotted(n.targets[0]): published_type(n.value) for n in assigned if is_call(n.value, "Publisher")}
+    for loop in (n for n in walk(tree) if isinstance(n, ast.While) and n not in inside):
+        of_number = (n for n in ast.walk(loop) if needs_number(n, kept, types))
+        for node in sorted(of_number, key=lambda n: n.lineno)[:1]:
+            lines = (loop.lineno, loop.end_lineno)
+            fix = "write `rospy.spin()` in place of the loop on lines %d to %d" % lines
+            yield slip(loop.lineno, "takes-number", "line %d needs a number" % node.lineno, fix=fix)
+
+
+KEPT_STEPS = 3
+NUMERIC = ("int", "float", "abs", "round", "range")
+
+
+def reads(node, names):
+    return any(dotted(n) in names for n in ast.walk(node) if isinstance(n, (ast.Name, ast.Attribute)))
+
+
+def needs_number(node, kept, types):
+    """Return whether an expression raises an error if one of the names has a text."""
+    used = []
+    if isinstance(node, ast.BinOp):
+        used = [node.left] if isinstance(node.op, ast.Mod) else [node.left, node.right]
+        joins = {ast.Add: (int, float), ast.Mult: float}.get(type(node.op))
+        used = used if joins is None or has_number(used, joins) else []
+    elif isinstance(node, ast.UnaryOp) and not isinstance(node.op, ast.Not):
+        used = [node.operand]
+    elif isinstance(node, ast.Compare) and isinstance(node.ops[0], (ast.Lt, ast.LtE, ast.Gt, ast.GtE)):
+        used = [node.left, *node.comparators]
+        used = used if has_number(used, (int, float)) else []
+    elif is_call(node, "publish"):
+        used = node.args if types.get(dotted(node.func.value), "String") != "String" else []
+    elif isinstance(node, ast.Call):
+        used = node.args if called_name(node) in NUMERIC or dotted(node.func).startswith("math.") else []
+    return any(dotted(one) in kept for one in used)
+
+
+def has_number(nodes, kinds):
+    return any(isinstance(getattr(node, "value", None), kinds) for node in nodes)
 
 
 def is_short(sleep):

@@ -29,12 +29,20 @@ def said_texts(tree):
             kinds.update(arg.arg for arg in ast.walk(node.args) if isinstance(arg, ast.arg))
     read = Texts({name: values[0] for name, values in given.items() if len(values) == 1 and values[0]}, kinds)
     moves = moves_to_run(tree)
+    loops = [n for n in walk(tree) if isinstance(n, (ast.While, ast.For))]
     for node in walk(tree):
         if is_call(node, "publish") and len(node.args) == 1:
             place, text = read.message(node.args[0])
+            place = node if made_before(place, node, loops) else place
             yield from said("publishes", place, text.replace(NODE, VALUE), "publish")
         elif called_name(node) in PRINTED and node.args:
             yield from said("prints", node, read.printed(node), called_name(node), moves.get(node, ""))
+
+
+def made_before(place, call, loops):
+    """Return whether what a loop publishes is made above it, and so is the same in each turn."""
+    around = [one.lineno for one in loops if one.lineno <= call.lineno <= one.end_lineno]
+    return bool(around) and place.lineno < max(around)
 
 
 def said(kind, node, text, call, fix=""):

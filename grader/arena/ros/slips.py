@@ -21,6 +21,7 @@ from script_counters import (
     counter_starts,
     counts,
     knows_time,
+    names_in,
     published_unchanged,
     resets,
     sends_no_time,
@@ -30,6 +31,7 @@ from script_loops import (
     deaf_loops,
     is_shutdown,
     loop_rates,
+    loops_of_numbers,
     never_reached,
     published_before,
     publishes_twice,
@@ -45,6 +47,7 @@ from script_names import (
     dotted,
     graph_names,
     misspelt,
+    parents_of,
     slip,
     walk,
 )  # fmt: skip
@@ -78,6 +81,7 @@ def slips(tree):
             message = "`%s()` waits for someone to type, and a graded node gets no input" % name
             line = numbered(node, tree)
             fix = "delete line %d, which makes a number of it" % line if line else ""
+            fix = decided_by(node, tree) or fix
             found.append(slip(node.lineno, "input", message, fix=fix, name=how_often(node, tree)))
     finders = (
         names_of_objects, misspelt, loop_rates, resets, never_run, never_reached, stopped_loops,
@@ -85,7 +89,7 @@ def slips(tree):
         queue_sizes, graph_names, object_slips, said_texts, deaf_loops, clock_values, counter_slips,
         counter_starts, without_effect, assigned_late, hidden_names, subscribed_again, imports, taken_off,
         unstarted_servers, wrong_values, unprinted_messages, values_left_out, published_unchanged,
-        unused_publishers,
+        unused_publishers, loops_of_numbers,
     )  # fmt: skip
     for find in finders:
         found += find(tree)
@@ -246,6 +250,21 @@ def numbered(node, tree):
         and dotted(n.targets[0]) in names
     ]
     return min(lines, default=0)
+
+
+def decided_by(node, tree):
+    """Return what to write in place of a question and of the `if`s that publish only after some of its answers."""
+    parents = parents_of(tree)
+    while node in parents and not isinstance(node, ast.stmt):
+        node = parents[node]
+    names = {dotted(t) for t in getattr(node, "targets", [])}
+    block = getattr(parents.get(node), "body", [])
+    below = block[block.index(node) + 1 :] if isinstance(block, list) and node in block else []
+    deciding = [one for one in below if isinstance(one, ast.If) and names & names_in(one.test)]
+    sent = [n for one in below for n in calls_in(one, "publish")]
+    if not deciding or not sent or any(calls_in(one, "publish") for one in below if one not in deciding):
+        return ""
+    return "publish … in place of lines %d to %d" % (node.lineno, deciding[-1].end_lineno)
 
 
 IMPORTS_LIMIT = 30

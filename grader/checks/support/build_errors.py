@@ -12,7 +12,6 @@ from grader.checks.support.build_output import FIRST_ERROR_HINT, BuildError, Exp
 from grader.checks.support.cpp_errors import (
     CPP_ERRORS,
     CPP_SUFFIXES,
-    call_below,
     missing_header,
     missing_link,
     other_namespace,
@@ -469,9 +468,8 @@ def _build_dependency(found: re.Match[str], _package: PackageFacts, _lines: Sequ
 
 def _unused_argument(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     why = f"catkin_package(…) does not know what to do with {shown(found[1].replace(';', ' '))}"
-    return Explained(
-        why, "write it after INCLUDE_DIRS, LIBRARIES, CATKIN_DEPENDS or DEPENDS, spelt like this"
-    )
+    hint = "write it after INCLUDE_DIRS, LIBRARIES, CATKIN_DEPENDS or DEPENDS, spelt like this"
+    return Explained(why, hint)
 
 
 FIXES_MAX = 4
@@ -483,7 +481,8 @@ NO_TARGET = r'dependency target "([^"]+)" of target "([^"]+)" does not exist'
 
 def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
     text = f"{found[1]}/{found[2]}.h does not exist when the program is compiled"
-    made = {f"{folder}/{found[2]}.{folder}" for folder in ("msg", "srv")}
+    action = re.sub("(Action)?(Goal|Result|Feedback)?$", "", found[2])
+    made = {f"msg/{found[2]}.msg", f"srv/{found[2]}.srv", f"action/{action}.action"}
     if found[1] != package.name or not made & {f.path for f in package.files}:
         own = [PurePosixPath(f.path).stem for f in package.files if f.path.endswith(tuple(MADE))]
         there = own if found[1] == package.name else noetic_messages().get(found[1], ())
@@ -526,8 +525,9 @@ def _unwaited(package: PackageFacts, text: str, what: str, targets: str, lines: 
         for call in cmake_calls(package, "add_executable")
         if call.args and call.args[0] in waiting
     ]
-    other = f"write {call_below('<program>', 'add_dependencies', targets)}"
-    return Explained(why, "; ".join(fixes[:FIXES_MAX]) or other)
+    programs = join_words(waiting, most=len(waiting)) or "each program"
+    other = f"write add_dependencies(<program> {targets}) below the add_executable(…) of {programs}"
+    return Explained(why, "; ".join(fixes) if 0 < len(fixes) <= FIXES_MAX else other)
 
 
 def _unknown_command(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:

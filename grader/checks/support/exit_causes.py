@@ -461,20 +461,23 @@ def _asks_for_input(
     asks = {s.line: s.name for s in package.slips if s.kind == "input" and place and s.file == place.file}
     asking = sorted(asks)
     source = found.own_frames[-1].source if found.own_frames else ""
-    if found.kind == "EOFError" and len(asking) > 1:
+    fixes = [s.fix for s in package.slips if s.kind == "input" and place and s.file == place.file and s.fix]
+    instead = ""
+    if len(asking) > 1:
         lines = join_words(map(str, asking))
-        return CAUSES["EOFError"][0], f"write values in the code in place of each `input()`: lines {lines}"
-    if found.kind == "EOFError" and (number := _NUMBER_ASKED.search(source)):
+        instead = f"write values in the code in place of each `input()`: lines {lines}"
+    elif fixes and fixes[0].startswith("publish …"):
+        instead = fixes[0].replace("…", VALUE_SLOT, 1)
+    elif number := _NUMBER_ASKED.search(source):
         value = "a number in the code" if "once" in asks.values() else VALUE_SLOT
-        return CAUSES["EOFError"][0], f"write {value} in place of `{number[0]}…))`"
-    if found.kind == "EOFError" and asks and "once" in asks.values():
-        return CAUSES["EOFError"][0], "write a value in the code in place of `input()`"
+        instead = f"write {value} in place of `{number[0]}…))`"
+    elif "once" in asks.values():
+        instead = "write a value in the code in place of `input()`"
+    if found.kind == "EOFError" and instead:
+        return CAUSES["EOFError"][0], instead
     if found.kind != "EOFError" or place is None or place.file not in rated:
         return None
-    numbered = next(
-        (s.fix for s in package.slips if s.kind == "input" and s.file == place.file and s.fix), ""
-    )
-    in_place = f"{NO_INPUT}; {numbered}" if numbered else NO_INPUT
+    in_place = f"{NO_INPUT}; {fixes[0]}" if fixes else NO_INPUT
     if "paused" in asks.values():
         return CAUSES["EOFError"][0], in_place
     return CAUSES["EOFError"][0], f"{in_place}, and make sure that the loop calls `sleep()` of its Rate"
