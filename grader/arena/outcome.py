@@ -176,7 +176,15 @@ def _lived_s(live: RunState, alive_s: float) -> float:
 
 
 def _quiet(live: RunState, until: Until, now_s: float) -> bool:
-    return until.quiet_s is None or (live.activity_s > 0 and now_s >= live.activity_s + until.quiet_s)
+    if until.quiet_s is None:
+        return True
+    if any(publisher not in live.helper_nodes for _, publisher in live.unrecorded):
+        return False
+    quiet_at_s = live.activity_s + until.quiet_s
+    silent = tuple(topic for topic, nodes in live.published.items() if topic != ROSOUT and nodes)
+    if silent and not _talking(live) and not is_silent(live, silent, until, now_s):
+        quiet_at_s = max(quiet_at_s, live.started_s + until.first_message_s)  # it has yet to begin
+    return live.activity_s > 0 and now_s >= quiet_at_s
 
 
 def _has_heard(live: RunState, until: Until, now_s: float) -> bool:

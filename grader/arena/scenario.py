@@ -132,8 +132,7 @@ def _starts(scenario: Scenario, place: ProcessEnvironment) -> list[tuple[Start, 
     """Return each process of the scenario with what the arena needs to start it."""
     numbers = count()
     starts = [(start, spec) for start in scenario.start for spec in process_specs(start, place, numbers)]
-    typed_to = {step.type.process for step in scenario.steps if step.type is not None}
-    typed_to |= {start.name for start in scenario.start if start.tests is not None}
+    typed_to = scenario.typed_to | {start.name for start in scenario.start if start.tests is not None}
     for start, spec in starts:
         spec["stdin"] = start.name in typed_to
         spec["keeps"] = scenario.keeps if spec["role"] == "student" else ()

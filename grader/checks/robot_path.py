@@ -32,7 +32,7 @@ from grader.checks.support.geometry import (
     turned_rad,
 )
 from grader.checks.support.processes import GlobalName
-from grader.checks.support.topics import Sender, cite, nothing_sent
+from grader.checks.support.topics import Sender, cite, nothing_sent, topics_with
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -169,13 +169,20 @@ def never_moves(path: Sequence[Pose], figures: str, run: Run) -> Verdict:
     if turned_rad(path) > TURNING_RAD:
         hint = f"{DRIVE}: linear.x, and not only angular.z"
         return unjudged("it turns, and never leaves its place", measured=figures, hint=hint)
-    return only_sideways(unjudged("it never moves", measured=figures, hint=DRIVE), run)
+    return why_still(unjudged("it never moves", measured=figures, hint=DRIVE), run)
 
 
-def only_sideways(verdict: Verdict, run: Run) -> Verdict:
-    """Return the loss with its cause where the student's velocities have a linear.y, and never a linear.x."""
+def why_still(verdict: Verdict, run: Run) -> Verdict:
+    """Return the loss with its cause where the student's velocities have a linear.y, and never a linear.x, or go where
+    the robot does not listen."""
+    types = {topic: kind for _, event in run.graph for topic, kind in event.topic_types.items()}
+    simulated = topics_with(run, "subscribers", lambda node: node in run.grader_nodes)
+    hears = sorted(topic for topic in simulated if "Twist" in types.get(topic, ""))
     for channel in run.student_channels():
         commands = [command for _, command in commands_of(channel)]
+        if hears and channel.topic not in hears and any(one.speed for one in commands):
+            why = f"its velocities are on {channel.topic}, which no node hears"
+            return verdict.explained(why, f"publish them on {join_words(hears, last='or')}")
         if any(one.left for one in commands) and not any(one.forward for one in commands):
             why = f"linear.x of {channel.topic} is always 0, and linear.y does not move a robot on wheels"
             return verdict.explained(why, "set linear.x in place of linear.y")

@@ -11,7 +11,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
-from grader.checks.robot_path import DRIVE, metres, never_moves, only_sideways, spot, unreadable
+from grader.checks.robot_path import DRIVE, metres, never_moves, spot, unreadable, why_still
 from grader.checks.support.clocks import LATE_MS, Lateness, excused, no_clock, run_seconds
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.geometry import (
@@ -63,7 +63,7 @@ STEER = (
 )
 FASTER = "drive faster, or take a shorter way"
 IN_ITS_WAY = "see on the map what is in its way, and turn away from that before you drive on"
-SEE = "see on the map where it leaves its way, and what it does there"
+SEE = "see on the map where it leaves its way, and what it does there; where it does not, it is too slow"
 """For a robot that knows no position: it steers by what it sees."""
 STRAIGHT = 2.0
 """A way that is longer by this factor than it brings the robot nearer is not a slow one, but a wrong one."""
@@ -265,7 +265,11 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
         return failed(message, hint=turn if strays else FASTER if moves else IN_ITS_WAY)
     if turned_rad(judged, STILL_S) > TURNING_RAD:
         return failed(f"{at}, and turns on the spot", hint=_steer(run, params))
-    hint = f"stop only where the distance is less than {significant(params.tolerance_m)} m"
+    near = f"the distance is less than {significant(params.tolerance_m)} m"
+    hint, told = f"stop only where {near}", _told(run, asked)
+    if told and (told[-1].speed or told[-1].turn):
+        at += f": the last velocity, which is not 0, came {asked.to_s - told[-1].time_s:.1f} s before that"
+        hint = f"publish a velocity again and again until {near}"
     return failed(at, hint=hint)
 
 
@@ -298,7 +302,7 @@ def _never_moves(
     if any(command.forward for command in sent):
         return unjudged(f"{message}, though it is told to drive", hint=IN_ITS_WAY)
     if not sent or any(command.speed or command.turn for command in sent):
-        return only_sideways(unjudged(message, hint=DRIVE), run)
+        return why_still(unjudged(message, hint=DRIVE), run)
     message += f": {plural(len(sent), 'velocity', 'velocities')} came, and {'all are' if len(sent) > 1 else 'it is'} 0"
     hint = (
         "look at the condition that stops it: the distance is math.hypot(dx, dy), which is never less than 0"
@@ -480,6 +484,9 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
         if stands(recent) and turned_rad(recent) > TURNING_RAD:
             message += f", and it turns on the spot at {spot(path[-1].point)} in the end"
             hint = "drive on where the way is clear: look at the ranges in front alone, by their angles in radians"
+            if abs(recent[-1].heading - recent[0].heading) < turned_rad(recent) / 2:
+                message += ", now to the left and now to the right"
+                hint = "once it turns, let it turn to the same side until the way in front is clear"
         verdict = failed(message, hint=hint)
     else:
         always = f"for {inside:.0%} of the time" if any(out) else "all the time"
@@ -516,6 +523,8 @@ def _keep(point: Point, region: Region) -> str:
         and region.min_m is not None
         and Band(region.walls, region.min_m, None).out_m(point)
     ):
+        if region.max_m is not None:
+            return "steer away from what you follow while the distance is too small"
         return "turn away, or stop, earlier: look at all ranges in front of the robot, not only at the middle one"
     if isinstance(region, Band):
         return "steer towards what you follow while the distance is too large"

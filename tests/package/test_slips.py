@@ -141,6 +141,8 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("never-reached", 5, "the publish(…) on line 7")]),
         (node("    for i in range(9):\n        p.publish(1)\n") + CALLED,
          [("loop-left", 4, "write `while not rospy.is_shutdown():` on line 4")]),
+        (node("    for i in range(4):\n        p.publish(1)\n        rospy.sleep(1)\n    p.publish(0)\n") + CALLED,
+         [("loop-left", 4, "call rospy.spin() below line 7")]),
         *((node(f"    while rospy.is_shutdown() {end}:\n        p.publish(1)\n") + CALLED,
            [("loop-left", 4, "on line 4, write `while not rospy.is_shutdown():`")])
           for end in ("!= 0", "== True", "is True")),

@@ -145,7 +145,14 @@ def stopped_loops(tree):
             message = "the loop on line %d ends after a fixed number of rounds" % loop.lineno
             used = {n.id for one in loop.body for n in ast.walk(one) if isinstance(n, ast.Name)}
             fix = "write `while not rospy.is_shutdown():` on line %d" % loop.lineno
-            if isinstance(loop, ast.For) and dotted(loop.target) in used:
+            after = [
+                one.lineno
+                for one in calls_in(turned[loop][0] or tree, "publish")
+                if one.lineno > loop.end_lineno
+            ]
+            if after:
+                fix = "call rospy.spin() below line %d: it waits there until Ctrl-C" % max(after)
+            elif isinstance(loop, ast.For) and dotted(loop.target) in used:
                 fix = "put it inside a `while not rospy.is_shutdown():`"
             yield slip(loop.lineno, "loop-left", message, fix=fix)
         left = next((n for n in loop.body if isinstance(n, (ast.Break, ast.Return))), None)
@@ -360,6 +367,7 @@ ENDS = (ast.Break, ast.Return, ast.Raise)
 RAISING = ("wait_for_message", "wait_for_service")
 """Calls that end with an exception on Ctrl-C. `rate.sleep()` is none of them: by the real clock it sleeps on."""
 ASKS = "check `rospy.is_shutdown()` in it: `while not rospy.is_shutdown():`"
+ASKS_TOO = "on line %d, write ` and not rospy.is_shutdown()` before the colon"
 
 
 def deaf_loops(tree):
@@ -404,8 +412,11 @@ def deaf(loop, within):
     named = "loops on lines %s and %d never check" % (", ".join(map(str, lines[:-1])), lines[-1])
     named = named if within else "loop on line %d never checks" % loop.lineno
     ends = ["write `if rospy.is_shutdown(): break` below the `for` on line %d" % one.lineno for one in within]
+    asks = ASKS
+    if isinstance(loop, ast.While) and not isinstance(loop.test, (ast.Constant, ast.BoolOp)):
+        asks = ASKS_TOO % loop.lineno  # its own condition ends it, too
     fixes = (
-        [ASKS, *ends]
+        [asks, *ends]
         if isinstance(loop, ast.While) or within
         else ["write `if rospy.is_shutdown(): break` below the `for` on line %d" % loop.lineno]
     )
