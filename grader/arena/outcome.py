@@ -183,7 +183,7 @@ def _quiet(live: RunState, until: Until, now_s: float) -> bool:
     quiet_at_s = live.activity_s + until.quiet_s
     silent = tuple(topic for topic, nodes in live.published.items() if topic != ROSOUT and nodes)
     if silent and not _talking(live) and not is_silent(live, silent, until, now_s):
-        quiet_at_s = max(quiet_at_s, live.started_s + until.first_message_s)  # it has yet to begin
+        quiet_at_s = max(quiet_at_s, _began_s(live) + until.first_message_s)  # it has yet to begin
     return live.activity_s > 0 and now_s >= quiet_at_s
 
 
@@ -212,7 +212,7 @@ def _silent(live: RunState, until: Until, now_s: float) -> str:
     if waited and not seen:
         return (
             f"no message within {until.first_message_s:g} s"
-            if now_s > live.started_s + until.first_message_s - live.waited_s
+            if now_s > _began_s(live) + until.first_message_s
             else ""
         )
     for topic, count in until.messages.items():
@@ -267,6 +267,11 @@ def _in_namespaces(live: RunState, until: Until, now_s: float) -> str:
     if until.connected and all(_enough(live, others, now_s)):
         return f"the nodes are connected over {until.connected[0]} of a namespace"
     return ""
+
+
+def _began_s(live: RunState) -> float:
+    """Return since when a first message may have come: what starts after a simulator waits until that is up."""
+    return max(live.started_s - live.waited_s, live.last_start_s)
 
 
 def _standstill(live: RunState, until: Until, now_s: float) -> str:

@@ -47,6 +47,9 @@ UNFOLLOWED_S = 2.0
 UNFOLLOWED_HZ = 15.0
 REGISTERED_S = 1.0
 HEARD_SETTLE_S = 0.3
+TALKED_S = 1.0
+"""So long after its first message a node's connections are asked for: it may end before the run does, and they with
+it."""
 GRAPH_EVERY_S, GRAPH_S = 0.25, 5.0
 STARTING_S = 1.5
 EXPECTED_HZ = 10.0
@@ -236,8 +239,13 @@ async def _await_rostests(scenario: Scenario, arena: ArenaSession, tell: Tell) -
 async def _observe(scenario: Scenario, arena: ArenaSession, tell: Tell) -> tuple[str, str]:
     until, live = scenario.until, arena.live
     warped = scenario.clock == "warped"
+    looked = bool(until.connected)
     while True:
         now_s = time.monotonic()
+        talked_s = (at_s for node, at_s in live.talking.items() if node not in live.helper_nodes)
+        if not looked and any(now_s >= at_s + TALKED_S for at_s in talked_s):
+            looked = True
+            arena.send(do="graph")
         done = find_outcome(live, until, now_s)
         if done is not None:
             # What was printed last may not be in yet, and the verdict rests on it.

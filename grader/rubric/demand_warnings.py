@@ -66,6 +66,8 @@ def demand_warnings(rubric: dict[str, Any], criteria: Criteria, scenarios: Scena
         yield from _easy(at, check, given, scenario)
         yield from _impossible(at, check, given)
         yield from _not_its_name(at, given, rubric)
+        if check == "connected":
+            yield from _process_for_node(at, given, scenario, criteria)
         if check == "service-answers":
             yield from _any_answer(at, given, scenario)
         if check in OF_VALUES and not SIDEWAYS.search(handout):
@@ -263,6 +265,17 @@ def _more_values(criteria: Criteria, scenarios: Scenarios, handout: str) -> Iter
         if sent and count == sent + 1 and not PERIODIC.search(handout) and re.search(r"\beach\b", handout):
             fault = f"are {count}, and {criterion.get('scenario')} sends {plural(sent, 'message')}"
             yield ("criteria", index, "with", "values"), fault
+
+
+def _process_for_node(
+    at: KeyPath, given: dict[str, Any], scenario: dict[str, Any], criteria: Criteria
+) -> Iterator[Fault]:
+    """Yield ends of a connection that are named as a process of the scenario, and as no node that a criterion names."""
+    scripts = {start.get("name") for start in starts_of(scenario) if start.get("script")}
+    named = {name for _, one in criteria for _, name in as_texts(as_map(one.get("with")).get("names"))}
+    for end in ("publisher", "subscriber"):
+        if (name := given.get(end)) in scripts - named:
+            yield (*at, end), f"{name} is a process here: is a node of this name asked for? It is what counts"
 
 
 def _other_ends(criteria: Criteria) -> Iterator[Fault]:

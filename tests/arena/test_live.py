@@ -124,6 +124,9 @@ def test_a_node_that_has_a_publisher_and_has_not_used_it_is_not_quiet_yet() -> N
     live.nodes, live.activity_s, live.published = {"/node"}, 1.0, {"/a": {"/node"}}
     assert find_outcome(live, until, 9.9) is None
     assert find_outcome(live, until, 10.1) == ("complete", "")
+    live.last_start_s = 4.0  # a simulator was waited for
+    assert find_outcome(live, until, 13.9) is None
+    assert find_outcome(live, until, 14.1) == ("complete", "")
     live.note_messages("/a", 1, 5.0)
     live.unrecorded.add(("/a", "/node"))  # a flood, of which no more is seen
     assert find_outcome(live, until, 8.1) is None
