@@ -181,8 +181,10 @@ def _quiet(live: RunState, until: Until, now_s: float) -> bool:
     if any(publisher not in live.helper_nodes for _, publisher in live.unrecorded):
         return False
     quiet_at_s = live.activity_s + until.quiet_s
-    silent = tuple(topic for topic, nodes in live.published.items() if topic != ROSOUT and nodes)
-    if silent and not _talking(live) and not is_silent(live, silent, until, now_s):
+    own = {topic: nodes - live.helper_nodes for topic, nodes in live.published.items() if topic != ROSOUT}
+    silent = tuple(topic for topic, nodes in own.items() if nodes)
+    talks = any(nodes & live.talking.keys() for nodes in own.values())
+    if silent and not talks and not is_silent(live, silent, until, now_s):
         quiet_at_s = max(quiet_at_s, _began_s(live) + until.first_message_s)  # it has yet to begin
     return live.activity_s > 0 and now_s >= quiet_at_s
 

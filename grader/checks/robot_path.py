@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import groupby, pairwise, takewhile
 from typing import Annotated, NamedTuple
 
@@ -377,11 +377,12 @@ def _strays(path: Sequence[Pose], way: Way, course: Course) -> Words:
     if course.reached == len(way.points):
         apart = metres(math.dist(peak.point, way.points[-1]))
         message = f"it passes every point, and goes on: it is {apart} from the last {where}"
-        stays = path[course.at : course.strayed]
-        if any(b.time_s - a.time_s >= STOPS_S for a, b in _rests(stays)):
+        hint = f"publish a zero velocity once you are there; {allowed}"
+        if _rests(path[course.at : course.strayed]):
             hint = "it stops there, and then drives another stretch: count those that the loop, or the calls, make"
-            return Words(message, hint)
-        return Words(message, f"publish a zero velocity once you are there; {allowed}")
+        elif _rests(path[course.strayed :]):
+            hint = f"it stops too late: publish the zero velocity sooner; {allowed}"
+        return Words(message, hint)
     line = f"{way.name(course.reached - 1)} to {way.name(course.reached)}"
     return (
         _too_far(path, way, course)
@@ -393,11 +394,11 @@ def _strays(path: Sequence[Pose], way: Way, course: Course) -> Words:
     )
 
 
-def _rests(path: Sequence[Pose]) -> Iterator[tuple[Pose, Pose]]:
-    """Yield the first and the last pose at each place where it stands, or turns in place."""
-    for _, poses in groupby(path, key=lambda pose: (round(pose.x, 3), round(pose.y, 3))):
-        first, *others = poses
-        yield first, (others or [first])[-1]
+def _rests(path: Sequence[Pose]) -> bool:
+    """Return whether it stands anywhere for a while, or turns in place."""
+    places = groupby(path, key=lambda pose: (round(pose.x, 3), round(pose.y, 3)))
+    stays = [list(poses) for _, poses in places]
+    return any(poses[-1].time_s - poses[0].time_s >= STOPS_S for poses in stays)
 
 
 def _too_far(path: Sequence[Pose], way: Way, course: Course) -> Words | None:

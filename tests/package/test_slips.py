@@ -364,6 +364,7 @@ def test_a_script_that_is_no_node(tmp_path, text, told):
         ("while n < 9:\n    n = 0\n", "the loop on line 1"),
         ("while n < 9:\n    n += 1\nwhile True:\n    n = 0\n", "the loop on line 3"),
         ("for n in itertools.count():\n    time.sleep(1)\n", "the loop on line 1"),
+        ("while n > 9:\n    n -= 9\nfor n in range(9):\n    time.sleep(1)\n", "the loop on line 3 never checks"),
         ("for n in range(9):\n    time.sleep(1)\n", "the loop on line 1 never checks"),
         ("for n in range(9):\n    pub.publish(n)\n", ""),
         ("rospy.init_node('a', disable_signals=True)\n", "`disable_signals=True` on line 1"),

@@ -379,6 +379,7 @@ def deaf_loops(tree):
         if (
             not inside
             or any(map(is_shutdown, inside))
+            or counts_down(loop)
             or not (is_while or is_endless_for(loop) or sleeps(loop))
         ):
             continue
@@ -404,6 +405,14 @@ def deaf_loops(tree):
             message = "line %d replaces what rospy does on Ctrl-C" % node.lineno
             yield slip(node.lineno, "deaf", message, fix="delete it")
     yield from endless or others or counted
+
+
+def counts_down(loop):
+    """Whether it calls nothing, and steps what it asks for: `while angle > pi: angle -= 2 * pi`."""
+    asked = {dotted(n) for n in ast.walk(getattr(loop, "test", loop))}
+    inside = [n for one in loop.body for n in ast.walk(one)]
+    steps = any(isinstance(n, ast.AugAssign) and dotted(n.target) in asked for n in inside)
+    return isinstance(loop, ast.While) and steps and not any(isinstance(n, ast.Call) for n in inside)
 
 
 def deaf(loop, within):
