@@ -173,13 +173,18 @@ def never_moves(path: Sequence[Pose], figures: str, run: Run) -> Verdict:
 
 
 def why_still(verdict: Verdict, run: Run) -> Verdict:
-    """Return the loss with its cause where the student's velocities have a linear.y, and never a linear.x, or go where
-    the robot does not listen."""
+    """Return the loss with its cause where the student's velocities have a linear.y, and never a linear.x, are no
+    numbers, or go where the robot does not listen."""
     types = {topic: kind for _, event in run.graph for topic, kind in event.topic_types.items()}
     simulated = topics_with(run, "subscribers", lambda node: node in run.grader_nodes)
     hears = sorted(topic for topic in simulated if "Twist" in types.get(topic, ""))
     for channel in run.student_channels():
         commands = [command for _, command in commands_of(channel)]
+        if "Twist" in channel.type and len(commands) < len(channel.values):
+            why = f"velocities on {channel.topic} are no numbers (nan or inf), which a robot does not obey"
+            return verdict.explained(
+                why, "a range is inf where nothing is in reach: calculate with no such range"
+            )
         if hears and channel.topic not in hears and any(one.speed for one in commands):
             why = f"its velocities are on {channel.topic}, which no node hears"
             return verdict.explained(why, f"publish them on {join_words(hears, last='or')}")
