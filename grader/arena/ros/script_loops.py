@@ -141,14 +141,15 @@ def stopped_loops(tree):
             message = "the loop stops at the spin() on line %d, which waits until the node ends" % spin.lineno
             fix = "remove spin(): the loop keeps the node alive"
             yield slip(spin.lineno, "spin-in-loop", message, fix=fix)
-        if is_counted(loop) and ending is None and not turned[loop][1]:
+        function = turned[loop][0]
+        name = getattr(function, "name", None)
+        is_part = sum(called_name(one) == name for one in walk(tree)) > 1  # of what the node does
+        if is_counted(loop) and ending is None and not turned[loop][1] and not is_part:
             message = "the loop on line %d ends after a fixed number of rounds" % loop.lineno
             used = {n.id for one in loop.body for n in ast.walk(one) if isinstance(n, ast.Name)}
             fix = "write `while not rospy.is_shutdown():` on line %d" % loop.lineno
             after = [
-                one.lineno
-                for one in calls_in(turned[loop][0] or tree, "publish")
-                if one.lineno > loop.end_lineno
+                one.lineno for one in calls_in(function or tree, "publish") if one.lineno > loop.end_lineno
             ]
             if after:
                 fix = "call rospy.spin() below line %d: it waits there until Ctrl-C" % max(after)
