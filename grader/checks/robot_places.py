@@ -63,7 +63,7 @@ STEER = (
 )
 FASTER = "drive faster, or take a shorter way"
 IN_ITS_WAY = "see on the map what is in its way, and turn away from that before you drive on"
-SEE = "see on the map where it leaves its way, and what it does there; where it does not, it is too slow"
+SEE = "see on the map where it leaves its way, and what it does there"
 """For a robot that knows no position: it steers by what it sees."""
 STRAIGHT = 2.0
 """A way that is longer by this factor than it brings the robot nearer is not a slow one, but a wrong one."""
@@ -260,7 +260,9 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
         around, strays = turned_rad(judged) / math.tau, length_m(judged) > STRAIGHT * nearer_m
         driven = f"it drives {metres(length_m(judged))} and is {metres(max(0.0, nearer_m))} nearer"
         driven = driven if strays else f"it turns around {around:.1f} times on its way"
-        turn = f"{'it drives away' if nearer_m < 0 else driven}: {_steer(run, params)}"
+        steer = _steer(run, params)
+        steer += "; where it does not, it is too slow" if steer == SEE and nearer_m >= 0 else ""
+        turn = f"{'it drives away' if nearer_m < 0 else driven}: {steer}"
         strays = strays or around > 1
         return failed(message, hint=turn if strays else FASTER if moves else IN_ITS_WAY)
     if turned_rad(judged, STILL_S) > TURNING_RAD:
