@@ -265,11 +265,13 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
         turn = f"{'it drives away' if nearer_m < 0 else driven}: {steer}"
         strays = strays or around > 1
         return failed(message, hint=turn if strays else FASTER if moves else IN_ITS_WAY)
-    if turned_rad(judged, STILL_S) > TURNING_RAD:
+    told = _told(run, asked)
+    holds = bool(told) and asked.to_s - told[-1].time_s <= hold_s
+    if turned_rad(judged, STILL_S) > TURNING_RAD or (holds and told[-1].turn):
         return failed(f"{at}, and turns on the spot", hint=_steer(run, params))
     near = f"the distance is less than {significant(params.tolerance_m)} m"
-    hint, told = f"stop only where {near}", _told(run, asked)
-    if told and (told[-1].speed or told[-1].turn):
+    hint = f"stop only where {near}"
+    if told and not holds and (told[-1].speed or told[-1].turn):
         at += f": the last velocity, which is not 0, came {asked.to_s - told[-1].time_s:.1f} s before that"
         hint = f"publish a velocity again and again until {near}"
     return failed(at, hint=hint)
