@@ -168,6 +168,8 @@ def never_moves(path: Sequence[Pose], figures: str, run: Run) -> Verdict:
     """Return the loss of a robot that stays where it is, and turns there at most."""
     if turned_rad(path) > TURNING_RAD:
         hint = f"{DRIVE}: linear.x, and not only angular.z"
+        if any(one.forward for channel in run.student_channels() for _, one in commands_of(channel)):
+            hint = "look at the condition under which it drives: it is hardly ever true"
         return unjudged("it turns, and never leaves its place", measured=figures, hint=hint)
     return why_still(unjudged("it never moves", measured=figures, hint=DRIVE), run)
 
