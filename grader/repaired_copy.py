@@ -60,7 +60,7 @@ def choose_repairs(
     if not lost and not blocked:
         return (), ()
     found = _find_in_all(submission, facts, rubric)
-    typed = any(step.type is not None for scenario in rubric.scenarios.values() for step in scenario.steps)
+    typed = any(scenario.typed_to for scenario in rubric.scenarios.values())
     counting = [one for one in found if rubric.share_of(one.kind) > 0 and (typed or not one.asks_input)]
     built, launched = built or not needs_build(facts), launched_in(facts)
 

@@ -176,7 +176,17 @@ def _lived_s(live: RunState, alive_s: float) -> float:
 
 
 def _quiet(live: RunState, until: Until, now_s: float) -> bool:
-    return until.quiet_s is None or (live.activity_s > 0 and now_s >= live.activity_s + until.quiet_s)
+    if until.quiet_s is None:
+        return True
+    if any(publisher not in live.helper_nodes for _, publisher in live.unrecorded):
+        return False
+    quiet_at_s = live.activity_s + until.quiet_s
+    own = {topic: nodes - live.helper_nodes for topic, nodes in live.published.items() if topic != ROSOUT}
+    silent = tuple(topic for topic, nodes in own.items() if nodes)
+    talks = any(nodes & live.talking.keys() for nodes in own.values())
+    if silent and not talks and not is_silent(live, silent, until, now_s):
+        quiet_at_s = max(quiet_at_s, _began_s(live) + until.first_message_s)  # it has yet to begin
+    return live.activity_s > 0 and now_s >= quiet_at_s
 
 
 def _has_heard(live: RunState, until: Until, now_s: float) -> bool:
@@ -204,7 +214,7 @@ def _silent(live: RunState, until: Until, now_s: float) -> str:
     if waited and not seen:
         return (
             f"no message within {until.first_message_s:g} s"
-            if now_s > live.started_s + until.first_message_s - live.waited_s
+            if now_s > _began_s(live) + until.first_message_s
             else ""
         )
     for topic, count in until.messages.items():
@@ -259,6 +269,11 @@ def _in_namespaces(live: RunState, until: Until, now_s: float) -> str:
     if until.connected and all(_enough(live, others, now_s)):
         return f"the nodes are connected over {until.connected[0]} of a namespace"
     return ""
+
+
+def _began_s(live: RunState) -> float:
+    """Return since when a first message may have come: what starts after a simulator waits until that is up."""
+    return max(live.started_s - live.waited_s, live.last_start_s)
 
 
 def _standstill(live: RunState, until: Until, now_s: float) -> str:

@@ -121,6 +121,8 @@ class RunState:
 
     # --- Changes ---
 
+    unrecorded: set[tuple[str, str]] = field(default_factory=set)
+    """Topics and their publishers that send more than is recorded: when such a one falls silent is not known."""
     activity_s: float = 0.0
     """When the student's processes last did anything; `news_s`, anything besides sending messages."""
     news_s: float = 0.0

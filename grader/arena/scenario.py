@@ -47,6 +47,9 @@ UNFOLLOWED_S = 2.0
 UNFOLLOWED_HZ = 15.0
 REGISTERED_S = 1.0
 HEARD_SETTLE_S = 0.3
+TALKED_S = 1.0
+"""So long after its first message a node's connections are asked for: it may end before the run does, and they with
+it."""
 STARTING_S = 1.5
 EXPECTED_HZ = 10.0
 WATCHED_MORE_S = 0.5
@@ -131,8 +134,7 @@ def _starts(scenario: Scenario, place: ProcessEnvironment) -> list[tuple[Start, 
     """Return each process of the scenario with what the arena needs to start it."""
     numbers = count()
     starts = [(start, spec) for start in scenario.start for spec in process_specs(start, place, numbers)]
-    typed_to = {step.type.process for step in scenario.steps if step.type is not None}
-    typed_to |= {start.name for start in scenario.start if start.tests is not None}
+    typed_to = scenario.typed_to | {start.name for start in scenario.start if start.tests is not None}
     for start, spec in starts:
         spec["stdin"] = start.name in typed_to
         spec["keeps"] = scenario.keeps if spec["role"] == "student" else ()
@@ -238,8 +240,13 @@ async def _await_rostests(scenario: Scenario, arena: ArenaSession, tell: Tell) -
 async def _observe(scenario: Scenario, arena: ArenaSession, tell: Tell) -> tuple[str, str]:
     until, live = scenario.until, arena.live
     warped = scenario.clock == "warped"
+    looked = bool(until.connected)
     while True:
         now_s = time.monotonic()
+        talked_s = (at_s for node, at_s in live.talking.items() if node not in live.helper_nodes)
+        if not looked and any(now_s >= at_s + TALKED_S for at_s in talked_s):
+            looked = True
+            arena.send(do="graph")
         done = find_outcome(live, until, now_s)
         if done is not None:
             # What was printed last may not be in yet, and the verdict rests on it.

@@ -331,6 +331,10 @@ class ArenaSession:
             self.live.note_activity(time.monotonic())
         elif topic == "/grader/actor":
             self._acted(record)
+        elif topic == "/grader/recorder" and record["event"] == "limit":
+            self.live.unrecorded.add((record["topic"], record["callerid"]))
+        elif topic == "/grader/recorder" and record["event"] == "closed":
+            self.live.unrecorded.discard((record["topic"], record["callerid"]))
 
     def _acted(self, record: dict[str, Any]) -> None:
         """Take note of what the arena says that a process or a node did, or was refused."""

@@ -368,8 +368,7 @@ class StepRunner:
 
     async def _come_up(self) -> None:
         """Wait for processes that may yet become nodes: on a busy machine, a pause would be over before they are up."""
-        live, until = self._live, self._scenario.until
-        typed_to = {step.type.process for step in self._scenario.steps if step.type is not None}
+        live, until, typed_to = self._live, self._scenario.until, self._scenario.typed_to
 
         def is_up() -> bool:
             now_s = time.monotonic()

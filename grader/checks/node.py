@@ -91,7 +91,7 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
         and catch `rospy.ROSInterruptException` around the call of your main function.
     """
     named = f", named {wanted_names(params.names, params.anonymous)}" if params.names else ""
-    expected = f"one node{named}, alive {params.min_s:g} s or more after its first message, ending on Ctrl-C"
+    expected = f"one node{named}, alive until Ctrl-C, and ending on it"
     one = life(run, params.process)
     if one is None:
         return not_started(params.process).about(expected=expected)
@@ -226,7 +226,7 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
         message = f"{_script(one)} did not end on Ctrl-C and had to be stopped with SIG{stopped_by}"
         if deaf := next((s for s in package.slips if s.kind == "deaf" and s.file == one.start.script), None):
             return failed(f"{message}: {deaf.message}", hint=deaf.fix, citations=(deaf.place,))
-        if excuse := _locked_up(one, run) or _asleep(one, package):
+        if excuse := _locked_up(one, run) or _asleep(one, package) or _asking(one, run, package):
             return excuse
         hint = IN_A_LOOP + both("; a bare `except:` in the loop swallows the Ctrl-C", "")
         return failed(message, hint=hint).if_repeated()  # no line of the script is known to be why
@@ -254,6 +254,16 @@ def _asleep(one: Life, package: PackageFacts) -> Verdict | None:
         f"line {slow.line} lets it sleep for {pause} at a time, also after Ctrl-C, so its end is not counted"
     )
     return passed(f"{_script(one)} is one node and stayed alive; {slept}")
+
+
+def _asking(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
+    """Return that the node waited for a line, where the rubric types what it asks for: rospy takes the Ctrl-C, and
+    `input()` waits on until a line comes."""
+    asks = next((s for s in package.slips if s.kind == "input" and s.file == one.start.script), None)
+    if asks is None or all(e.action != "type" or e.detail != one.name for _, e in run.actors):
+        return None
+    waits = f"line {asks.line} waits for a line that is typed, also after Ctrl-C, so its end is not counted"
+    return passed(f"{_script(one)} is one node and stayed alive; {waits}")
 
 
 def _locked_up(one: Life, run: Run) -> Verdict | None:

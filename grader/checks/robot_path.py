@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise, takewhile
+from itertools import groupby, pairwise, takewhile
 from typing import Annotated, NamedTuple
 
 from pydantic import Field, model_validator
 
 from grader.checks.registry import check
-from grader.checks.support.clocks import excused, lateness, no_clock
+from grader.checks.support.clocks import excused, lateness, no_clock, run_seconds
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.geometry import (
     TURNING_RAD,
@@ -20,6 +20,7 @@ from grader.checks.support.geometry import (
     Spot,
     Track,
     commands_of,
+    driven,
     followed,
     length_m,
     off_m,
@@ -31,7 +32,7 @@ from grader.checks.support.geometry import (
     turned_rad,
 )
 from grader.checks.support.processes import GlobalName
-from grader.checks.support.topics import Sender, cite, nothing_sent
+from grader.checks.support.topics import Sender, cite, nothing_sent, topics_with
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -49,6 +50,11 @@ DEGREES_FROM = 20.0
 
 AWAY = 0.3
 """How far from a corner, as a share of what follows it, the robot is when its direction is looked at."""
+STANDS_M = 0.01
+"""Of a robot that turns in place: how far it goes for each radian."""
+STOPS_S = 0.3
+STOPS_AFTER_S = 1.0
+"""The last velocity of a node that ends holds for so long."""
 OTHER_TURN_DEG, HALF_TURN_DEG = 20.0, 170.0
 """A turn by so much more or less is another one; one of nearly half a circle has no side."""
 
@@ -145,7 +151,11 @@ def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
         return passed(f"the path passes {count} within {significant(params.tolerance_m)} m", measured=figures)
     if stands(taken):
         return never_moves(taken, figures, run)
-    words = _in_degrees(run) or what_is_wrong(taken, params.way, course, mirror=params.relative)
+    words = (
+        _in_degrees(run)
+        or _let_go(run, params)
+        or what_is_wrong(taken, params.way, course, mirror=params.relative)
+    )
     verdict = failed(words.message, hint=words.hint, measured=figures)
     nearly = followed(taken, params.way.points, 2 * params.tolerance_m + _drift_m(run, taken, params.way))
     if not nearly.done and not _strays_late(nearly, params.way):
@@ -158,14 +168,28 @@ def never_moves(path: Sequence[Pose], figures: str, run: Run) -> Verdict:
     """Return the loss of a robot that stays where it is, and turns there at most."""
     if turned_rad(path) > TURNING_RAD:
         hint = f"{DRIVE}: linear.x, and not only angular.z"
+        if any(one.forward for channel in run.student_channels() for _, one in commands_of(channel)):
+            hint = "look at the condition under which it drives: it is hardly ever true"
         return unjudged("it turns, and never leaves its place", measured=figures, hint=hint)
-    return only_sideways(unjudged("it never moves", measured=figures, hint=DRIVE), run)
+    return why_still(unjudged("it never moves", measured=figures, hint=DRIVE), run)
 
 
-def only_sideways(verdict: Verdict, run: Run) -> Verdict:
-    """Return the loss with its cause where the student's velocities have a linear.y, and never a linear.x."""
+def why_still(verdict: Verdict, run: Run) -> Verdict:
+    """Return the loss with its cause where the student's velocities have a linear.y, and never a linear.x, are no
+    numbers, or go where the robot does not listen."""
+    types = {topic: kind for _, event in run.graph for topic, kind in event.topic_types.items()}
+    simulated = topics_with(run, "subscribers", lambda node: node in run.grader_nodes)
+    hears = sorted(topic for topic in simulated if "Twist" in types.get(topic, ""))
     for channel in run.student_channels():
         commands = [command for _, command in commands_of(channel)]
+        if "Twist" in channel.type and len(commands) < len(channel.values):
+            why = f"velocities on {channel.topic} are no numbers (nan or inf), which a robot does not obey"
+            return verdict.explained(
+                why, "a range is inf where nothing is in reach: calculate with no such range"
+            )
+        if hears and channel.topic not in hears and any(one.speed for one in commands):
+            why = f"its velocities are on {channel.topic}, which no node hears"
+            return verdict.explained(why, f"publish them on {join_words(hears, last='or')}")
         if any(one.left for one in commands) and not any(one.forward for one in commands):
             why = f"linear.x of {channel.topic} is always 0, and linear.y does not move a robot on wheels"
             return verdict.explained(why, "set linear.x in place of linear.y")
@@ -196,6 +220,27 @@ def _in_degrees(run: Run) -> Words | None:
         return None
     message = f"it turns with an angular.z of {significant(fastest)} on {channel.topic}, which is in radians a second"
     return Words(message, "a turn of 90 degrees is math.pi / 2, in radians: math.radians(90)")
+
+
+def _let_go(run: Run, params: PathParams) -> Words | None:
+    """A robot that stops by itself between two messages, and would take the right way if it did not."""
+    seconds = run_seconds(run)
+    if seconds is None or not params.relative:
+        return None
+    for channel in run.student_channels():
+        commands = [one._replace(time_s=seconds(time_ns)) for time_ns, one in commands_of(channel)]
+        gaps_s = [b.time_s - a.time_s for a, b in pairwise(commands) if a.speed or a.turn]
+        longest_s = max(gaps_s, default=0.0)
+        if longest_s <= (params.hold_s or math.inf):
+            continue
+        held = driven(commands, None, commands[-1].time_s + STOPS_AFTER_S)
+        if followed(relative(held), params.way.points, params.tolerance_m).done:
+            again = f"{longest_s:.1f} s pass before the next message on {channel.topic}"
+            return Words(
+                f"the robot stops by itself: {again}, and a velocity holds for {significant(params.hold_s or 0)} s",
+                "publish the velocity again and again, ten times a second, for as long as it should drive or turn",
+            )
+    return None
 
 
 class Words(NamedTuple):
@@ -232,6 +277,7 @@ def what_is_wrong(path: Sequence[Pose], way: Way, course: Course, *, mirror: boo
     return (
         (_explain_mirrored(path, way) if mirror else None)
         or _wrong_start(path, way, course)
+        or _turns_while_driving(path, way, course)
         or _wrong_turn(path, way, course)
         or (_strays(path, way, course) if course.strayed is not None else _ends_short(path, way, course))
     )
@@ -297,6 +343,32 @@ def _wrong_turn(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
     return Words(f"at {name} it turns by {abs(turned):.0f}°{_side(turned)} instead of {right}", hint)
 
 
+def _turns_while_driving(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
+    """Through a corner in an arc, behind a leg that it drove straight along."""
+    corner = course.reached - 1
+    if not 0 < corner < len(way.points) - 1 or _arc(path[: course.at], math.inf)[0] > TURNING_RAD:
+        return None
+    before, here, goal = way.points[corner - 1 : corner + 2]
+    asked = math.remainder(_direction(here, goal) - _direction(before, here), math.tau)
+    turned, arc_m = _arc(path[course.at :], abs(asked) - math.radians(OTHER_TURN_DEG))
+    if arc_m <= way.tolerance_m or abs(turned - asked) > math.radians(OTHER_TURN_DEG):
+        return None
+    message = f"at {way.name(corner)} it turns while it drives on, in an arc {metres(arc_m)} long"
+    return Words(message, "publish a linear.x of 0 for as long as it turns")
+
+
+def _arc(path: Sequence[Pose], enough_rad: float) -> tuple[float, float]:
+    """Return by how much it turned while it drove, to the left (rad), and how far (m), until it has turned enough."""
+    turned = arc_m = 0.0
+    for a, b in pairwise(path):
+        step, step_m = math.remainder(b.heading - a.heading, math.tau), math.dist(a.point, b.point)
+        if step and step_m > abs(step) * STANDS_M:
+            turned, arc_m = turned + step, arc_m + step_m
+        if abs(turned) >= enough_rad:
+            break
+    return turned, arc_m
+
+
 def _direction(start: Point, end: Point) -> float:
     return math.atan2(end[1] - start[1], end[0] - start[0])
 
@@ -312,7 +384,12 @@ def _strays(path: Sequence[Pose], way: Way, course: Course) -> Words:
     if course.reached == len(way.points):
         apart = metres(math.dist(peak.point, way.points[-1]))
         message = f"it passes every point, and goes on: it is {apart} from the last {where}"
-        return Words(message, f"publish a zero velocity once you are there; {allowed}")
+        hint = f"publish a zero velocity once you are there; {allowed}"
+        if _rests(path[course.at : course.strayed]):
+            hint = "it stops there, and then drives another stretch: count those that the loop, or the calls, make"
+        elif _rests(path[course.strayed :]):
+            hint = f"it stops too late: publish the zero velocity sooner; {allowed}"
+        return Words(message, hint)
     line = f"{way.name(course.reached - 1)} to {way.name(course.reached)}"
     return (
         _too_far(path, way, course)
@@ -322,6 +399,13 @@ def _strays(path: Sequence[Pose], way: Way, course: Course) -> Words:
             f"keep to the straight line from one point to the next: {allowed}",
         )
     )
+
+
+def _rests(path: Sequence[Pose]) -> bool:
+    """Return whether it stands anywhere for a while, or turns in place."""
+    places = groupby(path, key=lambda pose: (round(pose.x, 3), round(pose.y, 3)))
+    stays = [list(poses) for _, poses in places]
+    return any(poses[-1].time_s - poses[0].time_s >= STOPS_S for poses in stays)
 
 
 def _too_far(path: Sequence[Pose], way: Way, course: Course) -> Words | None:

@@ -11,7 +11,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
-from grader.checks.robot_path import DRIVE, metres, never_moves, only_sideways, spot, unreadable
+from grader.checks.robot_path import DRIVE, metres, never_moves, spot, unreadable, why_still
 from grader.checks.support.clocks import LATE_MS, Lateness, excused, no_clock, run_seconds
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.geometry import (
@@ -260,12 +260,20 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
         around, strays = turned_rad(judged) / math.tau, length_m(judged) > STRAIGHT * nearer_m
         driven = f"it drives {metres(length_m(judged))} and is {metres(max(0.0, nearer_m))} nearer"
         driven = driven if strays else f"it turns around {around:.1f} times on its way"
-        turn = f"{'it drives away' if nearer_m < 0 else driven}: {_steer(run, params)}"
+        steer = _steer(run, params)
+        steer += "; where it does not, it is too slow" if steer == SEE and nearer_m >= 0 else ""
+        turn = f"{'it drives away' if nearer_m < 0 else driven}: {steer}"
         strays = strays or around > 1
         return failed(message, hint=turn if strays else FASTER if moves else IN_ITS_WAY)
-    if turned_rad(judged, STILL_S) > TURNING_RAD:
+    told = _told(run, asked)
+    holds = bool(told) and asked.to_s - told[-1].time_s <= hold_s
+    if turned_rad(judged, STILL_S) > TURNING_RAD or (holds and told[-1].turn):
         return failed(f"{at}, and turns on the spot", hint=_steer(run, params))
-    hint = f"stop only where the distance is less than {significant(params.tolerance_m)} m"
+    near = f"the distance is less than {significant(params.tolerance_m)} m"
+    hint = f"stop only where {near}"
+    if told and not holds and (told[-1].speed or told[-1].turn):
+        at += f": the last velocity, which is not 0, came {asked.to_s - told[-1].time_s:.1f} s before that"
+        hint = f"publish a velocity again and again until {near}"
     return failed(at, hint=hint)
 
 
@@ -298,7 +306,7 @@ def _never_moves(
     if any(command.forward for command in sent):
         return unjudged(f"{message}, though it is told to drive", hint=IN_ITS_WAY)
     if not sent or any(command.speed or command.turn for command in sent):
-        return only_sideways(unjudged(message, hint=DRIVE), run)
+        return why_still(unjudged(message, hint=DRIVE), run)
     message += f": {plural(len(sent), 'velocity', 'velocities')} came, and {'all are' if len(sent) > 1 else 'it is'} 0"
     hint = (
         "look at the condition that stops it: the distance is math.hypot(dx, dy), which is never less than 0"
@@ -480,6 +488,9 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
         if stands(recent) and turned_rad(recent) > TURNING_RAD:
             message += f", and it turns on the spot at {spot(path[-1].point)} in the end"
             hint = "drive on where the way is clear: look at the ranges in front alone, by their angles in radians"
+            if abs(recent[-1].heading - recent[0].heading) < turned_rad(recent) / 2:
+                message += ", now to the left and now to the right"
+                hint = "once it turns, let it turn to the same side until the way in front is clear"
         verdict = failed(message, hint=hint)
     else:
         always = f"for {inside:.0%} of the time" if any(out) else "all the time"
@@ -516,6 +527,8 @@ def _keep(point: Point, region: Region) -> str:
         and region.min_m is not None
         and Band(region.walls, region.min_m, None).out_m(point)
     ):
+        if region.max_m is not None:
+            return "steer away from what you follow while the distance is too small"
         return "turn away, or stop, earlier: look at all ranges in front of the robot, not only at the middle one"
     if isinstance(region, Band):
         return "steer towards what you follow while the distance is too large"

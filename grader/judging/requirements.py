@@ -59,7 +59,10 @@ class Requirements:
         if undecided is None:
             return verdict
         message = f"{verdict.message}; and {undecided} could not be judged"
-        return inconclusive(message, expected=verdict.expected, measured=verdict.measured, hint=verdict.hint)
+        hint = (
+            f"see {undecided} first"  # what this one was told would put right what nobody knows to be wrong
+        )
+        return inconclusive(message, expected=verdict.expected, measured=verdict.measured, hint=hint)
 
     def _explains(self, required: str, criterion: Criterion, found: Verdict) -> bool:
         """Return whether the loss of a required criterion can be why there was nothing to judge for this one.

@@ -69,6 +69,8 @@ def demand_warnings(rubric: dict[str, Any], criteria: Criteria, scenarios: Scena
         yield from _easy(criterion)
         yield from _impossible(criterion)
         yield from _not_its_name(criterion, rubric)
+        if criterion.check == "connected":
+            yield from _process_for_node(criterion, criteria)
         if criterion.check == "service-answers":
             yield from _any_answer(criterion)
         if criterion.check in OF_VALUES and not SIDEWAYS.search(handout):
@@ -243,6 +245,16 @@ def _more_values(criteria: Criteria, handout: str) -> Iterator[Fault]:
         if sent and count == sent + 1 and not PERIODIC.search(handout) and re.search(r"\beach\b", handout):
             fault = f"are {count}, and {criterion.run} sends {plural(sent, 'message')}"
             yield (*criterion.at, "values"), fault
+
+
+def _process_for_node(criterion: WrittenCriterion, criteria: Criteria) -> Iterator[Fault]:
+    """Yield ends of a connection that are named as a process of the scenario, and as no node that a criterion names."""
+    scripts = {start.get("name") for start in starts_of(criterion.scenario) if start.get("script")}
+    named = {name for one in criteria for _, name in as_texts(one.given.get("names"))}
+    for end in ("publisher", "subscriber"):
+        if (name := criterion.given.get(end)) in scripts - named:
+            fault = f"{name} is a process here: is a node of this name asked for? It is what counts"
+            yield (*criterion.at, end), fault
 
 
 def _other_ends(criteria: Criteria) -> Iterator[Fault]:

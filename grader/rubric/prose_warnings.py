@@ -108,6 +108,8 @@ def _shifted_numbers(criterion: WrittenCriterion, rubric: dict[str, Any]) -> Ite
             is_opposite = key == "values" and meant in own
             if number in said | known or meant is None or is_opposite or is_round or there.count(number) > 1:
                 continue
+            if at[-1] == "tolerance_m" and abs(number) < abs(meant):
+                continue  # a tenth of the way is a usual one
             if at[-1] != "tolerance" and (known is said or len(known) == 1):
                 fault = f"{number:g} is on no other line, and the rubric's text has {meant:g}"
                 yield (*criterion.at, *at), fault

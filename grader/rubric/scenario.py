@@ -422,7 +422,8 @@ class Until(Record):
     ended: tuple[Name, ...] = ()
     """Processes that have ended."""
     quiet_s: Seconds | None = None
-    """Nothing has been printed, published, registered or set for this long, after something was."""
+    """Nothing has been printed, published, registered or set for this long, after something was. A node that has a
+    publisher has up to `first_message_s` to use it."""
     first_message_s: Seconds = 20.0
     """The run gives up if no message has come within this time."""
     silent_s: Seconds = 6.0
@@ -471,6 +472,11 @@ class Scenario(Record):
             for kind, name in named.items():
                 first.setdefault(name or "", kind)
         return frozenset(name for name, kind in first.items() if name and kind)
+
+    @property
+    def typed_to(self) -> frozenset[str]:
+        """The processes on whose standard input a step types."""
+        return frozenset(step.type.process for step in self.steps if step.type is not None)
 
     @property
     def started_again(self) -> frozenset[str]:

@@ -31,6 +31,8 @@ FIELDS = {"result", "expect", "request", "goal", "answer", "feedback"}
 USUAL_FRAMES = {"map", "odom", "base_link", "base_footprint", "base_scan", "laser", "world"}
 """Frames of REP 105, and those of TurtleBot3 and Stage: right on one line alone, unless the handout has others of
 them."""
+POSES = {"robot_world": TRUE_POSE, "turtlesim_node": "/turtle1/pose"}
+"""By the program that publishes them."""
 _WORD = r"[^\W\d]\w+"
 CHARS_MIN = 3
 """Of names of so few letters, one that differs in a letter is another name."""
@@ -105,7 +107,8 @@ def _named_once(data: object, folder: Path) -> Iterator[tuple[KeyPath, str, str]
     actions = {text for path, text in texts if path[-1] == "action"}
     handout = str(rubric.get("handout"))
     frames = USUAL_FRAMES & {*re.findall(r"\w+", handout)} or USUAL_FRAMES
-    known_ones = {*SYSTEM_TOPICS, *frames} | ({TRUE_POSE} if "robot_world" in programs else set())
+    poses = {POSES[program] for program in programs & POSES.keys()}
+    known_ones = {*SYSTEM_TOPICS, *frames, *poses}
     words = {word for path, text in texts if not PROSE & {*path} for word in re.findall(r"\w+", text)}
     for path, text, last in names:
         if text.rpartition("/")[0] in actions:  # `/dock/cancel`

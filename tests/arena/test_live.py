@@ -121,6 +121,24 @@ def test_a_process_that_is_no_node_yet_is_waited_for(
     assert find_outcome(live, until, 6.1 + until.silent_s) is not None
 
 
+def test_a_node_that_has_a_publisher_and_has_not_used_it_is_not_quiet_yet() -> None:
+    live, until = _live(), Until(quiet_s=3, first_message_s=10)
+    live.nodes, live.activity_s, live.published = {"/node"}, 1.0, {"/a": {"/node"}, "/pose": {"/simulator"}}
+    live.helper_nodes, live.talking = {"/simulator"}, {"/simulator": 0.5}
+    live.note_messages("/pose", 9, 0.5, active=False)
+    assert find_outcome(live, until, 9.9) is None
+    assert find_outcome(live, until, 10.1) == ("complete", "")
+    live.last_start_s = 4.0  # a simulator was waited for
+    assert find_outcome(live, until, 13.9) is None
+    assert find_outcome(live, until, 14.1) == ("complete", "")
+    live.note_messages("/a", 1, 5.0)
+    live.talking["/node"] = 5.0
+    live.unrecorded.add(("/a", "/node"))  # a flood, of which no more is seen
+    assert find_outcome(live, until, 8.1) is None
+    live.unrecorded.clear()
+    assert find_outcome(live, until, 8.1) == ("complete", "")
+
+
 def test_what_is_sent_has_longer_to_be_printed_where_others_fill_the_machine() -> None:
     live, until = _live(), Until(heard=True)
     live.note_probe("word", 1.0)

@@ -141,6 +141,9 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("never-reached", 5, "the publish(…) on line 7")]),
         (node("    for i in range(9):\n        p.publish(1)\n") + CALLED,
          [("loop-left", 4, "write `while not rospy.is_shutdown():` on line 4")]),
+        ("def stop():\n    for i in range(4):\n        p.publish(1)\nrospy.init_node('a')\nstop()\nstop()\n", []),
+        (node("    for i in range(4):\n        p.publish(1)\n        rospy.sleep(1)\n    p.publish(0)\n") + CALLED,
+         [("loop-left", 4, "call rospy.spin() below line 7")]),
         *((node(f"    while rospy.is_shutdown() {end}:\n        p.publish(1)\n") + CALLED,
            [("loop-left", 4, "on line 4, write `while not rospy.is_shutdown():`")])
           for end in ("!= 0", "== True", "is True")),
@@ -365,6 +368,7 @@ def test_a_script_that_is_no_node(tmp_path, text, told):
         ("while n < 9:\n    n = 0\n", "the loop on line 1"),
         ("while n < 9:\n    n += 1\nwhile True:\n    n = 0\n", "the loop on line 3"),
         ("for n in itertools.count():\n    time.sleep(1)\n", "the loop on line 1"),
+        ("while n > 9:\n    n -= 9\nfor n in range(9):\n    time.sleep(1)\n", "the loop on line 3 never checks"),
         ("for n in range(9):\n    time.sleep(1)\n", "the loop on line 1 never checks"),
         ("for n in range(9):\n    pub.publish(n)\n", ""),
         ("rospy.init_node('a', disable_signals=True)\n", "`disable_signals=True` on line 1"),

@@ -198,6 +198,7 @@ def test_a_world_as_stages_on_a_fast_clock(tmp_path: Path) -> None:
     end, truth = of["/odom"][-1], of["/base_pose_ground_truth"][-1]
     assert (end["header"]["frame_id"], end["child_frame_id"]) == ("odom", "base_footprint")
     assert end["pose"]["pose"]["position"]["x"] == pytest.approx(0.82, abs=0.01)
+    assert 0 < abs(of["/odom"][0]["pose"]["pose"]["orientation"]["z"]) < 1e-3  # as in Gazebo, never exactly 0
     assert truth["pose"]["pose"]["position"] == pytest.approx({"x": 0.82, "y": 0.75, "z": 0}, abs=0.01)
     assert [value["data"] for value in of["/collision"]] == [False, True]
     scan = of["/base_scan"][-1]

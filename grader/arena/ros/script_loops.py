@@ -142,11 +142,19 @@ def stopped_loops(tree):
             message = "the loop stops at the spin() on line %d, which waits until the node ends" % spin.lineno
             fix = "remove spin(): the loop keeps the node alive"
             yield slip(spin.lineno, "spin-in-loop", message, fix=fix)
-        if is_counted(loop) and ending is None and not turned[loop][1]:
+        function = turned[loop][0]
+        name = getattr(function, "name", None)
+        is_part = sum(called_name(one) == name for one in walk(tree)) > 1  # of what the node does
+        if is_counted(loop) and ending is None and not turned[loop][1] and not is_part:
             message = "the loop on line %d ends after a fixed number of rounds" % loop.lineno
             used = {n.id for one in loop.body for n in ast.walk(one) if isinstance(n, ast.Name)}
             fix = "write `while not rospy.is_shutdown():` on line %d" % loop.lineno
-            if isinstance(loop, ast.For) and dotted(loop.target) in used:
+            after = [
+                one.lineno for one in calls_in(function or tree, "publish") if one.lineno > loop.end_lineno
+            ]
+            if after:
+                fix = "call rospy.spin() below line %d: it waits there until Ctrl-C" % max(after)
+            elif isinstance(loop, ast.For) and dotted(loop.target) in used:
                 fix = "put it inside a `while not rospy.is_shutdown():`"
             yield slip(loop.lineno, "loop-left", message, fix=fix)
         left = next((n for n in loop.body if isinstance(n, (ast.Break, ast.Return))), None)
@@ -416,6 +424,7 @@ ENDS = (ast.Break, ast.Return, ast.Raise)
 RAISING = ("wait_for_message", "wait_for_service")
 """Calls that end with an exception on Ctrl-C. `rate.sleep()` is none of them: by the real clock it sleeps on."""
 ASKS = "check `rospy.is_shutdown()` in it: `while not rospy.is_shutdown():`"
+ASKS_TOO = "on line %d, write ` and not rospy.is_shutdown()` before the colon"
 
 
 def deaf_loops(tree):
@@ -427,6 +436,7 @@ def deaf_loops(tree):
         if (
             not inside
             or any(map(is_shutdown, inside))
+            or counts_down(loop)
             or not (is_while or is_endless_for(loop) or sleeps(loop))
         ):
             continue
@@ -454,14 +464,25 @@ def deaf_loops(tree):
     yield from endless or others or counted
 
 
+def counts_down(loop):
+    """Whether it calls nothing, and steps what it asks for: `while angle > pi: angle -= 2 * pi`."""
+    asked = {dotted(n) for n in ast.walk(getattr(loop, "test", loop))}
+    inside = [n for one in loop.body for n in ast.walk(one)]
+    steps = any(isinstance(n, ast.AugAssign) and dotted(n.target) in asked for n in inside)
+    return isinstance(loop, ast.While) and steps and not any(isinstance(n, ast.Call) for n in inside)
+
+
 def deaf(loop, within):
     """Return the slip of a loop that never asks, with those `within` it that take their time."""
     lines = [one.lineno for one in (loop, *within)]
     named = "loops on lines %s and %d never check" % (", ".join(map(str, lines[:-1])), lines[-1])
     named = named if within else "loop on line %d never checks" % loop.lineno
     ends = ["write `if rospy.is_shutdown(): break` below the `for` on line %d" % one.lineno for one in within]
+    asks = ASKS
+    if isinstance(loop, ast.While) and not isinstance(loop.test, (ast.Constant, ast.BoolOp)):
+        asks = ASKS_TOO % loop.lineno  # its own condition ends it, too
     fixes = (
-        [ASKS, *ends]
+        [asks, *ends]
         if isinstance(loop, ast.While) or within
         else ["write `if rospy.is_shutdown(): break` below the `for` on line %d" % loop.lineno]
     )

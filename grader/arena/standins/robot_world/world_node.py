@@ -83,6 +83,9 @@ ROBOTS = {
     },
 }
 SHARED = {"odom_hz": 20.0, "noise": 0.0, "seed": 0, "cmd_vel_timeout": 0.0, "start": [0.0, 0.0, 0.0]}
+TREMOR = 1e-5
+"""In odometry, metres and radians: Gazebo's robot is never exactly where it began, and nodes that work there may rely
+on that (`if yaw > start_yaw`)."""
 
 
 class Every:
@@ -108,6 +111,7 @@ class World:
         chance = random.Random(about["seed"])  # noqa: S311 - noise, and the same in each run
         bounds = (about["range_min"], about["range_max"])
         self._laser = Laser(walls, angles, bounds, about["noise"], chance)
+        self._tremor = random.Random(about["seed"])  # noqa: S311 - as above
         self._about = about
         self._scan_due, self._odom_due = Every(about["scan_hz"]), Every(about["odom_hz"])
         self._steps = 0
@@ -181,7 +185,8 @@ class World:
         (x0, y0, theta0), speed = self._start, (robot.forward, robot.turning)
         ahead, aside = robot.x - x0, robot.y - y0
         cos, sin = math.cos(theta0), math.sin(theta0)
-        since_start = (ahead * cos + aside * sin, aside * cos - ahead * sin, robot.theta - theta0)
+        exact = (ahead * cos + aside * sin, aside * cos - ahead * sin, robot.theta - theta0)
+        since_start = tuple(self._tremor.gauss(value, TREMOR) for value in exact)
         self._odom.publish(_odometry("odom", since_start, speed, stamp))
         self._truth.publish(_odometry("map", (robot.x, robot.y, robot.theta), speed, stamp))
         self._tf.publish(self._tf_type([_transform("odom", "base_footprint", since_start, stamp)]))
