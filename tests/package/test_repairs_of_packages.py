@@ -362,6 +362,20 @@ CASES = {
          CMAKELISTS: ACTION_CMAKE.replace("actionlib_msgs std", "std")},
         ["build-line"], "write actionlib_msgs after DEPENDENCIES",
     ),
+    "own-action-and-no-calls": Case(
+        {"src/talker.py": "#!/usr/bin/env python3\nfrom lab.msg import GoAction\n",
+         "action/Go.action": "int32 n\n---\nint32 n\n---\nint32 n\n"},
+        ["build-line"] * 3, "write actionlib_msgs message_generation after",
+        after={CMAKELISTS: "generate_messages(DEPENDENCIES actionlib_msgs)"},
+    ),
+    "messages-and-services-without-generation": Case(
+        {"src/talker.py": "#!/usr/bin/env python3\nfrom lab.msg import Num\n", "msg/Num.msg": "int8 a\n",
+         "srv/Add.srv": "---\n",
+         CMAKELISTS: CMAKE.replace("rospy)\n", "message_generation rospy)\nadd_message_files(FILES Num.msg)\n"
+                                                "add_service_files(FILES Add.srv)\n")},
+        ["build-line"], "does not call generate_messages(…)",
+        after={CMAKELISTS: "add_service_files(FILES Add.srv)\ngenerate_messages()\n"},
+    ),
     "own-action-in-another-order": Case(
         {"src/go.py": "from lab.msg import GoAction\n",
          "action/Go.action": "int32 n  # how far\n---\nint32 left\n---\nbool there\n",
