@@ -95,7 +95,8 @@ def _shifted_numbers(index: int, criterion: dict[str, Any], rubric: dict[str, An
     there = [number for at, number in numbers_in((), rubric) if not _is_setting(at)]
     own = {number for _, number in numbers_in((), criterion.get("with"))}
     for key in EXPECTED:
-        for at, number in numbers_in((key,), as_map(criterion.get("with")).get(key)):
+        asked = as_map(criterion.get("with")).get(key)
+        for at, number in numbers_in((key,), asked) if key != "goal" else ():  # which of the goals
             known = said_hz if key == "rate_hz" else said
             shifts = SHIFTS[:-1] if at[-1] in {"min", "max"} else SHIFTS
             meant = next((number / by for by in shifts if round(number / by, 9) in known), None)

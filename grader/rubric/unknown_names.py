@@ -94,6 +94,7 @@ def _own_types(rubric: dict[str, Any]) -> Iterator[Fault]:
     criteria = list(as_maps(rubric.get("criteria")))
     files = [str(as_map(c.get("with")).get("file")) for _, c in criteria if c.get("check") == "definition"]
     names, own = {PurePosixPath(file).stem for file in files}, packages_in(rubric)
+    told = {*re.findall(r"\w+", str(rubric.get("handout")))}
     defined = {
         (
             str(c.get("package") or next(iter(own), "")),
@@ -111,13 +112,14 @@ def _own_types(rubric: dict[str, Any]) -> Iterator[Fault]:
     for path, given in typed:
         kind = given.get("type")
         package, _, name = kind.partition("/") if isinstance(kind, str) else ("", "", "")
-        near = closest(name, names, cutoff=SURE) if package in own and name not in names else ""
+        near = closest(name, names, cutoff=SURE) if package in own and name not in names | told else ""
         places = {judged for judged, stem in defined if stem == name}
         if package in own and places and package not in places:
             fault = f"a criterion looks for {name} in {join_words(sorted(places))}, and this is {kind}"
             yield (*path, "type"), f"{fault}: give the criterion package: {package}"
         if near:
-            yield (*path, "type"), f'no criterion asks for {name} (did you mean "{package}/{near}"?)'
+            fault = f'no criterion asks for {name} (did you mean "{package}/{near}"?)'
+            yield (*path, "type"), f"{fault}: if it is right, say it in the handout too"
 
 
 def _misspelt_scripts(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
