@@ -299,7 +299,11 @@ class Later:
         return lines[slip.line - 1] if slip.line <= len(lines) else ""
 
     def _asked(self) -> set[tuple[str, int]]:
-        """Return where the scripts ask for input; nothing where the verdict is about one of these lines."""
+        """Return where the scripts ask for input; nothing where the verdict is about one of these lines, or where the
+        run types what they ask for."""
+        scenario = self._rubric.scenarios.get(self._criterion.scenario or "")
+        if scenario is not None and any(step.type is not None for step in scenario.steps):
+            return set()
         files = [one for one in map(self._package.file, self._paths) if one is not None and one.python_fault]
         asked = {(slip.file, slip.line) for slip in self._of("input")} | {
             (one.path, number)
