@@ -180,7 +180,8 @@ def unmade(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     elif not cmake_calls(maker, "generate_messages"):
         hint = "call generate_messages(…) above catkin_package(…)"
         if not cmake_calls(maker, *OF_FILES):
-            hint = f"{_listing(maker.interfaces)}, and call generate_messages(…)"
+            # names no file: a repair that does is told behind it
+            hint = "list them in add_message_files(…) or add_service_files(…), and call generate_messages(…)"
     return f"the build makes {whose}", hint
 
 
