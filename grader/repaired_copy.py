@@ -100,7 +100,7 @@ def most_of(helping: Sequence[Repair]) -> list[Repair]:
 def _find_in_all(submission: Submission, facts: PackageFacts, rubric: Rubric) -> list[Repair]:
     """Return the repairs of all of the lab's packages, with paths from the main one."""
     found = list(find_repairs(submission.package.folder, facts, wanted_of(rubric)))
-    for package, own in zip(submission.also, facts.also, strict=True):
+    for package, own in zip(submission.also, facts.views()[1:], strict=True):
         way = facts.way_to(own)
         found += [
             one.with_paths(partial(posixpath.join, way))

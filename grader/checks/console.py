@@ -5,13 +5,20 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from difflib import SequenceMatcher
-from itertools import islice
 from typing import Annotated
 
 from pydantic import Field, model_validator
 
 from grader.checks.registry import ProcessName, check
-from grader.checks.support.console_output import Level, Line, Logged, logged_by, split_log_line, stream_lines
+from grader.checks.support.console_output import (
+    Level,
+    Line,
+    Logged,
+    logged_by,
+    split_log_line,
+    stream_lines,
+    tracebacks,
+)
 from grader.checks.support.exit_causes import (
     explain_end,
     explain_error,
@@ -122,13 +129,8 @@ def prints(package: PackageFacts, run: Run, params: PrintsParams) -> Verdict:
     expected = f"{params.words} printed{code}"
     if one is None:
         return not_started(params.process).about(expected=expected)
-    lines = [
-        line
-        for stream in stream_lines(run, one.name)
-        for line in islice(stream, LINES_MAX)
-        if line.text.strip()
-    ]
-    right = next((line for line in lines if _fits(line, params)), None)
+    lines, errors = _read(run, one.name)
+    right = next((line for line in (*lines, *errors) if _fits(line, params)), None)
     if right is None:
         verdict = _not_printed(one, lines, package, run, params)
     else:
@@ -139,6 +141,20 @@ def prints(package: PackageFacts, run: Run, params: PrintsParams) -> Verdict:
         measured=verdict.measured or plural(len(lines), "line"),
         citations=(cite(run, "/grader/console", *span),),
     )
+
+
+def _read(run: Run, process: str) -> tuple[list[Line], list[Line]]:
+    """Return the lines that a process prints, and the last line of each traceback, which says what was raised. The
+    other lines of a traceback are Python's: the number in `line 40` is no output."""
+    lines: list[Line] = []
+    errors: list[Line] = []
+    for stream in stream_lines(run, process):
+        read = stream[:LINES_MAX]
+        found = tracebacks([line.text for line in read])
+        hidden = {index for one in found for index in range(one.first, one.last + 1)}
+        lines += [line for index, line in enumerate(read) if index not in hidden and line.text.strip()]
+        errors += [read[one.last] for one in found]
+    return lines, errors
 
 
 def _fits(line: Line, params: PrintsParams) -> bool:
@@ -155,11 +171,14 @@ def _not_printed(
 ) -> Verdict:
     other = [line for line in lines if any(params.found_in(line))]
     hint = f"print {params.words} where it happens"
-    if other:
+    failing = one.ended_early and (one.end is None or one.end.exit_code != 0)
+    if other and not (
+        failing and not re.search(r"\w", params.text.replace(PLACE, ""))
+    ):  # any number is no answer
         near = f", within {significant(params.tolerance)}" if params.tolerance else ""
         message = f"it prints {shown(other[0].text)!r}, not {params.words}{near}{_slip(other[0], params)}"
         return failed(message, hint=hint)
-    if one.ended_early and (one.end is None or one.end.exit_code != 0):
+    if failing:
         end = explain_end(one, run, package)
         return end.verdict(unjudged, f"it ended before it printed {params.words}: {end.cause}")
     if error := explain_error(package, run):

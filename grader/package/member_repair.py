@@ -92,7 +92,9 @@ class _Names:
             if isinstance(node.value, ast.Name) and node.value.id != "rospy":
                 self._members.setdefault(node.value.id, set(ALL_MEMBERS)).add(node.attr)
         calls = [n for n in nodes_in(tree) if isinstance(n, ast.Call) and last_name(n.func) in KEYWORDS]
-        self._types = {ast.unparse(n) for one in calls for n in one.args if isinstance(n, ast.Attribute)}
+        types = {ast.unparse(n) for one in calls for n in one.args if isinstance(n, ast.Attribute)}
+        classes = [n for n in nodes_in(tree) if isinstance(n, ast.ClassDef)]
+        self._types = types - {f"{one.name}.{name}" for one in classes for name in _members_of(one)}
 
     def members_of(self, owner: str) -> Collection[str]:
         """Return what may stand behind a name and a dot."""
@@ -316,5 +318,8 @@ def with_place(source: str) -> str:
 
 
 def _near(word: str, names: Collection[str]) -> str:
-    """Return the name of which a word is a slip; "" where there is none."""
-    return next((one for one in names if word.lower() == one or is_one_edit(word.lower(), one)), "")
+    """Return the name of which a word is a slip; "" where there is none, or a word of one letter may be any."""
+    small = word.lower()
+    return next(
+        (one for one in names if small == one.lower() or (len(word) > 1 and is_one_edit(small, one))), ""
+    )

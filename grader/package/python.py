@@ -21,6 +21,7 @@ from grader.package.reading import printable
 from grader.syntax_fixes import (
     BLOCK,
     COMMENTED_OUT,
+    DELETE_LINE,
     LFS_POINTER,
     MERGE_MARKER,
     OUT_OF_BLOCK,
@@ -96,6 +97,7 @@ _MESSAGES: tuple[tuple[str, ...], ...] = (
     (r"f-string: expecting '}'", "a `{` in the f-string is never closed", "write `}` after its value"),
     (r"expected 'except' or 'finally'",
      "a `try:` has no `except` below it", "write `except rospy.ROSInterruptException:` there, and `pass` below that"),
+    (r"future feature|__future__ imports must", "Python 3 needs nothing from `__future__`", DELETE_LINE),
     (r"keyword argument repeated", "an argument is given twice", "remove one of the two"),
     (r"positional argument follows keyword",
      "a value without a name comes after one with a name", "move what has `=` to the end of the call"),

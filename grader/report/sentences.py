@@ -71,7 +71,7 @@ def repair_words(result: GradingResult) -> tuple[str, ...]:
 
 def _repair_words(repairs: list[Repair], criteria: list[CriterionResult]) -> str:
     charged = [c for c in criteria if c.repaired and c.repaired.charged]
-    others = [c for c in criteria if c not in charged]
+    others = [c for c in criteria if c not in charged and not c.blocked_by]
     cost = sum(c.missing for c in charged)
     if not cost and not any(c.counts and c.points for c in others):
         return ""
@@ -99,7 +99,7 @@ def _faults(repairs: list[Repair]) -> list[str]:
 def judged_repaired(result: GradingResult) -> dict[str, list[str]]:
     """Return by the criterion that a fault is charged to, which others were judged with this repaired."""
     found: dict[str, list[str]] = {}
-    with_copy = [(c.id, c.repaired) for c in result.criteria if c.repaired is not None]
+    with_copy = [(c.id, c.repaired) for c in result.criteria if c.repaired is not None and not c.blocked_by]
     for name, charged in with_copy:
         if charged.charged:
             others = [

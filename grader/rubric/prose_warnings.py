@@ -100,7 +100,8 @@ def _shifted_numbers(criterion: WrittenCriterion, rubric: dict[str, Any]) -> Ite
     there = [number for at, number in numbers_in((), rubric) if not _is_setting(at)]
     own = {number for _, number in numbers_in((), criterion.given)}
     for key in EXPECTED:
-        for at, number in numbers_in((key,), criterion.given.get(key)):
+        asked = criterion.given.get(key)
+        for at, number in numbers_in((key,), asked) if key != "goal" else ():  # which of the goals
             known = said_hz if key == "rate_hz" else said
             shifts = SHIFTS[:-1] if at[-1] in {"min", "max"} else SHIFTS
             meant = next((number / by for by in shifts if round(number / by, 9) in known), None)

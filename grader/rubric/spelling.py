@@ -77,7 +77,8 @@ def _package(data: object) -> Iterator[tuple[KeyPath, str, str]]:
     rubric = as_map(data)
     package, prose = rubric.get("package"), f"{rubric.get('handout') or ''} {rubric.get('title')}"
     known = dict.fromkeys([str(rubric.get("id")).replace("-", "_"), *re.findall(r"\w+", prose)])
-    if isinstance(package, str) and not re.search(rf"\b{re.escape(package)}\b", prose):
+    typed = any(text.startswith(f"{package}/") for path, text in texts_in((), data) if path[-1] == "type")
+    if isinstance(package, str) and not typed and not re.search(rf"\b{re.escape(package)}\b", prose):
         near = next((one for one in known if is_slip(package, one)), "")
         if near and package not in known:
             yield ("package",), package, near

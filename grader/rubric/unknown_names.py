@@ -99,6 +99,7 @@ def _of_actions(scenario: dict[str, Any]) -> Iterator[str]:
 def _own_types(rubric: dict[str, Any]) -> Iterator[Fault]:
     """Yield types of the student's package that are all but one whose file a criterion asks for."""
     criteria, own = criteria_of(rubric), packages_in(rubric)
+    told = {*re.findall(r"\w+", str(rubric.get("handout")))}
     defined = {
         (str(c.data.get("package") or next(iter(own), "")), PurePosixPath(str(c.given.get("file"))).stem)
         for c in criteria
@@ -112,13 +113,14 @@ def _own_types(rubric: dict[str, Any]) -> Iterator[Fault]:
     for path, given in typed:
         kind = given.get("type")
         package, _, name = kind.partition("/") if isinstance(kind, str) else ("", "", "")
-        near = closest(name, names, cutoff=SURE) if package in own and name not in names else ""
+        near = closest(name, names, cutoff=SURE) if package in own and name not in names | told else ""
         places = {judged for judged, stem in defined if stem == name}
         if package in own and places and package not in places:
             fault = f"a criterion looks for {name} in {join_words(sorted(places))}, and this is {kind}"
             yield (*path, "type"), f"{fault}: give the criterion package: {package}"
         if near:
-            yield (*path, "type"), f'no criterion asks for {name} (did you mean "{package}/{near}"?)'
+            fault = f'no criterion asks for {name} (did you mean "{package}/{near}"?)'
+            yield (*path, "type"), f"{fault}: if it is right, say it in the handout too"
 
 
 def _misspelt_scripts(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:

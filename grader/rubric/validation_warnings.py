@@ -60,6 +60,7 @@ def warnings(data: object) -> Iterator[Fault]:
     yield from _required_of_runs(criteria)
     yield from _patterns(criteria)
     yield from _own_messages(criteria, scenarios)
+    yield from _of_the_build(criteria)
     yield from _heavy_members(rubric, criteria)
     yield from _other_rates(criteria)
     yield from _not_private(scenarios, str(rubric.get("handout") or ""))
@@ -137,6 +138,15 @@ def _lone_quotes(rubric: dict[str, Any]) -> Iterator[Fault]:
             is_value = path[-1] == "value" or path[-2:-1] == ("values",)
             if is_value and len(text) > 2 and text.startswith(quote) and text.endswith(quote):
                 yield path, "has quotation marks in its quotation marks: a node has to publish them, too"
+
+
+def _of_the_build(criteria: Criteria) -> Iterator[Fault]:
+    """Yield packages that are asked for at run time, and that only a build needs."""
+    for criterion in criteria:
+        asked = criterion.given if criterion.check in {"manifest", "dependencies"} else {}
+        for path, name in texts_in(criterion.at, asked):
+            if name == "message_generation":
+                yield path, "is asked for at run time, and only the build needs it: write message_runtime"
 
 
 def _own_messages(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:

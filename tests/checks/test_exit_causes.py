@@ -328,8 +328,70 @@ def test_a_class_that_the_build_makes_is_imported_from_its_module(tmp_path, sour
 
 
 @pytest.mark.parametrize(
+    ("cmake", "error", "hint"),
+    [
+        ("add_service_files(FILES Sum.srv)", "NameError: name 'Add' is not defined. Did you mean: 'add'?",
+         "list Add.srv in add_service_files(…)"),
+        ("add_service_files(FILES Sum.srv)", "NameError: name 'AddResponse' is not defined",
+         "list Add.srv in add_service_files(…)"),
+        # the build makes it: the import is of another module, or comes later
+        ("add_service_files(FILES Sum.srv Add.srv)", "NameError: name 'Add' is not defined", "check the spelling"),
+        ("add_service_files(DIRECTORY srv)", "NameError: name 'Add' is not defined", "check the spelling"),
+        ("add_service_files(FILES Sum.srv)", "NameError: name 'Sub' is not defined", "check the spelling"),
+    ],
+)  # fmt: skip
+def test_a_name_that_a_star_does_not_bring_is_one_that_the_build_has_not_made(tmp_path, cmake, error, hint):
+    (tmp_path / "package.xml").write_text("<package><name>lab</name></package>")
+    (tmp_path / "CMakeLists.txt").write_text(f"{cmake}\ngenerate_messages()\n")
+    (tmp_path / "srv").mkdir()
+    for name in ("Add", "Sum"):
+        (tmp_path / "srv" / f"{name}.srv").write_text("---\n")
+    source = "from lab.srv import *\nadd = rospy.ServiceProxy('add', Add)\n"
+    (tmp_path / "node.py").write_text(source)
+    package = facts_of(tmp_path)
+    end = explain_traceback(said(package, ("node.py", 2, source.split("\n")[1]), error=error), package)
+    assert end.hint.startswith(hint)
+    assert (
+        ("the build has not made it from srv/Add.srv" in end.cause) == end.unbuilt == hint.startswith("list")
+    )
+    assert "Did you mean" not in end.cause
+
+
+def test_without_its_file_for_cmake_a_package_has_no_messages(tmp_path):
+    (tmp_path / "package.xml").write_text("<package><name>lab</name></package>")
+    (tmp_path / "srv").mkdir()
+    (tmp_path / "srv" / "Add.srv").write_text("---\n")
+    (tmp_path / "node.py").write_text("from lab.srv import Add\n")
+    package = facts_of(tmp_path)
+    raised = said(
+        package, ("node.py", 1, "from lab.srv import Add"), error="ModuleNotFoundError: No module named 'lab'"
+    )
+    assert explain_traceback(raised, package).hint == (
+        "first add the CMakeLists.txt that `catkin_create_pkg` writes. In it, list Add.srv in add_service_files(…), "
+        "and call generate_messages(…)"
+    )
+
+
+def test_the_message_is_that_of_the_package_that_is_named(tmp_path):
+    made = "add_message_files(FILES Reading.msg)\ngenerate_messages()\n"
+    for name, cmake in (("lab", ""), ("lab_msgs", made)):
+        (tmp_path / name / "msg").mkdir(parents=True)
+        (tmp_path / name / "msg" / "Reading.msg").write_text("int8 a\n")
+        (tmp_path / name / "package.xml").write_text(f"<package><name>{name}</name></package>")
+        (tmp_path / name / "CMakeLists.txt").write_text(cmake)
+    line = "from lab_msgs.msg import Reading"
+    (tmp_path / "lab" / "node.py").write_text(f"{line}\n")
+    package = facts_of(tmp_path / "lab").model_copy(
+        update={"also": (facts_of(tmp_path / "lab_msgs", "lab_msgs"),)}
+    )
+    raised = said(package, ("node.py", 1, line), error="ModuleNotFoundError: No module named 'lab_msgs'")
+    assert explain_traceback(raised, package).hint == "first get the build to pass: catkin_make"
+
+
+@pytest.mark.parametrize(
     ("source", "error", "hint"),
     [
+        ("return str(a)", "struct.error: required argument is not an integer", "give it an int: `int(…)`"),
         ("return AddResponse(3)", "NameError: name 'AddResponse' is not defined",
          "write `from lab.srv import AddResponse` at the top"),
         ("x = Reading()", "NameError: name 'Reading' is not defined", "write `from lab.msg import Reading` at the top"),

@@ -359,6 +359,15 @@ def test_a_question_in_a_script_that_does_not_compile_is_named() -> None:
     assert any(told in hint for hint in found.values())
 
 
+def test_a_question_whose_answer_the_run_types_is_right() -> None:
+    asks = slip("input", "input", 6, name="once")
+    scenarios = {"talker": {**SCENARIO, "steps": [{"type": {"process": "talker", "line": "3"}}]}}
+    recorded = build_runs({"runs": {"talker": DIES}, "package": {**PACKAGE, "slips": [asks]}})
+    found = judge(rubric(*TALKER, scenarios=scenarios), recorded)
+    assert all("for input" not in c.hint for c in found)
+    assert "for input" in hint_of("node", DIES, TALKER, asks)
+
+
 MADE = "    rate = rospy.Rate(10)\n"
 LOOP = "    while not rospy.is_shutdown():\n        pub.publish(x)\n"
 SLEEPS = "        rate.sleep()\n"

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from grader.model.message_definitions import parse_definition
-from grader.package.repairs import Wanted
+from grader.package.repairs import Wanted, find_repairs
 from tests.package.repairing import (
     CMAKE,
     CMAKELISTS,
@@ -17,12 +17,15 @@ from tests.package.repairing import (
     MANIFEST,
     SCRIPT,
     TALKER,
+    WANTED,
     XML,
     Case,
     asking,
     check,
+    package,
     swapped,
 )
+from tests.package.trees import facts_of
 
 pytestmark = pytest.mark.usefixtures("without_processes")
 
@@ -362,6 +365,20 @@ CASES = {
          CMAKELISTS: ACTION_CMAKE.replace("actionlib_msgs std", "std")},
         ["build-line"], "write actionlib_msgs after DEPENDENCIES",
     ),
+    "own-action-and-no-calls": Case(
+        {"src/talker.py": "#!/usr/bin/env python3\nfrom lab.msg import GoAction\n",
+         "action/Go.action": "int32 n\n---\nint32 n\n---\nint32 n\n"},
+        ["build-line"] * 3, "write actionlib_msgs message_generation after",
+        after={CMAKELISTS: "generate_messages(DEPENDENCIES actionlib_msgs)"},
+    ),
+    "messages-and-services-without-generation": Case(
+        {"src/talker.py": "#!/usr/bin/env python3\nfrom lab.msg import Num\n", "msg/Num.msg": "int8 a\n",
+         "srv/Add.srv": "---\n",
+         CMAKELISTS: CMAKE.replace("rospy)\n", "message_generation rospy)\nadd_message_files(FILES Num.msg)\n"
+                                                "add_service_files(FILES Add.srv)\n")},
+        ["build-line"], "does not call generate_messages(…)",
+        after={CMAKELISTS: "add_service_files(FILES Add.srv)\ngenerate_messages()\n"},
+    ),
     "own-action-in-another-order": Case(
         {"src/go.py": "from lab.msg import GoAction\n",
          "action/Go.action": "int32 n  # how far\n---\nint32 left\n---\nbool there\n",
@@ -458,3 +475,18 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_a_mistake_in_a_package_is_found_and_repaired(name: str, tmp_path: Path) -> None:
     check(CASES[name], tmp_path)
+
+
+def test_a_program_waits_for_the_headers_of_the_message_package_beside_it(tmp_path: Path) -> None:
+    node = "#include <lab_msgs/Num.h>\nint main() {}\n"
+    folder = package(tmp_path, {"src/a.cpp": node, CMAKELISTS: f"{CMAKE}add_executable(a src/a.cpp)\n"})
+    (tmp_path / "lab_msgs" / "msg").mkdir(parents=True)
+    (tmp_path / "lab_msgs" / "msg" / "Num.msg").write_text("int8 a\n")
+    (tmp_path / "lab_msgs" / "package.xml").write_text("<package><name>lab_msgs</name></package>")
+    beside = facts_of(tmp_path / "lab_msgs", "lab_msgs")
+    facts = facts_of(folder, "lab").model_copy(update={"also": (beside,)})
+    found = [one for one in find_repairs(folder, facts, WANTED) if "headers" in one.message]
+    assert [one.fix.partition(", write ")[2] for one in found] == [
+        "add_dependencies(a ${catkin_EXPORTED_TARGETS})"
+    ]
+    assert not any("headers" in one.message for one in find_repairs(folder, facts_of(folder, "lab"), WANTED))

@@ -48,6 +48,15 @@ CASES = {
         OWN_POINT | swapped(TALKER, ("\ndef main", "from lab.msg import Point\nPoint().x = 1\n\ndef main")),
         [*3 * ["build-line"], "missing-call"], "`x` is called `X`",
     ),
+    "field-of-one-letter-that-may-be-any": Case(  # is it X, or another one?
+        OWN_POINT | swapped(TALKER, ("\ndef main", "from lab.msg import Point\nPoint().a = 1\n\ndef main")),
+        3 * ["build-line"],
+    ),
+    "topic-of-the-class": Case(
+        swapped(TALKER, ("\ndef main", "class Names:\n    TOPIC = 'numeric_chatter'\n\ndef main"),
+                ("'numeric_chatter', Int8", "Names.TOPIC, Int8")),
+        [],
+    ),
     "field-of-a-message-of-the-same-name": Case(
         OWN_POINT | swapped(TALKER, ("\ndef main", "from geometry_msgs.msg import Point\nPoint().x = 1\n\ndef main")),
         [],

@@ -276,7 +276,8 @@ def test_two_faults_that_cost_the_same_criterion_are_told_in_one_sentence():
         criterion("executable", Status.FAIL, 0, 5, repaired=both),
         criterion("rate", Status.PARTIAL, 5, 10, repaired=one),
     )
-    (words,) = repair_words(result(criteria=criteria))
+    blocked = criterion("step", Status.BLOCKED, 0, 10, repaired=one, blocked_by="rate")
+    (words,) = repair_words(result(criteria=(*criteria, blocked)))
     assert words == (
         "src/a.py is not executable and line 7 of src/a.py: tabs: this costs you 5 points (executable); "
         "rate was judged with this repaired, for 50% of the points"

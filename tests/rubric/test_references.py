@@ -443,7 +443,8 @@ criteria:
          ("20: criteria[4].with.expect[0]: the response of std_srvs/SetBool has no field sucess "
           '(did you mean "success"?)')),
         ("type: lab1/Reading", "type: lab1/Readings",
-         '18: criteria[3].with.type: no criterion asks for Readings (did you mean "lab1/Reading"?)'),
+         ('18: criteria[3].with.type: no criterion asks for Readings (did you mean "lab1/Reading"?): '
+         "if it is right, say it in the handout too")),
         ("/ask/times", "/asks/times",
          '9: scenarios.asks.params[0].name: the node is called ask, and not asks (did you mean "/ask/times"?)'),
         ("int64 a", "int46 a",

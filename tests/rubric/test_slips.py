@@ -273,6 +273,26 @@ def test_a_rubric_of_the_graders_own_loads_without_a_word(path: Path) -> None:
     assert warnings_of(load_rubric(str(path)), path.name) == []
 
 
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        # the package is one letter off from a topic, and types are in it
+        ("service-client", "adder", "adds"),
+        # the handout has two messages of almost one name
+        ("own-message", "file: msg/Reading.msg", "file: msg/Reading2.msg"),
+        # which goal it is has nothing to do with the handout's numbers
+        ("action-server", "A target below 0 is", "A target below 20 is"),
+    ],
+)
+def test_what_looks_like_a_slip_and_is_none_is_accepted(
+    examples: Path, name: str, old: str, new: str
+) -> None:
+    path = examples / "spoiled.yaml"
+    path.write_text((examples / f"{name}.yaml").read_text(encoding="utf-8").replace(old, new))
+    found = warnings_of(load_rubric(str(path)), path.name)
+    assert not [one for one in found if "did you mean" in one or "has 20" in one]
+
+
 def test_a_step_that_is_left_out_of_one_of_several_runs_is_a_warning(examples: Path) -> None:
     start = "start: [{name: distance, script: scripts/distance.py}]"
     near = f"  near:\n    title: Near\n    {start}\n    steps: [wait: {{seconds: 1}}]\n"

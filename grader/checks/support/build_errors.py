@@ -231,7 +231,7 @@ def _missing_folder(found: re.Match[str], package: PackageFacts, _lines: Sequenc
 def _missing_include(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     folder = found[1].rstrip("/")
     why = f"catkin_package(…) names the folder {folder}/, which is not in the package"
-    fix = f"remove INCLUDE_DIRS {folder}: it is for C++ header files"
+    fix = f"remove INCLUDE_DIRS {folder}: it is for C++ header files, and git keeps no empty folder"
     return Explained(why, f"{fix}; or put them into {folder}/ and push them")
 
 

@@ -76,6 +76,10 @@ SLIPS = {
     **{f"{said} 'publish'{rest}": ("`publish` belongs to what `rospy.Publisher(…)` returns",
        "write that name in front of it: `pub.publish(…)`")
        for said, rest in (("name", " is not defined"), ("module 'rospy' has no attribute", ""))},
+    "required argument is not an integer": (
+     "a field of whole numbers is given something else, such as a text or 2.0", "give it an int: `int(…)`"),
+    "required argument is not a float": ("a field of numbers is given something else, such as a text",
+     "give it a number: `float(…)`"),
     "namespaces are not allowed in node names": ("the name in `rospy.init_node(…)` has a slash in it",
      "write the node's name without a slash"),
     "init_node() has already been called with different arguments": ("`rospy.init_node(…)` is called a second time",

@@ -382,7 +382,9 @@ def _said(found: Traceback, cause: str) -> str:
     """Return the exception's own words, without a guess of Python's where the cause names another one."""
     said = re.sub(r" \(/\S+/__init__\.py\)$", "", found.text)
     guess = _BY_PYTHON.search(said)
-    is_spare = guess is not None and (hasattr(builtins, guess[1]) or "did you mean" in cause)
+    is_spare = guess is not None and (
+        hasattr(builtins, guess[1]) or cause.startswith("the build ") or "did you mean" in cause
+    )
     return said.removesuffix(guess[0]) if guess is not None and is_spare else said
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import ast
 import posixpath
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from contextlib import suppress
 from pathlib import PurePosixPath
 from typing import NamedTuple
@@ -27,7 +27,7 @@ from grader.installable import (
     nearest_module,
     noetic_messages,
 )
-from grader.model.package import PackageFacts
+from grader.model.package import CMAKE, Interface, PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.verdict import FileCitation
 from grader.syntax_fixes import parsed
@@ -114,12 +114,13 @@ def own_message(found: Traceback, package: PackageFacts) -> tuple[str, str] | No
     if asked is None:
         return None
     module, names = asked
-    made = {
-        name: f"{one.name}.{own.module}"
+    places = [
+        (name, f"{one.name}.{own.module}")
         for one in (*package.also, package)
         for own in one.interfaces
         for name in own.classes
-    }
+    ]
+    made = dict(sorted(places, key=lambda one: one[1] == module))  # two packages may have one of that name
     near_by = module.partition(".")[0] in {package.name, *(one.name for one in package.also)}
     meant = {name: _class_of(name, made, near=near_by) for name in names}
     lines: dict[str, list[str]] = {}
@@ -158,16 +159,14 @@ def unmade(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     makers = (one for one in (package, *package.also) if _makes(one, found.message))
     maker = None if own_message(found, package) else next(makers, None)
     if maker is None:
-        return None
+        return _unlisted(found, package)
     wanted = re.match(r"cannot import name '(\w+)'", found.message)
     if wanted is not None and "__init__.py" in found.message:  # the build made others
         own = next((one for one in maker.interfaces if wanted[1] in one.classes), None)
         if own is None:
             made = join_words(name for one in maker.interfaces for name in one.classes)
             return f"the build makes {made}", f"write the one that you mean instead of {wanted[1]}"
-        kind = own.path.rpartition(".")[2].replace("msg", "message").replace("srv", "service")
-        hint = f"list {own.path.rpartition('/')[2]} in add_{kind}_files(…)"
-        return f"the build has not made it from {own.path}", hint
+        return f"the build has not made it from {own.path}", _listing([own])
     asked = re.search(rf"'{re.escape(maker.name or '')}\.(msg|srv)'", found.message)
     if asked is not None and all(own.module != asked[1] for own in maker.interfaces):
         kind = {"msg": "message", "srv": "service"}[asked[1]]
@@ -175,11 +174,38 @@ def unmade(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
         return f"the package has no .{asked[1]} file to build it from", hint
     whose = "the package's own messages" if maker is package else f"the messages of {maker.name}"
     hint = "first get the build to pass: catkin_make"
-    if not cmake_calls(maker, "generate_messages"):
+    if maker.file(CMAKE) is None:
+        hint = f"first add the {CMAKE} that `catkin_create_pkg` writes. In it, {_listing(maker.interfaces)}"
+        hint += ", and call generate_messages(…)"
+    elif not cmake_calls(maker, "generate_messages"):
         hint = "call generate_messages(…) above catkin_package(…)"
         if not cmake_calls(maker, *OF_FILES):
+            # names no file: a repair that does is told behind it
             hint = "list them in add_message_files(…) or add_service_files(…), and call generate_messages(…)"
     return f"the build makes {whose}", hint
+
+
+def _listing(interfaces: Iterable[Interface]) -> str:
+    """Return the advice to name these definitions in the calls that make them."""
+    files = [PurePosixPath(one.path) for one in interfaces]
+    calls = {call: [path.name for path in files if path.suffix == kind] for call, kind in OF_FILES.items()}
+    return "list " + join_words(f"{join_words(names)} in {call}(…)" for call, names in calls.items() if names)
+
+
+def _unlisted(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
+    """Return the cause and the hint of a name that `from lab1.srv import *` does not bring, because CMakeLists.txt
+    lists other definitions than its own."""
+    wanted = re.match(r"name '(\w+)' is not defined", found.message)
+    file = found.own_frames[-1].file if found.own_frames else ""
+    if wanted is None or any(s.name == wanted[1] and file.endswith(f"/{s.file}") for s in package.slips):
+        return None
+    for maker in (package, *package.also):
+        own = next((one for one in maker.interfaces if wanted[1] in one.classes), None)
+        call = next((c for c, kind in OF_FILES.items() if own is not None and own.path.endswith(kind)), "")
+        listed = [word for one in cmake_calls(maker, call) for word in one.args]
+        if own and "FILES" in listed and not {PurePosixPath(own.path).name, "DIRECTORY"} & {*listed}:
+            return f"the build has not made it from {own.path}", _listing([own])
+    return None
 
 
 def _makes(package: PackageFacts, message: str) -> bool:

@@ -337,10 +337,15 @@ OF_INTERFACES = (*OF_FILES, "generate_messages")
 def commented_calls(
     package: PackageFacts, lines: Sequence[str], names: Iterable[str]
 ) -> dict[str, tuple[int, int]]:
-    """Return of these commands those that are not called, are of files that the package has, and are commented out."""
-    kinds = {None, *(PurePosixPath(one.path).suffix for one in package.interfaces)}
-    asked = [name for name in names if not cmake_calls(package, name) and OF_FILES.get(name) in kinds]
-    return {name: place for name in asked if (place := commented_call(lines, name))}
+    """Return of these commands those that are not called and are commented out. Those of files name one that the
+    package has, and not only `Message1.msg` as the template does."""
+    own = [PurePosixPath(one.path).name for one in package.interfaces]
+    places = {n: place for n in names if not cmake_calls(package, n) and (place := commented_call(lines, n))}
+    return {
+        name: (first, last)
+        for name, (first, last) in places.items()
+        if name not in OF_FILES or any(one in line for one in own for line in lines[first : last + 1])
+    }
 
 
 def commented_call(lines: Sequence[str], name: str) -> tuple[int, int] | None:

@@ -26,7 +26,13 @@ from grader.package.repairs.cmake_calls import (
     words_of,
 )
 from grader.package.repairs.editing import Files, naming_files, rename_word
-from grader.package.repairs.interfaces import GENERATE, exchange_parts, make_interfaces, needs_interfaces
+from grader.package.repairs.interfaces import (
+    GENERATE,
+    exchange_parts,
+    make_interfaces,
+    needs_interfaces,
+    wait_for_headers,
+)
 from grader.package.repairs.manifest import OF_ROS, declare_for_running
 from grader.package.repairs.names import Wanted, is_near
 from grader.package.repairs.programs import (
@@ -100,6 +106,7 @@ def repair_cmake(
     if not has_call(files, package, "catkin_package"):
         below = (GENERATE, "find_package", "project")
         add_call(files, "catkin_package()", "catkin_package()", below)
+    wait_for_headers(files, package, name)
     if needs_interfaces(files, package, name, scripts):
         make_interfaces(files, package, name, scripts)
         exchange_parts(files, package, wanted)
@@ -303,6 +310,7 @@ def _correct_include(files: Files) -> None:
             f"line {call.line} of {CMAKE}: catkin_package(…) names {folders}, which is not in the package"
         )
         fix = f"remove INCLUDE_DIRS {listed}" if absent == given else f"remove {listed} from INCLUDE_DIRS"
+        fix += ", as git keeps no empty folder"
         files.change("build-line", CMAKE, text, message, fix)
         return
 

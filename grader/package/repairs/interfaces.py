@@ -53,8 +53,7 @@ def make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Col
     _correct_types(files, package)
     _correct_dividers(files, package)
     _call_by_kind(files)
-    _wait_for_headers(files, package, name)
-    _generate(files, package)  # from below, so that the lines above stay where they are
+    lacking = _generate(files, package)  # from below, so that the lines above stay where they are
     run = [path for path in code if path in scripts or path.endswith(CPP)]
     needed = {word for path in run for word in re.findall(r"\w+", files.text(path) or "")}
     needed |= {
@@ -74,7 +73,8 @@ def make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Col
                 "build-line", CMAKE, replace_token(cmake_text(files), near, GENERATION), message, fix
             )
             return
-        _name_components(files, [GENERATION])
+        lacking.append(GENERATION)
+    _name_components(files, lacking)
 
 
 def _delete_generation(files: Files, package: PackageFacts) -> None:
@@ -109,25 +109,28 @@ def _delete(files: Files, call: Command, why: str) -> None:
     files.change("build-line", CMAKE, changed, f"line {call.line} of {CMAKE}: {why}", fix)
 
 
-def _wait_for_headers(files: Files, package: PackageFacts, name: str) -> None:
-    """Make programs wait for the headers of the package's own definitions, which they include and nothing makes them
+def wait_for_headers(files: Files, package: PackageFacts, name: str) -> None:
+    """Make programs wait for the headers of definitions that were handed in, which they include and nothing makes them
     wait for."""
-    own = "|".join(PurePosixPath(one.path).stem for one in package.interfaces)
-    includes = re.compile(
-        rf"#\s*include\s*[<\"]{re.escape(name)}/(?:{own})(?:Request|Response|Action)?\.h[>\"]"
-    )
+    defining = {name: package.interfaces, **{one.name or "": one.interfaces for one in package.also}}
+    made = {
+        maker: "|".join(PurePosixPath(one.path).stem for one in own) for maker, own in defining.items() if own
+    }
+    headers = "|".join(f"{re.escape(maker)}/(?:{stems})" for maker, stems in made.items())
+    includes = re.compile(rf"#\s*include\s*[<\"](?:{headers})(?:Request|Response|Action)?\.h[>\"]")
     waiting = {token.value for call in calls_of(files, "add_dependencies") for token in words_of(call)[:1]}
     found = []
     for call in calls_of(files, "add_executable"):
         target, *sources = [token.value for token in words_of(call)]
         if target not in waiting and any(includes.search(files.text(path) or "") for path in sources):
             found.append((target, call))
-    if not own or not found:
+    if not made or not found:
         return
+    targets_made = "${PROJECT_NAME}" if [*made] == [name] else "catkin"
     lines, fixes = cmake_text(files).split("\n"), list[str]()
     for target, call in reversed(found):
         at = cmake_text(files).count("\n", 0, call.span.stop) + 1
-        new = f"add_dependencies({target} ${{${{PROJECT_NAME}}_EXPORTED_TARGETS}})"
+        new = f"add_dependencies({target} ${{{targets_made}_EXPORTED_TARGETS}})"
         lines.insert(at, new)
         fixes.insert(0, f"below the add_executable(…) on line {call.line}, write {new}")
     targets = join_words(target for target, _ in found)
@@ -146,14 +149,17 @@ def _components(files: Files) -> tuple[list[Command], list[str]]:
 def _name_components(files: Files, names: Sequence[str]) -> None:
     """Name these packages in find_package(catkin …), where it lists its packages in plain words."""
     of_catkin, named = _components(files)
-    missing = " ".join(name for name in names if name not in named)
+    absent = [name for name in names if name not in named]
+    missing = " ".join(absent)
     if not of_catkin or not missing or any("$" in word for word in named):
         return
     words = words_of(of_catkin[0])
     listed = next((t for t in words if t.value == "COMPONENTS"), None)
     token, new = (listed, missing) if listed else (words[-1], f"COMPONENTS {missing}")
     changed = replace_token(cmake_text(files), token, f"{token.value} {new}")
-    message = f"line {of_catkin[0].line} of {CMAKE}: find_package(catkin …) does not name {missing}"
+    message = (
+        f"line {of_catkin[0].line} of {CMAKE}: find_package(catkin …) does not name {join_words(absent)}"
+    )
     files.change("build-line", CMAKE, changed, message, f"write {new} after {token.value}")
 
 
@@ -253,8 +259,9 @@ def _name_definitions(files: Files, name: str, made: Sequence[str], needed: Coll
             files.change("build-line", CMAKE, changed, message, f"write {file} {place} {stray}")
 
 
-def _generate(files: Files, package: PackageFacts) -> None:
-    """Call generate_messages(…) where nothing does, with the packages whose types are used, above catkin_package(…)."""
+def _generate(files: Files, package: PackageFacts) -> list[str]:
+    """Call generate_messages(…) where nothing does, with the packages whose types are used, above catkin_package(…).
+    Return those that find_package(catkin …) has to name with it."""
     calls, of_catkin = calls_of(files, GENERATE), calls_of(files, "catkin_package")
     types = {field.type for one in package.interfaces for field in one.fields}
     needed = {"std_msgs"} if types & {"Header", "Header[]"} else set[str]()
@@ -262,8 +269,10 @@ def _generate(files: Files, package: PackageFacts) -> None:
     needed |= {name.partition("/")[0] for name in types if "/" in name} - {package.name}
     if not calls:
         line = f"{GENERATE}({' '.join(['DEPENDENCIES', *sorted(needed)] if needed else [])})"
-        add_call(files, f"{GENERATE}(…)", line, (*INTERFACE_FOLDERS, "find_package"), sorted(needed))
-        return
+        lines = {name: max((c.line for c in calls_of(files, name)), default=0) for name in INTERFACE_FOLDERS}
+        below = (*sorted(lines, key=lambda name: -lines[name]), "find_package")
+        add_call(files, f"{GENERATE}(…)", line, below, sorted(needed))
+        return sorted(needed)
     late = [c for name in INTERFACE_FOLDERS for c in calls_of(files, name) if c.line > calls[0].line]
     if late and (not of_catkin or late[0].line < of_catkin[0].line):
         text, call, at = cmake_text(files), late[0].span, calls[0].span.start
@@ -272,7 +281,7 @@ def _generate(files: Files, package: PackageFacts) -> None:
         message = f"line {late[0].line} of {CMAKE}: {name}(…) is called after {GENERATE}(…)"
         fix = f"move {name}(…), from line {late[0].line}, above {GENERATE}(…)"
         files.change("build-line", CMAKE, changed, message, fix)
-        return
+        return []
     if of_catkin and calls[0].line > of_catkin[0].line:
         text, call, at = cmake_text(files), calls[0].span, of_catkin[0].span.start
         changed = f"{text[:at]}{text[call]}\n\n{text[at : call.start].rstrip()}\n{text[call.stop :].lstrip()}"
@@ -290,3 +299,4 @@ def _generate(files: Files, package: PackageFacts) -> None:
         fix = f"write {listed} after DEPENDENCIES" if token else f"write {GENERATE}({added})"
         files.change("build-line", CMAKE, text[:at] + added + text[at:], message, fix)
         _name_components(files, missing)
+    return []
