@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 from itertools import accumulate
 
@@ -10,7 +9,6 @@ import pytest
 
 from grader.arena.outcome import describe_wait, find_outcome, next_look_s
 from grader.arena.run_state import RunState
-from grader.arena.session import ArenaSession
 from grader.arena.settling import all_compute, is_settled, is_silent
 from grader.model.message_rate import RateBounds
 from grader.rubric.scenario import Until
@@ -239,32 +237,6 @@ def test_a_connection_has_to_last() -> None:
     live.note_connections({"/a"}, 2.0)
     assert find_outcome(live, until, 2.5) is None
     assert find_outcome(live, until, 3.0) == ("complete", "")
-
-
-@pytest.mark.parametrize(
-    ("publishes", "looks"),
-    [("/average", 3), ("/alarm", 0)],  # what a node alone publishes and hears needs no other
-)
-def test_nodes_that_share_a_topic_are_waited_for(
-    publishes: str, looks: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    live = _live()
-    live.published, live.listened = {"/mean": {publishes}, "/rosout": {"/a"}}, {"/mean": {"/alarm"}}
-    asked: list[float] = []
-
-    async def look(session: ArenaSession) -> None:
-        asked.append(1)
-        live.note_connections({"/mean"} if len(asked) == 3 else (), 1.0)
-
-    async def wait(session: ArenaSession, condition: object, timeout_s: float) -> bool:
-        return False
-
-    monkeypatch.setattr(ArenaSession, "look_at_connections", look)
-    monkeypatch.setattr(ArenaSession, "wait", wait)
-    session = ArenaSession.__new__(ArenaSession)
-    session.live = live
-    asyncio.run(session.await_connections())
-    assert len(asked) == looks
 
 
 def test_looking_at_the_graph_is_no_change_of_it() -> None:

@@ -1,8 +1,14 @@
-"""Which run begins first."""
+"""Which run begins first, and what a run waits for before the grader's first message."""
 
 from __future__ import annotations
 
+import asyncio
+
+import pytest
+
 from grader.arena.recorder import order_runs
+from grader.arena.run_state import RunState
+from grader.arena.session import ArenaSession
 from grader.rubric.model import Rubric
 from grader.rubric.scenario import Scenario, Start, Until
 
@@ -36,3 +42,29 @@ def test_then_the_longest() -> None:
 
 def test_a_warped_run_measures_no_rate() -> None:
     assert order("slow", long=LONG, slow=scenario("warped", window_s=1)) == ("long", "slow")
+
+
+@pytest.mark.parametrize(
+    ("publishes", "looks"),
+    [("/average", 3), ("/alarm", 0)],  # what a node alone publishes and hears needs no other
+)
+def test_nodes_that_share_a_topic_are_waited_for(
+    publishes: str, looks: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    live = RunState(running={"node"})
+    live.published, live.listened = {"/mean": {publishes}, "/rosout": {"/a"}}, {"/mean": {"/alarm"}}
+    asked: list[float] = []
+
+    async def look(session: ArenaSession) -> None:
+        asked.append(1)
+        live.note_connections({"/mean"} if len(asked) == 3 else (), 1.0)
+
+    async def wait(session: ArenaSession, condition: object, timeout_s: float) -> bool:
+        return False
+
+    monkeypatch.setattr(ArenaSession, "look_at_connections", look)
+    monkeypatch.setattr(ArenaSession, "wait", wait)
+    session = ArenaSession.__new__(ArenaSession)
+    session.live = live
+    asyncio.run(session.await_connections())
+    assert len(asked) == looks

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import builtins
 import re
-import signal
 from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
@@ -33,7 +32,7 @@ from grader.checks.support.missing_names import (
     unmade,
     unused_import,
 )
-from grader.checks.support.processes import Life, early_end, lives, nodes_of
+from grader.checks.support.processes import Life, early_end, lives, nodes_of, signal_name
 from grader.checks.support.rospy_calls import (
     other_items,
     part_of_action,
@@ -184,7 +183,7 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
     printed = [line.line for _, line in run.lines(life.name) if line.line.strip()]
     if life.end is not None and life.end.signal is not None and life.end.stopped_by is None:
         said = (known for line in printed for text, known in OF_ROSCPP.items() if text in line)
-        return Ending(*next(said, (f"{_signal_name(life.end.signal)} ended it", RUN_IT)))
+        return Ending(*next(said, (f"{signal_name(life.end.signal)} ended it", RUN_IT)))
     if code == 0:
         return _not_run(life, run, package) or _ran_to_the_end(printed)
     exceptions = [line for line in printed if line.startswith("RLException: ")]
@@ -382,9 +381,8 @@ def _said(found: Traceback, cause: str) -> str:
     """Return the exception's own words, without a guess of Python's where the cause names another one."""
     said = re.sub(r" \(/\S+/__init__\.py\)$", "", found.text)
     guess = _BY_PYTHON.search(said)
-    is_spare = guess is not None and (
-        hasattr(builtins, guess[1]) or cause.startswith("the build ") or "did you mean" in cause
-    )
+    has_other = cause.startswith("the build ") or "did you mean" in cause
+    is_spare = guess is not None and (hasattr(builtins, guess[1]) or has_other)
     return said.removesuffix(guess[0]) if guess is not None and is_spare else said
 
 
@@ -584,13 +582,6 @@ def _place(found: Traceback, package: PackageFacts) -> FileCitation | None:
                 update={"column": begin + 1, "end_column": end + 1, "source": frame.source}
             )
     return None
-
-
-def _signal_name(number: int) -> str:
-    try:
-        return f"signal {number} ({signal.Signals(number).name})"
-    except ValueError:
-        return f"signal {number}"
 
 
 def _of_machine(found: Traceback, lacking: str, place: FileCitation | None, package: PackageFacts) -> Ending:

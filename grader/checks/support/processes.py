@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import re
+import signal
 from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Annotated, Literal, NamedTuple
 
@@ -63,6 +64,14 @@ class Life(NamedTuple):
         """Return up to when it could act freely: Ctrl-C, its own end, or the recording's."""
         times = (t for t in (self.interrupt_ns, self.end_ns) if t is not None)
         return min(times, default=run.end_ns)
+
+
+def signal_name(number: int) -> str:
+    """Return `signal 11 (SIGSEGV)`."""
+    try:
+        return f"signal {number} ({signal.Signals(number).name})"
+    except ValueError:
+        return f"signal {number}"
 
 
 def not_started(who: str) -> Verdict:
