@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from graphlib import TopologicalSorter
 from pathlib import PurePath
@@ -144,9 +144,20 @@ def judge_all_runs(
     if package is not None:
         named = (name_unchanged_files(result, rubric, package, handed_out) for result in results)
         results = add_advice([with_own_name(one, rubric, package) for one in named], package, rubric)
-    late = {i for i, v in shown.items() if v.status is Status.INCONCLUSIVE and not v.of_machine}
-    undecided = frozenset(c.scenario for c in rubric.criteria if c.id in late and c.scenario)
-    return Judgement(leave_out(rubric, results), doubtful, undecided)
+    return Judgement(leave_out(rubric, results), doubtful, _undecided(rubric, shown))
+
+
+def _undecided(rubric: Rubric, verdicts: Mapping[str, Verdict]) -> frozenset[str]:
+    """Return the scenarios of the open criteria, without those that rest on what the machine lacks."""
+    by_id, lacking = {c.id: c for c in rubric.criteria}, set[str]()
+    for name in _in_order(rubric):
+        is_open = verdicts[name].status is Status.INCONCLUSIVE
+        if verdicts[name].of_machine or (is_open and lacking.intersection(by_id[name].requires)):
+            lacking.add(name)
+    late = (
+        c for c in rubric.criteria if verdicts[c.id].status is Status.INCONCLUSIVE and c.id not in lacking
+    )
+    return frozenset(c.scenario for c in late if c.scenario)
 
 
 def _with_repaired_copy(
@@ -198,11 +209,16 @@ def _with_cited_lines(verdict: Verdict, criterion: Criterion, facts: Facts, used
     return show_lines(cite_name(verdict, build), build)
 
 
+def _in_order(rubric: Rubric) -> Iterable[str]:
+    """Return the ids of the criteria, each after those that it requires."""
+    return TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order()
+
+
 def judge_facts(rubric: Rubric, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> dict[str, Verdict]:
     """Return the verdict of each criterion by its id."""
     criteria = {c.id: c for c in rubric.criteria}
     requirements = Requirements(rubric, checks)
-    for name in TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order():
+    for name in _in_order(rubric):
         verdict = _with_made_up(rubric, criteria[name], verdict_of(criteria[name], facts, checks))
         applied = requirements.apply(criteria[name], verdict)
         requirements.verdicts[name] = (
@@ -408,7 +424,7 @@ def judge_files(
     the build makes more precise was looked at for it.
     """
     judging = _Judging(rubric, package, checks)
-    for name in TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order():
+    for name in _in_order(rubric):
         judging.judge(name)
     found = [judging.results[c.id] for c in rubric.criteria if c.id in judging.results]
     names = lab_names(rubric, {v.criterion.id for v in found if v.criterion.status.is_lost}, package)

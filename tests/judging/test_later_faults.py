@@ -431,6 +431,21 @@ def test_what_may_be_decided_by_grading_again_is_known() -> None:
     assert judgement_of(short, TALKER).undecided == {"talker"}
 
 
+def test_what_rests_on_what_the_machine_lacks_is_not_run_again() -> None:
+    lines = [*DIES["console"][0]["lines"][:-1], "ModuleNotFoundError: No module named 'smoothly'"]
+    lacking = {**DIES["console"][0], "lines": lines}
+    silent = {"processes": [STARTED]}
+    runs = {"talker": {**DIES, "console": [lacking]}, "silent": silent}
+    criteria = (NODE | ROOT, RATE | {"scenario": "silent", "requires": ["node"]})
+    lab = rubric(*criteria, scenarios={"talker": SCENARIO, "silent": SCENARIO})
+    judgement = judge_all_runs(lab, build_runs({"runs": runs, "package": PACKAGE}))
+    assert [(c.status.value, c.scenario) for c in judgement.criteria] == [
+        ("inconclusive", "talker"),
+        ("inconclusive", "silent"),
+    ]
+    assert judgement.undecided == frozenset()
+
+
 def test_a_name_in_an_except_is_not_reached() -> None:
     wrong = slip("misspelt", "", 2, name="rospi", fix="write rospy instead of rospi")
     sources = {"except": "try:\nexcept rospi.ROSInterruptException:\n", "plain": "x = 1\nrospi.spin()\n"}
