@@ -126,9 +126,12 @@ def _window(live: RunState, until: Until, now_s: float) -> bool:
         return _talks_elsewhere(live, until, now_s)
     if until.topics and _rates_are_clear(live, topics):
         return True
+    # the least time of a rate lies between two of its messages, and the last comes up to a period before the end
+    rates = [rate for topic in topics for rate in live.rates.get(topic, ())]
+    window_s = max([until.window_s, *(one.min_window_s + 2 / (one.low_hz + one.high_hz) for one in rates)])
     if len(seen) == len(topics):
-        return now_s >= max(s.first_s for s in seen) + until.window_s
-    return now_s >= max(s.first_s for s in seen) + max(until.window_s, _late_s(live, until, now_s))
+        return now_s >= max(s.first_s for s in seen) + window_s
+    return now_s >= max(s.first_s for s in seen) + max(window_s, _late_s(live, until, now_s))
 
 
 def _talks_elsewhere(live: RunState, until: Until, now_s: float) -> bool:

@@ -201,6 +201,14 @@ def test_a_window_that_shows_more_than_rates_does_not_end_early() -> None:
     assert not _rated([0.1] * 60, "a", "b", chosen=("/a", "/b"))
 
 
+def test_a_window_holds_the_least_time_of_a_rate_and_a_period() -> None:
+    live, until = _live(a=(40, 1.0, 6.0)), Until(window_s=5, topics=("/a",))
+    assert find_outcome(live, until, 6.05) == ("complete", "")
+    live.watch_rates([TEN_HZ])
+    assert find_outcome(live, until, 6.05) is None
+    assert find_outcome(live, until, 6.15) == ("complete", "")
+
+
 def test_of_a_flood_few_arrivals_are_kept() -> None:
     live = _live(a=(1, 1.0, 9.0))
     live.watch_rates([TEN_HZ])
