@@ -29,6 +29,7 @@ COMMENTED_OUT = "block commented out"
 OUT_OF_BLOCK = "ends its block too early"
 """What the grader says of a line further out than the block that goes on below it."""
 MERGE_MARKER = re.compile(r"(<{7}|={7}|>{7}|\|{7})(\s|$)")
+MERGED = "git's merge markers (`<<<<<<<`) are still in the file"
 _BLOCK = re.compile(rf"\s*{BLOCK}")
 _BRACE = rf"(?:\}}\s*)?{BLOCK}(?:.*[\w\])\"])?\s*\{{$"
 _TEXT = re.compile(r"""("(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')|#.*""")
@@ -99,7 +100,7 @@ class _Habit(NamedTuple):
 
 
 _HABITS = (
-    _Habit(MERGE_MARKER.pattern, "git's merge markers (`<<<<<<<`) are still in the file", "keep one version"),
+    _Habit(MERGE_MARKER.pattern, MERGED, "keep one version"),
     _Habit(rf"^\s*(?:{_SHELL})",
            "this is a command for the terminal, not Python", DELETE_LINE),
     _Habit(rf"\)\s*(?:{_SHELL}).*$", "a command for the terminal comes after the code", "delete it",
@@ -533,3 +534,15 @@ def _parses(line: str) -> bool:
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return False
     return True
+
+
+def first_version(text: str) -> str:
+    """Return the text with empty lines in place of git's merge markers and of all versions but the first. The others
+    stand behind `=======` and, for the one that both come from, behind `|||||||`."""
+    kept, part = [], ""
+    for line in text.split("\n"):
+        marker = MERGE_MARKER.match(line)
+        part = marker[1][0] if marker and (part or line[0] == "<") else part
+        kept.append("" if part and (marker or part in "|=") else line)
+        part = "" if part == ">" else part
+    return "\n".join(kept)

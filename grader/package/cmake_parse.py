@@ -20,6 +20,7 @@ from cmake_parser.interpreter import Context
 from grader.model.package import CMAKE, CMakeCall, CMakeFacts, Fault
 from grader.package.cmake_slips import find_slip, is_open
 from grader.package.reading import printable, read_markup
+from grader.syntax_fixes import MERGE_MARKER, MERGED
 from grader.wording import lines_text
 
 _CALLS_MAX = 5_000
@@ -283,6 +284,8 @@ def _explain_fault(text: str, end: int, file: str, message: str) -> Fault:
     unparsed = next((t for t in tokens if t.kind == "UNPARSEABLE"), None)
     line, cause, fix = first.line, f"`{_word(first)}` is not a command", "CMake expects name(...)"
     unclosed = ""
+    if MERGE_MARKER.match(text.split("\n")[line - 1]):
+        return _fault(file, line, message, MERGED, fix="keep one version and delete the markers")
     half = join_half_comment(text)
     if half is not None:
         return _fault(file, half.line, message, half.cause, fix=half.fix)

@@ -17,9 +17,9 @@ from typing import Any
 
 from grader.syntax_fixes import (
     DELETE_LINE,
-    MERGE_MARKER,
     PLAIN,
     corrections,
+    first_version,
     reason_of_line,
     without_brace,
     without_comment_sign,
@@ -137,20 +137,8 @@ def _only_tabs(text: str, error: Error) -> bool:
     return error["kind"] == "TabError" and syntax_error(_all_expanded(text, 8)) is None
 
 
-def _first_version(text: str) -> str:
-    """Return the text with empty lines in place of git's merge markers and of all versions but the first. The others
-    stand behind `=======` and, for the one that both come from, behind `|||||||`."""
-    kept, part = [], ""
-    for line in text.split("\n"):
-        marker = MERGE_MARKER.match(line)
-        part = marker[1][0] if marker and (part or line[0] == "<") else part
-        kept.append("" if part and (marker or part in "|=") else line)
-        part = "" if part == ">" else part
-    return "\n".join(kept)
-
-
 def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
-    yield "merged", _first_version(text)
+    yield "merged", first_version(text)
     if error["kind"] in {"TabError", "IndentationError"}:
         yield "tabs", _all_expanded(text, 8)
         yield "tabs", _like_the_line_before(text, error["line"])

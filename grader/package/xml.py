@@ -12,7 +12,7 @@ from lxml import etree
 from grader.model.package import Fault
 from grader.package.line_slips import LineSlip, changed_line, doubled_and_turned
 from grader.package.xml_slips import ATTRIBUTES, DECLARATION, TAGS, slips_of
-from grader.syntax_fixes import LFS_BEGINS, LFS_POINTER, Reason
+from grader.syntax_fixes import LFS_BEGINS, LFS_POINTER, MERGED, Reason
 
 TYPOGRAPHIC = re.compile("[\u2018\u2019\u201a\u201b\u201c\u201d\u201e\u2033\u00ab\u00bb]")
 
@@ -213,8 +213,7 @@ def _explain(message: str, log: list[str], line: str, *, root: str) -> tuple[Rea
     """Return libxml2's message in plain words, with the line of the tag that is not ended where it is that: libxml2
     says where it noticed. `log` holds all its messages, `line` the text of the faulty line."""
     if line.startswith((LFS_BEGINS, "<<<<<<<", "=======", ">>>>>>>")):
-        why = "git's merge markers (`<<<<<<<`) are still in the file"
-        merged = Reason(why, "keep one version and delete the markers")
+        merged = Reason(MERGED, "keep one version and delete the markers")
         return LFS_POINTER if line.startswith(LFS_BEGINS) else merged, None
     if "AttValue" in message and (quote := TYPOGRAPHIC.search(line)):
         why = f"a typographic quote {quote[0]} was copied from a PDF or a web page"

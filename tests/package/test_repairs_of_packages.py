@@ -80,7 +80,36 @@ Node::Node() : n_(1)
 %s}
 """
 
+
+def both(old: str, new: str) -> tuple[str, str]:
+    """The line, and another version of it, with git's merge markers."""
+    return old, f"<<<<<<< HEAD\n{old}\n=======\n{new}\n>>>>>>> main"
+
+
+NODE = '  <node pkg="lab" type="talker.py" name="talker"/>'
+
 CASES = {
+    "merged-launch": Case(
+        swapped(LAUNCHED, both(NODE, NODE.replace("/>", ' output="screen"/>'))), ["launch-syntax"],
+        "line 2 of launch/lab.launch: git's merge markers (`<<<<<<<`) are still in the file",
+    ),
+    "merged-first-line-of-launch": Case(
+        {LAUNCHED: '<<<<<<< HEAD\n<?xml version="1.0"?>\n=======\n>>>>>>> main\n' + LAUNCH},
+        ["launch-syntax"], "for the first one, delete lines 1, 3 and 4",
+    ),
+    "merged-manifest": Case(
+        swapped(XML, both("  <license>MIT</license>", "  <license>BSD</license>")), ["manifest-line"],
+        "keep one of the two versions; for the first one, delete lines 6 and 8 to 10",
+    ),
+    "merged-cmake": Case(
+        swapped(CMAKELISTS, both("catkin_package()", "catkin_package(CATKIN_DEPENDS rospy)")), ["build-line"],
+        "line 4 of CMakeLists.txt: git's merge markers (`<<<<<<<`) are still in the file",
+    ),
+    "merged-yaml": Case(
+        {"config/my.yaml": "<<<<<<< HEAD\nrate: 5\n=======\nrate: 10\n>>>>>>> main\n"}, ["yaml-syntax"],
+        "line 1 of config/my.yaml: git's merge markers", asking(files=("config/my.yaml",)),
+        {"config/my.yaml": "rate: 5\n"},
+    ),
     "topic-in-cpp": Case(
         {"src/a.cpp": '// advertise<Int8>("/other", 1)\npub = nh.advertise<std_msgs::Int8>("/men", 1);\n'},
         ["topic-name"], "line 2 of src/a.cpp: the topic /men should be /mean", asking(topics=("/mean",)),

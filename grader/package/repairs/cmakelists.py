@@ -25,7 +25,7 @@ from grader.package.repairs.cmake_calls import (
     values_behind,
     words_of,
 )
-from grader.package.repairs.editing import Files, naming_files, rename_word
+from grader.package.repairs.editing import Files, keep_first_version, naming_files, rename_word
 from grader.package.repairs.interfaces import (
     GENERATE,
     exchange_parts,
@@ -87,6 +87,7 @@ def repair_cmake(
     run."""
     if files.text(CMAKE) is None:
         return
+    keep_first_version(files, CMAKE, "build-line")
     _correct_line(files)
     _close_bracket(files)
     if commands_of(cmake_text(files).encode()) is None or _is_of_workspace(files):

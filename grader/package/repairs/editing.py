@@ -23,6 +23,8 @@ from grader.package.reading import LEFT_OUT
 from grader.package.xml import find_strange, parse_xml
 from grader.package.xml_edits import well_formed
 from grader.portable import BINARY, CLOEXEC, DIRECTORY, NOFOLLOW, READ
+from grader.syntax_fixes import MERGED, first_version
+from grader.wording import numbers_text
 
 TEXT_BYTES_MAX = 64_000
 """Larger files are not a student's work, and are left as they are."""
@@ -138,6 +140,28 @@ class Files:
             )
             self.repairs.pop()
         self.repairs.append(made)
+
+
+KEEP_ONE = "keep one of the two versions; for the first one, delete {emptied}"
+
+
+def keep_first_version(files: Files, file: str, kind: RepairKind) -> bool:
+    """Of git's merge markers and the versions between them, keep the first one; return whether there are any."""
+    text = files.text(file) or ""
+    kept = first_version(text)
+    if kept != text:
+        line, _, _ = changed_lines(text, kept)
+        fix = KEEP_ONE.format(emptied=emptied_lines(text, kept))
+        # nothing may stand above an XML declaration
+        files.change(kind, file, kept.lstrip("\n"), f"line {line} of {file}: {MERGED}", fix)
+    return kept != text
+
+
+def emptied_lines(before: str, after: str) -> str:
+    """Return `lines 3 and 5 to 8`, of lines that have nothing in them any more."""
+    pairs = enumerate(zip(before.split("\n"), after.split("\n"), strict=False), start=1)
+    numbers = [number for number, (old, new) in pairs if old and not new]
+    return f"{'line' if len(numbers) == 1 else 'lines'} {numbers_text(numbers)}"
 
 
 def repair_xml(files: Files, file: str, root: str, kind: RepairKind) -> bool:

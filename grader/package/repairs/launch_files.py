@@ -10,7 +10,7 @@ from grader.model.package import MANIFEST, LaunchFile, LaunchNode, PackageFacts
 from grader.model.repair import RepairKind
 from grader.package.launch import parse_launch
 from grader.package.manifest import parse_manifest
-from grader.package.repairs.editing import Files, repair_xml
+from grader.package.repairs.editing import Files, keep_first_version, repair_xml
 from grader.package.repairs.names import Wanted, is_near
 
 TAG_LINES_MAX = 20
@@ -22,7 +22,8 @@ def repair_launch_files(files: Files, package: PackageFacts) -> PackageFacts:
     launches = [
         parse_launch((files.text(launch.path) or "").encode(), launch.path)
         if (launch.fault is None or launch.fault.kind == "XMLSyntaxError")
-        and repair_xml(files, launch.path, "launch", "launch-syntax")
+        and keep_first_version(files, launch.path, "launch-syntax")
+        | repair_xml(files, launch.path, "launch", "launch-syntax")
         else launch
         for launch in package.launch_files
     ]

@@ -8,7 +8,7 @@ from grader.installable import known_packages, noetic_messages
 from grader.model.package import MANIFEST, PackageFacts
 from grader.model.repair import Repair
 from grader.package.manifest import parse_manifest, required_tags
-from grader.package.repairs.editing import UTF16, Files, as_text, read_data, repair_xml
+from grader.package.repairs.editing import UTF16, Files, as_text, keep_first_version, read_data, repair_xml
 from grader.package.repairs.files import to_utf8
 from grader.package.repairs.names import Wanted, is_near
 from grader.package.xml import parse_xml
@@ -47,6 +47,7 @@ def repair_manifest(files: Files, package: PackageFacts, wanted: Wanted) -> str:
     text = files.text(MANIFEST)
     if text is None:
         return package.name
+    keep_first_version(files, MANIFEST, "manifest-line")
     repair_xml(files, MANIFEST, "package", "manifest-line")
     _correct_values(files)
     _add_required(files, package.name)

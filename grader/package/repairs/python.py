@@ -20,8 +20,8 @@ from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.repair import RepairKind, as_code
 from grader.package.python import reason_of
-from grader.package.repairs.editing import Files
-from grader.syntax_fixes import COMMENTED_OUT, DELETE_LINE, OUT_OF_BLOCK, Reason
+from grader.package.repairs.editing import KEEP_ONE, Files, emptied_lines
+from grader.syntax_fixes import COMMENTED_OUT, DELETE_LINE, MERGED, OUT_OF_BLOCK, Reason
 from grader.wording import is_one_edit, join_words, numbers_text, plural
 
 EXAMINE = "grader.package.source_repair:examine"
@@ -284,13 +284,6 @@ def _rewritten(before: str, after: str) -> str:
     return "; ".join([f"write {found[0][1]}", *written]) + more
 
 
-def _emptied_lines(before: str, after: str) -> str:
-    """Return `lines 3 and 5 to 8`, of lines that have nothing in them any more."""
-    pairs = enumerate(zip(before.split("\n"), after.split("\n"), strict=False), start=1)
-    numbers = [number for number, (old, new) in pairs if old and not new]
-    return f"{'line' if len(numbers) == 1 else 'lines'} {numbers_text(numbers)}"
-
-
 def _further_in(before: str, after: str, line: int) -> str:
     """Return by how many characters more the line begins."""
     one, other = (text.split("\n")[line - 1 : line] or [""] for text in (before, after))
@@ -326,7 +319,7 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
             names=names,
             calls=calls,
             told=told,
-            emptied=_emptied_lines(before, after),
+            emptied=emptied_lines(before, after),
             further=_further_in(before, after, first.line),
         )
         for words in WORDS[cause]
@@ -340,8 +333,7 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
 
 BELOW = "{place}: `global {word}` comes after a line that uses {word}"
 WORDS: dict[Cause, tuple[str, str]] = {
-    "merged": ("{place}: git's merge markers (`<<<<<<<`) are still in the file",
-     "keep one of the two versions; for the first one, delete {emptied}"),
+    "merged": (f"{{place}}: {MERGED}", KEEP_ONE),
     "tabs": ("{place}: tabs and spaces are mixed in the indentation", "replace the tabs: "),
     "level": ("{place}: {told}", "change the indentation: "),
     "indent": ("{place}: the line after a `:` must be indented", "indent line {line} by {further} more spaces"),

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import yaml
 
 from grader.model.package import PackageFacts
-from grader.package.repairs.editing import Files
+from grader.package.repairs.editing import Files, keep_first_version
 from grader.package.repairs.names import Wanted
 from grader.wording import plural
 from grader.yaml_fixes import YAML_LINES_MAX, slip_of_yaml
@@ -38,6 +38,7 @@ def repair_yaml_files(files: Files, package: PackageFacts, wanted: Wanted) -> No
 
 
 def _repair_file(files: Files, path: str, wanted: Wanted) -> None:
+    keep_first_version(files, path, "yaml-syntax")
     text = files.text(path)
     if text is None or text.count("\n") > YAML_LINES_MAX:
         return
