@@ -4,7 +4,8 @@ A package's folder, its facts and what the rubric names come in, `model.repair.R
 one on a copy, or on the student's own files. Nothing of the student's is executed, and no link is followed.
 
 A new kind needs its name, its share and how it is done by hand (`RepairKind`, `DEFAULT_SHARES` and `BY_HAND` in
-`model/repair.py`), a function that finds it in one of the modules here, and a call of that in `find_repairs`.
+`model/repair.py`), a function that finds it in one of the modules here, and a call of that in `find_repairs`. One more
+line of Python for a kind that is there is a correction in `syntax_fixes.py`, or a step in `package/source_repair.py`.
 """
 
 from __future__ import annotations
