@@ -205,7 +205,7 @@ COUNTERS = {
     "sleeps-in-a-function-too": (f"def turn():\n    p.publish(1)\n    r.sleep()\n{LOOP}    turn()\n    r.sleep()\n",
                                  ("sleep-twice", 7, "delete line 7")),
     "sleeps-in-a-method-below": (
-        "class A:\n def run(self):\n  while 1:\n   p.publish(1)\n   self.w()\n   r.sleep()\n def w(self):\n  r.sleep()\n",
+        "class A:\n def run(self):\n  while 1:\n   p.publish(1)\n   self.w()\n   r.sleep()\n def w(s):\n  r.sleep()\n",
         ("sleep-twice", 6, "delete line 6")),
     "sleeps-in-a-function-twice": (f"def w():\n    r.sleep()\n{LOOP}    w()\n    p.publish(1)\n    w()\n", None),
     "sleeps-in-another-publish": (
