@@ -98,7 +98,7 @@ def on_interrupt(handler: Callable[[int, FrameType | None], Any] | signal.Handle
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before or signal.default_int_handler)
+        signal.signal(signal.SIGINT, signal.default_int_handler if before is None else before)
 
 
 @contextmanager

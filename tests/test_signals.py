@@ -21,7 +21,7 @@ from grader import grade
 from grader.arena import arena_process
 from grader.arena.sandbox import why_no_sandbox
 from grader.errors import HostError
-from grader.portable import own_session, wait_for_children
+from grader.portable import on_interrupt, own_session, wait_for_children
 from tests.arena.support import printed, run_script
 from tests.faulty import ROOT, RUBRIC, VICTIM, result_in
 from tests.support.processes import lives
@@ -34,6 +34,17 @@ for number in (signal.SIGCHLD, signal.SIGHUP, signal.SIGTERM, signal.SIGUSR1):
     signal.signal(number, signal.SIG_IGN)
 os.execv(sys.argv[1], sys.argv[1:])
 """
+
+
+@pytest.mark.parametrize("before", [signal.SIG_DFL, signal.SIG_IGN, signal.default_int_handler])
+def test_what_ctrl_c_did_before_a_block_it_does_after_it(before: signal.Handlers) -> None:
+    own = signal.signal(signal.SIGINT, before)
+    try:
+        with on_interrupt(signal.SIG_IGN):
+            assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+        assert signal.getsignal(signal.SIGINT) is before
+    finally:
+        signal.signal(signal.SIGINT, own)
 
 
 def deaf(*argv: str | Path) -> subprocess.CompletedProcess[str]:

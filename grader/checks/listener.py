@@ -38,6 +38,7 @@ from grader.checks.support.text import (
     refuse_others,
     shown,
     subscriber,
+    unfilled,
 )
 from grader.checks.support.topics import (
     call_in_comment,
@@ -148,8 +149,8 @@ def _other_words(
         hint = f"put a space between the words and the message: '{wanted}'"
     elif said and (mark := _mark_between(said[0], missing[0], params.template)):
         hint = f"print '{wanted}', with ' ' in place of {mark!r} between the words and the message"
-        if UNFILLED in mark:
-            hint = f"print '{wanted}': write % in place of the + before the message, which fills the {UNFILLED} in"
+        if place := unfilled(mark):
+            hint = f"print '{wanted}': {place}{both(', in place of the + or the comma there', '')}"
     share = 1 - (1 - OTHER_WORDS_SHARE) * len(missing) / len(probes)
     all_of = plural(len(probes), "message")
     measured = f"{len(probes)} of {all_of} printed, {len(missing)} of them in other words"
@@ -166,7 +167,7 @@ def _mark_between(said: str, probe: Probe, template: str) -> str:
 
 
 UNFILLED = "%s"
-"""What is printed as it is where the message is only joined to it."""
+"""What is printed as it is where the message is only joined to it, or printed behind it."""
 
 
 def _some_in_other_words(

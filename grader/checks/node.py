@@ -259,9 +259,11 @@ def _asleep(one: Life, package: PackageFacts) -> Verdict | None:
 def _asking(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
     """Return that the node waited for a line, where the rubric types what it asks for: rospy takes the Ctrl-C, and
     `input()` waits on until a line comes."""
-    asks = next((s for s in package.slips if s.kind == "input" and s.file == one.start.script), None)
-    if asks is None or all(e.action != "type" or e.detail != one.name for _, e in run.actors):
-        return None
+    asking = [s for s in package.slips if s.kind == "input" and s.file == one.start.script]
+    asks = next((s for s in asking if s.name != "once"), asking[-1] if asking else None)
+    typed = sum(e.action == "type" and e.detail == one.name for _, e in run.actors)
+    if asks is None or not typed or (asks.name == "once" and typed >= len(asking)):
+        return None  # it asks for nothing, or has been told all
     waits = f"line {asks.line} waits for a line that is typed, also after Ctrl-C, so its end is not counted"
     return passed(f"{_script(one)} is one node and stayed alive; {waits}")
 

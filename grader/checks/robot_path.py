@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import groupby, pairwise, takewhile
+from itertools import pairwise, takewhile
 from typing import Annotated, NamedTuple
 
 from pydantic import Field, model_validator
@@ -22,6 +22,7 @@ from grader.checks.support.geometry import (
     commands_of,
     driven,
     followed,
+    has_no_numbers,
     length_m,
     off_m,
     relative,
@@ -52,6 +53,7 @@ AWAY = 0.3
 """How far from a corner, as a share of what follows it, the robot is when its direction is looked at."""
 STANDS_M = 0.01
 """Of a robot that turns in place: how far it goes for each radian."""
+RESTS_M = 0.001
 STOPS_S = 0.3
 STOPS_AFTER_S = 1.0
 """The last velocity of a node that ends holds for so long."""
@@ -180,14 +182,16 @@ def why_still(verdict: Verdict, run: Run) -> Verdict:
     types = {topic: kind for _, event in run.graph for topic, kind in event.topic_types.items()}
     simulated = topics_with(run, "subscribers", lambda node: node in run.grader_nodes)
     hears = sorted(topic for topic in simulated if "Twist" in types.get(topic, ""))
+    heard, own = topics_with(run, "subscribers", lambda _: True), topics_with(run, "subscribers")
     for channel in run.student_channels():
         commands = [command for _, command in commands_of(channel)]
-        if "Twist" in channel.type and len(commands) < len(channel.values):
+        if has_no_numbers(channel):
             why = f"velocities on {channel.topic} are no numbers (nan or inf), which a robot does not obey"
-            return verdict.explained(
-                why, "a range is inf where nothing is in reach: calculate with no such range"
-            )
-        if hears and channel.topic not in hears and any(one.speed for one in commands):
+            hint = "print what they are calculated from, to see where the first nan or inf comes from"
+            if any("LaserScan" in types.get(topic, "") for topic in own):
+                hint = "a range is inf where nothing is in reach: calculate with no such range"
+            return verdict.explained(why, hint)
+        if hears and channel.topic not in heard and any(one.speed for one in commands):
             why = f"its velocities are on {channel.topic}, which no node hears"
             return verdict.explained(why, f"publish them on {join_words(hears, last='or')}")
         if any(one.left for one in commands) and not any(one.forward for one in commands):
@@ -346,7 +350,7 @@ def _wrong_turn(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
 def _turns_while_driving(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
     """Through a corner in an arc, behind a leg that it drove straight along."""
     corner = course.reached - 1
-    if not 0 < corner < len(way.points) - 1 or _arc(path[: course.at], math.inf)[0] > TURNING_RAD:
+    if not 0 < corner < len(way.points) - 1 or abs(_arc(path[: course.at], math.inf)[0]) > TURNING_RAD:
         return None
     before, here, goal = way.points[corner - 1 : corner + 2]
     asked = math.remainder(_direction(here, goal) - _direction(before, here), math.tau)
@@ -403,9 +407,13 @@ def _strays(path: Sequence[Pose], way: Way, course: Course) -> Words:
 
 def _rests(path: Sequence[Pose]) -> bool:
     """Return whether it stands anywhere for a while, or turns in place."""
-    places = groupby(path, key=lambda pose: (round(pose.x, 3), round(pose.y, 3)))
-    stays = [list(poses) for _, poses in places]
-    return any(poses[-1].time_s - poses[0].time_s >= STOPS_S for poses in stays)
+    since = Pose(0.0, math.inf, math.inf)
+    for pose in path:
+        if math.dist(pose.point, since.point) > RESTS_M:
+            since = pose
+        elif pose.time_s - since.time_s >= STOPS_S:
+            return True
+    return False
 
 
 def _too_far(path: Sequence[Pose], way: Way, course: Course) -> Words | None:

@@ -488,7 +488,8 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
         if stands(recent) and turned_rad(recent) > TURNING_RAD:
             message += f", and it turns on the spot at {spot(path[-1].point)} in the end"
             hint = "drive on where the way is clear: look at the ranges in front alone, by their angles in radians"
-            if abs(recent[-1].heading - recent[0].heading) < turned_rad(recent) / 2:
+            steps = (math.remainder(b.heading - a.heading, math.tau) for a, b in pairwise(recent))
+            if abs(sum(steps)) < turned_rad(recent) / 2:
                 message += ", now to the left and now to the right"
                 hint = "once it turns, let it turn to the same side until the way in front is clear"
         verdict = failed(message, hint=hint)

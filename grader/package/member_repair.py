@@ -320,6 +320,6 @@ def with_place(source: str) -> str:
 def _near(word: str, names: Collection[str]) -> str:
     """Return the name of which a word is a slip; "" where there is none, or a word of one letter may be any."""
     small = word.lower()
-    return next(
-        (one for one in names if small == one.lower() or (len(word) > 1 and is_one_edit(small, one))), ""
-    )
+    same = [one for one in names if small == one.lower()]
+    near = [one for one in names if len(word) > 1 and is_one_edit(small, one)]
+    return next(iter(same + near), "")

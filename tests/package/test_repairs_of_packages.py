@@ -506,16 +506,31 @@ def test_a_mistake_in_a_package_is_found_and_repaired(name: str, tmp_path: Path)
     check(CASES[name], tmp_path)
 
 
-def test_a_program_waits_for_the_headers_of_the_message_package_beside_it(tmp_path: Path) -> None:
-    node = "#include <lab_msgs/Num.h>\nint main() {}\n"
-    folder = package(tmp_path, {"src/a.cpp": node, CMAKELISTS: f"{CMAKE}add_executable(a src/a.cpp)\n"})
+@pytest.mark.parametrize(
+    ("headers", "targets"),
+    [
+        (["lab_msgs/Num.h"], "${catkin_EXPORTED_TARGETS}"),
+        (["lab/Own.h"], "${${PROJECT_NAME}_EXPORTED_TARGETS}"),
+        (["lab/Own.h", "lab_msgs/Num.h"], "${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS}"),
+    ],
+)
+def test_a_program_waits_for_the_headers_that_it_includes(
+    headers: list[str], targets: str, tmp_path: Path
+) -> None:
+    node = "".join(f"#include <{one}>\n" for one in headers)
+    cmake = CMAKE.replace("catkin_p", "add_message_files(FILES Own.msg)\ngenerate_messages()\ncatkin_p")
+    cmake += "add_executable()\nadd_executable(a src/a.cpp)\n"
+    folder = package(tmp_path, {"src/a.cpp": node, "msg/Own.msg": "int8 a\n", CMAKELISTS: cmake})
     (tmp_path / "lab_msgs" / "msg").mkdir(parents=True)
     (tmp_path / "lab_msgs" / "msg" / "Num.msg").write_text("int8 a\n")
     (tmp_path / "lab_msgs" / "package.xml").write_text("<package><name>lab_msgs</name></package>")
     beside = facts_of(tmp_path / "lab_msgs", "lab_msgs")
     facts = facts_of(folder, "lab").model_copy(update={"also": (beside,)})
     found = [one for one in find_repairs(folder, facts, WANTED) if "headers" in one.message]
-    assert [one.fix.partition(", write ")[2] for one in found] == [
-        "add_dependencies(a ${catkin_EXPORTED_TARGETS})"
-    ]
+    assert [one.fix.partition(", write ")[2] for one in found] == [f"add_dependencies(a {targets})"]
+
+
+def test_a_program_waits_for_no_header_of_a_package_that_is_not_there(tmp_path: Path) -> None:
+    node = "#include <lab_msgs/Num.h>\n"
+    folder = package(tmp_path, {"src/a.cpp": node, CMAKELISTS: f"{CMAKE}add_executable(a src/a.cpp)\n"})
     assert not any("headers" in one.message for one in find_repairs(folder, facts_of(folder, "lab"), WANTED))

@@ -52,6 +52,11 @@ CASES = {
         OWN_POINT | swapped(TALKER, ("\ndef main", "from lab.msg import Point\nPoint().a = 1\n\ndef main")),
         3 * ["build-line"],
     ),
+    "field-with-other-capitals-beside-a-near-one": Case(
+        {"msg/Point.msg": "int8 goals\nint8 Goal\n"}
+        | swapped(TALKER, ("\ndef main", "from lab.msg import Point\nPoint().goal = 1\n\ndef main")),
+        [*3 * ["build-line"], "missing-call"], "`goal` is called `Goal`",
+    ),
     "topic-of-the-class": Case(
         swapped(TALKER, ("\ndef main", "class Names:\n    TOPIC = 'numeric_chatter'\n\ndef main"),
                 ("'numeric_chatter', Int8", "Names.TOPIC, Int8")),

@@ -204,6 +204,13 @@ COUNTERS = {
                               ("sleep-twice", 6, "delete line 6")),
     "sleeps-in-a-function-too": (f"def turn():\n    p.publish(1)\n    r.sleep()\n{LOOP}    turn()\n    r.sleep()\n",
                                  ("sleep-twice", 7, "delete line 7")),
+    "sleeps-in-a-method-below": (
+        "class A:\n def run(self):\n  while 1:\n   p.publish(1)\n   self.w()\n   r.sleep()\n def w(s):\n  r.sleep()\n",
+        ("sleep-twice", 6, "delete line 6")),
+    "sleeps-in-a-function-twice": (f"def w():\n    r.sleep()\n{LOOP}    w()\n    p.publish(1)\n    w()\n", None),
+    "sleeps-in-another-publish": (
+        f"class A:\n  def publish(self):\n    p.publish(1)\n    r.sleep()\n{LOOP}    p.publish(c)\n    r.sleep()\n",
+        None),
     "same-message-again": (f"{LOOP}    p.publish(c)\n    p.publish(c)\n    r.sleep()\n",
                            ("publish-twice", 4, "delete line 4")),
     "three-messages": (f"{LOOP}    p.publish(a)\n    b = 1\n    p.publish(b)\n    p.publish(c)\n    r.sleep()\n",

@@ -112,6 +112,7 @@ LOOP = "pub = rospy.Publisher('n', Int8)\nn = 0\nwhile not rospy.is_shutdown():\
         ("    if word == 'a':\n        pub.publish(1)\n    elif word == 'b':\n        pub.publish(2)\n",
          "lines 5 to 7 publish only under the conditions of the `if` on line 4"),
         ("    if n:\n        if w: pub.publish(1)\n        else: pub.publish(2)\n    else: pub.publish(3)\n", ""),
+        ("    if self.publish(n):\n        n += 1\n    rate.sleep()\n", ""),
     ],
 )  # fmt: skip
 def test_a_loop_that_counts_more_than_it_publishes(turn: str, message: str, tmp_path: Path) -> None:
@@ -152,9 +153,22 @@ def test_a_loop_that_needs_a_number_of_a_message(turn: str, found: bool, tmp_pat
     assert fixes == (["write `rospy.spin()` in place of the loop on lines 7 to 9"] if found else [])
 
 
+def test_what_an_object_has_itself_is_nothing_of_a_message(tmp_path: Path) -> None:
+    callback = "    def cb(self, m):\n        print(m.data)\n        rospy.Subscriber('c', Int32, self.cb)\n"
+    turn = "    def run(self):\n        while True:\n            while self.data > 1:\n                self.data -= 1\n"
+    (tmp_path / "a.py").write_text(f"class A:\n{callback}{turn}", encoding="utf-8")
+    (tmp_path / "b.py").write_text(f"{KEEPS}while a():\n    while b():\n        n - 1\n", encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py", "b.py"]).slips if s.kind == "takes-number"]
+    assert [(s.file, s.line) for s in slips] == [("b.py", 5)]
+
+
 @pytest.mark.parametrize(
     ("below", "fix"),
     [
+        (
+            "    rate.sleep()\n    if n == 1:\n        pub.publish(1)\n",
+            "",
+        ),
         ("    if n == 1:\n        pub.publish(1)\n    rate.sleep()\n", "publish … in place of lines 2 to 4"),
         ("    pub.publish(n)\n", ""),
         ("    if n == 1:\n        print(1)\n    pub.publish(n)\n", ""),

@@ -206,7 +206,22 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("callback-values", 3, "is the function that makes this call, not its callback: on line 4, write hear")]),
         ("def run(m):\n    rospy.Subscriber('a', A, run)\n    rospy.init_node('a')\n    print(m)\nrun()\n",
          [("callback-called", 5, "callback, which ROS gives each message: move lines 2 and 3 out of `run`, to where")]),
+        ("def run(m):\n    if m:\n      rospy.Subscriber('a', A, run)\n    rospy.init_node('a')\n    print(m)\nrun()\n",
+         [("callback-called", 6, "move lines 3 and 4 out of `run`, to where line 6 is, in its place, with")]),
+        ("def run(m):\n    rospy.init_node('a')\n    rospy.Subscriber('a', A, run)\n    rospy.spin()\nrun()\n",
+         [("callback-called", 5, "move lines 2, 3 and 4 out of `run`, to where line 5 is, in its place; in `run`")]),
         ("def run(m):\n    rospy.Subscriber('a', A, run)\nrospy.init_node('a')\nrun(None)\n", []),
+        (node("    for n in range(9):\n        p.publish(n)\n    p.publish(0)\n") + CALLED,
+         [("loop-left", 4, "call rospy.spin() below line 6: it waits")]),
+        (node("    for n in range(9):\n        p.publish(n)\n    while n < 9:\n        p.publish(0)\n        r()\n") +
+         CALLED,
+         [("loop-left", 4, "call rospy.spin() below line 8, with the same spaces or tabs before it as line 6 has"),
+          ("loop-left", 6, "on line 6")]),
+        (node("    if a:\n        for n in range(9):\n            p.publish(n)\n    else:\n        p.publish(0)\n") +
+         CALLED,
+         [("loop-left", 5, "put it inside a `while")]),
+        ("def publish():\n    for n in range(9):\n        p.publish(n)\nrospy.init_node('a')\npublish()\n",
+         [("loop-left", 2, "put it inside a `while")]),
     ],
 )  # fmt: skip
 def test_what_never_runs_is_known(tmp_path, text, found):
@@ -366,6 +381,7 @@ def test_a_script_that_is_no_node(tmp_path, text, told):
         ("while n < 9:\n    for i in range(99):\n        rate.sleep()\n", "the loops on lines 1 and 2 never check"),
         ("while not rospy.is_shutdown():\n    for i in range(99):\n        rate.sleep()\n", "the loop on line 2 never"),
         ("while n < 9:\n    n = 0\n", "the loop on line 1"),
+        ("while n[0] < 9:\n    m[0] += 1\n", "the loop on line 1"),
         ("while n < 9:\n    n += 1\nwhile True:\n    n = 0\n", "the loop on line 3"),
         ("for n in itertools.count():\n    time.sleep(1)\n", "the loop on line 1"),
         ("while n > 9:\n    n -= 9\nfor n in range(9):\n    time.sleep(1)\n", "the loop on line 3 never checks"),
@@ -380,6 +396,24 @@ def test_why_a_node_goes_on_after_ctrl_c(tmp_path, code, told):
     deaf = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "deaf"]
     assert len(deaf) == bool(told)
     assert all(told in one.message and one.fix for one in deaf)
+
+
+@pytest.mark.parametrize(
+    ("condition", "fix"),
+    [
+        ("n < 9 and on", "on line 1, write ` and not rospy.is_shutdown()` before the colon"),
+        ("(n <\n 9)", "on line 2, write"),
+        ("n < 9 or on", "check `rospy.is_shutdown()` in it"),
+        ("n := look()", "check `rospy.is_shutdown()` in it"),
+        ("n if on else m", "check `rospy.is_shutdown()` in it"),
+    ],
+)
+def test_a_condition_is_joined_with_another_where_that_changes_nothing_in_it(
+    condition: str, fix: str, tmp_path: Path
+) -> None:
+    (tmp_path / "a.py").write_text(f"while {condition}:\n    time.sleep(1)\n", encoding="utf-8")
+    (deaf,) = (s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "deaf")
+    assert deaf.fix.startswith(fix)
 
 
 @pytest.mark.parametrize(

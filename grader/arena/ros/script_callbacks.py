@@ -72,20 +72,22 @@ SETS_UP = ("init_node", "Publisher", "Subscriber", "spin")
 
 def own_callbacks(tree, functions):
     """Calls, without a message, of a function that sets the node up and is the callback of its own Subscriber."""
-    for node in walk(tree):
-        own = functions.get(called_name(node))
-        if own is None or node.args or node.keywords or takes(own, False) != (1, 1):
+    bare = [n for n in walk(tree) if isinstance(n, ast.Call) and not n.args and not n.keywords]
+    calls = {called_name(n): n.lineno for n in reversed(bare)}
+    for name, own in functions.items():
+        if name not in calls or takes(own, False) != (1, 1):
             continue
         given = [one for call in calls_in(own, "Subscriber") for one in argument(call, 2, "callback")]
-        if own.name not in map(dotted, given):
+        if name not in map(dotted, given):
             continue
-        lines = [str(one.lineno) for one in own.body if calls_in(one, *SETS_UP)]
-        where = "line" if len(lines) == 1 else "lines"
-        message = "`%s` sets the node up, and is also the callback, which ROS gives each message" % own.name
-        fix = "move %s %s out of `%s`, to where line %d is, in its place"
-        fix %= (where, " and ".join(lines), own.name, node.lineno)
-        fix += "" if calls_in(own, "spin") else ", with `rospy.spin()` below"
-        yield slip(node.lineno, "callback-called", message, fix=fix, name=own.name)
+        *others, last = sorted({one.lineno for one in calls_in(own, *SETS_UP)})
+        where = "lines %s and %d" % (", ".join(map(str, others)), last) if others else "line %d" % last
+        message = "`%s` sets the node up, and is also the callback, which ROS gives each message" % name
+        fix = "move %s out of `%s`, to where line %d is, in its place" % (where, name, calls[name])
+        fix += "" if calls_in(tree, "spin") else ", with `rospy.spin()` below"
+        if all(isinstance(one, (ast.Expr, ast.Assign)) and calls_in(one, *SETS_UP) for one in own.body):
+            fix += "; in `%s`, write what to do with each message" % name
+        yield slip(calls[name], "callback-called", message, fix=fix, name=name)
 
 
 def spare_callbacks(tree, functions):

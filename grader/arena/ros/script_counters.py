@@ -311,6 +311,8 @@ def values_left_out(tree):
         deciding = [one for one in body if isinstance(one, ast.If) and calls_in(one, "publish")][:IFS_LIMIT]
         for one in deciding:
             chain = [n for part in [*one.body, *one.orelse] for n in calls_in(part, "publish")]
+            if not chain:  # its condition publishes
+                continue
             sent = [n for part in one.body for n in calls_in(part, "publish")] or chain
             inside = set(ast.walk(one))
             counted = {dotted(t) for n in ast.walk(loop) if n not in inside for t in increments(n)}

@@ -5,6 +5,7 @@ Nothing is executed. Python 3.8, standard library only.
 """
 
 import ast
+from collections import Counter
 
 from script_names import (
     argument,
@@ -13,6 +14,7 @@ from script_names import (
     dotted,
     functions_in,
     is_call,
+    parents_of,
     published_type,
     slip,
     text_of,
@@ -121,7 +123,7 @@ def stopped_loops(tree):
     """`spin()` in a loop that publishes: the loop does not come round. `break` or `return` in each of its turns, or so
     many turns and no more. And `if` in place of `while`.
     """
-    turned = dict(turns(tree))
+    turned, called = dict(turns(tree)), Counter(map(called_name, walk(tree)))
     for loop in walk(tree):
         once = isinstance(loop, ast.If) and is_call(getattr(loop.test, "operand", None), "is_shutdown")
         if once and not turned[loop][1] and calls_in(loop, "publish"):
@@ -142,18 +144,17 @@ def stopped_loops(tree):
             message = "the loop stops at the spin() on line %d, which waits until the node ends" % spin.lineno
             fix = "remove spin(): the loop keeps the node alive"
             yield slip(spin.lineno, "spin-in-loop", message, fix=fix)
-        function = turned[loop][0]
-        name = getattr(function, "name", None)
-        is_part = sum(called_name(one) == name for one in walk(tree)) > 1  # of what the node does
+        name = getattr(turned[loop][0], "name", None)
+        is_part = called[name] > 1 and name != "publish"  # of what the node does
         if is_counted(loop) and ending is None and not turned[loop][1] and not is_part:
             message = "the loop on line %d ends after a fixed number of rounds" % loop.lineno
             used = {n.id for one in loop.body for n in ast.walk(one) if isinstance(n, ast.Name)}
             fix = "write `while not rospy.is_shutdown():` on line %d" % loop.lineno
-            after = [
-                one.lineno for one in calls_in(function or tree, "publish") if one.lineno > loop.end_lineno
-            ]
-            if after:
-                fix = "call rospy.spin() below line %d: it waits there until Ctrl-C" % max(after)
+            last = next((one for one in reversed(run_after(loop, tree)) if calls_in(one, "publish")), None)
+            if last is not None:
+                fix = "call rospy.spin() below line %d%s: it waits there until Ctrl-C"
+                alike = ", with the same spaces or tabs before it as line %d has" % last.lineno
+                fix %= (last.end_lineno, "" if last.lineno == last.end_lineno else alike)
             elif isinstance(loop, ast.For) and dotted(loop.target) in used:
                 fix = "put it inside a `while not rospy.is_shutdown():`"
             yield slip(loop.lineno, "loop-left", message, fix=fix)
@@ -163,6 +164,17 @@ def stopped_loops(tree):
             message = "the loop ends the first time around, at the %s on line %d" % (word, left.lineno)
             fix = "remove it from line %d, or put it inside an `if`" % left.lineno
             yield slip(left.lineno, "loop-left", message, fix=fix)
+
+
+def run_after(loop, tree):
+    """Return the statements that are run once a loop is over, up to the end of its function."""
+    parents, one, found = parents_of(tree), loop, []
+    while one in parents and not isinstance(one, (ast.FunctionDef, ast.AsyncFunctionDef)):
+        blocks = (getattr(parents[one], key, None) for key in ("body", "orelse", "finalbody"))
+        block = next((block for block in blocks if isinstance(block, list) and one in block), [one])
+        found += block[block.index(one) + 1 :]
+        one = parents[one]
+    return [one for one in found if not isinstance(one, (ast.FunctionDef, ast.ClassDef))]
 
 
 def published_before(tree):
@@ -235,10 +247,14 @@ def sleeps_twice(tree):
     functions = functions_in(tree)
     for loop in walk(tree):
         body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
-        called = [functions.get(called_name(getattr(n, "value", None))) for n in body]
-        body = [one for i, n in enumerate(body) for one in (called[i].body if called[i] else [n])]
+        called = {n: called_own(getattr(n, "value", None), functions) for n in body}
+        helpers = [one for one in called.values() if one is not None]
+        if len(set(helpers)) < len(helpers):
+            continue
+        body = [one for n in body for one in (called[n].body if called[n] else [n])]
         at = [i for i, n in enumerate(body) if isinstance(n, ast.Expr) and called_name(n.value) == "sleep"]
-        if len(at) != 2:
+        own = [body[i].lineno for i in at if body[i] in called]
+        if len(at) != 2 or not own:
             continue
         between, around = body[at[0] + 1 : at[1]], body[: at[0]] + body[at[1] + 1 :]
         sent = [
@@ -247,7 +263,13 @@ def sleeps_twice(tree):
         if any(sent) and sent[0].isdisjoint(sent[1]):
             lines = tuple(sorted(body[i].lineno for i in at))
             message = "the loop sleeps on line %d and again on line %d" % lines
-            yield slip(lines[1], "sleep-twice", message, fix="delete line %d" % lines[1])
+            yield slip(own[-1], "sleep-twice", message, fix="delete line %d" % own[-1])
+
+
+def called_own(node, functions):
+    """Return the script's function that `f()` or `self.f()` calls; None of any other expression."""
+    owner, _, name = dotted(node.func).rpartition(".") if isinstance(node, ast.Call) else ("", "", "")
+    return functions.get(name) if owner in ("", "self") else None
 
 
 def publishes_twice(tree):
@@ -306,7 +328,7 @@ def loops_of_numbers(tree):
     given = [one for call in calls_in(tree, "Subscriber") for one in argument(call, 2, "callback")]
     called = [functions[name] for name in {dotted(n).rpartition(".")[2] for n in given} if name in functions]
     inside = {n for function in called for n in ast.walk(function)}
-    kept = {arg.arg + ".data" for function in called for arg in function.args.args}
+    kept = {arg.arg + ".data" for function in called for arg in function.args.args if arg.arg != "self"}
     assigned = [n for n in walk(tree) if isinstance(n, ast.Assign)]
     for _ in range(KEPT_STEPS):
         kept |= {dotted(t) for n in assigned if reads(n.value, kept) for t in n.targets}
@@ -316,6 +338,7 @@ def loops_of_numbers(tree):
         for node in sorted(of_number, key=lambda n: n.lineno)[:1]:
             lines = (loop.lineno, loop.end_lineno)
             fix = "write `rospy.spin()` in place of the loop on lines %d to %d" % lines
+            inside.update(ast.walk(loop))
             yield slip(loop.lineno, "takes-number", "line %d needs a number" % node.lineno, fix=fix)
 
 
@@ -466,7 +489,7 @@ def deaf_loops(tree):
 
 def counts_down(loop):
     """Whether it calls nothing, and steps what it asks for: `while angle > pi: angle -= 2 * pi`."""
-    asked = {dotted(n) for n in ast.walk(getattr(loop, "test", loop))}
+    asked = {dotted(n) for n in ast.walk(getattr(loop, "test", loop))} - {"..."}
     inside = [n for one in loop.body for n in ast.walk(one)]
     steps = any(isinstance(n, ast.AugAssign) and dotted(n.target) in asked for n in inside)
     return isinstance(loop, ast.While) and steps and not any(isinstance(n, ast.Call) for n in inside)
@@ -479,8 +502,10 @@ def deaf(loop, within):
     named = named if within else "loop on line %d never checks" % loop.lineno
     ends = ["write `if rospy.is_shutdown(): break` below the `for` on line %d" % one.lineno for one in within]
     asks = ASKS
-    if isinstance(loop, ast.While) and not isinstance(loop.test, (ast.Constant, ast.BoolOp)):
-        asks = ASKS_TOO % loop.lineno  # its own condition ends it, too
+    test = getattr(loop, "test", ast.Constant(True))
+    is_loose = isinstance(getattr(test, "op", None), ast.Or)  # binds less than `and` does
+    if not is_loose and not isinstance(test, (ast.Constant, ast.NamedExpr, ast.IfExp, ast.Lambda)):
+        asks = ASKS_TOO % test.end_lineno  # its own condition ends it, too
     fixes = (
         [asks, *ends]
         if isinstance(loop, ast.While) or within

@@ -81,7 +81,7 @@ def slips(tree):
             message = "`%s()` waits for someone to type, and a graded node gets no input" % name
             line = numbered(node, tree)
             fix = "delete line %d, which makes a number of it" % line if line else ""
-            fix = decided_by(node, tree) or fix
+            fix = (len(found) < SLIPS_LIMIT and decided_by(node, tree)) or fix
             found.append(slip(node.lineno, "input", message, fix=fix, name=how_often(node, tree)))
     finders = (
         names_of_objects, misspelt, loop_rates, resets, never_run, never_reached, stopped_loops,
@@ -264,6 +264,8 @@ def decided_by(node, tree):
     sent = [n for one in below for n in calls_in(one, "publish")]
     if not deciding or not sent or any(calls_in(one, "publish") for one in below if one not in deciding):
         return ""
+    if any(calls_in(one, "sleep") for one in below[: below.index(deciding[-1]) + 1]):
+        return ""  # without it, the node would flood its topic
     return "publish … in place of lines %d to %d" % (node.lineno, deciding[-1].end_lineno)
 
 

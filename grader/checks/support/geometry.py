@@ -32,6 +32,8 @@ Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 Spot = tuple[Coordinate, Coordinate]
 TURNING_RAD = 0.1
 """A robot that turns by less stands still."""
+TREMOR_RAD = 1e-3
+"""A simulated robot that stands trembles by less."""
 FASTEST = 1e6
 MOVED_M = 0.01
 
@@ -134,8 +136,13 @@ def stands(path: Sequence[Pose]) -> bool:
 
 def turned_rad(path: Sequence[Pose], last_s: float = math.inf) -> float:
     """Return by how much it turned in the last seconds, to either side."""
-    recent = [pose for pose in path if pose.time_s >= path[-1].time_s - last_s]
-    return sum(abs(math.remainder(b.heading - a.heading, math.tau)) for a, b in pairwise(recent))
+    recent = [pose.heading for pose in path if pose.time_s >= path[-1].time_s - last_s]
+    turned, heading = 0.0, recent[0]
+    for now in recent:
+        step = abs(math.remainder(now - heading, math.tau))
+        if step > TREMOR_RAD:
+            turned, heading = turned + step, now
+    return turned
 
 
 def set_off_s(path: Sequence[Pose]) -> float:
@@ -296,6 +303,13 @@ def commands_of(channel: Channel) -> list[tuple[int, Command]]:
     pairs = zip(channel.times_ns, channel.values, strict=True) if "Twist" in channel.type else ()
     commands = ((time_ns, _command(0.0, message)) for time_ns, message in pairs)
     return [(t, one) for t, one in commands if one is not None and _finite(one.forward, one.left, one.turn)]
+
+
+def has_no_numbers(channel: Channel) -> bool:
+    """Return whether a velocity on a topic is nan or inf."""
+    sent = (_command(0.0, one) for one in channel.values) if "Twist" in channel.type else ()
+    parts = (part for one in sent if one is not None for part in (one.forward, one.left, one.turn))
+    return not all(map(math.isfinite, parts))
 
 
 def _finite(*values: float) -> bool:

@@ -117,23 +117,26 @@ def wait_for_headers(files: Files, package: PackageFacts, name: str) -> None:
         maker: "|".join(PurePosixPath(one.path).stem for one in own) for maker, own in defining.items() if own
     }
     headers = "|".join(f"{re.escape(maker)}/(?:{stems})" for maker, stems in made.items())
-    includes = re.compile(rf"#\s*include\s*[<\"](?:{headers})(?:Request|Response|Action)?\.h[>\"]")
+    includes = re.compile(rf"#\s*include\s*[<\"]({headers})(?:Request|Response|Action)?\.h[>\"]")
     waiting = {token.value for call in calls_of(files, "add_dependencies") for token in words_of(call)[:1]}
     found = []
-    for call in calls_of(files, "add_executable"):
-        target, *sources = [token.value for token in words_of(call)]
-        if target not in waiting and any(includes.search(files.text(path) or "") for path in sources):
-            found.append((target, call))
-    if not made or not found:
+    for call in calls_of(files, "add_executable") if made else ():
+        target, *sources = [token.value for token in words_of(call)] or [""]
+        included = [one for path in sources for one in includes.findall(files.text(path) or "")]
+        makers = {one.partition("/")[0] for one in included}
+        of_own, of_others = ["${${PROJECT_NAME}_EXPORTED_TARGETS}"], ["${catkin_EXPORTED_TARGETS}"]
+        exported = (of_own if name in makers else []) + (of_others if makers - {name} else [])
+        if target not in waiting and exported:
+            found.append((target, call, " ".join(exported)))
+    if not found:
         return
-    targets_made = "${PROJECT_NAME}" if [*made] == [name] else "catkin"
     lines, fixes = cmake_text(files).split("\n"), list[str]()
-    for target, call in reversed(found):
+    for target, call, exported_targets in reversed(found):
         at = cmake_text(files).count("\n", 0, call.span.stop) + 1
-        new = f"add_dependencies({target} ${{{targets_made}_EXPORTED_TARGETS}})"
+        new = f"add_dependencies({target} {exported_targets})"
         lines.insert(at, new)
         fixes.insert(0, f"below the add_executable(…) on line {call.line}, write {new}")
-    targets = join_words(target for target, _ in found)
+    targets = join_words(target for target, *_ in found)
     message = (
         f"line {found[0][1].line} of {CMAKE}: {targets} may be compiled before the headers of the messages"
     )
