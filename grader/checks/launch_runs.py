@@ -96,7 +96,7 @@ def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParam
     file = read_launch(package, params.launch)
     if isinstance(file, Verdict):
         return file.about(expected=expected)
-    found = list(connected_nodes(run, params.topic))
+    found = list(connected_nodes(package, run, params.topic))
     nodes = run.student_nodes()
     verdict = (
         not_run(run)
@@ -276,7 +276,7 @@ def _judge_nodes(package: PackageFacts, file: LaunchFile, run: Run, params: Laun
     if lacking is not None:
         return _not_up(package, file, run, lacking)
     names = [name for w in wanted for name in nodes_up(run, w.node)]
-    if params.topic and not _are_connected(run, params.topic, names, alone=len(wanted) < 2):
+    if params.topic and not _are_connected(package, run, params.topic, names, alone=len(wanted) < 2):
         return _not_connected(package, file, run, wanted, params.topic)
     if params.topic and (ended := _ended_soon(run, [w.node for w in wanted], params.topic)):
         return _ended_by_itself(package, file, ended)
@@ -307,7 +307,9 @@ def _right_parts(
         if found and all(nodes_up(run, one) and why_died(package, run, one) is None for one in found)
     ]
     topic, every = params.topic, [one for found in nodes.values() for one in found]
-    connected = topic is not None and any(connected_nodes(run, topic)) and not _ended_soon(run, every, topic)
+    connected = (
+        topic is not None and any(connected_nodes(package, run, topic)) and not _ended_soon(run, every, topic)
+    )
     if not up:
         misnamed = [one for name, pkg in params.nodes.items() for one in _misnamed(file, name, pkg)]
         if not (connected and len(misnamed) == len(params.nodes) > 0):
@@ -479,9 +481,9 @@ def _not_up(package: PackageFacts, file: LaunchFile, run: Run, lacking: Wanted) 
     return verdict.about(citations=(FileCitation(file=node.file or file.path, line=node.line),))
 
 
-def _are_connected(run: Run, topic: str, names: list[str], *, alone: bool) -> bool:
+def _are_connected(package: PackageFacts, run: Run, topic: str, names: list[str], *, alone: bool) -> bool:
     """Return whether two of the nodes are connected; where the lab names one `alone`, or none, it with any other."""
-    pairs = list(connected_nodes(run, topic))
+    pairs = list(connected_nodes(package, run, topic))
     if alone:
         return any(not names or {*pair} & {*names} for pair in pairs)
     return any({*pair} <= {*names} for pair in pairs)

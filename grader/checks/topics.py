@@ -275,9 +275,8 @@ def connected(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdi
         Both ends need the same topic name, with the namespace and after every `<remap>`, and the same
         message type. `rosnode info <node>` and `rqt_graph` show the connections.
     """
-    found = next(
-        connected_nodes(run, params.topic, lambda node, end: _fits(run, node, params.name(end))), None
-    )
+    fits = connected_nodes(package, run, params.topic, lambda node, end: _fits(run, node, params.name(end)))
+    found = next(fits, None)
     ends = [_wanted_text(params.name(end), end) for end in ENDS]
     if found:
         verdict = passed(f"{found[0]} and {found[1]} are connected over {params.topic}")

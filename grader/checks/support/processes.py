@@ -233,6 +233,15 @@ def observed_until_ns(run: Run) -> int | None:
     return min(ends, default=None)
 
 
+def taken_off(run: Run, topic: str) -> set[str]:
+    """Return the nodes that are there up to Ctrl-C, and last without the topic."""
+    until_ns = observed_until_ns(run) or run.end_ns
+    before = (event for time_ns, event in reversed(run.graph) if time_ns <= until_ns)
+    if (last := next(before, None)) is None:
+        return set()
+    return {*last.nodes} - {*last.publishers.get(topic, ()), *last.subscribers.get(topic, ())}
+
+
 def fell_silent(one: Life, run: Run) -> bool:
     """Return whether it had to be killed, and neither printed nor published after Ctrl-C."""
     if one.interrupt_ns is None or one.end is None or one.end.stopped_by != "KILL":

@@ -19,6 +19,7 @@ from grader.checks.support.processes import (
     plain_type,
     run_scripts,
     run_slips,
+    taken_off,
 )
 from grader.checks.support.scripts import programs
 from grader.checks.support.text import (
@@ -80,15 +81,16 @@ def topics_with(run: Run, end: End, fits: Callable[[str], bool] | None = None) -
 
 
 def connected_nodes(
-    run: Run, topic: str, fits: Callable[[str, End], bool] | None = None
+    package: PackageFacts, run: Run, topic: str, fits: Callable[[str, End], bool] | None = None
 ) -> Iterator[tuple[str, str]]:
     """Yield publisher and subscriber of each connection of two nodes over the topic: of the student's, or of those that
-    `fits` accepts at their end."""
+    `fits` accepts at their end. Of one that a script takes off the topic, it is chance whether it was still seen."""
     wanted = fits or (lambda node, _: run.is_student_node(node))
-    for one in (one for _, event in run.graph for one in event.connections if one.topic == topic):
-        first, second = one.publisher, one.subscriber
+    there = [one for _, event in run.graph for one in event.connections if one.topic == topic]
+    off = taken_off(run, topic) if there and any(s.kind == "unregistered" for s in package.slips) else ()
+    for first, second in ((one.publisher, one.subscriber) for one in there):
         if first != second and wanted(first, "publishers") and wanted(second, "subscribers"):
-            yield first, second
+            yield from [] if {first, second} & {*off} else [(first, second)]
 
 
 def published_topics(run: Run) -> dict[str, str]:
