@@ -108,10 +108,6 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
         verdict = failed(message, hint="print each number once, in the callback")
     elif missing:
         verdict = _judge_missing(package, run, probes, missing, params)
-        if verdict.hint == CALLBACK_HINT and params.template != VALUE:
-            said = f"'{in_words(params.template)}'"
-            hint = CALLBACK_HINT.replace("the message's .data", said, 1)
-            verdict = verdict.model_copy(update={"hint": hint})
     elif not in_order(places):
         message = f"what came on {params.topic} is printed, but not in the order in which it was sent"
         verdict = failed(
@@ -266,7 +262,7 @@ def _judge_missing(
 ) -> Verdict:
     """Some or all of what was sent was not printed: the likeliest reason that shows."""
     lines = printed_lines(run)
-    return (
+    verdict = (
         _other_words(probes, missing, lines, params)
         or _judge_error(package, run)
         or _subscribed_again(package, run, probes, missing)
@@ -278,6 +274,10 @@ def _judge_missing(
         or _some_in_other_words(probes, missing, lines, params)
         or _by_number(probes, missing, lines, _print_in_comment(package, run))
     )
+    if verdict.hint != CALLBACK_HINT or params.template == VALUE:
+        return verdict
+    hint = CALLBACK_HINT.replace("the message's .data", f"'{in_words(params.template)}'", 1)
+    return verdict.model_copy(update={"hint": hint})
 
 
 def _print_in_comment(package: PackageFacts, run: Run) -> PythonSlip | None:

@@ -406,7 +406,7 @@ def _all_required(
 ) -> list[WrittenCriterion]:
     """Return what a criterion requires, and what that requires in turn."""
     names = list(criterion.requires)
-    for name in names:  # which grows meanwhile
+    for name in names:  # which grows as it is gone through
         names += [one for one in (by_id[name].requires if name in by_id else ()) if one not in names]
     return [by_id[name] for name in names if name in by_id]
 
