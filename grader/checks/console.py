@@ -172,9 +172,8 @@ def _not_printed(
     other = [line for line in lines if any(params.found_in(line))]
     hint = f"print {params.words} where it happens"
     failing = one.ended_early and (one.end is None or one.end.exit_code != 0)
-    if other and not (
-        failing and not re.search(r"\w", params.text.replace(PLACE, ""))
-    ):  # any number is no answer
+    is_number_alone = not re.search(r"\w", params.text.replace(PLACE, ""))  # then any number is no answer
+    if other and not (failing and is_number_alone):
         near = f", within {significant(params.tolerance)}" if params.tolerance else ""
         message = f"it prints {shown(other[0].text)!r}, not {params.words}{near}{_slip(other[0], params)}"
         return failed(message, hint=hint)

@@ -59,9 +59,8 @@ class Requirements:
         if undecided is None:
             return verdict
         message = f"{verdict.message}; and {undecided} could not be judged"
-        hint = (
-            f"see {undecided} first"  # what this one was told would put right what nobody knows to be wrong
-        )
+        # what this one was told would put right what nobody knows to be wrong
+        hint = f"see {undecided} first"
         return inconclusive(message, expected=verdict.expected, measured=verdict.measured, hint=hint)
 
     def _explains(self, required: str, criterion: Criterion, found: Verdict) -> bool:

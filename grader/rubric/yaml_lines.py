@@ -1,4 +1,7 @@
-"""A rubric's YAML as plain data with the line of every key: read as `yaml.safe_load` would, within limits."""
+"""A rubric's YAML as plain data with the line of every key: read as `yaml.safe_load` would, within limits.
+
+What looks for slips in a rubric reads criteria, packages and scenarios here as they are written, faults and all.
+"""
 
 from __future__ import annotations
 

@@ -89,8 +89,9 @@ def connected_nodes(
     there = [one for _, event in run.graph for one in event.connections if one.topic == topic]
     off = taken_off(run, topic) if there and any(s.kind == "unregistered" for s in package.slips) else ()
     for first, second in ((one.publisher, one.subscriber) for one in there):
-        if first != second and wanted(first, "publishers") and wanted(second, "subscribers"):
-            yield from [] if {first, second} & {*off} else [(first, second)]
+        is_pair = first != second and not {first, second}.intersection(off)
+        if is_pair and wanted(first, "publishers") and wanted(second, "subscribers"):
+            yield first, second
 
 
 def published_topics(run: Run) -> dict[str, str]:

@@ -76,9 +76,8 @@ def connect(address: str) -> Iterator[Any]:
     from grader.classes.cluster.local import own_cluster  # noqa: PLC0415 - slow to load
 
     with ExitStack() as stack:
-        with on_interrupt(
-            signal.SIG_IGN
-        ):  # its processes are ended in order, and not by the terminal's Ctrl-C
+        # its processes are ended in order, and not by the terminal's Ctrl-C
+        with on_interrupt(signal.SIG_IGN):
             cluster = stack.enter_context(own_cluster())
         yield stack.enter_context(Client(cluster, set_as_default=False))
 
