@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 import time
 from collections import Counter
@@ -28,7 +29,8 @@ from grader.cli.display import live_console
 from grader.cli.output import say, say_json
 from grader.model.batch import ROSTER
 from grader.model.verdict import Status
-from grader.report.class_page.submissions import state_of
+from grader.report.class_page.page import grade_one
+from grader.report.class_page.submissions import letters_of, passed_by_none, state_of
 from grader.untrusted_text import line
 from grader.wording import first_few, number, plural
 
@@ -114,8 +116,10 @@ class BatchProgress:
 def list_attention(folder: BatchFolder) -> Iterator[str]:
     """Yield why each submission that is not graded is not, then how to go on with them."""
     found: Counter[str] = Counter()
+    criteria, letters = folder.run.criteria, []
     for row in folder.rows():
         state = state_of(row.result)
+        letters.append(letters_of(row.result, criteria))
         found[state] += 1
         if state == "error":
             error = row.result.error
@@ -128,6 +132,11 @@ def list_attention(folder: BatchFolder) -> Iterator[str]:
     for name, words in NEXT_STEPS.items():
         if found[name]:
             yield words.format(count=found[name], folder=folder.path, overrides=folder.path / OVERRIDES)
+    by_none = passed_by_none(criteria, letters)
+    for place, decided in islice(by_none.items(), NAMES_SHOWN):
+        yield f"none of {decided} passed {criteria[place].id} ({criteria[place].title}): is the rubric right there?"
+    if by_none:
+        yield f"  hint: grade a package that you know to be correct: {shlex.join(grade_one(folder.run))}"
 
 
 def _name(row: GradebookRow) -> str:

@@ -274,6 +274,19 @@ def test_a_rubric_of_the_graders_own_loads_without_a_word(path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    "path",
+    # turtle-square shows every kind of criterion of its simulator, and is no lab to copy from
+    sorted(
+        set((rubrics_folder() / "examples").glob("*.yaml"))
+        - {rubrics_folder() / "examples/turtle-square.yaml"}
+    ),
+    ids=lambda path: path.stem,
+)
+def test_an_example_has_sixty_lines_at_most(path: Path) -> None:
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= 60
+
+
+@pytest.mark.parametrize(
     ("name", "old", "new"),
     [
         # the package is one letter off from a topic, and types are in it

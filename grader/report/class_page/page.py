@@ -42,6 +42,7 @@ from grader.report.class_page.submissions import (
     gather,
     gather_anonymous,
     link_to,
+    passed_by_none,
 )
 from grader.report.html.shell import environment, own_file, policy, script, style
 from grader.report.sentences import SIGNS, STATES
@@ -247,6 +248,11 @@ def again(run: BatchRun, out: Path, only: str = "", *, static: bool | None = Non
     return _command_line(words)
 
 
+def grade_one(run: BatchRun) -> list[str]:
+    """Return the command that grades a package in FOLDER by the batch's rubric."""
+    return ["grader", "grade", "FOLDER", "--rubric", run.rubric_source or run.rubric.id]
+
+
 def review(out: Path) -> Markup:
     """Where a person gives points."""
     return _command_line(["grader", "review", str(out.absolute())])
@@ -359,8 +365,29 @@ def todos(run: BatchRun, lines: Sequence[SubmissionRow], out: Path | None) -> It
                 count=len(found),
                 command=kind.command(run, out) if out else Markup(),
             )
+    if by_none := passed_by_none(run.criteria, [one.letters for one in lines]):
+        yield _suspects(run, by_none, out)
     if run.faults:
         yield _faults(run, out)
+
+
+def _suspects(run: BatchRun, by_none: Mapping[int, int], out: Path | None) -> Todo:
+    return Todo(
+        anchor="rubric",
+        title="Criteria that no one passed",
+        advice="The mistake may be the rubric's. Before you publish, grade a package that you know to be correct:",
+        items=[
+            Item(
+                id=run.criteria[place].id,
+                link="",
+                name=run.criteria[place].title,
+                text=f"none of {decided}",
+            )
+            for place, decided in by_none.items()
+        ],
+        count=len(by_none),
+        command=_command_line(grade_one(run)) if out else Markup(),
+    )
 
 
 def _faults(run: BatchRun, out: Path | None) -> Todo:

@@ -36,6 +36,8 @@ LETTERS: Mapping[Status, str] = {
 """A status in one sign: what the page's data and its style sheet call it."""
 ABSENT = "n"
 LOST_LETTERS, OPEN = "afb", "iem"
+CLASS_MIN = 5
+"""That fewer than so many submissions lose a criterion says nothing of the rubric."""
 SubmissionState = Literal["graded", "inconclusive", "manual", "error", "missing"]
 
 
@@ -83,10 +85,40 @@ class SubmissionRow:
         return self.state in {"graded", "inconclusive", "manual"}
 
 
+def _judged(result: GradingResult, criteria: Sequence[CriterionInfo]) -> list[CriterionResult | None]:
+    by_id = {criterion.id: criterion for criterion in result.criteria}
+    return [by_id.get(criterion.id) for criterion in criteria]
+
+
+def letters_of(result: GradingResult, criteria: Sequence[CriterionInfo]) -> str:
+    """Return one of `LETTERS` for each of these criteria, `ABSENT` where the result does not have it."""
+    return "".join(
+        LETTERS[found.status] if found and not found.left_out else ABSENT
+        for found in _judged(result, criteria)
+    )
+
+
+def passed_by_none(criteria: Sequence[CriterionInfo], letters: Iterable[str]) -> dict[int, int]:
+    """Return criteria, by place, that no submission passed, with how many were decided: at least `CLASS_MIN`.
+
+    Of these the mistake may be the rubric's. Criteria without points, and those that were lost only by what failed
+    before, are left out.
+    """
+    counts = [Counter(column) for column in zip(*letters, strict=True)]
+    decided = {place: sum(found[letter] for letter in LOST_LETTERS) for place, found in enumerate(counts)}
+    return {
+        place: decided[place]
+        for place, found in enumerate(counts)
+        if criteria[place].max_points > 0
+        and not found[LETTERS[Status.PASS]]
+        and decided[place] >= CLASS_MIN
+        and decided[place] > found[LETTERS[Status.BLOCKED]]
+    }
+
+
 def line_of(entry: Entry, result: GradingResult, criteria: Sequence[CriterionInfo]) -> SubmissionRow:
     """One submission and its result, as the page shows it."""
-    by_id = {criterion.id: criterion for criterion in result.criteria}
-    judged = [by_id.get(criterion.id) for criterion in criteria]
+    judged = _judged(result, criteria)
     late = result.late
     return SubmissionRow(
         id=line(entry.id, CHARS),
@@ -95,9 +127,7 @@ def line_of(entry: Entry, result: GradingResult, criteria: Sequence[CriterionInf
         folder=result.submission.id if _has_reports(result) else "",
         state=state_of(result),
         points=result.points,
-        letters="".join(
-            LETTERS[found.status] if found and not found.left_out else ABSENT for found in judged
-        ),
+        letters=letters_of(result, criteria),
         earned={place: found.points for place, found in enumerate(judged) if found and _unusual(found)},
         caused=_points_lost(result, criteria),
         late_s=late.late_s if late else 0.0,

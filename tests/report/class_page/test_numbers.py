@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
+from grader.classes.gradebook import GradebookRow
+from grader.cli.class_display import list_attention
+from grader.model.result import CriterionResult
+from grader.model.verdict import Status
 from grader.report.class_page.page import todos
 from grader.report.class_page.statistics import costs, most_first, span, spread_of, timing
-from grader.report.class_page.submissions import SubmissionRow, line_of
+from grader.report.class_page.submissions import SubmissionRow, line_of, passed_by_none
 from tests.report.class_page.made_up import made_up_rows, made_up_run
 
 
@@ -111,3 +117,52 @@ def test_commands_are_quoted_and_whole(tmp_path) -> None:
     assert " --static " in found["error"]
     assert found["error"].endswith(" --only failed")
     assert "--only" not in found["missing"]
+
+
+@pytest.mark.parametrize(
+    ("letters", "none"),
+    [
+        ("fffff", 5),
+        ("aaaaaffff", 9),
+        ("fbbbbiem", 5),
+        ("ffff", 0),
+        ("fffffp", 0),
+        ("bbbbbbb", 0),
+        ("iiiiiiimmmeee", 0),
+        ("nnnnnn", 0),
+    ],
+)
+def test_what_a_whole_class_loses_may_be_the_rubrics_mistake(letters: str, none: int) -> None:
+    criteria = made_up_run(1).criteria[:1]
+    assert passed_by_none(criteria, letters) == ({0: none} if none else {})
+    assert not passed_by_none([criteria[0].model_copy(update={"max_points": 0.0})], letters)
+
+
+def test_the_page_and_the_terminal_ask_for_a_correct_package(tmp_path) -> None:
+    run = made_up_run(9, rubric_source="my lab.yaml")
+    rows = [
+        GradebookRow(
+            entry=entry,
+            result=result.model_copy(
+                update={"criteria": (lost(result.criteria[0]), *result.criteria[1:])}
+                if result.criteria
+                else {}
+            ),
+        )
+        for entry, result in made_up_rows(9)
+    ]
+    found = [line_of(row.entry, row.result, run.criteria) for row in rows]
+    todo = next(todo for todo in todos(run, found, tmp_path) if todo.anchor == "rubric")
+    assert (todo.count, todo.items[0].id, todo.items[0].text) == (1, run.criteria[0].id, "none of 9")
+    assert todo.command.unescape() == "grader grade FOLDER --rubric 'my lab.yaml'"
+    assert not next(todo for todo in todos(run, found, None) if todo.anchor == "rubric").command
+
+    told = list(list_attention(SimpleNamespace(run=run, rows=lambda: rows, path=tmp_path)))
+    assert told[-2:] == [
+        "none of 9 passed manifest (package.xml names lab1): is the rubric right there?",
+        "  hint: grade a package that you know to be correct: grader grade FOLDER --rubric 'my lab.yaml'",
+    ]
+
+
+def lost(criterion: CriterionResult) -> CriterionResult:
+    return criterion.model_copy(update={"status": Status.FAIL, "points": 0.0})
