@@ -12,23 +12,28 @@ from pathlib import PurePosixPath
 from pydantic import ValidationError
 
 from grader.checks.build import run_hint
+from grader.checks.reacts import ReactsParams
 from grader.checks.registry import Check, Evidence
 from grader.checks.support.build_errors import unreadable_file
 from grader.checks.support.exit_causes import syntax_hint
 from grader.checks.support.launch_slips import own_script, read_launch
-from grader.checks.support.processes import failed_program
+from grader.checks.support.processes import ended_programs, failed_program, plain_type
 from grader.checks.support.scripts import SYNTAX, find_script, programs, syntax_fault
 from grader.checks.support.text import Language, texts_in
+from grader.checks.support.topics import unheard_programs
 from grader.evidence.events import PACKAGE_RUN, RECORDING_MISSING, RECORDING_PROBLEM
 from grader.evidence.run import Run
+from grader.installable import NOTHING_TO_DO
 from grader.model.package import LaunchFile, PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, unjudged
+from grader.model.verdict import Verdict, failed, inconclusive, machine_lacks, unjudged
+from grader.rubric.message_fields import said_types
 from grader.rubric.model import Criterion, Rubric
 from grader.rubric.scenario import Scenario, Start
 from grader.wording import join_words
 
 NOT_RUN = "not_run"
+REACTS = "reacts"
 OF_BUILDS, OF_BUILD_FILES = {"build", "build-and-run"}, {"manifest", "cmake"}
 """Checks of what the build makes, and of the files that say how."""
 NO_PACKAGE = PackageFacts(
@@ -136,12 +141,49 @@ class Facts:
             if known
             else {}
         )
-        failure = failed_program(run, programs)
-        if not failure:
+        if failure := failed_program(run, programs):
+            message = f"one of the grader's programs failed in the run {scenario!r}: {failure}"
+            hint = "`grader doctor --rubric RUBRIC` shows what this machine lacks for it; then grade again"
+            return inconclusive(message, hint=hint)
+        if not programs or not (otherwise := self._otherwise_than_said(run, scenario)):
             return None
-        message = f"one of the grader's programs failed in the run {scenario!r}: {failure}"
-        hint = "`grader doctor --rubric RUBRIC` shows what this machine lacks for it; then grade again"
-        return inconclusive(message, hint=hint)
+        message = f"the rubric and a program of the run {scenario!r} contradict each other: {otherwise}"
+        return machine_lacks(message, hint=f"{NOTHING_TO_DO}tell your instructor")
+
+    def _otherwise_than_said(self, run: Run, scenario: str) -> str:
+        """Return what a program beside the student's nodes does otherwise than the rubric says, so that nothing can
+        come of it, whatever a student hands in: `tank publishes on /levels, and the rubric names /level`."""
+        names = {node: process for _, event in run.graph for node, process in event.processes.items()}
+        channels = [c for c in run.channels if c.callerid in run.grader_nodes]
+        unheard = unheard_programs(run)
+        for channel in channels:
+            who, topic = names[channel.callerid], channel.topic
+            right = next(filter(self._names, unheard.get(topic, ())), "")
+            if right and not self._names(topic):
+                return f"{who} publishes on {topic}, and the rubric names {right}"
+            said = tuple(said_types(topic, self.rubric.handout))
+            if said and plain_type(channel.type) not in said:
+                return (
+                    f"{who} publishes {plain_type(channel.type)} on {topic}, and the handout says {said[0]}"
+                )
+        heeding = {one.subscriber for _, event in run.graph for one in event.connections}
+        done = {node for node, process in names.items() if process in ended_programs(run)} - heeding
+        for criterion in self.rubric.criteria:
+            if not done or criterion.scenario != scenario or criterion.check != REACTS:
+                continue
+            cause = ReactsParams.model_validate(criterion.parameters).cause
+            own = [c for c in channels if cause and c.topic == cause.topic]
+            alone = own != [] and done.issuperset(c.callerid for c in own)
+            if cause and alone and not any(map(cause.holds, cause.read(own))):
+                return f"{names[own[0].callerid]} ended, and {cause.words} never came"
+        return ""
+
+    def _names(self, topic: str) -> bool:
+        """Return whether the rubric has the topic's name, in its handout or in what its criteria ask for."""
+        asked = (text for c in self.rubric.criteria for text in texts_in(c.parameters))
+        return topic in asked or bool(
+            re.search(rf"(?<![\w/]){re.escape(topic)}(?![\w/])", self.rubric.handout)
+        )
 
     def unreadable(self, check: Check, criterion: Criterion) -> Verdict | None:
         """Return why what is still to be built or run for the criterion cannot be: that shows in files which nothing

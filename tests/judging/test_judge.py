@@ -227,6 +227,80 @@ def test_a_program_of_the_graders_that_fails_is_the_machines_fault(
     ].message
 
 
+HANDOUT = "The node alarm hears /level, a std_msgs/Float32, and answers on /alarm."
+ANSWERS = {
+    "id": "answers",
+    "check": "reacts",
+    "with": {
+        "cause": {"topic": "/level", "field": "data", "min": 6},
+        "effect": {"topic": "/alarm", "field": "data", "value": True},
+        "within_s": 0.5,
+    },
+    "scenario": "talker",
+}
+FED = {"topic": "/level", "type": "std_msgs/Float32", "callerid": "/tank", "values": [1.0, 3.0, 5.0]}
+ALARM = {"topic": "/alarm", "type": "std_msgs/Bool", "callerid": "/alarm", "values": [False]}
+ENDS, RUNS_ON = {"exit_s": 0.9, "exit_code": 0}, {"exit_s": 2.0, "stopped_by": "INT"}
+
+
+@pytest.mark.parametrize(
+    ("fed", "end", "heard", "otherwise"),
+    [
+        ({"topic": "/levels"}, RUNS_ON, {}, "tank publishes on /levels, and the rubric names /level"),
+        (
+            {"type": "std_msgs/Int32", "values": [1]},
+            RUNS_ON,
+            {},
+            "tank publishes std_msgs/Int32 on /level, and the handout says std_msgs/Float32",
+        ),
+        ({}, ENDS, {}, "tank ended, and data of /level at least 6 never came"),
+        # here the student may have kept it from coming, or came too early to its end
+        ({}, RUNS_ON, {}, ""),
+        ({}, ENDS, {"/alarm": ["/tank"]}, ""),
+        # the cause came, or it is the student who hears a topic that the rubric does not have
+        ({"values": [1.0, 7.0]}, ENDS, {}, ""),
+        ({}, RUNS_ON, {"/level": [], "/levels": ["/alarm"]}, ""),
+    ],
+    ids=["topic", "type", "ends", "runs-on", "closed-loop", "came", "students-topic"],
+)
+def test_a_program_that_contradicts_the_rubric_costs_no_student_a_mark(
+    fed: dict[str, Any], end: dict[str, Any], heard: dict[str, list[str]], otherwise: str
+) -> None:
+    start = [{"name": "tank", "program": "course_sim/tank.py"}, *SCENARIO["start"]]
+    topics = [FED | fed, ALARM]
+    subscribers = {"/level": ["/alarm"], **heard}
+    types = dict.fromkeys(subscribers, FED["type"]) | {one["topic"]: one["type"] for one in topics}
+    graph = {
+        "nodes": ["/tank", "/alarm"],
+        "processes": {"/tank": "tank", "/alarm": "talker"},
+        "topic_types": types,
+        "publishers": {one["topic"]: [one["callerid"]] for one in topics},
+        "subscribers": subscribers,
+        "connections": [
+            {"topic": topic, "publisher": sender, "subscriber": hearer}
+            for topic, sender in (("/level", "/tank"), ("/alarm", "/alarm"))
+            for hearer in subscribers.get(topic, ())
+        ],
+    }
+    run = {
+        "topics": topics,
+        "graph": [graph],
+        "processes": [
+            {"name": "tank", "role": "grader", **end},
+            {"name": "talker", "stopped_by": "INT", "exit_code": 0},
+        ],
+    }
+    found = results(
+        {"runs": {"talker": run}, "package": PACKAGE},
+        ANSWERS,
+        scenarios={"talker": {**SCENARIO, "start": start}},
+        handout=HANDOUT,
+    )["answers"]
+    assert otherwise in found.message
+    assert ("contradict each other" in found.message) == bool(otherwise)
+    assert not otherwise or found.status is Status.INCONCLUSIVE
+
+
 def test_what_else_is_wrong_with_a_node_is_no_reason_for_its_end() -> None:
     named = {
         "id": "node",

@@ -108,6 +108,13 @@ def failed_program(run: Run, names: Collection[str]) -> str:
     return ""
 
 
+def ended_programs(run: Run) -> set[str]:
+    """Return the grader's own programs that ended by themselves while the run went on, with exit code 0."""
+    starts = [(t, e) for t, e in run.processes if e.role == "grader" and e.event == "start"]
+    found = (_life(run, start_ns, start) for start_ns, start in starts)
+    return {one.name for one in found if one.ended_early and one.end is not None and one.end.exit_code == 0}
+
+
 def how_it_ended(end: ProcessEvent) -> str:
     """Return `exit code 1`, or `signal 9`."""
     return f"signal {end.signal}" if end.exit_code is None else f"exit code {end.exit_code}"

@@ -328,7 +328,7 @@ def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
         e.topic or ""
         for _, e in run.actors
         if e.actor == "grader" and (e.action == "publish" or (e.action == "note" and e.detail == UNHEARD))
-    ) | dict.fromkeys(offered := _unheard_programs(run))
+    ) | dict.fromkeys(offered := unheard_programs(run))
     others = topics_with(run, "subscribers")
     missed = [topic for topic in topics if topic not in others]
     connected = {
@@ -355,7 +355,7 @@ def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
     return failed(message, hint=remapped or add)
 
 
-def _unheard_programs(run: Run) -> dict[str, tuple[str, ...]]:
+def unheard_programs(run: Run) -> dict[str, tuple[str, ...]]:
     """Return the topics of programs beside the student's nodes that none of these hears, by those of the same type
     which they hear in their place, and on which nobody publishes."""
     types = {topic: kind for _, event in run.graph for topic, kind in event.topic_types.items()}
