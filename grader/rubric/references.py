@@ -117,6 +117,11 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
         for key, file in (("script", start.get("script")), ("load", start.get("load"))):
             if isinstance(file, str) and (fault := _file_fault(file, rubric)):
                 yield (*path, "start", index, key), fault
+        for key in ("script", "launch"):
+            owner, slash, _ = str(start.get(key)).partition("/")
+            if slash and owner in {name for _, name in as_texts(rubric.get("packages"))}:
+                fault = f"is of {owner}, which the rubric brings along: write program: {start[key]}"
+                yield (*path, "start", index, key), fault
         at = (*path, "start", index, "program")
         yield from _of_machine(at, "program", start.get("program"), rubric)
         package, _, file = str(start.get("program")).partition("/")
