@@ -10,7 +10,7 @@ import re
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache, partial
 from pathlib import Path, PurePosixPath
@@ -26,7 +26,7 @@ from grader.files import temporary_folder
 from grader.model.verdict import Status
 from grader.portable import own_session
 from grader.rubric.yaml_lines import Fault, criteria_of
-from grader.wording import join_words
+from grader.wording import closest, join_words, plural
 
 HINTS = 4
 SHOWN_TESTS = 20
@@ -68,28 +68,75 @@ class _Test(NamedTuple):
     names: tuple[str, ...]
 
 
-def select_faults(rubric: dict[str, Any], files: Mapping[str, bytes]) -> Iterator[Fault]:
-    """Yield what criteria select of an instructor's tests, and none of them is called."""
+def test_file_faults(rubric: dict[str, Any], files: Mapping[str, bytes]) -> Iterator[Fault]:
+    """Yield what is wrong with an instructor's test files: they are no Python, they ask for files and functions that
+    the handout calls otherwise, or none of their tests is called as a criterion selects."""
+    handout = str(rubric.get("handout") or "")
+    broken, read = set[str](), set[str]()
     for criterion in criteria_of(rubric):
         file, select = str(criterion.given.get("file")), criterion.given.get("select")
-        if criterion.check == "pytest" and file in files and isinstance(select, str) and select.strip():
-            tests = _tests_in(files[file])
-            try:
-                expression = ast.parse(select.strip(), mode="eval").body
-                fits = not tests or any(_fits(expression, test.names) for test in tests)
-            except (SyntaxError, ValueError):  # pytest has more forms
-                continue
-            if not fits:
-                there = join_words(sorted({test.name for test in tests}))
-                yield (*criterion.at, "select"), f"fits no test of {file}: there is {there}"
+        if criterion.check != "pytest" or file not in files or file in broken:
+            continue
+        try:
+            tree = ast.parse(files[file])
+        except (SyntaxError, ValueError) as error:
+            line = f", line {error.lineno}" if isinstance(error, SyntaxError) else ""
+            yield (*criterion.at, "file"), f"{file}{line}: {getattr(error, 'msg', error)}"
+            broken.add(file)
+            continue
+        if file not in read and (fault := _called_otherwise(tree, handout)):
+            yield (*criterion.at, "file"), f"{file}, {fault}"
+        read.add(file)
+        tests = _tests_in(tree, files[file])
+        if isinstance(select, str) and select.strip() and not _selects(select.strip(), tests):
+            there = join_words(sorted({test.name for test in tests}))
+            yield (*criterion.at, "select"), f"fits no test of {file}: there is {there}"
 
 
-def _tests_in(raw: bytes) -> list[_Test]:
-    """Return the tests of a file; none where they cannot be known."""
+def _called_otherwise(tree: ast.Module, handout: str) -> str:
+    """Return which file or function of the student's the tests ask for, where the handout has one that is much like
+    it, or with other arguments than the handout has; "" where it says no such thing."""
+    texts = {
+        ast.unparse(target): node.value
+        for node in tree.body
+        if isinstance(node, ast.Assign)
+        for target in node.targets
+    }
+    files = dict.fromkeys(re.findall(r"[\w./-]+\.py\b", handout))
+    functions = {name: given.split(",") for name, given in re.findall(r"`(\w+)\((\w[\w, ]*)\)`", handout)}
+    tries_wrong_calls = any(isinstance(node, ast.Name) and node.id == "TypeError" for node in ast.walk(tree))
+    calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call) and node.args]
+    for call in calls:
+        if ast.unparse(call.func) == "student":
+            path = getattr(texts.get(ast.unparse(call.args[0]), call.args[0]), "value", None)
+            if near := _other_name(path, files, handout):
+                return f"line {call.lineno}: the handout has {near}, and not {path}"
+        elif isinstance(call.func, ast.Attribute) and ast.unparse(call.func).startswith("student("):
+            name, given = call.func.attr, functions.get(call.func.attr)
+            if near := _other_name(name, functions, handout):
+                return f"line {call.lineno}: the handout has {near}, and not {name}"
+            is_plain = not call.keywords and not any(isinstance(one, ast.Starred) for one in call.args)
+            if given and is_plain and not tries_wrong_calls and len(given) != len(call.args):
+                takes = plural(len(given), "argument")
+                return f"line {call.lineno}: {name} has {takes} in the handout, and {len(call.args)} here"
+    return ""
+
+
+def _other_name(name: object, known: Collection[str], handout: str) -> str:
+    return closest(name, known) if isinstance(name, str) and name not in handout else ""
+
+
+def _selects(select: str, tests: Sequence[_Test]) -> bool:
+    """Return whether one of the tests is selected, or may be: pytest has more forms of it than are read here."""
     try:
-        tree = ast.parse(raw)
+        expression = ast.parse(select, mode="eval").body
+        return not tests or any(_fits(expression, test.names) for test in tests)
     except (SyntaxError, ValueError):
-        return []
+        return True
+
+
+def _tests_in(tree: ast.Module, raw: bytes) -> list[_Test]:
+    """Return the tests of a file; none where they cannot be known."""
     if "params=" in raw.decode(errors="replace"):  # of fixtures: their ids are selected, too
         return []
     classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]

@@ -609,3 +609,42 @@ def test_a_rate_may_be_that_of_a_parameter_which_the_run_sets(examples: Path) ->
     path.write_text(text, encoding="utf-8")
     told = warnings_of(load_rubric(str(path)), path.name)
     assert [one for one in told if "rate_hz" in one] == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ("def hand(", "def hand(:", "line 10: invalid syntax"),
+        (
+            '"src/kinematics.py"',
+            '"src/kinematic.py"',
+            "line 43: the handout has src/kinematics.py, and not src/kinematic.py",
+        ),
+        ("student(FILE).wrap(", "student(FILE).wrapped(", "line 61: the handout has wrap, and not wrapped"),
+        ("wrap(angle)\n", "wrap(angle, 1)\n", "line 61: wrap has 1 argument in the handout, and 2 here"),
+        # what the handout does not have, is worked out, or is called wrongly on purpose
+        ("student(FILE).wrap(", "student(FILE).own_name(", ""),
+        ("student(FILE).wrap(", "student(f'src/{FILE}').wrap(", ""),
+        (
+            "found = student(FILE).wrap(angle)\n",
+            "with pytest.raises(TypeError): student(FILE).wrap(angle, 1)\n",
+            "",
+        ),
+    ],
+    ids=["syntax", "file", "function", "arguments", "own-name", "worked-out", "on-purpose"],
+)
+def test_a_slip_in_an_instructors_test_file_is_refused(
+    examples: Path, old: str, new: str, fault: str
+) -> None:
+    folder = examples.parent / "tested"
+    folder.mkdir(exist_ok=True)
+    tests = (examples / "test_kinematics.py").read_text(encoding="utf-8")
+    assert old in tests
+    (folder / "test_kinematics.py").write_text(tests.replace(old, new, 1), encoding="utf-8")
+    shutil.copy(examples / "unit-tests.yaml", folder)
+    told = [f"unit-tests.yaml:23: criteria[1].with.file: test_kinematics.py, {fault}"]
+    assert (
+        (faults(folder / "unit-tests.yaml") == told)
+        if fault
+        else load_rubric(str(folder / "unit-tests.yaml"))
+    )
