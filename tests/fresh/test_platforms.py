@@ -137,7 +137,7 @@ def test_gradescope_hears_of_a_grader_that_takes_too_long_and_keeps_no_score(
 ) -> None:
     root = rooms.fresh_root(on=autograder)
     script = root.path / "autograder" / "run_autograder"
-    script.write_text(script.read_text().replace("--kill-after=15 570", "--kill-after=15 8"))
+    script.write_text(script.read_text().replace("--kill-after=15 570", "--kill-after=15 3"))
     document = _graded_by_gradescope(root, _tree(CORRECT), locks)
     assert "took longer than" in document["output"]
     assert "score" not in document

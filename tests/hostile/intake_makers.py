@@ -26,8 +26,9 @@ def long_header(folder: Path, *, kind: str, size_mb: int) -> Path:
 
 
 def busy_header(folder: Path) -> Path:
-    """Records of an extended header that overlap, and digits that a pattern tries from every place."""
-    record = b"5 aaa" * 6_000 + b"1" * 30_000 + b"=\n"
+    """Records of an extended header that overlap, then an empty one, which no Python takes, and digits that a pattern
+    tries from every place."""
+    record = b"5 aaa" * 6_000 + b"0 a=" + b"1" * 30_000 + b"=\n"
     info = tarfile.TarInfo("x")
     info.type, info.size = tarfile.XHDTYPE, len(record)
     return _packed(folder, gzip.compress(info.tobuf() + record + bytes(-len(record) % BLOCK) + _tar(folder)))
