@@ -22,7 +22,7 @@ from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.package.manifest import read_manifest
 from grader.pipeline import GradeOptions, grade
-from grader.ros_packages import ros_packages
+from grader.ros_env import ros_packages
 from grader.rubric.model import Rubric
 
 ROOT = Path(__file__).resolve().parent.parent

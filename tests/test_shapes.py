@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 import pytest
 
 from fixtures.make import labs, rubric_of, solution_of
-from grader.authoring.mutation.package_tree import read_tree, write_tree
+from grader.authoring.mutation.solution import read_tree, write_tree
 from grader.judging.judge import judge_files
 from grader.model.progress import Silence
 from grader.model.repair import DEFAULT_SHARES, KINDS, Repair

@@ -11,9 +11,8 @@ from pathlib import Path
 
 from grader import pipeline
 from grader.cli.checking import say_choice
-from grader.cli.display import open_progress
+from grader.cli.display import exit_code, judged_criteria, open_progress
 from grader.cli.host_support import warn_without_sandbox
-from grader.cli.outcome import exit_code, judged_criteria
 from grader.cli.output import report, say
 from grader.cli.select_rubric import Chosen, choose_all, only, package_prefix
 from grader.errors import ExitCode, GraderError, RubricError, UsageError

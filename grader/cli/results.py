@@ -26,7 +26,7 @@ from grader.classes.batch.renew_results import (
 )
 from grader.classes.batch.run import INDEX
 from grader.cli.declare import STDOUT
-from grader.cli.outcome import exit_code, worst
+from grader.cli.display import exit_code, worst
 from grader.cli.output import report, say, say_beside, write_document
 from grader.cli.select_rubric import package_prefix
 from grader.errors import EvidenceError, ExitCode, UsageError

@@ -18,7 +18,7 @@ from grader.model.message_definitions import (
     parse_definition,
     parse_interface,
 )
-from grader.ros_packages import ros_packages
+from grader.ros_env import ros_packages
 from grader.rubric.definitions import (
     SUFFIXES,
     Definitions,

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from grader.classes.review.guard import REPORTS as SHOWN_IN_REVIEW
-from grader.cli.outcome import REPORTS as SHOWN_AT_THE_END
+from grader.cli.display import REPORTS as SHOWN_AT_THE_END
 from grader.errors import HostError, OutputError
 from grader.files import atomic_write, check_writable
 from grader.integrations.ci_results import REPORT_NAMES

@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.authoring.mutation.faulty_packages import Planned
-from grader.authoring.mutation.package_tree import Tree, unified_diff, write_tree
-from grader.authoring.mutation.solution import Solution
+from grader.authoring.mutation.solution import Solution, Tree, unified_diff, write_tree
 from grader.classes.batch.job import FolderJob, GradedSubmission, grade_all
 from grader.errors import HostError
 from grader.files import temporary_folder

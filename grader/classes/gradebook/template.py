@@ -20,7 +20,7 @@ from grader.classes.gradebook.platforms import (
     row_identity,
 )
 from grader.classes.gradebook.table import harmless, number_text
-from grader.classes.roster.table import delimiter_of, encoding_of
+from grader.classes.roster.entries import delimiter_of, encoding_of
 from grader.errors import UsageError
 from grader.wording import first_few
 

@@ -47,9 +47,8 @@ def grade(
     """Grade one submission: a folder, an archive, a git URL or a recording."""
     with loading():
         from grader import pipeline
-        from grader.cli.display import open_progress
+        from grader.cli.display import open_progress, show
         from grader.cli.host_support import warn_without_sandbox
-        from grader.cli.outcome import show
         from grader.files import check_writable
         from grader.intake.open import is_recording
         from grader.rubric.load import load_rubric
