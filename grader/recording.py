@@ -21,7 +21,7 @@ from grader.files import make_folder
 from grader.judging.judge import Judgement, judge_all_runs
 from grader.judging.repeats_and_repairs import REPAIRS, was_built
 from grader.model.package import PackageFacts
-from grader.model.progress import Progress
+from grader.model.result import Progress
 from grader.model.submission import Submission
 from grader.package import read_packages
 from grader.ros_env import look_for, why_nodes_cannot_run

@@ -42,7 +42,7 @@ from grader.evidence.run import Run
 from grader.files import temporary_folder
 from grader.intake.open import open_submission
 from grader.model.package import Interface, PackageFacts
-from grader.model.progress import Progress
+from grader.model.result import Progress
 from grader.model.verdict import Status
 from grader.package import read_package
 from grader.rubric.load import LoadedRubric

@@ -29,12 +29,11 @@ from grader.errors import ExitCode, HostError, OutputError, UsageError
 from grader.files import atomic_write, check_writable, temporary_folder
 from grader.intake.gitdir import write_staged
 from grader.intake.names import safe_name
-from grader.model.progress import Progress, Silence
-from grader.model.result import GitStatus, GradingResult, Point
+from grader.model.result import GitStatus, GradingResult, Point, Progress, Silence
 from grader.report.losses import arrange
-from grader.report.student_view import hidden_ids, without_hidden
 from grader.report.terminal import fit_encoding, open_console
 from grader.report.text import line
+from grader.report.view import hidden_ids, without_hidden
 from grader.rubric.find import named_labs
 from grader.rubric.load import LoadedRubric, needs_ros
 from grader.student.git_status import advise, read_environment
@@ -174,7 +173,7 @@ def watch_package(
     source: str, rubric: LoadedRubric, options: pipeline.GradeOptions, *, out: Path | None, as_json: bool
 ) -> ExitCode:
     """Grade the package whenever one of its files is saved, until Ctrl-C."""
-    from grader.student.watching import Grading, JsonLines, TerminalScreen, watch  # noqa: PLC0415 - slow to load  # noqa: PLC0415
+    from grader.student.watching import Grading, JsonLines, TerminalScreen, watch  # noqa: PLC0415 - slow to load
 
     static, hidden = options.static_only, len(hidden_ids(rubric.rubric))
 

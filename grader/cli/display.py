@@ -25,8 +25,7 @@ from rich.text import Text
 from grader.cli.output import report, say, say_document
 from grader.errors import ExitCode, GraderError
 from grader.judging.summary import overall_status, reached_pass_mark, scaled_pass_mark
-from grader.model.progress import Progress, StepState
-from grader.model.result import CriterionResult, EarlyVerdict, GradingResult
+from grader.model.result import CriterionResult, EarlyVerdict, GradingResult, Progress, StepState
 from grader.model.verdict import Status
 from grader.report.files import result_text
 from grader.report.terminal import STYLES, mark, open_console, print_report
@@ -83,7 +82,7 @@ class Steps:
         self.tell = tell
 
     def step(self, name: str, state: StepState, detail: str = "", expected_s: float | None = None) -> None:
-        """Take note of a step's state (see `grader.model.progress.Progress`)."""
+        """Take note of a step's state (see `grader.model.result.Progress`)."""
         now_s = self.clock()
         with self.lock:
             before = self.steps.get(name)

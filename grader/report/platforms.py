@@ -31,9 +31,8 @@ from grader.report.sentences import (
     score_words,
     visible_words,
 )
-from grader.report.student_view import hidden_ids
 from grader.report.text import json_text, line, text_limit
-from grader.report.view import is_students_fault, not_graded, of_points, places, points_of
+from grader.report.view import hidden_ids, is_students_fault, not_graded, of_points, places, points_of
 from grader.rubric.model import Rubric
 from grader.wording import number
 

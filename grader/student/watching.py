@@ -35,25 +35,16 @@ from grader.intake.choose import WantedPackage
 from grader.intake.open import open_submission
 from grader.intake.source import identify
 from grader.model.package import SourceFile
-from grader.model.progress import Progress
-from grader.model.result import CriterionResult, GradingResult, SubmissionInfo
+from grader.model.result import CriterionResult, GradingResult, Progress, SubmissionInfo
 from grader.model.verdict import Status
 from grader.package.facts import read_files
 from grader.package.reading import LEFT_OUT
 from grader.report.files import result_text
 from grader.report.losses import arrange
 from grader.report.sentences import points_line
-from grader.report.student_view import without_hidden
-from grader.report.terminal import (
-    TO_FIX,
-    Terminal,
-    emit,
-    fit_encoding,
-    open_console,
-    print_report,
-)
+from grader.report.terminal import TO_FIX, Terminal, emit, fit_encoding, open_console, print_report
 from grader.report.text import line
-from grader.report.view import points_of
+from grader.report.view import points_of, without_hidden
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
 from grader.wording import first_few, number
@@ -456,8 +447,7 @@ class TerminalScreen(Screen):
         view = arrange(result, self._rubric)
         lost = number(sum(loss.points for loss in view.lost))
         yield Text.assemble(
-            (points_line(result, view), "bold"),
-            f", {lost} lost" if view.lost else ", nothing lost",
+            (points_line(result, view), "bold"), f", {lost} lost" if view.lost else ", nothing lost"
         )
         changed = compare(before, result)
         for words, criteria in changed.items():

@@ -16,9 +16,8 @@ from grader.report.junit import render_junit
 from grader.report.losses import arrange
 from grader.report.markdown import render_markdown
 from grader.report.platforms import render_classroom, render_gradescope
-from grader.report.student_view import without_hidden
 from grader.report.terminal import open_console, print_report
-from grader.report.view import points_of
+from grader.report.view import points_of, without_hidden
 from grader.rubric.model import Rubric
 from tests.judging.rubrics import rubric
 from tests.report.hostile import result

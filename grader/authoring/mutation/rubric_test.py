@@ -17,8 +17,7 @@ from grader.errors import HostError
 from grader.files import temporary_folder
 from grader.model import SandboxMode
 from grader.model.mutants import Cost, LostCriterion, Mutant, MutantResult, ReferenceResult, RubricTest, State
-from grader.model.progress import Progress
-from grader.model.result import CriterionResult, GradingResult, RubricInfo
+from grader.model.result import CriterionResult, GradingResult, Progress, RubricInfo
 from grader.model.verdict import Status
 from grader.rubric.load import LoadedRubric
 from grader.wording import number

@@ -308,11 +308,7 @@ def read_sheet(path: Path) -> Sheet:
         raise UsageError(f"{path}: not {encoding.upper()} text", hint=_EXPORT) from error
     delimiter = delimiter_of(re.split(r"[\r\n]", text, maxsplit=1)[0])
     sheet = Sheet(
-        path=path,
-        mark=mark,
-        encoding=encoding,
-        delimiter=delimiter,
-        records=list(_records(text, delimiter)),
+        path=path, mark=mark, encoding=encoding, delimiter=delimiter, records=list(_records(text, delimiter))
     )
     if not any(name.strip() for name in sheet.header):
         raise UsageError(f"{path}:1: no columns are named", hint=_EXPORT)

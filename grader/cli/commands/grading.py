@@ -136,9 +136,7 @@ def judge(
 
 @command("inspect")
 def inspect(
-    *,
-    file: Annotated[Path, Argument("FILE", "an .mcap, .bag or .db3 file")],
-    as_json: JsonFlag = False,
+    *, file: Annotated[Path, Argument("FILE", "an .mcap, .bag or .db3 file")], as_json: JsonFlag = False
 ) -> ExitCode:
     """Show what is in an evidence file or a bag: rates, gaps, nodes."""
     with loading():
