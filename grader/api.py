@@ -30,8 +30,7 @@ from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.files import check_writable
 from grader.model import SandboxMode
-from grader.model.progress import Progress, Silence, StepState
-from grader.model.result import NO_TIME, GradingResult, SubmissionInfo
+from grader.model.result import NO_TIME, GradingResult, Progress, Silence, StepState, SubmissionInfo
 from grader.portable import on_interrupt, wait_for_children
 from grader.results import RESULT, read_result_file
 from grader.rubric.load import LoadedRubric

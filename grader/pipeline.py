@@ -34,9 +34,8 @@ from grader.judging.judge import judge_files
 from grader.judging.summary import assemble_result, environment_info
 from grader.model.figure import Figures
 from grader.model.package import PackageFacts
-from grader.model.progress import Progress
 from grader.model.record import build_records
-from grader.model.result import EarlyVerdict, GradingResult, SubmissionInfo, TimingInfo
+from grader.model.result import EarlyVerdict, GradingResult, Progress, SubmissionInfo, TimingInfo
 from grader.model.submission import RecordedSubmission, Submission
 from grader.package import read_packages
 from grader.portable import wait_for_children
@@ -52,7 +51,7 @@ from grader.recording import (
     record_other_runs,
 )
 from grader.report.files import write_reports
-from grader.report.student_view import hidden_ids
+from grader.report.view import hidden_ids
 from grader.results import EVIDENCE, Results, finish_killed
 from grader.ros_env import find_ros
 from grader.rubric.load import LoadedRubric, files_of, needs_package, origin_of

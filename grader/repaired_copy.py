@@ -25,9 +25,8 @@ from grader.judging.repeats_and_repairs import (
     programs_of_build,
 )
 from grader.model.package import MANIFEST, PackageFacts
-from grader.model.progress import Progress, Silence, StepState
 from grader.model.repair import Repair
-from grader.model.result import CriterionResult
+from grader.model.result import CriterionResult, Progress, Silence, StepState
 from grader.model.submission import SourcePackage, Submission
 from grader.package.manifest import parse_manifest
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs, wanted_of

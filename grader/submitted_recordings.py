@@ -16,7 +16,7 @@ from grader.files import unwritable
 from grader.intake.limits import IntakeLimits
 from grader.intake.names import safe_name
 from grader.intake.open import find_recordings
-from grader.model.progress import Progress
+from grader.model.result import Progress
 from grader.model.submission import RecordedSubmission, Submission
 from grader.rubric.model import Rubric
 

@@ -35,7 +35,7 @@ from grader.judging.summary import overall_status, total_fields
 from grader.model.result import Automatic, CriterionResult, GradingResult, Lateness
 from grader.report.files import result_text
 from grader.report.sentences import RUBRIC_FROM
-from grader.report.student_view import hidden_ids, without_hidden
+from grader.report.view import hidden_ids, without_hidden
 from grader.results import EVIDENCE, RESULT, SIGNATURE, SUMS, read_result_file
 from grader.rubric.load import LoadedRubric
 from grader.wording import number, plural

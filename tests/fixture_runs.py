@@ -17,12 +17,11 @@ from pathlib import Path
 from fixtures.make import declaration, declared, faulty_package, lost_points
 from fixtures.make import rubric_of as loaded
 from grader.model.mutants import Mutant
-from grader.model.progress import Silence
-from grader.model.result import CriterionResult, GradingResult
+from grader.model.result import CriterionResult, GradingResult, Silence
 from grader.model.verdict import Status
 from grader.package.manifest import read_manifest
 from grader.pipeline import GradeOptions, grade
-from grader.ros_packages import ros_packages
+from grader.ros_env import ros_packages
 from grader.rubric.model import Rubric
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -31,8 +31,7 @@ from grader.errors import (
     UsageError,
 )
 from grader.faults import fault_of
-from grader.model.progress import Silence
-from grader.model.result import GradingResult
+from grader.model.result import GradingResult, Silence
 from grader.pipeline import GradeOptions, grade
 from grader.results import Results
 from grader.rubric.load import LoadedRubric, load_rubric

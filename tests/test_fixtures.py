@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from fixtures.make import faulty_package, labs
-from grader.authoring.mutation.package_tree import read_tree
+from grader.authoring.mutation.solution import read_tree
 from grader.intake.open import open_submission
 from grader.judging.judge import judge_files
 from grader.model.result import GradingResult

@@ -39,8 +39,7 @@ ALLOWED = {
     "syntax_fixes": {"wording"},
     "yaml_fixes": set[str](),
     "portable": {"errors"},
-    "ros_env": {"errors", "model", "portable"},
-    "ros_packages": {"errors", "host_programs", "installable", "ros_env", "wording"},
+    "ros_env": {"errors", "host_programs", "installable", "model", "portable", "wording"},
     "host_programs": set[str](),
     "limited_child": {"host_programs"},
     "workers": {"errors", "host_programs", "limited_child"},
@@ -57,17 +56,17 @@ ALLOWED = {
     },
     "intake": BASE | {"files", "host_programs", "limited_child"},
     "checks": BASE | {"evidence", "installable", "syntax_fixes", "yaml_fixes"},
-    "rubric": BASE | {"checks", "evidence", "files", "installable", "ros_packages"},
+    "rubric": BASE | {"checks", "evidence", "files", "installable", "ros_env"},
     "judging": BASE | {"checks", "evidence", "installable", "rubric"},
     "report": BASE | {"checks", "evidence", "files", "judging", "rubric"},
     "arena": BASE | {
-        "evidence", "files", "host_programs", "package", "ros_env", "ros_packages", "rubric.course_packages",
+        "evidence", "files", "host_programs", "package", "ros_env", "rubric.course_packages",
         "rubric.model", "rubric.pytest_check", "rubric.scenario"
     },
     "submitted_recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
     "repaired_copy": {"files", "judging", "model", "package", "rubric"},
     "recording": BASE | {
-        "arena", "evidence", "files", "installable", "judging", "package", "repaired_copy", "ros_env", "ros_packages",
+        "arena", "evidence", "files", "installable", "judging", "package", "repaired_copy", "ros_env",
         "rubric", "submitted_recordings"
     },
     "pipeline": BASE | {
@@ -93,7 +92,7 @@ ALLOWED = {
     "cli": {
         *BASE, "arena", "authoring", "checks", "classes", "evidence", "faults", "files", "integrations", "intake",
         "host_programs", "installable", "judging", "package", "pipeline", "report", "results", "ros_env",
-        "ros_packages", "rubric", "student", "verification"
+        "rubric", "student", "verification"
     },
     "__main__": {"cli"},
 }  # fmt: skip

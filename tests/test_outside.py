@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.cli.doctor import _modules
+from grader.cli.host_support import _modules
 from grader.host_programs import (
     find_user_program,
     module_command,

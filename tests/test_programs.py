@@ -42,7 +42,7 @@ STARTS = {
     "ros_env.py:_from_setup": Start("base", "'/'", "nothing: ROS's own setup.bash"),
     "arena/arena_process.py:__init__": Start("dict(env)", "'/'", "nothing: ROS's own variables"),
     "host_programs.py:run_host_program": Start("HOST_ENV", "'/'", "nothing: names that the rubric gives"),
-    "cli/doctor.py:_modules": Start("ros.env", "'/'", "nothing"),
+    "cli/host_support.py:_modules": Start("ros.env", "'/'", "nothing"),
     "arena/control_groups.py:_move_to_scope": Start(
         "{**HOST_ENV, 'XDG_RUNTIME_DIR': str(RUNTIME / str(os.geteuid()))}",
         "'/'",

@@ -12,8 +12,7 @@ from grader.cli.fixing import fix_packages
 from grader.cli.select_rubric import choose_all, only
 from grader.errors import PackageNotFound, RubricError
 from grader.intake.open import open_submission
-from grader.model.progress import Silence
-from grader.model.result import CriterionResult
+from grader.model.result import CriterionResult, Silence
 from grader.model.submission import Submission
 from grader.model.verdict import FileCitation, Status
 from grader.package import read_packages

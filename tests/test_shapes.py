@@ -10,11 +10,10 @@ from pathlib import Path, PurePosixPath
 import pytest
 
 from fixtures.make import labs, rubric_of, solution_of
-from grader.authoring.mutation.package_tree import read_tree, write_tree
+from grader.authoring.mutation.solution import read_tree, write_tree
 from grader.judging.judge import judge_files
-from grader.model.progress import Silence
 from grader.model.repair import DEFAULT_SHARES, KINDS, Repair
-from grader.model.result import CriterionResult, GradingResult
+from grader.model.result import CriterionResult, GradingResult, Silence
 from grader.model.verdict import Status
 from grader.package.repairs import apply_repair, find_repairs, wanted_of
 from grader.pipeline import GradeOptions, grade

@@ -43,7 +43,7 @@ from grader.files import make_folder, read_untrusted, temporary_folder
 from grader.model import SandboxMode
 from grader.model.message_rate import RateBounds
 from grader.model.package import PackageFacts
-from grader.model.progress import Progress
+from grader.model.result import Progress
 from grader.model.submission import Submission
 from grader.package import SyntaxReport, python_paths, read_syntax_report, with_build_facts
 from grader.package.python import REPORT_BYTES_MAX

@@ -22,8 +22,8 @@ from grader.evidence.events import PACKAGE_RUN, ActorEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.files import read_untrusted
 from grader.model.package import PackageFacts, SourceFile
-from grader.model.progress import Progress
 from grader.model.record import Record
+from grader.model.result import Progress
 from grader.model.submission import Submission
 from grader.ros_env import RosInstallation
 from grader.rubric.model import Rubric

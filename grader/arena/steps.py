@@ -22,12 +22,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from typing_extensions import Self
 
-from grader.arena.function_calls import call_functions
-from grader.arena.outcome import starting, starts_until_s
+from grader.arena.outcome import is_settled, is_silent, starting, starts_until_s
 from grader.arena.scenario_inputs import make_shots
-from grader.arena.served import ServedAction, ServedServices
+from grader.arena.served import ServedAction, ServedServices, call_functions
 from grader.arena.session import NS, ArenaSession
-from grader.arena.settling import is_settled, is_silent
 from grader.errors import ArenaError, EvidenceError
 from grader.evidence.decode import FindText
 from grader.evidence.events import GOAL_STATUS, MISFIT, UNHEARD, UNSENDABLE, ActorEvent

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 
 from grader import pipeline
-from grader.authoring.observe import Observed, Topic, answers_to, heard_template, observe, wraps_of
 from grader.authoring.rubric_draft import (
     ANSWERS_S,
     INTEGER_PROBES,
@@ -15,19 +14,25 @@ from grader.authoring.rubric_draft import (
     STRING,
     TEXT_PROBES,
     DraftSheet,
+    Observed,
     Parts,
     RubricEntry,
+    Topic,
+    answers_to,
     assign_points,
     drop_empty,
     dump_flow,
     find_parts,
     first_look,
     format_number,
+    heard_template,
     label_of,
+    observe,
     probe_for,
     rubric_text,
     second_look,
     step_for,
+    wraps_of,
 )
 from grader.checks.build import judge_build
 from grader.checks.package_files import RUNTIME_KINDS
@@ -37,7 +42,7 @@ from grader.evidence.run import Run
 from grader.files import temporary_folder
 from grader.intake.open import open_submission
 from grader.model.package import Interface, PackageFacts
-from grader.model.progress import Progress
+from grader.model.result import Progress
 from grader.model.verdict import Status
 from grader.package import read_package
 from grader.rubric.load import LoadedRubric

@@ -28,8 +28,7 @@ from grader.classes.gradebook import Book, GradebookRow
 from grader.classes.gradebook.table import BookCriterion
 from grader.classes.overrides import FILE as OVERRIDES
 from grader.classes.overrides import read_overrides
-from grader.classes.roster.entries import known_columns
-from grader.classes.roster.table import read_table
+from grader.classes.roster.entries import known_columns, read_table
 from grader.errors import UsageError
 from grader.files import make_folder
 from grader.intake.names import folder_key

@@ -21,21 +21,19 @@ from rich.padding import Padding
 from rich.text import Text
 
 from grader import pipeline
-from grader.cli.display import open_progress
+from grader.cli.display import REPORT, exit_code, judged_criteria, open_progress, show, staged_code, worst
 from grader.cli.host_support import how_to_run_nodes, warn_without_sandbox, why_nothing_runs
-from grader.cli.outcome import REPORT, exit_code, judged_criteria, show, staged_code, worst
 from grader.cli.output import say, say_beside
 from grader.cli.select_rubric import Chosen, only
 from grader.errors import ExitCode, HostError, OutputError, UsageError
 from grader.files import atomic_write, check_writable, temporary_folder
 from grader.intake.gitdir import write_staged
 from grader.intake.names import safe_name
-from grader.model.progress import Progress, Silence
-from grader.model.result import GitStatus, GradingResult, Point
+from grader.model.result import GitStatus, GradingResult, Point, Progress, Silence
 from grader.report.losses import arrange
-from grader.report.student_view import hidden_ids, without_hidden
 from grader.report.terminal import fit_encoding, open_console
 from grader.report.text import line
+from grader.report.view import hidden_ids, without_hidden
 from grader.rubric.find import named_labs
 from grader.rubric.load import LoadedRubric, needs_ros
 from grader.student.git_status import advise, read_environment
@@ -175,8 +173,7 @@ def watch_package(
     source: str, rubric: LoadedRubric, options: pipeline.GradeOptions, *, out: Path | None, as_json: bool
 ) -> ExitCode:
     """Grade the package whenever one of its files is saved, until Ctrl-C."""
-    from grader.student.watch_screen import JsonLines, TerminalScreen  # noqa: PLC0415 - slow to load
-    from grader.student.watching import Grading, watch  # noqa: PLC0415
+    from grader.student.watching import Grading, JsonLines, TerminalScreen, watch  # noqa: PLC0415 - slow to load
 
     static, hidden = options.static_only, len(hidden_ids(rubric.rubric))
 

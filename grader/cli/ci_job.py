@@ -11,9 +11,8 @@ from pathlib import Path
 
 from grader import pipeline
 from grader.cli.checking import say_choice
-from grader.cli.display import open_progress
+from grader.cli.display import exit_code, judged_criteria, open_progress
 from grader.cli.host_support import warn_without_sandbox
-from grader.cli.outcome import exit_code, judged_criteria
 from grader.cli.output import report, say
 from grader.cli.select_rubric import Chosen, choose_all, only, package_prefix
 from grader.errors import ExitCode, GraderError, RubricError, UsageError
@@ -28,18 +27,12 @@ from grader.integrations.ci_results import (
     describe_outcome,
     keep,
 )
-from grader.integrations.ci_systems import (
-    RUNNERS,
-    JobSettings,
-    read_settings,
-    with_pass_mark,
-)
+from grader.integrations.ci_systems import RUNNERS, JobSettings, read_settings, with_pass_mark
 from grader.judging.summary import overall_status, total_fields
 from grader.model.result import GradingResult
 from grader.report.sentences import rubric_words, without_sandbox
-from grader.report.student_view import hidden_ids, without_hidden
 from grader.report.terminal import open_console, print_report
-from grader.report.view import is_students_fault
+from grader.report.view import hidden_ids, is_students_fault, without_hidden
 from grader.results import RESULT, read_result
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric

@@ -228,8 +228,7 @@ SandboxOption = Annotated[
 AllFlag = Annotated[bool, Flag("--all", "list all criteria with what was measured, not only what was lost")]
 JsonFlag = Annotated[bool, Flag("--json", "print JSON")]
 PackageOption = Annotated[
-    str | None,
-    Option("--package", "NAME", "grade this package, whatever the lab calls it", package_name),
+    str | None, Option("--package", "NAME", "grade this package, whatever the lab calls it", package_name)
 ]
 JobsOption = Annotated[
     int | None, Option("--jobs", "N", "how many at a time (default: four per core, with --static one)", count)

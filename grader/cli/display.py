@@ -1,6 +1,7 @@
-"""Shows the progress of a grading on stderr: live on a terminal, else as a line at each change of state.
+"""Shows a grading: its progress on stderr, live on a terminal, else as a line at each change of state.
 
-What a package's files alone decide goes to stdout as soon as it is known, before anything is built or run.
+What a package's files alone decide goes to stdout as soon as it is known, before anything is built or run. At the end
+`show` prints the report and where its files are, and gives the exit code that the criteria come to.
 """
 
 from __future__ import annotations
@@ -8,24 +9,29 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import partial
+from pathlib import Path
 from typing import IO
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from grader.cli.output import say
-from grader.model.progress import Progress, StepState
-from grader.model.result import EarlyVerdict
+from grader.cli.output import report, say, say_document
+from grader.errors import ExitCode, GraderError
+from grader.judging.summary import overall_status, reached_pass_mark, scaled_pass_mark
+from grader.model.result import CriterionResult, EarlyVerdict, GradingResult, Progress, StepState
 from grader.model.verdict import Status
-from grader.report.terminal import STYLES, mark
+from grader.report.files import result_text
+from grader.report.terminal import STYLES, mark, open_console, print_report
 from grader.report.text import visible
+from grader.results import RESULT
+from grader.rubric.model import Rubric
 from grader.untrusted_text import line, without_ci_commands
 
 EARLY_TITLE = "Your files, before anything is built or run:"
@@ -76,7 +82,7 @@ class Steps:
         self.tell = tell
 
     def step(self, name: str, state: StepState, detail: str = "", expected_s: float | None = None) -> None:
-        """Take note of a step's state (see `grader.model.progress.Progress`)."""
+        """Take note of a step's state (see `grader.model.result.Progress`)."""
         now_s = self.clock()
         with self.lock:
             before = self.steps.get(name)
@@ -264,3 +270,87 @@ def _wrap_lines(row: Text, width: int) -> Iterator[Text]:
         harmless = without_ci_commands(part.plain)
         shown = part if harmless == part.plain else Text(harmless, part.style)
         yield Text(" " * HANGING).append_text(shown) if number else shown
+
+
+def exit_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
+    """Return the exit code of the criteria that are shown.
+
+    A pass mark in points that is reached stays reached, even if some criteria are open.
+    """
+    shown = tuple(criteria)
+    status = overall_status(shown)
+    if status == "error":
+        return ExitCode.NOT_GRADED
+    if reached_pass_mark(_in_proportion(rubric, shown), shown):
+        return ExitCode.PASSED
+    return ExitCode.INCONCLUSIVE if status == "inconclusive" else ExitCode.BELOW_PASS_MARK
+
+
+def worst(codes: Iterable[ExitCode]) -> ExitCode:
+    """Return the worst code: not graded is worse than below the pass mark, and that is worse than inconclusive."""
+    order = (ExitCode.PASSED, ExitCode.INCONCLUSIVE, ExitCode.BELOW_PASS_MARK, ExitCode.NOT_GRADED)
+    return max(codes, key=order.index)
+
+
+def staged_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
+    """Return the code of a pre-commit hook: any criterion that fails, fails it, whatever the pass mark is."""
+    judged = judged_criteria(criteria)
+    counted = [c for c in judged if c.is_required or c.status is Status.ERROR]
+    return exit_code(judged, rubric.model_copy(update={"pass_mark": None})) if counted else ExitCode.PASSED
+
+
+def judged_criteria(criteria: Iterable[CriterionResult]) -> tuple[CriterionResult, ...]:
+    """Return the criteria that could be judged."""
+    return tuple(c for c in criteria if not c.status.is_open)
+
+
+def _in_proportion(rubric: Rubric, shown: tuple[CriterionResult, ...]) -> Rubric:
+    """Return the rubric with its pass mark scaled from all points to those that are shown."""
+    points = sum(c.max_points for c in shown)
+    return rubric.model_copy(update={"pass_mark": scaled_pass_mark(rubric, points)})
+
+
+REPORT = "report.html"
+REPORTS = (REPORT, RESULT, "report.md", "junit.xml", "console.log")
+
+
+def show(
+    result: GradingResult,
+    rubric: Rubric,
+    folder: Path | None,
+    *,
+    hidden: int = 0,
+    as_json: bool = False,
+    static: bool = False,
+    unrun: str = "",
+    remarks: Sequence[RenderableType] = (),
+    full: bool = False,
+) -> ExitCode:
+    """Print the result, from which `hidden` criteria are left out already, and return its exit code.
+
+    With `static`, only the criteria that could be judged count. `unrun` says why nothing was run, on purpose or not:
+    open criteria are then only counted in the report. `remarks` stand before the losses; with `full` all criteria are
+    listed.
+    """
+    if as_json:
+        say_document(lambda ascii_only: result_text(result, ascii_only=ascii_only))
+    else:
+        console = open_console(sys.stdout)
+        print_report(result, rubric, console, hidden=hidden, unrun=unrun, remarks=remarks, full=full)
+        _paths(folder)
+    if result.error is not None:
+        report(GraderError(result.error.message, hint=result.error.hint))
+    if result.status == "error":
+        return ExitCode.NOT_GRADED
+    return exit_code(judged_criteria(result.criteria) if static else result.criteria, rubric)
+
+
+def _paths(folder: Path | None) -> None:
+    if folder is None:
+        return
+    others = [name for name in REPORTS[1:] if (folder / name).is_file()]
+    others += ["evidence/"] if (folder / "evidence").is_dir() else []
+    if (folder / REPORT).is_file():
+        say(f"Report: {folder / REPORT}")
+    if others:
+        say(f"Beside it: {', '.join(others)}")

@@ -14,7 +14,7 @@ from rich.console import RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
-from grader.authoring.mutation.package_tree import read_tree, unified_diff
+from grader.authoring.mutation.solution import read_tree, unified_diff
 from grader.cli.output import say
 from grader.cli.select_rubric import Chosen
 from grader.errors import OutputError, UsageError

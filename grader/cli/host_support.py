@@ -1,36 +1,61 @@
 """What this machine can run, and how safely: each part of the sandbox, and what a machine without ROS 1 can do.
 
-Rows for `grader doctor` go out, and warnings before students' code is run. What else is looked at is in `doctor`.
+Rows for `grader doctor` go out, and warnings before students' code is run. Nothing is changed.
 """
 
 from __future__ import annotations
 
+import locale
+import os
+import platform
+import shutil
+import socket
+import subprocess
 import sys
-from collections.abc import Iterator
+import tempfile
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Literal
+from typing import IO, Literal
 
 from pydantic import AliasChoices, Field
+from rich.table import Table
+from rich.text import Text
 
 from grader.arena.control_groups import describe, find_cgroups, has_memory
 from grader.arena.sandbox import (
     NAMESPACES,
     ULIMIT_HINT,
     choose_sandbox,
+    is_shown,
     last_error_line,
     refused_limits,
     words_to_drop_root,
 )
+from grader.arena.sandbox_files import missing_packages
 from grader.cli.output import say_beside
 from grader.errors import GraderError, HostError, RosMissing
-from grader.host_programs import find_host_program
+from grader.host_programs import LISTS, LOCALHOST, LOCALHOST_HINT, find_host_program, resolves
+from grader.installable import install_command
 from grader.model import SandboxMode
 from grader.model.record import Record
-from grader.portable import system, user_id
+from grader.portable import cores, system, user_id
 from grader.report.sentences import without_sandbox
-from grader.ros_env import why_nodes_cannot_run
+from grader.report.terminal import emit, open_console
+from grader.report.text import visible
+from grader.ros_env import (
+    INSTALL_HINT,
+    STANDINS,
+    Need,
+    RosInstallation,
+    RosPackages,
+    find_ros,
+    look_for,
+    ros_packages,
+    why_nodes_cannot_run,
+)
 from grader.rubric.load import LoadedRubric, needs_ros
+from grader.wording import join_words
 
 PROGRAMS = {"bwrap": "bubblewrap", "setpriv": "util-linux", "prlimit": "util-linux"}
 SETTINGS = Path("/proc/sys")
@@ -183,3 +208,242 @@ def require_room(*, gradings: int) -> None:
         from grader.arena.inherited_limits import make_room  # noqa: PLC0415 - other systems lack what it imports
 
         make_room(gradings=gradings)
+
+
+STYLES = {"ok": "green", "limited": "yellow", "missing": "red"}
+ROS_TOOLS = {"git": "git", "cmake": "cmake", "make": "make", "c++": "g++"}
+ROS_PROGRAMS = ("catkin_make", "roslaunch", "rosrun", "rospack")
+ROS_MODULES = {
+    "rospy": "python3-rospy",
+    "rosgraph": "python3-rosgraph",
+    "rosmaster": "python3-rosmaster",
+    "roslaunch": "python3-roslaunch",
+    "std_msgs": "python3-std-msgs",
+    "rosgraph_msgs": "python3-rosgraph-msgs",
+    "geometry_msgs": "python3-geometry-msgs",
+    "sensor_msgs": "python3-sensor-msgs",
+}
+FIND_MODULES = (
+    "import importlib.util, sys; print(*[m for m in sys.argv[1:] if not importlib.util.find_spec(m)])"
+)
+GIB = 1 << 30
+MIN_MEMORY_BYTES, MIN_DISK_BYTES = GIB, GIB
+
+
+def diagnose() -> tuple[DoctorRow, ...]:
+    """Return every row, in the order in which things are needed; on other systems than Linux, only what helps there."""
+    if system():
+        return (_python(), _git(), *platform_rows(), *_resources(), _encoding())
+    return (
+        _python(),
+        *_programs(),
+        *_ros(),
+        *sandbox_rows(),
+        _user(),
+        _search_paths(),
+        *_resources(),
+        _hostname(),
+        _encoding(),
+    )
+
+
+def diagnose_rubric(loaded: LoadedRubric) -> tuple[DoctorRow, ...]:
+    """Return a row for each ROS package that the rubric's programs and types come from, and for what it `needs`."""
+    packages, own, needs = ros_packages(), loaded.rubric.packages, loaded.rubric.needs
+    needed = _needed_by_package(loaded)
+    rows = [_package(name, needed[name], packages) for name in sorted(needed) if name not in own]
+    brought = [
+        DoctorRow(name=n, state="ok", detail="beside the rubric; built when the lab is graded") for n in own
+    ]
+    return (*rows, *brought, *map(_need, look_for(ros=(), apt=needs.apt, pip=needs.pip)))
+
+
+def _need(need: Need) -> DoctorRow:
+    state: Literal["ok", "missing"] = "ok" if need.here else "missing"
+    detail = f"the rubric needs it ({need.kind})" + ("" if need.here else ": not installed")
+    return DoctorRow(name=need.name, state=state, detail=detail, fix="" if need.here else need.install)
+
+
+def _needed_by_package(loaded: LoadedRubric) -> dict[str, list[str]]:
+    """Return by package what the rubric asks of it, nothing where it only needs it; the student's own left out."""
+    rubric = loaded.rubric
+    names = [start.program for s in rubric.scenarios.values() for start in s.start if start.program]
+    names += [probe.type for s in rubric.scenarios.values() for probe in s.probes]
+    names += [call.type for s in rubric.scenarios.values() for call in s.calls]
+    names += [served.type for s in rubric.scenarios.values() for served in s.serves]
+    steps = [step for s in rubric.scenarios.values() for step in s.steps]
+    names += [sent.type for step in steps if (sent := step.published) is not None]
+    names += [asked.type for step in steps if (asked := step.call or step.action) is not None]
+    names += [
+        str(one.value)
+        for criterion in rubric.criteria
+        if (check := loaded.checks.get(criterion.check))
+        for one in check.references(criterion.parameters)
+        if one.to in {"program", "message", "service"} and one.value
+    ]
+    found: dict[str, list[str]] = {}
+    for package, _, name in (one.partition("/") for one in dict.fromkeys(names)):
+        if package not in rubric.package_names:
+            found.setdefault(package, []).append(name)
+    for package in rubric.needs.ros:
+        found.setdefault(package, [])
+    return found
+
+
+def _package(name: str, asked: Sequence[str], packages: RosPackages) -> DoctorRow:
+    folder = packages.folders.get(name)
+    wanted = f"for {join_words(asked)}" if asked else "which the rubric needs"
+    if folder is None:
+        return DoctorRow(
+            name=name,
+            state="missing",
+            detail=f"not installed, {wanted}",
+            fix=install_command(name, _distro(packages.ros)),
+        )
+    if folder.is_relative_to(STANDINS):
+        return DoctorRow(name=name, state="ok", detail=f"the grader's stand-in, {wanted}")
+    if packages.ros is not None and not is_shown(folder, packages.ros):
+        fix = "install its workspace below /opt (catkin_make install), and name that setup.bash in $GRADER_ROS_SETUP"
+        return DoctorRow(
+            name=name, state="missing", detail=f"{folder} is hidden from the sandbox, {wanted}", fix=fix
+        )
+    return DoctorRow(name=name, state="ok", detail=f"{folder}, {wanted}")
+
+
+def _distro(ros: RosInstallation | None) -> str:
+    """Return the distribution of ROS's own repository; "" for Debian's ROS, or none."""
+    return ros.distro if ros is not None and ros.kind == "setup" else ""
+
+
+def _python() -> DoctorRow:
+    return DoctorRow(name="Python", state="ok", detail=f"{platform.python_version()} ({sys.executable})")
+
+
+def _programs() -> Iterator[DoctorRow]:
+    for name, package in ROS_TOOLS.items():
+        yield program_row(name, shutil.which(name), "missing", f"apt-get install {package}")
+
+
+def _git() -> DoctorRow:
+    return program_row("git", shutil.which("git"), "limited", "https://git-scm.com/downloads")
+
+
+def _ros() -> Iterator[DoctorRow]:
+    try:
+        ros = find_ros()
+    except RosMissing as error:
+        yield DoctorRow(name="ROS 1", state="missing", detail=error.message, fix=error.hint)
+        return
+    if ros is None:
+        yield DoctorRow(name="ROS 1", state="missing", detail="not found", fix=INSTALL_HINT)
+        return
+    yield DoctorRow(name="ROS 1", state="ok", detail=ros.label)
+    for program in ROS_PROGRAMS:
+        yield program_row(program, ros.program(program), "missing", INSTALL_HINT)
+    yield from _modules(ros)
+    yield _standins(ros)
+
+
+def _modules(ros: RosInstallation) -> Iterator[DoctorRow]:
+    """Look for ROS's Python packages with its own interpreter."""
+    command = [ros.python, "-c", FIND_MODULES, *ROS_MODULES]
+    try:
+        done = subprocess.run(
+            command,
+            env=ros.env,
+            cwd="/",
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=20,
+        )
+    except (OSError, subprocess.SubprocessError) as error:
+        yield DoctorRow(
+            name="ROS's Python", state="missing", detail=f"{ros.python}: {error}", fix=INSTALL_HINT
+        )
+        return
+    missing = done.stdout.split()
+    yield DoctorRow(name="ROS's Python", state="ok", detail=ros.python)
+    for module, package in ROS_MODULES.items():
+        if module in missing:
+            fix = f"apt-get install {package}" if ros.kind == "debian" else INSTALL_HINT
+            yield DoctorRow(name=module, state="missing", detail=f"{ros.python} cannot import it", fix=fix)
+        else:
+            yield DoctorRow(name=module, state="ok", detail="found")
+
+
+def _standins(ros: RosInstallation) -> DoctorRow:
+    missing = missing_packages(ros)
+    detail = f"for {', '.join(missing)}, which this ROS lacks" if missing else "not needed for any package"
+    return DoctorRow(name="stand-ins", state="ok", detail=detail)
+
+
+def _search_paths() -> DoctorRow:
+    """Look for entries that are not absolute paths: they mean the current folder, which may be a student's."""
+    odd = [name for name in LISTS if not all(map(os.path.isabs, os.environ.get(name, "/").split(os.pathsep)))]
+    if not odd:
+        return DoctorRow(name="search paths", state="ok", detail="every entry is an absolute path")
+    detail = f"{', '.join(odd)}: an entry means the current folder, so programs load files from there"
+    fix = "write ${NAME:+$NAME:} before what you add, without an empty entry"
+    return DoctorRow(name="search paths", state="limited", detail=detail, fix=fix)
+
+
+def _user() -> DoctorRow:
+    root = "root; students' code runs as an unprivileged user in the sandbox"
+    return DoctorRow(name="user", state="ok", detail=root if user_id() == 0 else f"uid {user_id()}")
+
+
+def _resources() -> Iterator[DoctorRow]:
+    if (number := cores()) >= 2:
+        yield DoctorRow(name="cores", state="ok", detail=str(number))
+    else:
+        detail = "1: runs take turns, and rates may be inconclusive"
+        yield DoctorRow(name="cores", state="limited", detail=detail)
+    if sys.platform != "win32":
+        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+        yield _amount("memory", memory, MIN_MEMORY_BYTES, "GiB")
+    folder = Path(tempfile.gettempdir())
+    yield _amount("disk", shutil.disk_usage(folder).free, MIN_DISK_BYTES, f"GiB free in {folder}")
+
+
+def _amount(name: str, size_bytes: int, least_bytes: int, unit: str) -> DoctorRow:
+    enough = size_bytes >= least_bytes
+    detail = f"{size_bytes / GIB:.1f} {unit}"
+    detail += "" if enough else f"; {least_bytes / GIB:.0f} GiB is recommended"
+    return DoctorRow(name=name, state="ok" if enough else "limited", detail=detail)
+
+
+def _hostname() -> DoctorRow:
+    """Look up the names by which ROS nodes look for their own machine."""
+    name = socket.gethostname()
+    if not resolves(LOCALHOST):
+        detail = "localhost does not resolve: without a sandbox, roslaunch cannot start anything"
+        return DoctorRow(name="host name", state="limited", detail=detail, fix=LOCALHOST_HINT)
+    if resolves(name):
+        return DoctorRow(name="host name", state="ok", detail=f"{name} resolves")
+    fix = f"echo '127.0.1.1 {name}' >> /etc/hosts"
+    return DoctorRow(name="host name", state="limited", detail=f"{name} does not resolve", fix=fix)
+
+
+def _encoding() -> DoctorRow:
+    name = locale.getpreferredencoding(do_setlocale=False)
+    if name.lower().replace("-", "") == "utf8":
+        return DoctorRow(name="encoding", state="ok", detail=name)
+    detail = f"{name}: reports use plain characters"
+    return DoctorRow(name="encoding", state="limited", detail=detail, fix="export LC_ALL=C.UTF-8")
+
+
+def print_rows(rows: Sequence[DoctorRow], stream: IO[str]) -> None:
+    """Print a row for each thing that grading needs, and what is missing."""
+    grid = Table.grid(padding=(0, 2, 0, 0))
+    for _ in range(2):
+        grid.add_column(no_wrap=True)
+    grid.add_column(overflow="fold")
+    for row in rows:
+        grid.add_row(Text(row.state, STYLES[row.state]), Text(row.name), Text(visible(row.detail)))
+        if row.fix:
+            grid.add_row(Text(), Text("fix:", "bold"), Text(visible(row.fix), "bold"))
+    missing = sum(row.state == "missing" for row in rows)
+    verdict = f"{missing} missing: grading is not fully possible here." if missing else "Ready to grade."
+    emit(open_console(stream), [grid, Text(f"\n{verdict}")])

@@ -29,9 +29,15 @@ from grader.authoring.mutation.faulty_packages import (
     refuse_unfit,
     select_mutants,
 )
-from grader.authoring.mutation.package_tree import Tree, write_tree
 from grader.authoring.mutation.rubric_test import Plan, run_test
-from grader.authoring.mutation.solution import Solution, find_reference, load_solution, reference_at
+from grader.authoring.mutation.solution import (
+    Solution,
+    Tree,
+    find_reference,
+    load_solution,
+    reference_at,
+    write_tree,
+)
 from grader.cli.display import open_progress
 from grader.cli.output import say
 from grader.errors import UsageError

@@ -26,7 +26,7 @@ from grader.classes.batch.renew_results import (
 )
 from grader.classes.batch.run import INDEX
 from grader.cli.declare import STDOUT
-from grader.cli.outcome import exit_code, worst
+from grader.cli.display import exit_code, worst
 from grader.cli.output import report, say, say_beside, write_document
 from grader.cli.select_rubric import package_prefix
 from grader.errors import EvidenceError, ExitCode, UsageError
@@ -44,9 +44,9 @@ from grader.report.class_page.page import write_class_page
 from grader.report.class_page.submissions import salt_in
 from grader.report.forms import FORMS, ReportInput
 from grader.report.sentences import missing_hidden
-from grader.report.student_view import without_hidden
 from grader.report.terminal import emit, open_console, print_report
 from grader.report.text import line
+from grader.report.view import without_hidden
 from grader.rubric.find import named_labs
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.verification import PartFinding, compare, read_whole, result_folders, verify

@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.errors import UsageError
-from grader.intake.choose import is_slip
-from grader.intake.find import (
+from grader.intake.choose import (
     WORKSPACE_MARKS,
     Candidate,
     enclosing_package,
     find_nearest,
     find_packages,
+    is_slip,
     manifest_name,
 )
 from grader.intake.gitdir import repository_around

@@ -17,8 +17,16 @@ from typing import NamedTuple, TypeVar
 
 from grader.errors import GraderError, OutputError, SubmissionError
 from grader.intake.archive import unpack
-from grader.intake.choose import Choice, WantedPackage, choose_package, not_found
-from grader.intake.find import Candidate, enclosing_package, find_candidates, linked_candidate
+from grader.intake.choose import (
+    Candidate,
+    Choice,
+    WantedPackage,
+    choose_package,
+    enclosing_package,
+    find_candidates,
+    linked_candidate,
+    not_found,
+)
 from grader.intake.git import Git, Repository
 from grader.intake.gitdir import Repositories
 from grader.intake.limits import IntakeLimits

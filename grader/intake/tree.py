@@ -98,8 +98,7 @@ def _is_hidden(path: str) -> bool:
 def too_deep(name: str) -> SubmissionError:
     """Return the error for a tree that no student's work looks like."""
     return SubmissionError(
-        f"{brief(name)} holds more than {MAX_DEPTH} folders in each other",
-        hint="Hand in the package alone.",
+        f"{brief(name)} holds more than {MAX_DEPTH} folders in each other", hint="Hand in the package alone."
     )
 
 

@@ -19,8 +19,7 @@ from grader.files import atomic_write, make_folder
 from grader.intake.source import Source, parse_source
 from grader.integrations.bundle import BundleSettings, ContainerLayout, LostModes, read_settings
 from grader.integrations.platforms import GRADESCOPE, PRAIRIELEARN
-from grader.model.progress import Silence
-from grader.model.result import GradingResult
+from grader.model.result import GradingResult, Silence
 from grader.report.terminal import open_console, print_report
 from grader.report.text import json_text, line
 from grader.results import read_result

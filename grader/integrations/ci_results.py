@@ -19,8 +19,7 @@ from grader.report.forms import FORMS, ReportInput
 from grader.report.losses import arrange
 from grader.report.markdown import render_markdown
 from grader.report.sentences import RUBRIC_FROM
-from grader.report.student_view import hidden_ids
-from grader.report.view import is_students_fault
+from grader.report.view import hidden_ids, is_students_fault
 from grader.results import EVIDENCE, RESULT
 from grader.rubric.model import Rubric
 from grader.wording import number

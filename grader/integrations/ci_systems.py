@@ -24,8 +24,8 @@ from grader.files import atomic_write
 from grader.intake.names import is_package_name
 from grader.integrations.ci_results import OF_CODE, TITLES, JobResult, JobStatus, summarize
 from grader.model import SandboxMode
-from grader.report.classroom import render_classroom
 from grader.report.findings import EACH_MAX, Severity, github_annotation, render_annotations
+from grader.report.platforms import render_classroom
 from grader.report.text import line, markdown
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric

@@ -37,9 +37,9 @@ from grader.checks.support.text import (
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.installable import NOTHING_TO_DO, PYTHON_2
-from grader.judging.as_handed_in import text_as_handed_in
 from grader.judging.cited_lines import LINE_CHARS, LINES_READ
 from grader.judging.facts import SOURCES, Facts, names_started, scripts_of, sources_of
+from grader.judging.repeats_and_repairs import text_as_handed_in
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.repair import Repair

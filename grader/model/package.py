@@ -401,10 +401,7 @@ class LaunchFile(Record):
 
 CLASSES_OF = {
     "srv": ("", "Request", "Response"),
-    "action": (
-        *("Action", "Goal", "Result", "Feedback"),
-        *("ActionGoal", "ActionResult", "ActionFeedback"),
-    ),
+    "action": (*("Action", "Goal", "Result", "Feedback"), *("ActionGoal", "ActionResult", "ActionFeedback")),
 }
 """What follows a definition's name in the names of its classes."""
 

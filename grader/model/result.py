@@ -5,8 +5,9 @@ The docstring of a field says what its key means: the reference and the JSON sch
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import date, datetime
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Protocol
 
 from pydantic import AliasChoices, AwareDatetime, Field, SerializerFunctionWrapHandler, model_serializer
 from typing_extensions import Self
@@ -416,3 +417,29 @@ class GradingResult(Record):
     there is anything; it costs no points."""
     error: ErrorInfo | None = None
     """Why it could not be graded. Only there for the status `error`."""
+
+
+StepState = Literal["waiting", "running", "done", "failed", "skipped"]
+
+
+class Progress(Protocol):
+    """A display of a grading's progress. Safe to call from any thread, cheap enough to call often."""
+
+    def step(self, name: str, state: StepState, detail: str = "", expected_s: float | None = None) -> None:
+        """Show that one step (`intake`, `build`, a scenario's name) is now in `state`.
+
+        `detail` says what it does or waits for; `expected_s` is how long the whole step is likely to take.
+        """
+
+    def early(self, verdicts: Callable[[], tuple[EarlyVerdict, ...]]) -> None:
+        """Show what the files alone decide, which `verdicts` works out. A display need not call it."""
+
+
+class Silence:
+    """Shows nothing."""
+
+    def step(self, name: str, state: StepState, detail: str = "", expected_s: float | None = None) -> None:
+        """Show that one step (`intake`, `build`, a scenario's name) is now in `state`."""
+
+    def early(self, verdicts: Callable[[], tuple[EarlyVerdict, ...]]) -> None:
+        """Show what the files alone decide, which `verdicts` works out. A display need not call it."""

@@ -119,11 +119,11 @@ _FORMS = (
         "the same for GitHub: commands that a step prints",
         cites_lines=True,
     ),
-    Form("gradescope", "gradescope.json", "gradescope:render_gradescope", "Gradescope's `results.json`"),
+    Form("gradescope", "gradescope.json", "platforms:render_gradescope", "Gradescope's `results.json`"),
     Form(
         "classroom",
         "classroom.txt",
-        "classroom:render_classroom",
+        "platforms:render_classroom",
         "GitHub Classroom's autograding reporter: a line of base64 for its `<ID>_RESULTS`, always without "
         "hidden criteria",
         cites_lines=True,

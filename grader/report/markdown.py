@@ -156,10 +156,7 @@ class _Writer:
         for words in (verdict_words(result, rubric, hidden), visible_words(result, hidden)):
             yield from (words, "") if words else ()
         version = self._text(result.rubric.version)
-        yield from (
-            f"{self._text(rubric.title)} ({self._code(result.rubric.id)}, version {version})",
-            "",
-        )
+        yield from (f"{self._text(rubric.title)} ({self._code(result.rubric.id)}, version {version})", "")
         commit = f", commit {self._code(submission.commit[:12])}" if submission.commit else ""
         kind = f", package {self._code(submission.package)}" if submission.package else ", a recording"
         yield f"Submission {self._code(submission.id)}{kind if result.error is None else ''}{commit}."

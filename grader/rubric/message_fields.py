@@ -11,14 +11,8 @@ from typing import Any
 from grader.checks.support.fields import is_number
 from grader.evidence.definitions import Field
 from grader.installable import noetic_messages
-from grader.model.message_definitions import (
-    BUILT_IN,
-    FULL_NAMES,
-    PARTS,
-    parse_definition,
-    parse_interface,
-)
-from grader.ros_packages import ros_packages
+from grader.model.message_definitions import BUILT_IN, FULL_NAMES, PARTS, parse_definition, parse_interface
+from grader.ros_env import ros_packages
 from grader.rubric.definitions import (
     SUFFIXES,
     Definitions,
@@ -46,11 +40,7 @@ from grader.rubric.yaml_lines import (
 from grader.wording import did_you_mean, join_words
 
 USUAL_PACKAGES = ("std_msgs", "geometry_msgs", "sensor_msgs", "nav_msgs")
-USUAL_TYPES = {
-    "cmd_vel": "geometry_msgs/Twist",
-    "odom": "nav_msgs/Odometry",
-    "scan": "sensor_msgs/LaserScan",
-}
+USUAL_TYPES = {"cmd_vel": "geometry_msgs/Twist", "odom": "nav_msgs/Odometry", "scan": "sensor_msgs/LaserScan"}
 """Of topics whose type a rubric does not say, most often: a name that is all but one of a field's is a slip."""
 SYSTEM_TYPES = {
     "/tf": "tf2_msgs/TFMessage",

@@ -275,12 +275,7 @@ def _run(command: list[str], folder: Path, timeout_s: float, handed: tuple[int, 
     with (
         (folder / "output").open("wb") as output,
         own_session(
-            command,
-            cwd=folder,
-            env=_environment(),
-            stdout=output,
-            stderr=subprocess.STDOUT,
-            pass_fds=handed,
+            command, cwd=folder, env=_environment(), stdout=output, stderr=subprocess.STDOUT, pass_fds=handed
         ) as process,
     ):
         try:

@@ -21,15 +21,7 @@ from grader.rubric.scenario import Scenario, Until
 from grader.rubric.simulators import FIELD_M, PROGRAMS, TRUE_POSE, robot_of
 from grader.rubric.started import starts_of
 from grader.rubric.step_faults import given_steps
-from grader.rubric.yaml_lines import (
-    Fault,
-    KeyPath,
-    WrittenCriterion,
-    as_list,
-    as_map,
-    as_maps,
-    criteria_of,
-)
+from grader.rubric.yaml_lines import Fault, KeyPath, WrittenCriterion, as_list, as_map, as_maps, criteria_of
 from grader.wording import plural
 
 WRAPS = {"minimum": 0, "maximum": 127, "wraps": 2}

@@ -13,8 +13,7 @@ from typing import Any
 
 from grader.checks.registry import Check, Reference
 from grader.checks.support.topics import SYSTEM_TOPICS
-from grader.ros_packages import TypeKind, ros_packages
-from grader.rubric.arguments import argument_faults
+from grader.ros_env import TypeKind, ros_packages
 from grader.rubric.definitions import Definitions, services_in
 from grader.rubric.durations import steps_s
 from grader.rubric.frames import frame_faults
@@ -22,7 +21,7 @@ from grader.rubric.message_fields import field_faults
 from grader.rubric.reachable import reach_faults
 from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Until
 from grader.rubric.simulators import PROGRAMS, asked_faults, only_publisher, parameter_faults
-from grader.rubric.started import started_faults, starts_of
+from grader.rubric.started import argument_faults, started_faults, starts_of
 from grader.rubric.step_faults import given_steps
 from grader.rubric.unknown_names import SURE, topics_in, unknown_names, values_of, with_other_topics
 from grader.rubric.yaml_lines import (

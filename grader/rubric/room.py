@@ -113,10 +113,7 @@ def _too_near(about: WrittenCriterion, away_m: float) -> Iterator[Fault]:
     if given.get("walls") or given.get("from_s") or given.get("share", 1) != 1:
         return
     least_m, most_m = given.get("min_m"), given.get("max_m")
-    wrong = {
-        "min_m": is_number(least_m) and away_m < least_m,
-        "max_m": is_number(most_m) and away_m > most_m,
-    }
+    wrong = {"min_m": is_number(least_m) and away_m < least_m, "max_m": is_number(most_m) and away_m > most_m}
     for key, is_wrong in wrong.items():
         if is_wrong:
             yield (*about.at, key), f"the robot starts {away_m:.2g} m from the nearest wall"

@@ -1,17 +1,30 @@
 """What scenarios start, and what criteria ask of that: files of another package, runs without the student's processes,
-topics that no program of the run has."""
+topics that no program of the run has; and arguments of starts that ROS would take for others."""
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import PurePosixPath
-from typing import Any
+from typing import Any, NamedTuple
 
 from grader.checks.registry import Check
+from grader.rubric.definitions import slip_of
 from grader.rubric.scenario import ROSTEST_ENDING
-from grader.rubric.simulators import PROGRAMS, asked_topics
-from grader.rubric.yaml_lines import Fault, KeyPath, as_maps, criteria_of, packages_in
-from grader.wording import join_words
+from grader.rubric.simulators import PROGRAMS, asked_topics, set_in
+from grader.rubric.spelling import PROSE, is_slip
+from grader.rubric.yaml_lines import (
+    Fault,
+    KeyPath,
+    as_map,
+    as_maps,
+    as_texts,
+    criteria_of,
+    packages_in,
+    texts_in,
+)
+from grader.wording import did_you_mean, join_words
 
 KINDS_OF_FILES = ("script", "launch", "load")
 OPEN_ENDINGS = (".launch", ".xml", ROSTEST_ENDING)
@@ -125,3 +138,163 @@ OWNERS = frozenset(program.partition("/")[0] for program in PROGRAMS)
 def _is_own(topic: str, program: str) -> bool:
     """Return whether nothing but the program would publish there: `/scan` and `/odom` may come from anywhere."""
     return program.startswith("turtlesim/") or topic == "/base_pose_ground_truth"
+
+
+_NUMBER = re.compile(r"-?\d+(\.\d+)?")
+SPECIAL = ("__name", "__ns", "__log", "__ip", "__hostname", "__master")
+
+
+class Known(NamedTuple):
+    """What the rubric names: topics and services, the last parts of parameters' names, and words of its texts."""
+
+    topics: frozenset[str]
+    params: frozenset[str]
+    words: frozenset[str]
+    quoted: frozenset[str]
+    """Words that the handout has in backticks."""
+    said: frozenset[str]
+    """Names with a slash that the handout has."""
+
+
+def argument_faults(scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    """Yield the faults of one scenario's arguments."""
+    known: Known | None = None
+    for index, start in as_maps(scenario.get("start")):
+        for number, text in as_texts(start.get("args")):
+            known = known or _known(rubric)
+            fault = _blanks(text) or _no_colon(text, start, known) or _of_launch(text, start, known)
+            fault = fault or _other_way(text, start, scenario, known) or _fault(text, start, known)
+            if fault:
+                yield ("start", index, "args", number), fault
+
+
+def argument_warnings(rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    """Yield private parameters that nothing else in the rubric names, and decimal numbers with a comma."""
+    known, handout = _known(rubric), str(rubric.get("handout") or "")
+    named = known.params if re.search(r"~\w", handout) else known.params | known.words
+    for scenario, one in as_map(rubric.get("scenarios")).items():
+        for index, start in as_maps(as_map(one).get("start")):
+            for number, text in as_texts(start.get("args")):
+                name, _, value = text.partition(":=")
+                at = ("scenarios", scenario, "start", index, "args", number)
+                if re.fullmatch(r"-?\d+,\d+", value):
+                    yield at, f"ROS reads {value} as text: a decimal number has a point, no comma"
+                elif start.get("script") and re.match(r"_(?!_)\w+:=", text) and name[1:] not in named:
+                    said = join_words([f"~{one}" for one in sorted(known.params)])
+                    fault = f"nothing else in the rubric names ~{name[1:]}"
+                    yield at, f"{fault}: it has {said}" if said else fault
+
+
+def _blanks(text: str) -> str:
+    """Return that one argument has been written in place of several, or with blanks around its `:=`."""
+    parts = text.split()
+    if re.search(r"\s:=|:=\s+\S", text):
+        return f"ROS reads no blanks around :=, write {re.sub(r' *:= *', ':=', text)}"
+    if len(parts) > 1 and (all(":=" in one for one in parts) or all(map(_NUMBER.fullmatch, parts))):
+        return f"is one argument: write {', '.join(json.dumps(one) for one in parts)}"
+    return ""
+
+
+def _no_colon(text: str, start: dict[str, Any], known: Known) -> str:
+    """Return that `_rate=5` sets no parameter, `gui=false` no argument, and `chatter=talk` remaps nothing."""
+    name, mark, value = text.partition("=")
+    is_name = re.fullmatch(r"[/A-Za-z][\w/]*", value)
+    is_topic = is_name and name in {topic.rpartition("/")[2] for topic in known.topics}
+    is_own = start.get("launch") is not None or name.startswith("_") or is_topic
+    is_meant = re.fullmatch(r"\w+", name) and is_own
+    return f"ROS reads {name}:={value}, with a colon, and not {text}" if mark and is_meant else ""
+
+
+def _of_launch(text: str, start: dict[str, Any], known: Known) -> str:
+    """Return that a launch file's argument is one letter off from a word that the handout has in backticks."""
+    name, mark, value = text.partition(":=")
+    near = next((one for one in sorted(known.quoted) if is_slip(name, one)), "")
+    if not mark or start.get("launch") is None or not near or name in known.words | known.params:
+        return ""
+    return f'nothing else in the rubric names {name} (did you mean "{near}:={value}"?)'
+
+
+def _fault(text: str, start: dict[str, Any], known: Known) -> str:
+    name, mark, value = text.partition(":=")
+    if (
+        not mark
+        or start.get("launch") is not None
+        or str(start.get("program")).endswith((".launch", ".test"))
+    ):
+        return ""
+    if name.startswith("__"):
+        return "" if name in SPECIAL else f"ROS has no {name}{did_you_mean(name, SPECIAL)}"
+    spaces = {topic.split("/")[1] for topic in known.topics}
+    if name == "_ns" and value.strip("/") in spaces:
+        return f"ROS reads __ns:={value}, with two underscores"
+    if name.startswith("_"):
+        near = next((one for one in sorted(known.params) if is_slip(name[1:], one)), "")
+        if start.get("script") is None or not near or name[1:] in known.params | known.words:
+            return ""
+        return f'nothing else in the rubric names {name} (did you mean "_{near}:={value}"?)'
+    return _remap(name, value, start, known)
+
+
+def _other_way(text: str, start: dict[str, Any], scenario: dict[str, Any], known: Known) -> str:
+    """Return that a remap of a script that runs alone is the wrong way round, that its namespace is missing, or that it
+    names a topic outside of it: the run waits for a topic that the node then never has."""
+    name, mark, value = text.partition(":=")
+    is_alone = start.get("script") is not None and len(as_maps(scenario.get("start"))) == 1
+    if not mark or not is_alone or name.startswith("_"):
+        return ""
+    given = dict(arg.split(":=", 1) for _, arg in as_texts(start.get("args")) if ":=" in arg)
+    space = given.get("__ns", "").strip("/")
+    old, new = (f"/{space}/{one}".replace("//", "/") if one[:1] != "/" else one for one in (name, value))
+    here = {one for _, one in texts_in((), {**scenario, "start": None}) if one in known.topics}
+    if old in here and new not in known.topics:
+        return (
+            f"what the node names comes before :=, and {old} is what the run asks for: write {value}:={name}"
+        )
+    spaces = [one.rpartition("/")[0] for one in here if one.endswith(f"/{value}") and one != new]
+    if (
+        not any("ns" in key for key in given)
+        and new not in known.topics
+        and len(spaces) == 1
+        and "/" not in value
+    ):
+        return f"this is {new}, and the run asks for {spaces[0]}/{value}: add __ns:={spaces[0].strip('/')}"
+    if space and name.startswith("/") and name[1:] in known.words and name not in known.said:
+        return f"{name} is not in the namespace {space}: write {name.lstrip('/')}:={value}"
+    return ""
+
+
+def _remap(name: str, value: str, start: dict[str, Any], known: Known) -> str:
+    """Return why nothing is remapped that the rubric speaks of."""
+    last = name.rpartition("/")[2]
+    program = PROGRAMS.get(str(start.get("program")))
+    sources = {topic.rpartition("/")[2] for topic in (program.topics if program else known.topics)}
+    if last not in sources and last in known.params:
+        return f"{last} is a parameter, and this remaps a topic: write _{last}:={value}"
+    if last not in sources and (near := slip_of(last, sources)):
+        return f'nothing else in the rubric names {name} (did you mean "{near}:={value}"?)'
+    if program and not program.is_installed and last not in sources:
+        return f"{program.node} has no topic {name}: it has {join_words(sorted(sources))}"
+    targets = {topic.rpartition("/")[2] for topic in known.topics}
+    space = dict(arg.split(":=", 1) for _, arg in as_texts(start.get("args")) if ":=" in arg).get("__ns", "")
+    whole = value if value.startswith("/") else f"/{space.strip('/')}/{value}".replace("//", "/")
+    if whole in known.topics:
+        return ""
+    alike = sorted(t for t in known.topics if t.rpartition("/")[2] == value.rpartition("/")[2])
+    near = (alike[0] if value.startswith("/") and alike else "") or slip_of(whole, known.topics)
+    if near:
+        return f'nothing else in the rubric names {whole} (did you mean "{name}:={near}"?)'
+    is_known = last in sources | known.words or value.rpartition("/")[2] in targets | known.words
+    return "" if is_known else f"nothing else in the rubric names {name} or {value}"
+
+
+def _known(rubric: dict[str, Any]) -> Known:
+    scenarios = [as_map(one) for one in as_map(rubric.get("scenarios")).values()]
+    params = {str(one.get("name")) for scenario in scenarios for _, one in set_in(scenario)}
+    texts = [(path, text) for path, text in texts_in((), rubric) if "args" not in path]
+    topics = {text for path, text in texts if re.fullmatch(r"(/\w+)+", text) and not PROSE & {*path}} - params
+    words = {word for path, text in texts if PROSE & {*path} for word in re.findall(r"\w+", text)}
+    private = {name for path, text in texts if PROSE & {*path} for name in re.findall(r"~(\w+)", text)}
+    params = private | {name.rpartition("/")[2] for name in params}
+    handout = str(rubric.get("handout") or "")
+    quoted, said = re.findall(r"`~?(\w+)`", handout), re.findall(r"(?<!\w)/\w[\w/]*", handout)
+    return Known(*map(frozenset, (topics, params, words, quoted, said)))

@@ -17,7 +17,7 @@ from grader.errors import EvidenceError
 from grader.evidence.message_values import FIRST, OTHER_TEXTS, MessageType, ServiceTypes, action_texts
 from grader.installable import noetic_messages
 from grader.model.message_definitions import NOT_FINITE
-from grader.ros_packages import ros_packages
+from grader.ros_env import ros_packages
 from grader.rubric.fault_words import model_faults
 from grader.rubric.scenario import STEP_S_MAX, Action, Step, Transform, Until
 from grader.rubric.spelling import is_slip

@@ -12,13 +12,12 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.support.fields import is_number
-from grader.rubric.arguments import argument_warnings
 from grader.rubric.definitions import services_in
 from grader.rubric.demand_warnings import Criteria, Scenarios, demand_warnings
 from grader.rubric.message_fields import POSES, VELOCITIES
 from grader.rubric.prose_warnings import SHIFTS, numbers_in, prose_warnings
 from grader.rubric.simulators import set_in, topics_of_programs
-from grader.rubric.started import starts_of
+from grader.rubric.started import argument_warnings, starts_of
 from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import (
     Fault,

@@ -19,7 +19,7 @@ from grader.arena.admission import Admission, FileLock, shared_folder
 from grader.arena.recorder import Recorder
 from grader.arena.static_recorder import RunCost
 from grader.intake.open import open_submission
-from grader.model.progress import Silence
+from grader.model.result import Silence
 from grader.package import read_packages
 from grader.rubric.load import load_rubric
 

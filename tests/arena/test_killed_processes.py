@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena import killed_processes
-from grader.arena.killed_processes import Killed
+from grader.arena import session
+from grader.arena.session import Killed
 
 INSIDE = {"signal": 9, "exit_code": 137, "stopped_by": None}
 WALL = {"signal": 9, "exit_code": None, "stopped_by": None}
@@ -21,8 +21,8 @@ def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         (tmp_path / "vmstat").write_text(f"nr_free_pages 7\noom_kill {kills}\n")
         (tmp_path / "meminfo").write_text(f"MemTotal: 100 kB\nMemFree: 1 kB\nMemAvailable: {left} kB\nBad\n")
 
-    real = killed_processes.read_numbers
-    monkeypatch.setattr(killed_processes, "read_numbers", lambda path: real(tmp_path / path.name))
+    real = session.read_numbers
+    monkeypatch.setattr(session, "read_numbers", lambda path: real(tmp_path / path.name))
     says(3, 50)
     return says
 

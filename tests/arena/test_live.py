@@ -7,9 +7,8 @@ from itertools import accumulate
 
 import pytest
 
-from grader.arena.outcome import describe_wait, find_outcome, next_look_s
+from grader.arena.outcome import all_compute, describe_wait, find_outcome, is_settled, is_silent, next_look_s
 from grader.arena.run_state import RunState
-from grader.arena.settling import all_compute, is_settled, is_silent
 from grader.model.message_rate import RateBounds
 from grader.rubric.scenario import Until
 

@@ -9,7 +9,7 @@ import pytest
 
 from grader.evidence.message_values import ServiceTypes
 from grader.evidence.run import Run
-from grader.ros_packages import ros_packages
+from grader.ros_env import ros_packages
 from grader.rubric.scenario import Scenario, Served
 from tests.arena.support import SCRIPT, make_place, printed, run
 

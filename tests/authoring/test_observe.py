@@ -8,9 +8,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.authoring.observe import answers_to, heard_template, nice_rate, observe, wraps_of
 from grader.authoring.propose import Proposal
-from grader.authoring.rubric_draft import Parts, assign_points, find_parts, rubric_text, second_look
+from grader.authoring.rubric_draft import (
+    Parts,
+    answers_to,
+    assign_points,
+    find_parts,
+    heard_template,
+    nice_rate,
+    observe,
+    rubric_text,
+    second_look,
+    wraps_of,
+)
 from grader.evidence.reader import package_facts
 from grader.evidence.run import Run
 from grader.rubric.load import load_rubric

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.model.result import ErrorInfo
-from grader.report.classroom import JSON_BYTES_MAX, render_classroom
-from grader.report.student_view import without_hidden
+from grader.report.platforms import JSON_BYTES_MAX, render_classroom
+from grader.report.view import without_hidden
 from tests.ci.reporter import reporter
 from tests.report.hostile import result, rubric
 from tests.support.a_class import criterion

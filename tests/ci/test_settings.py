@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from grader.cli.outcome import exit_code
+from grader.cli.display import exit_code
 from grader.errors import ExitCode, SubmissionError, UsageError
 from grader.integrations.ci_results import JobStatus, points_to_pass
 from grader.integrations.ci_systems import FAILING, PassMark, read_pass_mark, read_settings, with_pass_mark

@@ -13,8 +13,7 @@ from rich.live import Live
 
 from grader.cli.display import LiveSteps, print_early
 from grader.cli.main import run
-from grader.model.progress import Silence
-from grader.model.result import EarlyVerdict
+from grader.model.result import EarlyVerdict, Silence
 from grader.pipeline import GradeOptions, grade
 from grader.rubric.load import load_rubric
 from tests.fixture_runs import ROOT

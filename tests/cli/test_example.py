@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.authoring.mutation.package_tree import read_tree
-from grader.authoring.mutation.solution import references_folder
+from grader.authoring.mutation.solution import read_tree, references_folder
 from grader.cli.main import run
 from grader.rubric.find import rubric_ids, rubrics_folder
 

@@ -13,14 +13,13 @@ import pytest
 from grader import __version__
 from grader.arena.sandbox import is_shown
 from grader.checks import CHECKS
-from grader.cli import doctor
+from grader.cli import host_support
 from grader.cli.host_support import DoctorRow
 from grader.cli.main import run
 from grader.errors import EvidenceError
 from grader.judging.summary import criteria_bytes
 from grader.report.files import result_bytes
-from grader.ros_env import RosInstallation
-from grader.ros_packages import RosPackages
+from grader.ros_env import RosInstallation, RosPackages
 from grader.rubric.find import rubric_ids
 from grader.rubric.load import load_rubric
 from tests.report.hostile import result
@@ -238,7 +237,7 @@ def test_inspect_says_what_is_wrong_with_a_file(content, tmp_path, capsys):
 @pytest.mark.parametrize(("state", "code"), [("ok", 0), ("limited", 0), ("missing", 3)])
 def test_doctor_tells_by_its_exit_code(state, code, capsys, monkeypatch):
     row = DoctorRow(name="ROS 1", state=state, detail="x\x1b", fix="apt-get install ros")
-    monkeypatch.setattr("grader.cli.doctor.diagnose", lambda: (row,))
+    monkeypatch.setattr("grader.cli.host_support.diagnose", lambda: (row,))
     assert run(["doctor"]) == code
     out = capsys.readouterr().out
     assert state in out
@@ -249,16 +248,16 @@ def test_doctor_tells_by_its_exit_code(state, code, capsys, monkeypatch):
 
 
 def test_diagnosis_without_ros_names_the_command_that_mends_it(monkeypatch):
-    monkeypatch.setattr(doctor, "find_ros", lambda: None)
-    rows = {row.name: row for row in doctor.diagnose()}
+    monkeypatch.setattr(host_support, "find_ros", lambda: None)
+    rows = {row.name: row for row in host_support.diagnose()}
     assert rows["ROS 1"].state == "missing"
     assert "apt-get install" in rows["ROS 1"].fix
     assert {"Python", "git", "sandbox", "memory", "disk", "host name", "encoding"} <= set(rows)
 
 
 def test_doctor_names_a_machine_that_does_not_know_its_own_name(monkeypatch):
-    monkeypatch.setattr(doctor, "resolves", lambda name: name != "localhost")
-    rows = {row.name: row for row in doctor.diagnose()}
+    monkeypatch.setattr(host_support, "resolves", lambda name: name != "localhost")
+    rows = {row.name: row for row in host_support.diagnose()}
     assert (rows["host name"].state, rows["host name"].fix) == (
         "limited",
         "echo '127.0.0.1 localhost' >> /etc/hosts",
@@ -288,9 +287,9 @@ def test_doctor_says_what_a_rubric_needs_and_this_machine_lacks(tmp_path, capsys
     )
     here = RosPackages(ros)
     monkeypatch.setattr("grader.rubric.references.ros_packages", lambda: here)
-    monkeypatch.setattr(doctor, "ros_packages", lambda: here)
-    monkeypatch.setattr(doctor, "diagnose", lambda: ())
-    monkeypatch.setattr(doctor, "is_shown", lambda folder, _: folder.parent.name == "share")
+    monkeypatch.setattr(host_support, "ros_packages", lambda: here)
+    monkeypatch.setattr(host_support, "diagnose", lambda: ())
+    monkeypatch.setattr(host_support, "is_shown", lambda folder, _: folder.parent.name == "share")
     rows = ("course_sim/Lap", "course_map/Lap", "gazebo_msgs/LinkState", "lab1/Own")
     one = "  - {{id: c{}, title: x, points: 25, check: topic-type, scenario: real, with: {{topic: /c{}, type: {}}}}}\n"
     turtle = "script: src/talker.py}\n      - {name: s, program: turtlesim/turtlesim_node}"
@@ -321,7 +320,7 @@ def test_doctor_says_how_a_package_is_installed(kind, name, fix):
     ros = RosInstallation(
         kind=kind, where="x", distro="noetic", python="python3", prefixes=(), env={"ROS_PACKAGE_PATH": ""}
     )
-    assert doctor._package(name, ["Lap"], RosPackages(ros)).fix == fix
+    assert host_support._package(name, ["Lap"], RosPackages(ros)).fix == fix
 
 
 def test_a_workspace_below_tmp_is_hidden_from_the_sandbox():

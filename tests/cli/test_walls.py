@@ -12,8 +12,7 @@ from grader.arena import control_groups
 from grader.arena.control_groups import Cgroup, Cgroups
 from grader.arena.sandbox import Sandbox
 from grader.cli import host_support
-from grader.cli.doctor import diagnose
-from grader.cli.host_support import DoctorRow
+from grader.cli.host_support import DoctorRow, diagnose
 from grader.errors import HostError, SandboxMissing
 
 

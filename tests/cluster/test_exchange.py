@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from fsspec.implementations.local import LocalFileSystem
 
-from grader.classes.cluster.exchange import Exchange, check_url
+from grader.classes.cluster.worker import Exchange, check_url
 from grader.errors import HostError, UsageError
 
 WORD = "0123abcd"

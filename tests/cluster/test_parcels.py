@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.cluster import exchange
-from grader.classes.cluster.exchange import Parcel, pack, unpack
+from grader.classes.cluster import worker
+from grader.classes.cluster.worker import Parcel, pack, unpack
 from grader.errors import HostError
 
 
@@ -101,10 +101,10 @@ def test_what_was_not_sent_is_refused(harm: Callable[[bytes], bytes], tmp_path: 
 
 def test_more_than_results_ever_are_is_refused(tmp_path: Path, monkeypatch) -> None:
     content = _tar(*(_member(f"{number}", size=100) for number in range(20)))
-    monkeypatch.setattr(exchange, "ENTRIES", 19)
+    monkeypatch.setattr(worker, "ENTRIES", 19)
     with pytest.raises(HostError, match="more than results ever are"):
         unpack(io.BytesIO(content), _parcel(content), tmp_path)
-    monkeypatch.setattr(exchange, "ENTRIES", 20)
-    monkeypatch.setattr(exchange, "UNPACKED_BYTES", 1999)
+    monkeypatch.setattr(worker, "ENTRIES", 20)
+    monkeypatch.setattr(worker, "UNPACKED_BYTES", 1999)
     with pytest.raises(HostError, match="more than results ever are"):
         unpack(io.BytesIO(content), _parcel(content), tmp_path)

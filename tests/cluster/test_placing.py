@@ -11,8 +11,8 @@ import pytest
 from grader.arena.limits import RunLimits
 from grader.classes.batch.job import GradingJob, SubmissionOutcome
 from grader.classes.cluster import executor
-from grader.classes.cluster.exchange import Exchange, Parcel, Report, pack
 from grader.classes.cluster.executor import ParcelLost, store_results
+from grader.classes.cluster.worker import Exchange, Parcel, Report, pack
 from grader.errors import Busy
 from grader.results import Results
 from tests.cluster.jobs import jobs_for

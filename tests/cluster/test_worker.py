@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from grader.classes.cluster import worker
-from grader.classes.cluster.exchange import Exchange, GradeRequest
+from grader.classes.cluster.worker import Exchange, GradeRequest
 from grader.errors import HostError
 from tests.cluster.jobs import named_job
 from tests.support.processes import children_of, lives, until

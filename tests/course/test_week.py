@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.roster.table import read_table
+from grader.classes.roster.entries import read_table
 from grader.cli.main import run
 from tests.batch.a_class import CORRECT, RUBRIC, WRONG_NAME, lines_of
 from tests.course.test_course import write_roster

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.feedback import forges, rest
+from grader.classes.feedback import forges
 from grader.cli.main import run
 from tests.feedback.a_class import COMMIT, award, feedback, publish, sent
 from tests.feedback.forges import TOKEN, Failure, Forge, Repo, forge, github, gitlab
@@ -24,12 +24,12 @@ NAMES = ("ada", "bob")
 def slept(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """How long was waited for; nobody waits in the tests."""
     waits: list[float] = []
-    made = rest.Api.__init__
+    made = forges.Api.__init__
 
-    def without_waiting(self: rest.Api, *args: object) -> None:
+    def without_waiting(self: forges.Api, *args: object) -> None:
         made(self, *args, sleep=lambda wait_s: waits.append(round(wait_s)))  # type: ignore[arg-type]
 
-    monkeypatch.setattr(rest.Api, "__init__", without_waiting)
+    monkeypatch.setattr(forges.Api, "__init__", without_waiting)
     return waits
 
 

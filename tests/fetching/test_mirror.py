@@ -16,7 +16,7 @@ import pytest
 
 from grader.arena import base_workspace as arena_cache
 from grader.classes.fetching import Rule, prefetch
-from grader.classes.fetching.cache import cache_folder, locked, tidy
+from grader.classes.fetching.mirror import cache_folder, locked, tidy
 from tests.fetching.samples import AT_ONCE, DEADLINE, HOST, commit_at, entry
 from tests.intake.samples import git, write
 from tests.support.processes import until

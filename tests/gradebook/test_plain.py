@@ -13,8 +13,7 @@ from pathlib import Path
 import openpyxl
 import pytest
 
-from grader.classes.gradebook import Book, GradebookRow, write_gradebook
-from grader.classes.gradebook.write import json_line
+from grader.classes.gradebook import Book, GradebookRow, json_line, write_gradebook
 from grader.errors import OutputError, UsageError
 from grader.model.result import GradingResult
 from tests.gradebook.made import BOOK, late, overridden, row

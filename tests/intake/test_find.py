@@ -9,8 +9,7 @@ import time
 import pytest
 
 from grader.errors import PackageNotFound, SubmissionError
-from grader.intake.choose import WantedPackage
-from grader.intake.find import enclosing_package, find_packages
+from grader.intake.choose import WantedPackage, enclosing_package, find_packages
 from tests.intake.samples import lab, manifest, opened, repository, write
 
 BROKEN = "<package><name>lab1</name><oops></package>"

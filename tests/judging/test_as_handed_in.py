@@ -1,6 +1,6 @@
 import pytest
 
-from grader.judging.as_handed_in import with_lines_as_handed_in
+from grader.judging.repeats_and_repairs import with_lines_as_handed_in
 from grader.model.repair import Repair
 from grader.model.verdict import FileCitation, failed
 

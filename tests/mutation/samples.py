@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from grader.authoring.mutation.package_tree import Tree, TreeFile
-from grader.authoring.mutation.solution import Solution, find_reference, load_solution
+from grader.authoring.mutation.solution import Solution, Tree, TreeFile, find_reference, load_solution
 from grader.rubric.load import load_rubric
 
 ROOT = Path(__file__).resolve().parent.parent.parent

@@ -15,9 +15,8 @@ import yaml
 
 from fixtures.make import declared, faulty_package, rubric_of
 from grader.authoring.mutation.operators import OPERATORS
-from grader.authoring.mutation.package_tree import Tree, unified_diff
 from grader.authoring.mutation.registry import Operator, operator
-from grader.authoring.mutation.solution import Reference, Site, Solution, load_solution
+from grader.authoring.mutation.solution import Reference, Site, Solution, Tree, load_solution, unified_diff
 from tests.mutation.samples import EXAMPLES, LABS, other_solution, reference_solution, tree_of
 
 GOLDEN = Path(__file__).parent / "golden"

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from grader.authoring.mutation import package_tree as tree_module
-from grader.authoring.mutation.package_tree import TreeFile, read_tree, unified_diff, write_tree
+from grader.authoring.mutation import solution as tree_module
+from grader.authoring.mutation.solution import TreeFile, read_tree, unified_diff, write_tree
 from grader.authoring.mutation.source_edits import TextEdit, apply_edits
 from grader.errors import UsageError
 

@@ -10,8 +10,7 @@ from grader.authoring.mutation.faulty_packages import (
     select_mutants,
 )
 from grader.authoring.mutation.operators import OPERATORS
-from grader.authoring.mutation.package_tree import TreeFile, unified_diff
-from grader.authoring.mutation.solution import Solution
+from grader.authoring.mutation.solution import Solution, TreeFile, unified_diff
 from grader.errors import RubricError, UsageError
 from grader.model.mutants import Mutant
 from grader.rubric.yaml_lines import Source

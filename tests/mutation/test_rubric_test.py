@@ -15,8 +15,7 @@ from grader.authoring.mutation.solution import Solution
 from grader.classes.batch.job import FolderJob, GradedSubmission
 from grader.errors import HostError
 from grader.model.mutants import Mutant
-from grader.model.progress import Silence
-from grader.model.result import CriterionResult
+from grader.model.result import CriterionResult, Silence
 from grader.rubric.load import load_rubric
 from tests.mutation.samples import tree_of
 from tests.report.hostile import result

@@ -6,8 +6,13 @@ from pathlib import Path
 import pytest
 
 from grader.authoring.mutation.faulty_packages import mutants_file
-from grader.authoring.mutation.package_tree import read_tree
-from grader.authoring.mutation.solution import Reference, find_reference, load_solution, reference_at
+from grader.authoring.mutation.solution import (
+    Reference,
+    find_reference,
+    load_solution,
+    read_tree,
+    reference_at,
+)
 from grader.errors import UsageError
 from grader.rubric.load import load_rubric
 from tests.mutation.samples import LABS, ROOT

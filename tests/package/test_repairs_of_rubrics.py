@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from grader.authoring.mutation.operators import OPERATORS
-from grader.authoring.mutation.package_tree import Tree, read_tree, write_tree
-from grader.authoring.mutation.solution import Solution
+from grader.authoring.mutation.solution import Solution, Tree, read_tree, write_tree
 from grader.package.repairs import Wanted, find_repairs, wanted_of
 from grader.rubric.find import rubric_ids
 from grader.rubric.load import load_rubric

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from grader.classes.review.guard import REPORTS as SHOWN_IN_REVIEW
-from grader.cli.outcome import REPORTS as SHOWN_AT_THE_END
+from grader.cli.display import REPORTS as SHOWN_AT_THE_END
 from grader.errors import HostError, OutputError
 from grader.files import atomic_write, check_writable
 from grader.integrations.ci_results import REPORT_NAMES
@@ -21,8 +21,8 @@ from grader.report.forms import FORMS
 from grader.report.losses import arrange
 from grader.report.markdown import render_markdown
 from grader.report.sentences import repair_words
-from grader.report.student_view import without_hidden
 from grader.report.terminal import Terminal, open_console
+from grader.report.view import without_hidden
 from grader.results import RESULT, RESULT_FILES
 from tests.report.hostile import result, rubric
 from tests.support.a_class import criterion

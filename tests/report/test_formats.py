@@ -23,9 +23,9 @@ from grader.model.result import ErrorInfo
 from grader.model.verdict import FileCitation, Status
 from grader.report.findings import findings, render_annotations, render_sarif, repository_path
 from grader.report.forms import FORMS
-from grader.report.gradescope import render_gradescope
 from grader.report.junit import render_junit
 from grader.report.markdown import BYTES_MAX, EDGES_MAX, PARTS_MAX, mermaid, render_markdown
+from grader.report.platforms import render_gradescope
 from tests.report import hostile
 from tests.report.nasty import STEERING
 from tests.report.test_shown import TO_A_CI

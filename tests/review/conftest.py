@@ -12,8 +12,7 @@ from flask import Flask
 from flask.testing import FlaskClient
 
 from grader.classes.review.app import create_app
-from grader.classes.review.background import Pace
-from grader.classes.review.session import ReviewSession, open_session
+from grader.classes.review.session import Pace, ReviewSession, open_session
 from tests.review.a_class import a_class
 
 PORT = 8123

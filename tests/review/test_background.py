@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from threading import Event
 
-from grader.classes.review.background import BackgroundWriter, Pace
+from grader.classes.review.session import BackgroundWriter, Pace
 from grader.errors import Busy
 
 WAIT_S = 60

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.review.code import CodeFile, code_of, highlighted
+from grader.classes.review.cards import CodeFile, code_of, highlighted
 from grader.errors import RubricError
 from grader.evidence.reader import load_run
 from grader.rubric.load import load_rubric

@@ -9,8 +9,7 @@ from datetime import datetime
 import pytest
 
 from grader.classes.batch.run import hold_folder
-from grader.classes.review.background import Pace
-from grader.classes.review.session import open_session
+from grader.classes.review.session import Pace, open_session
 from grader.model.result import Override
 from tests.review.a_class import overrides_of, points_of, result_of
 from tests.review.conftest import QUICK

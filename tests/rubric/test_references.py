@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from grader.checks import CHECKS
-from grader.ros_env import RosInstallation
-from grader.ros_packages import RosPackages
+from grader.ros_env import RosInstallation, RosPackages
 from grader.rubric import references
 from grader.rubric.load import load_rubric
 from grader.rubric.spelling import names_seen_once

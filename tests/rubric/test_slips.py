@@ -18,7 +18,7 @@ import pytest
 import yaml
 
 from grader.errors import RubricError
-from grader.ros_packages import STANDINS
+from grader.ros_env import STANDINS
 from grader.rubric.find import rubrics_folder
 from grader.rubric.load import load_rubric, warnings_of
 from grader.rubric.simulators import FIELD_M, ROBOTS

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from grader.classes.similarity import comparison
+from grader.cli.classes import starter_of
 from grader.cli.main import run as grader
-from grader.cli.similarity import starter_of
 from grader.model.batch import BatchRun, Entry, Similarity
 from grader.model.result import RubricInfo
 from tests.rubric.samples import spoiled

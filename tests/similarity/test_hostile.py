@@ -7,10 +7,9 @@ import re
 
 import pytest
 
-from grader.classes.similarity import compare, fingerprints, matching
-from grader.classes.similarity.comparison import ComparisonRequest
-from grader.classes.similarity.fingerprints import CodeSource, read_files, read_place, reading_ended
-from grader.classes.similarity.sources import ProgramText
+from grader.classes.similarity import compare, matching
+from grader.classes.similarity.comparison import ComparisonRequest, ProgramText
+from grader.classes.similarity.matching import CodeSource, read_files, read_place, reading_ended
 from grader.workers import WorkerEnded
 from tests.similarity.classes import class_of, hand_in, solution
 
@@ -53,8 +52,8 @@ def test_a_regular_expression_without_end_is_interrupted(monkeypatch) -> None:
     def stuck(path: str, code: str, language: str) -> None:
         re.match(r"(a+)+$", "a" * 60 + "b")
 
-    monkeypatch.setattr(fingerprints, "FILE_S", 0.2)
-    monkeypatch.setattr(fingerprints, "read_text", stuck)
+    monkeypatch.setattr(matching, "FILE_S", 0.2)
+    monkeypatch.setattr(matching, "read_text", stuck)
     read = read_files(CodeSource(name="ann"), (ProgramText(path="a.py", code="", language="python"),))
     assert [(one.file, one.reason) for one in read.left_out] == [("a.py", "took longer than 0.2 s to read")]
 
@@ -68,7 +67,7 @@ def test_a_regular_expression_without_end_is_interrupted(monkeypatch) -> None:
 )
 def test_what_harms_the_reader_is_said(tmp_path, monkeypatch, harm, reason) -> None:
     """What ends it costs its own submission alone: tests/test_workers.py."""
-    monkeypatch.setattr(fingerprints, "read_submission", harm)
+    monkeypatch.setattr(matching, "read_submission", harm)
     place = CodeSource(name="bad", folder=tmp_path)
     assert [one.reason for one in read_place(place).left_out] == [reason]
     ended = reading_ended(place, WorkerEnded("ended by signal 9"))

@@ -15,7 +15,7 @@ from grader.arena.sandbox_files import (
     standin_packages,
     with_standins,
 )
-from grader.cli.doctor import _standins
+from grader.cli.host_support import _standins
 from grader.ros_env import RosInstallation
 from grader.rubric.scenario import Scenario, Start, Until
 from tests.arena.support import make_place, printed, require_ros, run

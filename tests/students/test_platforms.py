@@ -32,7 +32,6 @@ LOADED = (
         "cli/checking",
         "cli/commands",
         "cli/declare",
-        "cli/doctor",
         "cli/results",
         "cli/explanation",
         "cli/main",

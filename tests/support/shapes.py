@@ -10,8 +10,7 @@ from itertools import product
 from fixtures.make import labs, rubric_of
 from fixtures.make import solution_of as reference_of
 from grader.authoring.mutation.operators import OPERATORS
-from grader.authoring.mutation.package_tree import Tree, TreeFile
-from grader.authoring.mutation.solution import Site, Solution
+from grader.authoring.mutation.solution import Site, Solution, Tree, TreeFile
 from grader.authoring.mutation.source_edits import TextEdit, apply_edits
 from grader.model.repair import RepairKind
 from grader.package.repairs import wanted_of

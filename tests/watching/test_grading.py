@@ -14,7 +14,7 @@ from grader import pipeline
 from grader.arena.interruption import Stop, Stopped, run_until_signal
 from grader.cli.main import build_parser
 from grader.errors import Busy, ExitCode, HostError, OutputError, SandboxMissing, SubmissionError
-from grader.model.progress import Silence
+from grader.model.result import Silence
 from grader.model.verdict import Status
 from grader.student.watching import Grading
 from tests.report.hostile import criterion, result

@@ -12,8 +12,7 @@ from grader.errors import ExitCode
 from grader.model.result import ErrorInfo, GradingResult
 from grader.model.verdict import Status
 from grader.report.terminal import MINUS
-from grader.student.watch_screen import DASH, JsonLines, TerminalScreen, compare
-from grader.student.watching import WatchedResult
+from grader.student.watching import DASH, JsonLines, TerminalScreen, WatchedResult, compare
 from tests.report.hostile import ESCAPES, MARKDOWN, RICH, XML, criterion, result, rubric
 
 NOON = datetime(2026, 3, 2, 12, 3, 4, tzinfo=timezone.utc)

@@ -14,8 +14,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from grader.authoring.mutation.operators import OPERATORS
-from grader.authoring.mutation.package_tree import Tree, TreeFile
-from grader.authoring.mutation.solution import Site, Solution
+from grader.authoring.mutation.solution import Site, Solution, Tree, TreeFile
 from grader.authoring.rubric_draft import dump_flow
 from grader.errors import RubricError, UsageError
 from grader.model.mutants import (

@@ -11,15 +11,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.authoring.mutation.faulty_packages import Planned
-from grader.authoring.mutation.package_tree import Tree, unified_diff, write_tree
-from grader.authoring.mutation.solution import Solution
+from grader.authoring.mutation.solution import Solution, Tree, unified_diff, write_tree
 from grader.classes.batch.job import FolderJob, GradedSubmission, grade_all
 from grader.errors import HostError
 from grader.files import temporary_folder
 from grader.model import SandboxMode
 from grader.model.mutants import Cost, LostCriterion, Mutant, MutantResult, ReferenceResult, RubricTest, State
-from grader.model.progress import Progress
-from grader.model.result import CriterionResult, GradingResult, RubricInfo
+from grader.model.result import CriterionResult, GradingResult, Progress, RubricInfo
 from grader.model.verdict import Status
 from grader.rubric.load import LoadedRubric
 from grader.wording import number

@@ -28,9 +28,8 @@ from grader.judging.settle import settle
 from grader.judging.summary import NOTHING_RUN, passed
 from grader.model import SandboxMode
 from grader.model.batch import Entry
-from grader.model.progress import Silence, StepState
 from grader.model.record import Record
-from grader.model.result import NO_TIME, GradingResult, HandedIn, Override, SubmissionInfo
+from grader.model.result import NO_TIME, GradingResult, HandedIn, Override, Silence, StepState, SubmissionInfo
 from grader.pipeline import GradeOptions, grade, prepare
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.workers import WorkerEnded, run_each

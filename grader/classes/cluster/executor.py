@@ -24,7 +24,7 @@ from typing import Any, BinaryIO
 from grader.classes.batch.job import GradingJob, SubmissionOutcome, failed_outcome
 from grader.classes.cluster import worker
 from grader.classes.cluster.connect import LOCAL, Needs, Recruits, check_address, connect, is_encrypted
-from grader.classes.cluster.exchange import (
+from grader.classes.cluster.worker import (
     Exchange,
     GradeRequest,
     Parcel,

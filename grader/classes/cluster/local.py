@@ -56,10 +56,7 @@ def own_cluster() -> Iterator[Any]:
 def _settings(folder: Path) -> dict[str, Any]:
     """Dask imports modules from its scratch folder, which is one in `/tmp` that another user may have made. A process
     is started by `spawn`, which hands over the certificates through a pipe."""
-    return {
-        "temporary-directory": str(folder),
-        "distributed.worker.multiprocessing-method": "spawn",
-    }
+    return {"temporary-directory": str(folder), "distributed.worker.multiprocessing-method": "spawn"}
 
 
 def _listening(security: Security) -> dict[str, Any]:

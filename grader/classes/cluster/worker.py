@@ -2,6 +2,8 @@
 
 A thread hands its job to a process that stays for many jobs (`grader.workers`): whatever a grading does to its process,
 the Dask worker lives on. The results go into the exchange as one file; a task returns only what became of the job.
+
+The exchange is a folder that worker and client reach: a path or any fsspec URL. Nothing in a packed file is trusted.
 """
 
 from __future__ import annotations
@@ -11,22 +13,242 @@ import hashlib
 import os
 import pickle
 import platform
+import secrets
 import socket
+import tarfile
 import threading
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any, BinaryIO, cast
+from urllib.parse import urlsplit
 
 import pydantic
 
 import grader
 from grader.classes.batch.job import GradingJob, SubmissionOutcome, grade_job, outcome_of_ended
-from grader.classes.cluster.exchange import Exchange, GradeRequest, Parcel, Report, is_machines, pack, unpack
-from grader.errors import GraderError, HostError
-from grader.files import temporary_folder
+from grader.errors import GraderError, HostError, UsageError
+from grader.files import make_folder, temporary_folder
 from grader.intake.names import safe_name
+from grader.model.record import Record
+from grader.report.view import blame
 from grader.ros_env import find_ros
 from grader.workers import Worker, WorkerEnded, WorkerLimits
+
+TOKEN_BYTES = 8
+CHUNK_BYTES = 1 << 20
+PARCEL_BYTES = 1 << 30
+UNPACKED_BYTES = 2 << 30
+ENTRIES = 10_000
+LEVEL = 1  # evidence is compressed already
+OWN_MEMORY = ("memory", "local+memory")
+HELLO = "hello"
+
+
+class Parcel(Record):
+    """A packed folder in the exchange, under `name`: its size in bytes and the sha256 of its bytes."""
+
+    name: str
+    size: int
+    sha256: str
+
+
+class GradeRequest(Record):
+    """A job on its way to a worker. `exchange` is the URL for its results, `batch` names the client's batch.
+
+    `seen`: the job's source is a path that the client sees. `lab`: the rubric with the files that it brings along, if
+    any, in the exchange too.
+    """
+
+    job: GradingJob
+    exchange: str
+    batch: str
+    seen: bool
+    lab: Parcel | None = None
+
+
+class Report(Record):
+    """What became of a request. Without a `parcel` there are no results to put into place."""
+
+    outcome: SubmissionOutcome
+    parcel: Parcel | None = None
+
+
+def is_machines(outcome: SubmissionOutcome) -> bool:
+    """Return whether it is an error that is not the submission's."""
+    return outcome.status == "error" and blame(outcome.kind) != "submission"
+
+
+class Exchange:
+    """The folder at `url`. Each machine reaches it with credentials of its own.
+
+    What cannot be read or written raises HostError, or FileNotFoundError for a parcel that is not there.
+    """
+
+    def __init__(self, url: str) -> None:
+        self.url = url.rstrip("/")
+
+    def make(self) -> None:
+        """Make the folder, without what an earlier batch left there."""
+        self.remove()
+        with self._open("written") as (files, root):
+            if "://" in self.url:
+                files.makedirs(root, exist_ok=True)
+            elif not make_folder(Path(root)):
+                raise FileExistsError("another program has just made it")
+
+    def remove(self) -> None:
+        """Delete the folder and everything in it."""
+        with self._open("written") as (files, root):
+            if files.exists(root):
+                files.rm(root, recursive=True)
+
+    def put(self, local: Path, job_id: str) -> Parcel:
+        """Upload a file under a name of its own: another attempt at the same job does not overwrite it."""
+        digest = hashlib.sha256()
+        with local.open("rb") as file:
+            while chunk := file.read(CHUNK_BYTES):
+                digest.update(chunk)
+        name = f"{job_id}.{secrets.token_hex(TOKEN_BYTES)}.tar.gz"
+        with self._open("written") as (files, root):
+            files.put_file(str(local), f"{root}/{name}")
+        return Parcel(name=name, size=local.stat().st_size, sha256=digest.hexdigest())
+
+    def open(self, parcel: Parcel) -> BinaryIO:
+        """Return a stream of the parcel's bytes."""
+        with self._open("read") as (files, root):
+            return cast("BinaryIO", files.open(f"{root}/{parcel.name}", "rb"))
+
+    def delete(self, parcel: Parcel) -> None:
+        """Delete the parcel."""
+        with self._open("written") as (files, root):
+            files.rm_file(f"{root}/{parcel.name}")
+
+    def greet(self, word: str) -> None:
+        """Leave a word: a worker that reads it reaches the same folder."""
+        with self._open("written") as (files, root):
+            files.pipe_file(f"{root}/{HELLO}", word.encode())
+
+    def answers(self, word: str) -> bool:
+        """Return whether the client's word is there, and a file can be written beside it."""
+        with self._open("written") as (files, root):
+            if not files.exists(f"{root}/{HELLO}") or files.cat_file(f"{root}/{HELLO}") != word.encode():
+                return False
+            mine = f"{root}/{HELLO}.{secrets.token_hex(TOKEN_BYTES)}"
+            files.pipe_file(mine, b"")
+            files.rm_file(mine)
+            return True
+
+    @contextmanager
+    def _open(self, purpose: str) -> Iterator[tuple[Any, str]]:
+        """The file system and the folder's name in it. Whatever it raises becomes a HostError that names the exchange.
+
+        Each thread opens its own, since not every file system can be shared.
+        """
+        import fsspec  # noqa: PLC0415 - of the extra `cluster`
+
+        try:
+            if "://" in self.url:
+                files, root = fsspec.core.url_to_fs(self.url)
+                files.invalidate_cache()
+                yield files, root.rstrip("/")
+            else:
+                yield fsspec.filesystem("file"), self.url
+        except (FileNotFoundError, HostError):
+            raise
+        except Exception as error:
+            reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
+            raise HostError(
+                f"the exchange {self.url} cannot be {purpose}: {reason}",
+                hint="give --exchange a folder or URL that this machine and every worker can write",
+            ) from error
+
+
+def check_url(text: str) -> str:
+    """Return what `--exchange` says, a path made absolute.
+
+    Raises UsageError for what workers cannot reach, and for a password: it would be sent to all of them.
+    """
+    if "://" not in text:
+        return str(Path(text).absolute())
+    import fsspec  # noqa: PLC0415 - of the extra `cluster`
+
+    parts = urlsplit(text)
+    if parts.password is not None:
+        raise UsageError(
+            "--exchange holds a password, which every worker and its logs would see",
+            hint="let each machine have credentials of its own (a key, environment variables, a configuration file)",
+        )
+    if parts.scheme in OWN_MEMORY:
+        raise UsageError(
+            f"--exchange {text}: memory belongs to one process", hint="give a path or s3://…, sftp://…"
+        )
+    try:
+        fsspec.get_filesystem_class(parts.scheme)
+    except ImportError as error:
+        raise UsageError(f"--exchange {text}: {error}", hint="install it here and on every worker") from error
+    except ValueError as error:
+        known = "a path, s3://bucket/folder, gs://…, abfs://… or sftp://host/folder"
+        raise UsageError(f"--exchange {text}: {error}", hint=f"give {known}") from error
+    return text
+
+
+def pack(folder: Path, file: Path) -> None:
+    """Pack everything in `folder`, without the grader's own hidden files."""
+    with tarfile.open(file, "x:gz", compresslevel=LEVEL) as archive:
+        for path in sorted(folder.iterdir()):
+            if not path.name.startswith("."):
+                archive.add(path, arcname=path.name)
+
+
+def unpack(stream: BinaryIO, parcel: Parcel, folder: Path) -> None:
+    """Unpack the parcel's files into `folder`. Raises HostError for other content than was sent, for more than results
+    ever are, and for anything that is neither file nor folder or leads out; `folder` is then to be thrown away."""
+    measured = _Measured(stream, parcel)
+    try:
+        with tarfile.open(fileobj=cast("BinaryIO", measured), mode="r|gz") as archive:
+            _extract(archive, parcel, folder)
+        while measured.read(CHUNK_BYTES):
+            pass
+    except (tarfile.TarError, zlib.error, EOFError, ValueError, OSError) as error:
+        raise _refuse(parcel, str(error) or type(error).__name__) from error
+    if (measured.size, measured.digest.hexdigest()) != (parcel.size, parcel.sha256):
+        raise _refuse(parcel, "it is not what the worker sent")
+
+
+def _extract(archive: tarfile.TarFile, parcel: Parcel, folder: Path) -> None:
+    size, count = 0, 0
+    while (member := archive.next()) is not None:
+        size, count = size + member.size, count + 1
+        if count > ENTRIES or size > UNPACKED_BYTES:
+            raise _refuse(parcel, "it holds more than results ever are")
+        if not (member.isreg() or member.isdir()):
+            raise _refuse(parcel, "it holds something that is neither file nor folder")
+        archive.extract(member, folder, set_attrs=False, filter="data")
+        archive.members = []  # type: ignore[attr-defined] # it would keep all of them in memory
+
+
+class _Measured:
+    """A stream that counts and digests what is read from it."""
+
+    def __init__(self, stream: BinaryIO, parcel: Parcel) -> None:
+        self._stream, self._parcel = stream, parcel
+        self.size, self.digest = 0, hashlib.sha256()
+
+    def read(self, size: int) -> bytes:
+        data = self._stream.read(size)
+        self.size += len(data)
+        self.digest.update(data)
+        if self.size > min(self._parcel.size, PARCEL_BYTES):
+            raise _refuse(self._parcel, "it is larger than what the worker sent")
+        return data
+
+
+def _refuse(parcel: Parcel, why: str) -> HostError:
+    hint = "check whether another program writes into the exchange"
+    return HostError(f"{parcel.name} cannot be unpacked: {why}", hint=hint)
+
 
 WATCH_S = 1.0
 LEAVE_S = 40.0

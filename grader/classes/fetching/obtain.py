@@ -13,19 +13,22 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from grader.classes.fetching.cache import MirrorFolder, cache_folder, locked, tidy_now_and_then
 from grader.classes.fetching.history import Commit, NothingInTime, Rule, choose_commit, not_chosen
 from grader.classes.fetching.mirror import (
     FetchRequest,
     GivenUp,
     Listing,
     Mirror,
+    MirrorFolder,
     Patience,
     bring_up_to_date,
+    cache_folder,
     error_of,
     git_in,
+    locked,
     patiently,
     place_name,
+    tidy_now_and_then,
 )
 from grader.errors import SubmissionError
 from grader.files import temporary_folder

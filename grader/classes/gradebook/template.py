@@ -20,7 +20,7 @@ from grader.classes.gradebook.platforms import (
     row_identity,
 )
 from grader.classes.gradebook.table import harmless, number_text
-from grader.classes.roster.table import delimiter_of, encoding_of
+from grader.classes.roster.entries import delimiter_of, encoding_of
 from grader.errors import UsageError
 from grader.wording import first_few
 
@@ -308,11 +308,7 @@ def read_sheet(path: Path) -> Sheet:
         raise UsageError(f"{path}: not {encoding.upper()} text", hint=_EXPORT) from error
     delimiter = delimiter_of(re.split(r"[\r\n]", text, maxsplit=1)[0])
     sheet = Sheet(
-        path=path,
-        mark=mark,
-        encoding=encoding,
-        delimiter=delimiter,
-        records=list(_records(text, delimiter)),
+        path=path, mark=mark, encoding=encoding, delimiter=delimiter, records=list(_records(text, delimiter))
     )
     if not any(name.strip() for name in sheet.header):
         raise UsageError(f"{path}:1: no columns are named", hint=_EXPORT)

@@ -33,6 +33,7 @@ from grader.classes.overrides import bounds
 from grader.classes.review.cards import (
     MANUAL,
     Cards,
+    CodeFile,
     Decided,
     Draft,
     Known,
@@ -41,11 +42,11 @@ from grader.classes.review.cards import (
     bank_comment_of,
     card,
     cards,
+    code_of,
     comment_name,
     override_of,
     points_words,
 )
-from grader.classes.review.code import CodeFile, code_of
 from grader.classes.review.guard import (
     FRAMED,
     REPORTS,

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from grader.classes.roster.entries import OWN_FOLDER, Local, entries_of
+from grader.classes.roster.entries import OWN_FOLDER, Local, entries_of, read_table
 from grader.classes.roster.platforms import (
     from_folder,
     from_gitlab,
@@ -16,7 +16,6 @@ from grader.classes.roster.platforms import (
     refuse_classroom_roster,
     with_roster_columns,
 )
-from grader.classes.roster.table import read_table
 from grader.errors import UsageError
 from grader.model.batch import Entry, Roster
 

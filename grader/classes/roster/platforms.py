@@ -22,13 +22,15 @@ from grader.classes.roster.entries import (
     REFUSED,
     FoundEntry,
     Local,
+    RosterRow,
+    Table,
     columns_of,
     gather,
     local_fault,
     source_fault,
+    text_of,
     whole_source,
 )
-from grader.classes.roster.table import RosterRow, Table, text_of
 from grader.errors import HostError, UsageError
 from grader.files import make_folder, temporary_folder, unwritable
 from grader.intake.names import archive_stem, encodable, is_archive_name, listing, printable

@@ -47,9 +47,8 @@ def grade(
     """Grade one submission: a folder, an archive, a git URL or a recording."""
     with loading():
         from grader import pipeline
-        from grader.cli.display import open_progress
+        from grader.cli.display import open_progress, show
         from grader.cli.host_support import warn_without_sandbox
-        from grader.cli.outcome import show
         from grader.files import check_writable
         from grader.intake.open import is_recording
         from grader.rubric.load import load_rubric
@@ -137,9 +136,7 @@ def judge(
 
 @command("inspect")
 def inspect(
-    *,
-    file: Annotated[Path, Argument("FILE", "an .mcap, .bag or .db3 file")],
-    as_json: JsonFlag = False,
+    *, file: Annotated[Path, Argument("FILE", "an .mcap, .bag or .db3 file")], as_json: JsonFlag = False
 ) -> ExitCode:
     """Show what is in an evidence file or a bag: rates, gaps, nodes."""
     with loading():

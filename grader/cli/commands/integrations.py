@@ -143,8 +143,7 @@ def export_bag(
 
 @command("ci", notes=CI_VARIABLES, runs_code=True)
 def ci(
-    *,
-    system: Annotated[Literal["github", "gitlab"], Argument("", "the CI system that runs the job")],
+    *, system: Annotated[Literal["github", "gitlab"], Argument("", "the CI system that runs the job")]
 ) -> ExitCode:
     """Check a package in a CI job, and report to the CI system.
 

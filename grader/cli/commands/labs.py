@@ -139,10 +139,7 @@ def print_rubric_schema(*, rubric: Annotated[str | None, RUBRIC] = None) -> Exit
 
 @command("rubric copy", group=INSTRUCTORS)
 def copy_rubric(
-    *,
-    lab: Annotated[str, LAB],
-    out: Annotated[str, OUT] = STDOUT,
-    force: Annotated[bool, FORCE] = False,
+    *, lab: Annotated[str, LAB], out: Annotated[str, OUT] = STDOUT, force: Annotated[bool, FORCE] = False
 ) -> ExitCode:
     """Write the rubric of a lab that comes with the grader, to change it."""
     with loading():

@@ -104,7 +104,7 @@ def doctor(*, rubric: Annotated[str | None, RUBRIC] = None, as_json: JsonFlag = 
     something is missing.
     """
     with loading():
-        from grader.cli import doctor as machine
+        from grader.cli import host_support as machine
         from grader.cli.output import say_json
         from grader.rubric.load import load_rubric
     loaded = load_rubric(rubric) if rubric is not None else None

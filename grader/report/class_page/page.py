@@ -114,13 +114,7 @@ def _page(run: BatchRun, found: Gathered, out: Path | None) -> str:
         "heat": heat,
         "timing": timing(run, lines),
         "columns": list(_columns(lines)),
-        "data": page_data(
-            lines,
-            run.criteria,
-            [one.found.members for one in (*shared, *alone)],
-            cost,
-            heat,
-        ),
+        "data": page_data(lines, run.criteria, [one.found.members for one in (*shared, *alone)], cost, heat),
     }
     return _template().render(parts)
 

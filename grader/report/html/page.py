@@ -29,17 +29,14 @@ from grader.report.losses import (
     missing_files,
     write_files_hint,
 )
-from grader.report.sentences import (
-    is_own_fault,
-    lost_words,
-)
-from grader.report.student_view import hidden_ids
+from grader.report.sentences import is_own_fault, lost_words
 from grader.report.text import line
 from grader.report.view import (
     blame,
     commands_in,
     file_places,
     headline,
+    hidden_ids,
     hint_beside,
     not_graded,
     of_points,

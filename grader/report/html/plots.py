@@ -403,8 +403,7 @@ def _mean(frame: Frame, mean_hz: float | None) -> list[Markup]:
 def _hatching(name: str) -> Markup:
     line = element("path", d="M0 8L8 0", class_="hatch")
     return element(
-        "defs",
-        element("pattern", line, id=f"{name}-late", width=8, height=8, patternUnits="userSpaceOnUse"),
+        "defs", element("pattern", line, id=f"{name}-late", width=8, height=8, patternUnits="userSpaceOnUse")
     )
 
 

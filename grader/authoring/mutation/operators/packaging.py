@@ -9,9 +9,8 @@ from pathlib import PurePosixPath
 
 from cmake_parser.ast import Command, Token
 
-from grader.authoring.mutation.package_tree import Tree
 from grader.authoring.mutation.registry import Finder, operator
-from grader.authoring.mutation.solution import CodePlace, Solution
+from grader.authoring.mutation.solution import CodePlace, Solution, Tree
 from grader.authoring.mutation.source_edits import Document, Element, TextEdit, whole_lines
 from grader.model.package import CMAKE, MANIFEST
 
