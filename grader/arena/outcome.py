@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from grader.arena.run_state import ROSOUT, RunState, TopicSeen
-from grader.arena.settling import computes, goes_on, is_fed, is_settled, is_silent
+from grader.arena.settling import computes, goes_on, is_fed, is_settled, is_silent, is_unnamed
 from grader.rubric.scenario import Until
 
 Outcome = tuple[str, str]
@@ -204,7 +204,7 @@ def starting(live: RunState, until: Until, now_s: float) -> set[str]:
     """Return the processes that may yet become nodes: on a busy machine, imports alone can take many seconds."""
     if now_s > starts_until_s(live, until):
         return set()
-    return {p for p in live.running - live.registered if not computes(live, p)}
+    return {p for p in live.running - live.registered if not computes(live, p) and not is_unnamed(live, p)}
 
 
 def starts_until_s(live: RunState, until: Until) -> float:

@@ -251,6 +251,15 @@ def test_the_fault_behind_a_repaired_one_is_named() -> None:
     assert node.hint.startswith("src/numeric_talker.py line 7: indent every line with four spaces; then ")
 
 
+def test_what_the_machine_keeps_the_copy_from_showing_is_charged_to_no_other_criterion() -> None:
+    found = judged(
+        died("SyntaxError: invalid syntax", 7), died("ModuleNotFoundError: No module named 'tf'", 3), TABS
+    )
+    status = {name: one.status.value for name, one in found.items() if name != "executable"}
+    assert status == {"node": "fail", "rate": "inconclusive", "chatter": "inconclusive"}
+    assert "lacks tf" in found["rate"].message
+
+
 def test_a_copy_that_helps_nothing_changes_nothing() -> None:
     runs = build_runs({"runs": {"talker": DIED}, "package": PACKAGE})
     alone = judge(rubric(*ALL), runs)
@@ -491,6 +500,23 @@ def test_a_repair_concerns_the_runs_that_use_its_file(file: str, runs: set[str])
     asked = rubric(*ALL, scenarios={"talker": SCENARIO, **launched})
     name = Repair(kind="node-name", file=file, line=1, before="a", after="b", message="m", fix="b")
     assert {s for s, one in asked.scenarios.items() if is_used_by(one, name, asked, built=True)} == runs
+
+
+@pytest.mark.parametrize(
+    ("line", "uses"),
+    [
+        ("  FILES Add.srv", True),
+        ("FILES Fly.action", True),
+        ("  scripts/other.py", False),
+        ("  rospy", False),
+    ],
+)
+def test_a_definition_that_is_named_concerns_the_runs_though_the_build_worked(line: str, uses: bool) -> None:
+    asked = rubric(*ALL)
+    one = Repair(
+        kind="build-line", file="CMakeLists.txt", line=5, before="", after=line, message="m", fix="f"
+    )
+    assert is_used_by(asked.scenarios["talker"], one, asked, built=True) is uses
 
 
 @pytest.mark.parametrize(

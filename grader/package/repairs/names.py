@@ -97,8 +97,9 @@ def wanted_of(rubric: Rubric, package: str = "") -> Wanted:
 def _definitions(criteria: Iterable[Criterion]) -> Iterator[tuple[str, tuple[InterfaceField, ...]]]:
     for given in (one.parameters for one in criteria if one.check == "definition"):
         file, text = given["file"], given.get("text")
-        parts = (name.rpartition(".") for name in given.get("fields", ()))
-        named = (InterfaceField(part=part, type="", name=name, line=0) for part, _, name in parts)
+        types = dict(given.get("fields", {}))
+        parts = ((*path.rpartition("."), str(kind)) for path, kind in types.items())
+        named = (InterfaceField(part=part, type=kind, name=name, line=0) for part, _, name, kind in parts)
         yield file, tuple(parse_definition(text, PurePosixPath(file).suffix) if text else named)
 
 
