@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from grader.checks.registry import ProcessName, check
 from grader.checks.support.console_output import (
+    SUMMARY,
     Level,
     Line,
     Logged,
@@ -150,7 +151,7 @@ def _read(run: Run, process: str) -> tuple[list[Line], list[Line]]:
     lines: list[Line] = []
     errors: list[Line] = []
     for stream in stream_lines(run, process):
-        read = stream[:LINES_MAX]
+        read = [line for line in stream[:LINES_MAX] if not SUMMARY.match(line.text)]
         found = tracebacks([line.text for line in read])
         hidden = {index for one in found for index in range(one.first, one.last + 1)}
         lines += [line for index, line in enumerate(read) if index not in hidden and line.text.strip()]
@@ -462,7 +463,7 @@ def _is_late(run: Run, params: LogsParams) -> bool:
 def _asked_lines(run: Run, params: LogsParams) -> list[tuple[int, ConsoleLine]]:
     """Return the console's lines of the process that is judged, or of all the student's."""
     asked = {params.process} if params.process else {one.name for one in lives(run)}
-    return [(t, line) for t, line in run.console if line.process in asked]
+    return [(t, line) for t, line in run.console if line.process in asked and not SUMMARY.match(line.line)]
 
 
 def _near(run: Run, lines: Iterable[Logged], params: LogsParams) -> Verdict | None:
