@@ -483,6 +483,29 @@ def built(package: dict[str, Any], *, exit_code: int, said: Sequence[str] = ()) 
     return build_runs({"runs": {"package": run}})
 
 
+def test_a_build_that_the_machine_ends_after_the_repair_leaves_what_it_makes_open() -> None:
+    package = {**PACKAGE, "name": "lab1", "manifest": {}, "interfaces": [{"path": "msg/A.msg", "fields": []}]}
+    package["files"] = [*package["files"], {"path": "msg/A.msg"}, {"path": "CMakeLists.txt"}]
+    end = died("ModuleNotFoundError: No module named 'lab1'", 3)
+    folder = "CMake Error at CMakeLists.txt:4 (catkin_package):\n  catkin_package() include dir 'include' does not exist"
+    lacks = (
+        'CMake Error: Could not find a package configuration file provided by "tf" with any of the following'
+    )
+    runs: dict[str, Run] = {}
+    line = Repair(
+        kind="build-line", file="CMakeLists.txt", line=4, before="a include", after="a", message="m", fix="f"
+    )
+    for prefix, said in (("", folder), ("repaired-1/", lacks)):
+        runs[f"{prefix}package"] = built(package, exit_code=1, said=said.split("\n"))["package"]
+        about = {**runs[f"{prefix}package"].metadata, "repairs": json.dumps([line.model_dump()])}
+        runs[f"{prefix}package"] = replace(runs[f"{prefix}package"], metadata=about)
+        runs[f"{prefix}talker"] = build_runs({"runs": {"talker": end}, "package": package})["talker"]
+    asked = ({"id": "build", "check": "build"}, {**NODE, "requires": []}, {**RATE, "requires": ["node"]})
+    found = {c.id: c for c in judge(rubric(*asked), runs)}
+    assert found["build"].status.value == "fail"
+    assert {found[name].status.value for name in ("node", "rate")} == {"inconclusive"}
+
+
 @pytest.mark.parametrize(
     ("file", "runs"),
     [

@@ -18,8 +18,8 @@ UNDEFINED = {
         "and nothing calls `turn_server`: on line 7, write `turn_server` instead of `add_server`"),
     "a function of other arguments": ("def turn_server(a):\n    pass\nadd_server()\n", "above line 4, define it with"),
     "a value like a function's name": (
-        "from lab.srv import TurnResponse\ndef turning_velocity_server(req):\n"
-        "    return TurnResponse(turning_velocity)\n",
+        ("from lab.srv import TurnResponse\ndef turning_velocity_server(req):\n"
+         "    return TurnResponse(turning_velocity)\n"),
         "above line 4, write `turning_velocity = …`, with the value that it should have"),
     "publisher": ("while True:\n    pub.publish(1)\n",
                   "above line 2, write `pub = rospy.Publisher('…', …, queue_size=10)`"),
