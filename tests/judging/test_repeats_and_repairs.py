@@ -487,7 +487,9 @@ def test_a_build_that_the_machine_ends_after_the_repair_leaves_what_it_makes_ope
     package = {**PACKAGE, "name": "lab1", "manifest": {}, "interfaces": [{"path": "msg/A.msg", "fields": []}]}
     package["files"] = [*package["files"], {"path": "msg/A.msg"}, {"path": "CMakeLists.txt"}]
     end = died("ModuleNotFoundError: No module named 'lab1'", 3)
-    folder = "CMake Error at CMakeLists.txt:4 (catkin_package):\n  catkin_package() include dir 'include' does not exist"
+    folder = (
+        "CMake Error at CMakeLists.txt:4 (catkin_package):\n  catkin_package() include dir 'i' does not exist"
+    )
     lacks = (
         'CMake Error: Could not find a package configuration file provided by "tf" with any of the following'
     )

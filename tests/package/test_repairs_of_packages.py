@@ -53,6 +53,7 @@ generate_messages(DEPENDENCIES actionlib_msgs std_msgs)
 """,
 )
 GO_FIELDS = tuple(parse_definition("int32 n\n---\nbool there\n---\nint32 left\n", ".action"))
+TWO_FIELDS = tuple(parse_definition("int64 a\n---\nint64 sum", ".srv"))
 LEVEL_FIELDS = tuple(
     parse_definition("float64 level\nstring[] names\nint8 b", ".msg")
 )  # a number of another size and another name of a type are left as they are
@@ -429,6 +430,11 @@ CASES = {
         ["build-line"], "write a line `---` below lines 1 and 2",
         asking(definitions=(("action/Go.action", GO_FIELDS),)),
         {"action/Go.action": "int32 n\n---\nbool there\n---\nint32 left"},
+    ),
+    "own-service-without-its-divider": Case(
+        {**SERVICE, "srv/Two.srv": "int64 a\nint64 sum\n", TALKER: SCRIPT + "from lab.srv import Two\n",
+         CMAKELISTS: SERVICE_CMAKE}, ["build-line"], "below line 1 add `---`",
+        asking(definitions=(("srv/Two.srv", TWO_FIELDS),)), {"srv/Two.srv": "int64 a\n---\nint64 sum\n"},
     ),
     "own-action-with-fields-mixed": Case(
         {"src/go.py": "from lab.msg import GoAction\n", "action/Go.action": "int32 n\nint32 left\nbool there\nint8 s\n",

@@ -235,7 +235,7 @@ def _divide(files: Files, own: Interface, fields: Sequence[InterfaceField], text
     for line in reversed(below):
         lines.insert(line, DIVIDING)
     fault = own.fault.message if own.fault else ""
-    fix = f"write a line `---` below {'line' if len(below) == 1 else 'lines'} {numbers_text(below)}"
+    fix = f"write a line `---` below lines {numbers_text(below)}" if len(below) > 1 else ""
     files.change("build-line", own.path, "\n".join(lines), f"{own.path}: {fault}", fix)
 
 
