@@ -510,7 +510,8 @@ def _nothing(
         hint = f"call {INIT} before logging"
         return unjudged("no node was registered that could log", hint=hint)
     if lines:
-        message = f"{join_words(nodes)} logs {shown(lines[0].text)!r}, not {params.text!r}"
+        log_it = f"{join_words(nodes)} {'log' if len(nodes) > 1 else 'logs'}"
+        message = f"{log_it} {shown(lines[0].text)!r}, not {params.text!r}"
         return failed(message, hint=unfilled(lines[0].text) or _call(params)).about(said=lines[0].text)
     return _silent(package, run, nodes, params)
 
