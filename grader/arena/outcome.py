@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable
 
 from grader.arena.run_state import ROSOUT, RunState, TopicSeen
+from grader.evidence.events import UNNAMED
 from grader.rubric.scenario import Until
 
 Outcome = tuple[str, str]
@@ -208,7 +209,7 @@ def starting(live: RunState, until: Until, now_s: float) -> set[str]:
     """Return the processes that may yet become nodes: on a busy machine, imports alone can take many seconds."""
     if now_s > starts_until_s(live, until):
         return set()
-    return {p for p in live.running - live.registered if not computes(live, p)}
+    return {p for p in live.running - live.registered if not computes(live, p) and not is_unnamed(live, p)}
 
 
 def starts_until_s(live: RunState, until: Until) -> float:
@@ -380,7 +381,8 @@ def _at_rest_since(live: RunState, now_s: float) -> float | None:
         return None
     owners = [live.owners.get(node) for node in live.here]
     for process, rest in zip(live.running, rests, strict=True):
-        if rest is None or (owners.count(process) < rest.programs and not computes(live, process)):
+        lacks_node = rest is None or owners.count(process) < rest.programs
+        if rest is None or (lacks_node and not computes(live, process) and not is_unnamed(live, process)):
             return None
     if _is_awaited(live) and any(computes(live, process) for process in live.running):
         return None
@@ -397,9 +399,17 @@ def computes(live: RunState, process: str) -> bool:
     return rest is not None and rest.kind in {"computes", "stuck"}
 
 
+def is_unnamed(live: RunState, process: str) -> bool:
+    """Return whether a process is a client that looks for a service and is no node (it has no `init_node`)."""
+    lone = live.running - {live.owners.get(node, "") for node in live.here}
+    rest = live.at_rest.get(process)
+    return lone == {process} and rest is not None and rest.programs == 1 and UNNAMED in live.sought
+
+
 def _waits_in_vain(live: RunState, process: str) -> bool:
     """Return whether a process looks for a service or an action without end, and for none of those that are there."""
     nodes = {node for node in live.here if live.owners.get(node) == process}
+    nodes |= {UNNAMED} if is_unnamed(live, process) else set[str]()
     asked = {service for node in nodes & live.sought.keys() for service in live.sought[node]}
     goals = {t.removesuffix("/goal") for t in live.published if t.endswith("/goal")}
     goals = {action for action in goals if f"{action}/cancel" in live.published}

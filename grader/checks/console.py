@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from difflib import SequenceMatcher
 from typing import Annotated
 
@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from grader.checks.registry import ProcessName, check
 from grader.checks.support.console_output import (
+    SUMMARY,
     Level,
     Line,
     Logged,
@@ -30,6 +31,7 @@ from grader.checks.support.fields import unit_slip
 from grader.checks.support.processes import (
     LOGGERS,
     Life,
+    are_noted,
     early_end,
     first_interrupt_ns,
     life,
@@ -51,8 +53,8 @@ from grader.checks.support.text import (
     unfilled,
     words_pattern,
 )
-from grader.checks.support.topics import cite
-from grader.evidence.events import ConsoleLine
+from grader.checks.support.topics import cite, unheard
+from grader.evidence.events import UNNAMED, ConsoleLine
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
@@ -149,7 +151,7 @@ def _read(run: Run, process: str) -> tuple[list[Line], list[Line]]:
     lines: list[Line] = []
     errors: list[Line] = []
     for stream in stream_lines(run, process):
-        read = stream[:LINES_MAX]
+        read = [line for line in stream[:LINES_MAX] if not SUMMARY.match(line.text)]
         found = tracebacks([line.text for line in read])
         hidden = {index for one in found for index in range(one.first, one.last + 1)}
         lines += [line for index, line in enumerate(read) if index not in hidden and line.text.strip()]
@@ -172,47 +174,89 @@ def _not_printed(
     other = [line for line in lines if any(params.found_in(line))]
     hint = f"print {params.words} where it happens"
     failing = one.ended_early and (one.end is None or one.end.exit_code != 0)
+    asked = _asked_services(one, run)
+    absent = [name for name, is_there in asked.items() if not is_there and name not in _offered(run)]
+    lacking = absent[0] if absent and not one.ended_early else ""
     is_number_alone = not re.search(r"\w", params.text.replace(PLACE, ""))  # then any number is no answer
-    if other and not (failing and is_number_alone):
+    if other and not (lacking or (failing and is_number_alone)):
         near = f", within {significant(params.tolerance)}" if params.tolerance else ""
         message = f"it prints {shown(other[0].text)!r}, not {params.words}{near}{_slip(other[0], params)}"
-        return failed(message, hint=hint)
+        return _of_client(asked, run)(message, hint=hint)
     if failing:
         end = explain_end(one, run, package)
         return end.verdict(unjudged, f"it ended before it printed {params.words}: {end.cause}")
     if error := explain_error(package, run):
         return error.verdict(unjudged, f"it never prints {params.words}: {error.cause}")
     own = [line for line in lines if one.interrupt_ns is None or line.at_ns < one.interrupt_ns]
-    if unserved := _unserved(one, own, run, params.words):
-        return unserved
+    deaf = unheard(run, package)
+    never = f"it never prints {params.words}"
+    unheard_of = unjudged(f"{never}: {deaf.message}", hint=deaf.hint) if deaf else None
+    if why := _unserved(asked, lacking, own, run, never) or unheard_of:
+        return why
     if not own:
         nothing = unjudged(
             f"it prints nothing, not {params.words}", hint=f"{hint}, with flush=True"
         ).if_repeated()
         return nothing.model_copy(update={"silent": True})
     meant = max(own, key=lambda line: SequenceMatcher(None, params.words, line.text[:LINE_CHARS_MAX]).ratio())
-    hint = unfilled(meant.text) or hint
-    return failed(f"it never prints {params.words}; it prints {shown(meant.text)!r}", hint=hint).if_repeated()
+    hint = _of_whole_answer(meant, params) or unfilled(meant.text) or hint
+    return _of_client(asked, run)(f"{never}; it prints {shown(meant.text)!r}", hint=hint).if_repeated()
 
 
-def _unserved(one: Life, own: Sequence[Line], run: Run, words: str) -> Verdict | None:
+def _of_client(asked: Iterable[str], run: Run) -> Callable[..., Verdict]:
+    """Return how a loss is told: what a client prints wrong may be what another node of the student's answers."""
+    of_students = {
+        name
+        for _, e in run.graph
+        for name, nodes in e.services.items()
+        if any(map(run.is_student_node, nodes))
+    }
+    return failed if of_students.isdisjoint(asked) else unjudged
+
+
+def _of_whole_answer(line: Line, params: PrintsParams) -> str:
+    """Return how to print one field, where the line has the whole answer, `sum: 3`, in the place of its number."""
+    for field in dict.fromkeys(re.findall(r"\b([a-z_]\w*): ", line.text[:LINE_CHARS_MAX])):
+        if _fits(line._replace(text=line.text.replace(f"{field}: ", "", 1)), params):
+            return f"print the field {field} alone, not the whole answer: write .{field} behind it"
+    return ""
+
+
+def _offered(run: Run) -> set[str]:
+    return {name for _, e in run.graph for name in e.services if not name.endswith(LOGGERS)}
+
+
+def _asked_services(one: Life, run: Run) -> dict[str, bool]:
+    """Return the services for which a process asked, each with whether it was there at once. A program that is no node
+    asks by the name that rospy gives to all of these: it counts where there is one such program alone."""
+    unnamed = [other.name for other in lives(run) if not run.student_nodes(other.name)]
+    is_no_node = are_noted(run) and unnamed == [one.name]
+    names = {UNNAMED} if is_no_node else {*nodes_of(run, one.name)}
+    looked = [e for _, e in run.actors if e.action == "lookup" and e.actor in names and e.topic]
+    return {e.topic or "": not e.detail for e in looked}
+
+
+def _unserved(
+    asked: Mapping[str, bool], lacking: str, own: Sequence[Line], run: Run, never: str
+) -> Verdict | None:
     """Of a client: what its service does wrong, or that it asks for another one, or before a node offers it."""
-    never = f"it never prints {words}"
     for said, wrong in WRONG_ANSWERS.items():
         if any(said in line.text for line in own):
             hint = "end the service's callback with `return …Response(…)`"
             return unjudged(f"{never}: the service's callback returns {wrong}", hint=hint)
-    nodes = nodes_of(run, one.name)
-    asked = [
-        e.topic for _, e in run.actors if e.action == "lookup" and e.detail and e.actor in nodes and e.topic
-    ]
-    offered = {name for _, e in run.graph for name in e.services if not name.endswith(LOGGERS)}
-    absent = next((name for name in asked if name not in offered), "")
+    offered = _offered(run)
+    absent = lacking or next((n for n, is_there in asked.items() if not is_there and n not in offered), "")
     near = near_names(absent, offered) or (tuple(offered) if len(offered) == 1 else ())
     if absent and near:
         hint = f"use the name {near[0]} both where you wait for it and where you call it"
         return unjudged(f"{never}: it asks for {absent}, and {near[0]} is offered", hint=hint)
-    early = next((n for n in asked if any(f"service [{n}] unavailable" in line.text for line in own)), "")
+    if lacking:
+        hint = f"offer {lacking} in a node that runs beside it, or ask for the service that is offered"
+        return unjudged(f"{never}: it asks for {lacking}, which no node offers", hint=hint)
+    asked_early = [name for name, is_there in asked.items() if not is_there]
+    early = next(
+        (n for n in asked_early if any(f"service [{n}] unavailable" in line.text for line in own)), ""
+    )
     if early in offered:
         hint = f"wait for it before the call: `rospy.wait_for_service('{early}')`"
         return failed(f"{never}: it calls {early} before a node offers it", hint=hint).if_repeated()
@@ -419,7 +463,7 @@ def _is_late(run: Run, params: LogsParams) -> bool:
 def _asked_lines(run: Run, params: LogsParams) -> list[tuple[int, ConsoleLine]]:
     """Return the console's lines of the process that is judged, or of all the student's."""
     asked = {params.process} if params.process else {one.name for one in lives(run)}
-    return [(t, line) for t, line in run.console if line.process in asked]
+    return [(t, line) for t, line in run.console if line.process in asked and not SUMMARY.match(line.line)]
 
 
 def _near(run: Run, lines: Iterable[Logged], params: LogsParams) -> Verdict | None:
@@ -466,7 +510,8 @@ def _nothing(
         hint = f"call {INIT} before logging"
         return unjudged("no node was registered that could log", hint=hint)
     if lines:
-        message = f"{join_words(nodes)} logs {shown(lines[0].text)!r}, not {params.text!r}"
+        log_it = f"{join_words(nodes)} {'log' if len(nodes) > 1 else 'logs'}"
+        message = f"{log_it} {shown(lines[0].text)!r}, not {params.text!r}"
         return failed(message, hint=unfilled(lines[0].text) or _call(params)).about(said=lines[0].text)
     return _silent(package, run, nodes, params)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from grader.checks.launch_files import missing_node
 from grader.checks.registry import LaunchName, check
-from grader.checks.support.console_output import Line, printed_lines
+from grader.checks.support.console_output import SUMMARY, Line, printed_lines
 from grader.checks.support.launch import (
     BAD_FILE,
     NO_FILE,
@@ -39,7 +39,6 @@ from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
 from grader.wording import join_words, significant, there_is
 
-SUMMARY = re.compile(r"\s*\*\s+/")  # roslaunch's list of parameters
 OUTSIDE = 'write <rosparam file="$(find {})/{}"/> outside the <node>, without ns'
 Wanted = Mapping[str, int | float | str]
 

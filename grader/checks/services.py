@@ -288,19 +288,23 @@ def _rename_hint(wanted: str, found: str, node: str) -> str:
     return f"name it {wanted} in {SERVICE}"
 
 
-def handler_traceback(run: Run, service: str, since_ns: int) -> Traceback | None:
-    """Return the first traceback of the service's node since a call."""
+def handler_traceback(run: Run, service: str, call: Exchange) -> Traceback | None:
+    """Return the first traceback of the service's node since a call; of one that was given up, before the next one,
+    whose own it may be."""
     offer = offers(run).get(service)
     one = life_of(run, offer.node) if offer else None
     if one is None:
         return None
-    return next(iter(process_tracebacks(run, one.name, after_ns=since_ns, before_ns=one.interrupt_ns)), None)
+    later = [other.at_ns for other in exchanges(run, service) if other.at_ns > call.at_ns]
+    before_ns = min(later, default=None) if call.detail.startswith(NO_ANSWER) else None
+    ended_ns = before_ns or one.interrupt_ns
+    return next(iter(process_tracebacks(run, one.name, after_ns=call.at_ns, before_ns=ended_ns)), None)
 
 
 def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> Verdict:
     """Return why a call brought nothing back."""
     asked = f"{service}, called with {fields_text(one.request)},"
-    found = handler_traceback(run, service, one.at_ns)
+    found = handler_traceback(run, service, one)
     if found is not None:
         end = explain_traceback(found, package)
         return end.verdict(failed, f"{asked} fails: {end.cause}")

@@ -31,6 +31,8 @@ GOAL_STATUS = (
 """By number (actionlib_msgs/GoalStatus)."""
 OTHER_TYPE = "asks for another type"
 """Begins the detail of the note on a node that the grader's own node refused for its type."""
+UNNAMED = "/unnamed"
+"""As which rospy looks for services in a program that is no node."""
 UNHEARD = "nothing was published: no node has subscribed"
 """The detail of the note on a topic to which a step would have sent messages."""
 NO_ANSWER = "no answer within"

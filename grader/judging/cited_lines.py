@@ -131,6 +131,8 @@ def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: R
     in which it is commented out."""
     if not verdict.status.is_lost or package is None or package.cmake is None:
         return verdict
+    if verdict.status is Status.BLOCKED:
+        return verdict  # the criterion that blocks it tells it
     if called := verdict.sought_name("call"):
         return _cite_install(verdict, package, build, called)
     found = commented_calls(package, build.file_lines(CMAKE)[:LINES_READ], verdict.sought_names("uncalled"))

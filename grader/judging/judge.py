@@ -171,12 +171,16 @@ def _with_repaired_copy(
     rubric = facts.rubric
     of_copy = try_facts(rubric, {**first, **repaired})
     on_copy, repairs = judge_facts(rubric, of_copy, checks), repairs_of(rubric, repaired)
+    # a build that goes on as far as what the machine lacks shows what the repaired line kept from being made
+    shows = was_built(repaired) or any(
+        v.of_machine and verdicts[i].status.is_lost for i, v in on_copy.items()
+    )
     verdicts, uses = apply_repaired_copy(
         rubric,
         verdicts,
         on_copy,
         repairs,
-        built=not needs_build(of_copy.package) or was_built(first) or not was_built(repaired),
+        built=not needs_build(of_copy.package) or was_built(first) or not shows,
         builds=was_built(first),
         launched=launched_in(of_copy.package, of_copy.runs.get(PACKAGE_RUN)),
     )

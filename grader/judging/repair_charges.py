@@ -65,6 +65,7 @@ def charge_repairs(
     by_id = {c.id: c for c in rubric.criteria}
     order = TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order()
     criteria = [by_id[name] for name in order if name in better]
+    criteria_of_runs = [c for c in rubric.criteria if c.scenario is not None and c.points > 0]
     needed = dict.fromkeys(one for repairs in needs.values() for one in repairs)
     for repair in sorted(needed, key=lambda one: one.kind not in NAMES):
         asking = [c for c in rubric.criteria if c.scenario is None and asks_for(first[c.id], repair)]
@@ -80,6 +81,9 @@ def charge_repairs(
         own = [c for c in rubric.criteria if repair.kind == "node-name" and _names(c, repair)]
         if any(first[c.id].status.is_lost and c.id not in better for c in own):
             continue  # the criterion of the name says by itself what is wrong with it
+        failed_by_it = [c for c in criteria_of_runs if c.id not in better and _fails_in(first[c.id], repair)]
+        if repair.kind in OF_SYNTAX and failed_by_it:
+            continue  # that the copy shows nothing of that criterion is no reason to charge another
         possible = [c for c in criteria if repair in needs[c.id] and _may_ask_for(first[c.id], repair)]
         named = [c for c in possible if repair.kind in NAMES and _names(c, repair)]
         failing = [c for c in possible if first[c.id].status is not Status.BLOCKED]
@@ -96,6 +100,13 @@ def _may_ask_for(found: Verdict, repair: Repair) -> bool:
     """Return whether a criterion can be lost by what was repaired: by what keeps a script from being started only where
     that script is named."""
     return repair.kind not in DONE_BEFORE_RUNS or PurePosixPath(repair.file).name in found.message
+
+
+def _fails_in(found: Verdict, repair: Repair) -> bool:
+    """Return whether a criterion is lost by itself, and cites a line of what was repaired."""
+    lines = set(range(repair.line or 0, (repair.line or 0) + len(repair.before.split("\n"))))
+    cited = {line for file, line in cited_lines(found.citations) if file == repair.file}
+    return found.status is Status.FAIL and not lines.isdisjoint(cited)
 
 
 def _seeks(found: Verdict, repair: Repair) -> bool:

@@ -53,7 +53,7 @@ AT_ANY_RATE = {"node-name", "node-lives", "topic-type"}
 OF_ANY_WORDS = AT_ANY_RATE | {"rate", "connected", "launch-connects", "launch-runs"}
 """Checks of runs that a node passes whatever it says."""
 GENERATION = re.compile(
-    r"generate_messages|message_generation|add_(message|service|action)_files|add_executable"
+    r"generate_messages|message_generation|add_(message|service|action)_files|add_executable|\.(msg|srv|action)\b"
 )
 """Where these are wrong in CMakeLists.txt, a build can succeed that makes nothing of the package's own definitions, or
 another program."""
@@ -339,8 +339,9 @@ def _is_worse(first: Mapping[str, Verdict], on_copy: Mapping[str, Verdict], crit
     if copy.status.is_lost and copy.score <= one.score:
         same = copy.cause == one.cause and copy.blocked_by == one.blocked_by
         return not one.unjudged or (copy.unjudged and same)
-    # what was judged before, and could not be on the copy, shows nothing of the repair
-    return copy.status is Status.ERROR or (copy.status.is_open and not one.unjudged)
+    # what was judged before, and could not be on the copy, shows nothing of the repair, unless it ended in the same way
+    by_machine = copy.cause != "" and copy.cause == one.cause
+    return copy.status is Status.ERROR or (copy.status.is_open and not one.unjudged and not by_machine)
 
 
 LINES = re.compile(

@@ -130,6 +130,7 @@ def with_names(text: str) -> Iterator[Step]:
     shared = {name for one in tree.body for name in _bound_by(one)}
     known = bound | set(dir(builtins)) | {"__file__"}
     loaded = {n.id for n in nodes_in(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+    functions = {n.name for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)}
     blocks = (
         inner
         for one in tree.body
@@ -141,12 +142,15 @@ def with_names(text: str) -> Iterator[Step]:
         missing = [n for n in nodes_in(block) if isinstance(n, ast.Name) and n.id not in known]
         missing += _read_for_themselves(block, shared)
         stated = (n.value for n in nodes_in(block) if isinstance(n, ast.Expr))
+        values, idle = _values_in(block), _idle_functions(tree, block, loaded)
         alone = {n.id for n in stated if isinstance(n, ast.Name) and is_one_edit(n.id.lower(), "pass")}
         for name in dict.fromkeys(n.id for n in missing):
             guards = name == "name" and any(_is_guard(one) for one in tree.body)
             of_python = next((one for one in OF_PYTHON if is_slip(name, one)), "")
             meant = OBVIOUS_NAMES.get(name) or ("__name__" if guards else "")
-            meant = meant or meant_by(name, own, own - loaded) or ("pass" if name in alone else of_python)
+            near = own - functions if name in values else own
+            meant = meant or meant_by(name, near, near - loaded) or idle.get(name, "")
+            meant = meant or ("pass" if name in alone else of_python)
             spans = [span for n in missing if n.id == name and (span := span_of(lines, n))]
             if meant and spans:
                 after = edited(text, [(*span, meant) for span in spans])
@@ -155,6 +159,31 @@ def with_names(text: str) -> Iterator[Step]:
                     yield step
                     yield from with_names(text)
                     return
+
+
+def _values_in(block: ast.stmt) -> set[str]:
+    """Return the names that stand where a function makes no sense: in a calculation, or in what is answered."""
+    found: list[ast.expr] = []
+    for one in nodes_in(block):
+        if isinstance(one, ast.BinOp):
+            found += [one.left, one.right]
+        elif isinstance(one, ast.Compare):
+            found += [one.left, *one.comparators]
+        elif isinstance(one, ast.Call) and ast.unparse(one.func).endswith(("Response", "Result", "Feedback")):
+            found += one.args
+    return {one.id for one in found if isinstance(one, ast.Name)}
+
+
+def _idle_functions(tree: ast.Module, block: ast.stmt, loaded: Collection[str]) -> dict[str, str]:
+    """Return by what is called in a block the one function of the file that nothing names and that takes as many
+    arguments."""
+    idle = [one for one in tree.body if isinstance(one, ast.FunctionDef) and one.name not in loaded]
+    found: dict[str, str] = {}
+    for call in (one for one in nodes_in(block) if isinstance(one, ast.Call) and not one.keywords):
+        fitting = [one.name for one in idle if len(one.args.args) == len(call.args)]
+        if isinstance(call.func, ast.Name) and len(fitting) == 1:
+            found[call.func.id] = fitting[0]
+    return found
 
 
 def _read_for_themselves(block: ast.stmt, shared: Collection[str]) -> Iterator[ast.Name]:

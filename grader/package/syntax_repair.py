@@ -37,6 +37,7 @@ OUTERMOST = re.compile(r"(import|from)\s|if\s+__name__\b")
 EMPTY_EXCEPT = re.compile(r"expected an indented block after 'except' statement on line (\d+)")
 OF_BLOCK = re.compile(r"(elif|else|except|finally|try)\b")
 ROSPY_COMMA = re.compile(r"(?<![\w.])rospy\s*[,;:]\s*(?=[A-Za-z]\w*\s*[(:])")
+FUTURE = re.compile(r"\s*from\s+__future__\s+import\s+[\w \t,]+(#.*)?")
 CONTINUES = re.compile(r"(elif|else|except|finally)\b")
 
 Step = dict[str, Any]
@@ -163,7 +164,8 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
         moved = [("level", candidate) for candidate in _with_line_moved(lines, at)]
         moved += [("turned", candidate) for candidate in _with_lines_turned(lines, at)]
         yield from (one for one in moved if syntax_error(one[1]) is None)
-    if reason_of_line(lines[at]).fix == DELETE_LINE:
+    is_future = "future" in error["message"] and FUTURE.fullmatch(lines[at])
+    if is_future or reason_of_line(lines[at]).fix == DELETE_LINE:
         yield "token", "\n".join([*lines[:at], *lines[at + 1 :]])
 
 

@@ -83,9 +83,8 @@ class Shape(NamedTuple):
         """Return a field of a field; None where that is not known. Raises Misfit."""
         there = {one.name: one for one in self.types.get(field.type, ())}
         if not re.fullmatch(r"\w+", name):
-            raise Misfit(
-                f'no field is called "{name}": between a field and its value are a colon and a blank'
-            )
+            between = f'no field is called "{name}": between a field and its value are a colon and a blank'
+            raise Misfit(no_name(name) or between)
         if field.array and there:
             raise Misfit(f"{self.what}: {done} is a list: write {done}[0].{name}, or {done}[*].{name}")
         if name in there:
@@ -146,6 +145,15 @@ class Shape(NamedTuple):
             )
         for number, item in enumerate(value):
             self.compare(replace(field, array=False), item, f"{done}[{number}]")
+
+
+def no_name(name: str) -> str:
+    """Return why no field is called like a path to a field within a field; empty where the name is no such path."""
+    first, *rest = name.split(".")
+    if not rest or not all(re.fullmatch(r"[A-Za-z]\w*", part) for part in (first, *rest)):
+        return ""
+    inside = ": {".join([first, *rest]) + ": …" + "}" * len(rest)
+    return f'no field is called "{name}": write {inside}, one field within the other'
 
 
 def no_value(kind: str, value: object) -> str:

@@ -20,6 +20,7 @@ from grader.rubric.definitions import (
     Shape,
     instead_of,
     limits_of,
+    no_name,
     no_value,
     own_texts,
     services_in,
@@ -175,15 +176,18 @@ def _has_field(shape: Shape | None, path: object) -> bool:
         return True
 
 
-def _quoted(path: KeyPath, value: object, topic: str = "") -> Iterator[Fault]:
-    """Yield truth values in quotes where nothing is known of the type; of a topic's field, numbers too."""
+def _quoted(path: KeyPath, value: object, topic: str = "", *, are_fields: bool = False) -> Iterator[Fault]:
+    """Yield truth values in quotes where nothing is known of the type; of a topic's field, numbers too. Of a map of
+    fields, yield names that no field has."""
     if isinstance(value, str) and value.lower() in {"true", "false"}:
         yield path, f'"{value}" in quotes is text: write {value.lower()}{_or_type(topic)}'
     elif isinstance(value, str) and topic and _NUMBER.fullmatch(value):
         yield path, f'"{value}" in quotes is text: write {value}{_or_type(topic)}'
     elif isinstance(value, dict | list):
         for key, one in value.items() if isinstance(value, dict) else enumerate(value):
-            yield from _quoted((*path, key), one, topic)
+            if are_fields and (fault := no_name(str(key))):
+                yield path, fault
+            yield from _quoted((*path, key), one, topic, are_fields=are_fields)
 
 
 def _or_type(topic: str) -> str:
@@ -349,7 +353,7 @@ def _expected(criterion: WrittenCriterion, known: Definitions) -> Iterator[Fault
     each = [((), expected)] if isinstance(expected, dict) else [((n,), one) for n, one in as_maps(expected)]
     for at, one in each:
         if shape is None:
-            yield from _quoted((*criterion.at, key, *at), one)
+            yield from _quoted((*criterion.at, key, *at), one, are_fields=True)
         elif fault := shape.misfit(one) or _of_other_part(one, str(about.get("type")), shape, known):
             yield (*criterion.at, key, *at), fault
 
@@ -398,7 +402,7 @@ def _sent_fields(scenario: dict[str, Any], known: Definitions) -> Iterator[tuple
         elif shape is not None and (fault := shape.misfit(value)):
             yield at, fault
         elif shape is None and (part or kind.partition("/")[0] not in noetic_messages()):
-            yield from _quoted(at, value)
+            yield from _quoted(at, value, are_fields=True)
 
 
 def _other_definitions(

@@ -338,7 +338,8 @@ def _other_text(at: KeyPath, given: dict[str, Any], handout: str, keys: tuple[st
         pattern = r"[-+]?\d+(?:\.\d+)?".join(map(re.escape, text.split("{number}")))
         quoted = [re.sub(r"\s+", " ", one) for one in re.findall(r"`([^`]+)`", handout)]
         alike = [one for one in quoted if _letters(one) == _letters(text) or _is_begun(one, text)]
-        if alike and not re.search(pattern, re.sub(r"\s+", " ", handout)):
+        said = re.sub(r"\s+", " ", handout)
+        if alike and text not in said and not re.search(pattern, said):
             is_same = alike[0].lower() == text.lower()
             how = "in another case" if is_same else "with other blanks or signs"
             yield (*at, *path), f"the handout has `{alike[0]}`, {how}"

@@ -110,6 +110,8 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
         if isinstance(launch, str) and " " in launch.strip():
             fault = f"is the file alone, without its package: {launch.split()[-1]}"
             yield (*path, "start", index, "launch"), fault
+        elif isinstance(launch, str) and "/" in launch:
+            yield (*path, "start", index, "launch"), _in_any_folder(launch)
         elif isinstance(launch, str) and not launch.endswith(LAUNCH_ENDINGS):
             fault = f'roslaunch takes the file\'s whole name: "{launch}.launch"'
             yield (*path, "start", index, "launch"), fault
@@ -127,6 +129,11 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
         if package in packages_in(rubric):
             key = "launch" if file.endswith(LAUNCH_ENDINGS) else "script"
             yield at, f"is the student's: with program it would count as the grader's. Write {key}: {file}"
+
+
+def _in_any_folder(launch: str) -> str:
+    """Return how a launch file is named, which roslaunch finds by its name alone."""
+    return f"is found in whatever folder it lies: write its name, {PurePosixPath(launch).name}"
 
 
 def _type_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -200,6 +207,8 @@ def _criterion_faults(criterion: WrittenCriterion, check: Check, rubric: dict[st
     scenario = criterion.scenario
     for one in check.references(criterion.given):
         at = (*criterion.at, *one.path)
+        if one.to == "launch" and "/" in str(one.value):
+            yield at, _in_any_folder(str(one.value))
         yield from _of_machine(at, one.to, one.value, rubric)
         if scenario and check.needs_run and scenario.get("recording") is None:
             yield from ((at, fault) for fault in _misfits(one, check, criterion))
@@ -218,6 +227,7 @@ def _misfits(one: Reference, check: Check, criterion: WrittenCriterion) -> Itera
         yield f'{name} starts no process "{value}" of the student\'s{_instead(value, own)}'
     elif one.to in LISTED:
         words, listed = LISTED[one.to]
+        value = PurePosixPath(value).name if one.to == "launch" else value
         if value not in (there := sorted(listed(scenario))):
             yield words.format(name=name, value=value, instead=_instead(value, there))
     elif one.to == "kept":
@@ -455,7 +465,7 @@ def _served_names(scenario: dict[str, Any]) -> list[str]:
 LISTED: Mapping[str, tuple[str, Callable[[dict[str, Any]], Iterable[str]]]] = {
     "launch": (
         '{name} does not start "{value}"{instead}',
-        lambda scenario: values_of(starts_of(scenario), "launch"),
+        lambda scenario: [PurePosixPath(f).name for f in values_of(starts_of(scenario), "launch")],
     ),
     "sent": ("no probe of {name} sends on {value}{instead}", _sent_topics),
     "action": ("no step of {name} sends a goal to {value}{instead}", _actions),

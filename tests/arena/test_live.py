@@ -550,6 +550,23 @@ def test_a_client_of_another_name_than_the_students_server_is_not_waited_for() -
     assert find_outcome(live, until, 3.6) is None
 
 
+def test_a_client_that_is_no_node_is_not_waited_for_where_nobody_offers_its_service() -> None:
+    live, until = _resting(server=("spins", 1)), Until(ended=("client",))
+    live.note_start("client", 0.0, helper=False)
+    live.note_rest("client", "loops", 1, 2.0)
+    live.services = {"/clamps"}
+    assert find_outcome(live, until, 5.0) is None  # who knows what it does
+    live.sought["/unnamed"] = {"/clamp"}
+    assert find_outcome(live, until, 3.4) is None
+    assert find_outcome(live, until, 3.6) == ("silent", "the graph has settled")
+    live.services = {"/clamp"}
+    assert find_outcome(live, until, 3.6) is None
+    live.services = {"/clamps"}
+    live.note_start("other", 0.0, helper=False)  # which of the two asks is not known
+    live.note_rest("other", "loops", 1, 2.0)
+    assert find_outcome(live, until, 5.0) is None
+
+
 def test_a_service_is_sought_by_who_asks_for_it_again() -> None:
     live = RunState()
     live.note_lookup("/node", "/there", is_there=True)

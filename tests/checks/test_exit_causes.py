@@ -176,6 +176,10 @@ speed_pub = rospy.Publisher('cmd_vel', Twist)
          "make it with `CountResult(…)`"),
         (6, "server.set_succeeded(total)", "AttributeError: 'int' object has no attribute 'total'",
          "make a message of it: `…Result(…)`"),
+        (6, "client.send_goal(goal)", "AttributeError: 'float' object has no attribute 'secs'",
+         "write `rospy.Duration(…)` around the number where the field gets it"),
+        (6, "print(client.get_result().total)", "AttributeError: 'NoneType' object has no attribute 'total'",
+         "above that line, write `client.wait_for_result()`"),
         (6, "server.set_succeeded(CountResult)", "AttributeError: 'member_descriptor' object has no attribute 'x'",
          "write brackets with its fields: `CountResult(…)`"),
         (6, "client.send_goal(goal)", "AttributeError: 'CountAction' object has no attribute 'target'",
@@ -372,6 +376,27 @@ def test_without_its_file_for_cmake_a_package_has_no_messages(tmp_path):
     )
 
 
+@pytest.mark.parametrize(
+    ("source", "hint"),
+    [
+        (
+            "from lab.srv import Add, AddResponse",
+            "write srv/Add.srv, list it in add_service_files(…), and call",
+        ),
+        ("from lab.srv import AddResponse", "write srv/Add.srv, list it in add_service_files(…), and call"),
+        ("from lab.msg import *", "write the definition in msg/, list it in add_message_files(…), and call"),
+        ("import lab", "delete line 1"),
+    ],
+)
+def test_a_package_without_any_definition_is_told_what_to_write(tmp_path, source, hint):
+    (tmp_path / "package.xml").write_text("<package><name>lab</name></package>")
+    (tmp_path / "CMakeLists.txt").write_text("catkin_package()\n")
+    (tmp_path / "node.py").write_text(f"{source}\n")
+    package = facts_of(tmp_path)
+    raised = said(package, ("node.py", 1, source), error="ModuleNotFoundError: No module named 'lab'")
+    assert explain_traceback(raised, package).hint.startswith(hint)
+
+
 def test_the_message_is_that_of_the_package_that_is_named(tmp_path):
     made = "add_message_files(FILES Reading.msg)\ngenerate_messages()\n"
     for name, cmake in (("lab", ""), ("lab_msgs", made)):
@@ -411,6 +436,17 @@ def test_the_message_is_that_of_the_package_that_is_named(tmp_path):
          "go on to this line only if `math.isfinite(point.x)`"),
         ("int(point.y)", "OverflowError: cannot convert float infinity to integer",
          "go on to this line only if `math.isfinite(point.y)`"),
+        ("time.time() - start < goal.wait", "TypeError: '<' not supported between instances of 'float' and 'Duration'",
+         "write `.to_sec()` behind that side"),
+        ("start < goal.wait", "TypeError: '<' not supported between instances of 'float' and 'Duration'",
+         "write `start < goal.wait.to_sec()`"),
+        ("return AddResponse(1, 2)",
+         "TypeError: Invalid number of arguments, args should be ['sum'] args are(1, 2)", "give it one value: `sum=…`"),
+        ("answer.sum", "AttributeError: 'AddRequest' object has no attribute 'sum'",
+         "make it as AddResponse(), not as AddRequest()"),
+        ("publisher.publish(reading)",
+         "rospy.exceptions.ROSSerializationException: field name is a non-ascii string",
+         "compare the value of each of the message's other fields"),
         ("r ^ 2 - 1.0", "TypeError: unsupported operand type(s) for ^: 'float' and 'int'", "write `r ** 2 - 1.0`"),
         ("open('/home/anna/a.csv', 'w')", "FileNotFoundError: [Errno 2] No such file or directory: '/home/anna/a.csv'",
          "`import os`, and open `os.path.expanduser('~/a.csv')`"),

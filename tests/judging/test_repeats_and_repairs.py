@@ -251,6 +251,15 @@ def test_the_fault_behind_a_repaired_one_is_named() -> None:
     assert node.hint.startswith("src/numeric_talker.py line 7: indent every line with four spaces; then ")
 
 
+def test_what_the_machine_keeps_the_copy_from_showing_is_charged_to_no_other_criterion() -> None:
+    found = judged(
+        died("SyntaxError: invalid syntax", 7), died("ModuleNotFoundError: No module named 'tf'", 3), TABS
+    )
+    status = {name: one.status.value for name, one in found.items() if name != "executable"}
+    assert status == {"node": "fail", "rate": "inconclusive", "chatter": "inconclusive"}
+    assert "lacks tf" in found["rate"].message
+
+
 def test_a_copy_that_helps_nothing_changes_nothing() -> None:
     runs = build_runs({"runs": {"talker": DIED}, "package": PACKAGE})
     alone = judge(rubric(*ALL), runs)
@@ -474,6 +483,31 @@ def built(package: dict[str, Any], *, exit_code: int, said: Sequence[str] = ()) 
     return build_runs({"runs": {"package": run}})
 
 
+def test_a_build_that_the_machine_ends_after_the_repair_leaves_what_it_makes_open() -> None:
+    package = {**PACKAGE, "name": "lab1", "manifest": {}, "interfaces": [{"path": "msg/A.msg", "fields": []}]}
+    package["files"] = [*package["files"], {"path": "msg/A.msg"}, {"path": "CMakeLists.txt"}]
+    end = died("ModuleNotFoundError: No module named 'lab1'", 3)
+    folder = (
+        "CMake Error at CMakeLists.txt:4 (catkin_package):\n  catkin_package() include dir 'i' does not exist"
+    )
+    lacks = (
+        'CMake Error: Could not find a package configuration file provided by "tf" with any of the following'
+    )
+    runs: dict[str, Run] = {}
+    line = Repair(
+        kind="build-line", file="CMakeLists.txt", line=4, before="a include", after="a", message="m", fix="f"
+    )
+    for prefix, said in (("", folder), ("repaired-1/", lacks)):
+        runs[f"{prefix}package"] = built(package, exit_code=1, said=said.split("\n"))["package"]
+        about = {**runs[f"{prefix}package"].metadata, "repairs": json.dumps([line.model_dump()])}
+        runs[f"{prefix}package"] = replace(runs[f"{prefix}package"], metadata=about)
+        runs[f"{prefix}talker"] = build_runs({"runs": {"talker": end}, "package": package})["talker"]
+    asked = ({"id": "build", "check": "build"}, {**NODE, "requires": []}, {**RATE, "requires": ["node"]})
+    found = {c.id: c for c in judge(rubric(*asked), runs)}
+    assert found["build"].status.value == "fail"
+    assert {found[name].status.value for name in ("node", "rate")} == {"inconclusive"}
+
+
 @pytest.mark.parametrize(
     ("file", "runs"),
     [
@@ -491,6 +525,23 @@ def test_a_repair_concerns_the_runs_that_use_its_file(file: str, runs: set[str])
     asked = rubric(*ALL, scenarios={"talker": SCENARIO, **launched})
     name = Repair(kind="node-name", file=file, line=1, before="a", after="b", message="m", fix="b")
     assert {s for s, one in asked.scenarios.items() if is_used_by(one, name, asked, built=True)} == runs
+
+
+@pytest.mark.parametrize(
+    ("line", "uses"),
+    [
+        ("  FILES Add.srv", True),
+        ("FILES Fly.action", True),
+        ("  scripts/other.py", False),
+        ("  rospy", False),
+    ],
+)
+def test_a_definition_that_is_named_concerns_the_runs_though_the_build_worked(line: str, uses: bool) -> None:
+    asked = rubric(*ALL)
+    one = Repair(
+        kind="build-line", file="CMakeLists.txt", line=5, before="", after=line, message="m", fix="f"
+    )
+    assert is_used_by(asked.scenarios["talker"], one, asked, built=True) is uses
 
 
 @pytest.mark.parametrize(

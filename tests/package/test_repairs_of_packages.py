@@ -53,6 +53,10 @@ generate_messages(DEPENDENCIES actionlib_msgs std_msgs)
 """,
 )
 GO_FIELDS = tuple(parse_definition("int32 n\n---\nbool there\n---\nint32 left\n", ".action"))
+TWO_FIELDS = tuple(parse_definition("int64 a\n---\nint64 sum", ".srv"))
+LEVEL_FIELDS = tuple(
+    parse_definition("float64 level\nstring[] names\nint8 b", ".msg")
+)  # a number of another size and another name of a type are left as they are
 CPP_NODE = """\
 void callback(const Int8& msg) { for (int i = 0; i < 3; ++i) use(msg); }
 int main(int argc, char** argv) {
@@ -394,6 +398,10 @@ CASES = {
          CMAKELISTS: ACTION_CMAKE.replace("actionlib_msgs std", "std")},
         ["build-line"], "write actionlib_msgs after DEPENDENCIES",
     ),
+    "own-action-whose-messages-find-genmsg": Case(
+        {"src/go.py": "from lab.msg import GoAction\n", "action/Go.action": "int32 n\n---\nint32 n\n---\nint32 n\n",
+         CMAKELISTS: ACTION_CMAKE.replace("message_generation ", "")}, [],
+    ),
     "own-action-and-no-calls": Case(
         {"src/talker.py": "#!/usr/bin/env python3\nfrom lab.msg import GoAction\n",
          "action/Go.action": "int32 n\n---\nint32 n\n---\nint32 n\n"},
@@ -415,6 +423,35 @@ CASES = {
         ["build-line"], "result and feedback have changed places",
         asking(definitions=(("action/Go.action", GO_FIELDS),)),
         {"action/Go.action": "int32 n  # how far\n---\nbool there\n---\nint32 left\n"},
+    ),
+    "own-action-without-its-dividers": Case(
+        {"src/go.py": "from lab.msg import GoAction\n", "action/Go.action": "int32 n\nbool there\nint32 left",
+         CMAKELISTS: ACTION_CMAKE},
+        ["build-line"], "write a line `---` below lines 1 and 2",
+        asking(definitions=(("action/Go.action", GO_FIELDS),)),
+        {"action/Go.action": "int32 n\n---\nbool there\n---\nint32 left"},
+    ),
+    "own-service-without-its-divider": Case(
+        {**SERVICE, "srv/Two.srv": "int64 a\nint64 sum\n", TALKER: SCRIPT + "from lab.srv import Two\n",
+         CMAKELISTS: SERVICE_CMAKE}, ["build-line"], "below line 1 add `---`",
+        asking(definitions=(("srv/Two.srv", TWO_FIELDS),)), {"srv/Two.srv": "int64 a\n---\nint64 sum\n"},
+    ),
+    "own-action-with-fields-mixed": Case(
+        {"src/go.py": "from lab.msg import GoAction\n", "action/Go.action": "int32 n\nint32 left\nbool there\nint8 s\n",
+         CMAKELISTS: ACTION_CMAKE}, [], wanted=asking(definitions=(("action/Go.action", GO_FIELDS),)),
+    ),
+    "own-action-with-another-number": Case(
+        {"src/go.py": "from lab.msg import GoAction\n",
+         "action/Go.action": "int8 n\n---\nbool there\n---\nint32 left\n",
+         CMAKELISTS: ACTION_CMAKE},
+        ["build-line"], "line 1 of action/Go.action: goal.n is int8, but the handout asks for int32",
+        asking(definitions=(("action/Go.action", GO_FIELDS),)), {"action/Go.action": "int32 n\n---\nbool"},
+    ),
+    "own-message-with-a-text-for-a-list": Case(
+        {**OWN, "msg/Level.msg": "float32 level\nstring  names  # of all\nbyte b\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")},
+        ["build-line"], "write `string[] names`", asking(definitions=(("msg/Level.msg", LEVEL_FIELDS),)),
+        {"msg/Level.msg": "float32 level\nstring[]  names  # of all\nbyte b\n"},
     ),
     "own-message-of-no-type": Case(
         {**OWN, "msg/Level.msg": "Float64 level\n",

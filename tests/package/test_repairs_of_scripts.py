@@ -157,6 +157,20 @@ CASES = {
         "line 8 of src/talker.py: tabs"),
     "print": Case(swapped(TALKER, ("        rate.sleep()", "        print 'a', 1\n        rate.sleep()")),
               ["python-syntax"], "line 11 of src/talker.py: `print` has no brackets, as in Python 2"),
+    "the-function-that-nothing-calls": Case(
+        swapped(TALKER, ("\nmain()", "\nadd_two_ints_server()")), ["missing-call"],
+        "add_two_ints_server is not defined", after={TALKER: "\nmain()\n"},
+    ),
+    "a-value-like-a-function": Case(
+        swapped(TALKER, ("def main", "def turn_server(req):\n    return TurnResponse(turn_serve)\n\ndef main"),
+                        ("import rospy", "import rospy\nfrom lab.srv import TurnResponse"),
+                        ("    rate =", "    rospy.Service('t', Turn, turn_server)\n    rate =")), [],
+    ),
+    "no-such-future": Case(swapped(TALKER, ("import rospy", "from __future__ import print_functions\nimport rospy")),
+        ["python-syntax"], "needs nothing from `__future__`"),
+    "future-after-others": Case(
+        swapped(TALKER, ("import rospy", "import rospy\nfrom __future__ import division, print_function  # 2")),
+        ["python-syntax"], "needs nothing from `__future__`"),
     "colon": Case(swapped(TALKER, ("is_shutdown():", "is_shutdown()")), ["python-syntax"], "line 9"),
     "bracket": Case(swapped(TALKER, ("queue_size=10)", "queue_size=10")), ["python-syntax"], "never closed"),
     "quote": Case(swapped(TALKER, ("'talker')", "'talker)")), ["python-syntax"], "line 6 of src/talker.py: a quote"),

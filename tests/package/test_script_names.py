@@ -14,6 +14,13 @@ UNDEFINED = {
     "alias": ("x = np.zeros(3)\n", "`np` is not imported: write `import numpy as np` at the top"),
     "class": ("x = Robot()\n", "nothing in the file gives `Robot` a value: above line 2, define Robot or import it"),
     "function": ("steer(1)\n", "above line 2, define it with `def steer(…):`, or import it"),
+    "the function that nothing calls": ("def turn_server():\n    pass\ndef used(a):\n    pass\nused(1)\nadd_server()\n",
+        "and nothing calls `turn_server`: on line 7, write `turn_server` instead of `add_server`"),
+    "a function of other arguments": ("def turn_server(a):\n    pass\nadd_server()\n", "above line 4, define it with"),
+    "a value like a function's name": (
+        ("from lab.srv import TurnResponse\ndef turning_velocity_server(req):\n"
+         "    return TurnResponse(turning_velocity)\n"),
+        "above line 4, write `turning_velocity = …`, with the value that it should have"),
     "publisher": ("while True:\n    pub.publish(1)\n",
                   "above line 2, write `pub = rospy.Publisher('…', …, queue_size=10)`"),
     "rate": ("for i in range(3):\n    rate.sleep()\n", "above line 2, write `rate = rospy.Rate(…)`"),

@@ -585,6 +585,20 @@ def test_what_the_handout_says_otherwise_is_a_warning(
     assert warnings_of(load_rubric(str(path)), path.name) == [f"lab.yaml:{warning}"]
 
 
+def test_a_text_may_stand_in_the_handout_with_the_place_for_its_number(tmp_path: Path) -> None:
+    path = tmp_path / "lab.yaml"
+    asked = "check: prints, with: {process: control, text: 'is {number} degrees'}, scenario: warm, requires: [node]}"
+    rubric = (
+        THERMOSTAT.replace("points: 50", "points: 25") + f"  - {{id: said, title: Said, points: 50, {asked}\n"
+    )
+    for said, warnings in (("is {number} degrees", 0), ("Is {number} degrees", 1)):
+        text = rubric.replace("handout:", f"# {said}\nhandout:").replace(
+            "`quit`", f"`quit` and prints `{said}`"
+        )
+        path.write_text(text, encoding="utf-8")
+        assert len(warnings_of(load_rubric(str(path)), path.name)) == warnings
+
+
 def test_the_handout_says_which_type_a_topic_has(tmp_path: Path) -> None:
     path = tmp_path / "lab.yaml"
     path.write_text(THERMOSTAT.replace("[false, true, false]", "[0, 1, 0]"), encoding="utf-8")

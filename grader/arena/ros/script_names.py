@@ -161,6 +161,7 @@ def misspelt(tree):
     unbound = unbound_names(tree, known)
     keys, texts = without_quotes(tree, known), where_texts_stand(tree)
     stored = {n.id for n in names if isinstance(n.ctx, ast.Store)}
+    functions = {n.name for n in walk(tree) if isinstance(n, FUNCTIONS[:2])} - stored
     odd = {*keys, *unbound, *outside}
     unknown = [n for n in names if n.id not in known or id(n) in odd]
     for node in unknown[:USES_LIMIT]:
@@ -173,7 +174,11 @@ def misspelt(tree):
             fix = "on line %d, write `%s`" % (node.lineno, keys[id(node)])
             yield slip(node.lineno, "undefined", message, fix=fix, name=node.id)
         elif node.id not in known and (
-            near := spelt_alike(node.id, stored if id(node) in texts else own, attributes)
+            near := spelt_alike(
+                node.id,
+                stored if id(node) in texts else own - functions if is_value(node, tree) else own,
+                attributes,
+            )
         ):
             whole = near == "__name__" and is_guard(node, tree)
             fix = (
@@ -282,6 +287,15 @@ def spelt_alike(name, own, attributes):
         return "__name__"
     near = difflib.get_close_matches(name[:TEXT_LIMIT], sorted(own), 1, 0.8)
     return next(iter(near or [one for one in sorted(own) if sorted(one) == sorted(name)]), "")
+
+
+def is_value(node, tree):
+    """Whether a name stands where a function makes no sense: in a calculation, or in what is answered."""
+    around = parents_of(tree).get(node)
+    is_answer = isinstance(around, ast.Call) and node in around.args
+    return isinstance(around, (ast.BinOp, ast.Compare)) or (
+        is_answer and called_name(around).endswith(("Response", "Result", "Feedback"))
+    )
 
 
 def is_guard(node, tree):
@@ -452,7 +466,18 @@ def undefined(node, tree):
     module = "%s.%s" % (name, inner) if inner in ("msg", "srv") else ALIASES.get(name, name)
     if module != name or (name in MODULES and inner):
         return "`%s` is not imported" % name, "write `import %s` at the top" % module
+    idle = idle_functions(tree) if isinstance(used, ast.Call) and not used.keywords else []
+    fitting = [one.name for one in idle if len(one.args.args) == len(used.args)]
+    if len(fitting) == 1:
+        fix = "on line %d, write `%s` instead of `%s`" % (node.lineno, fitting[0], name)
+        return "%s, and nothing calls `%s`" % (why, fitting[0]), fix
     return why, "above line %d, %s" % what_to_write(node, used, tree)
+
+
+def idle_functions(tree):
+    """Return the functions of the file itself that nothing in it names."""
+    named = {n.id for n in walk(tree) if isinstance(n, ast.Name)}
+    return [n for n in tree.body if isinstance(n, ast.FunctionDef) and n.name not in named]
 
 
 def what_to_write(node, used, tree):

@@ -88,6 +88,10 @@ def printed_lines(run: Run) -> tuple[Line, ...]:
     )
 
 
+SUMMARY = re.compile(r"\s*\*\s+/")
+"""How a line of roslaunch's list of parameters begins, which no node prints."""
+
+
 def stream_lines(run: Run, process: str, *, with_names: bool = False) -> tuple[tuple[Line, ...], ...]:
     """Return what one process printed on stdout and on stderr, and what its nodes logged, each by time. Names of
     anonymous nodes and of its own are left out, unless the lines are wanted `with_names`."""

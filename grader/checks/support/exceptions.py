@@ -78,6 +78,9 @@ SLIPS = {
        for said, rest in (("name", " is not defined"), ("module 'rospy' has no attribute", ""))},
     "required argument is not an integer": (
      "a field of whole numbers is given something else, such as a text or 2.0", "give it an int: `int(…)`"),
+    "is a non-ascii string": (
+     "rospy names it by mistake, as a text may have such letters: another field has a value of the wrong type",
+     "compare the value of each of the message's other fields with its type in the .msg file"),
     "required argument is not a float": ("a field of numbers is given something else, such as a text",
      "give it a number: `float(…)`"),
     "namespaces are not allowed in node names": ("the name in `rospy.init_node(…)` has a slash in it",
@@ -115,10 +118,13 @@ def explain_exception(kind: str, message: str, source: str, marked: tuple[int, i
     return explain(message, source, marked) if explain else None
 
 
-def explain_number_of_values(message: str) -> Meaning | None:
-    """Return what is wrong with the number of values for a message of several fields; None of any other exception."""
+def explain_number_of_values(message: str, source: str) -> Meaning | None:
+    """Return what is wrong with the number of values for a message of several fields, or for one of one field that is
+    not published there; None of any other exception."""
     found = re.match(r"Invalid number of arguments, args should be \[([^\]]+)\]", message)
     fields = re.findall(r"\w+", found[1]) if found else []
+    if len(fields) == 1 and "publish" not in source:
+        return f"there is one field: {fields[0]}", f"give it one value: `{fields[0]}=…`"
     if len(fields) < 2:
         return None
     named = ", ".join(f"{field}=…" for field in fields)
@@ -232,7 +238,7 @@ def _type(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning
     ):
         return meaning
     if "'NoneType' object" in message:
-        return _none()
+        return _none(source)
     if message == "'tuple' object does not support item assignment":
         return _tuple(source)
     if meaning := _no_number(message, source):
@@ -345,7 +351,7 @@ def _operands(left: str, right: str, source: str) -> Meaning | None:
     """Of a calculation: a whole message, or a text."""
     message = next((kind for kind in (left, right) if kind[:1].isupper() and kind != "NoneType"), "")
     if "NoneType" in (left, right):
-        return _none()
+        return _none(source)
     if message:
         sides = [
             n.left if message == left else n.right if isinstance(n, ast.BinOp) else n.comparators[-1]
@@ -354,12 +360,14 @@ def _operands(left: str, right: str, source: str) -> Meaning | None:
         ]
         name = ast.unparse(sides[0]) if len(sides) == 1 else ""
         fields = noetic_messages()["std_msgs"].get(message, ())
-        if name and fields == ("data",):
-            return f"`{shown(name)}` is the whole message ({message})", rewritten(
-                source, (sides[0], f"{name}.data")
-            )
-        field = f"`{shown(name)}.…`" if name else "`msg.…`"
-        return f"one side is the whole message ({message})", f"take the field that you mean: {field}"
+        is_time = message in {"Duration", "Time"}
+        field = "to_sec()" if is_time else "data" if fields == ("data",) else ""
+        what = "no number of seconds" if is_time else "the whole message"
+        if name and field:
+            return f"`{shown(name)}` is {what} ({message})", rewritten(source, (sides[0], f"{name}.{field}"))
+        inner = f"`{shown(name)}.…`" if name else "`msg.…`"
+        hint = "write `.to_sec()` behind that side" if is_time else f"take the field that you mean: {inner}"
+        return f"one side is {what} ({message})", hint
     if "^" in source and {left, right} <= {"int", "float"}:
         return "`^` is no power in Python", f"write `{shown(source.replace('^', '**'))}`"
     if "str" in (left, right):
@@ -367,7 +375,9 @@ def _operands(left: str, right: str, source: str) -> Meaning | None:
     return None
 
 
-def _none() -> Meaning:
+def _none(source: str) -> Meaning:
+    if found := re.search(r"([\w.]+)\.get_result\(\)", source):
+        return "the action has no result yet", f"above that line, write `{found[1]}.wait_for_result()`"
     cause = "it is None here: nothing has given it a value yet, or a function without `return` did"
     return cause, "check `is not None` before that line"
 
@@ -413,7 +423,7 @@ def _attribute(message: str, source: str, _marked: tuple[int, int] | None) -> Me
             f"`{name}` is the type of the messages, not a message",
             f"write brackets where it is made: `{name} = …()`",
         )
-    return _none() if "'NoneType' object" in message else None
+    return _none(source) if "'NoneType' object" in message else None
 
 
 def _zero(_message: str, source: str, _marked: tuple[int, int] | None) -> Meaning:
@@ -500,7 +510,7 @@ _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | Non
     "ZeroDivisionError": _zero,
     "RecursionError": lambda *_: (
         "a function calls itself endlessly",
-        "call another function there, or loop",
+        "for its smallest values, return without that call, or loop",
     ),
 }
 

@@ -492,7 +492,7 @@ def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     if name and re.search(rf"//.*\b{name[1]}\b", source):
         return "a comment begins with `#` in Python", f"write `{shown(source.replace('//', '#', 1))}`"
     known = next((known for said, known in SLIPS.items() if said in found.message), None)
-    known = explain_number_of_values(found.message) or known
+    known = explain_number_of_values(found.message, source) or known
     meant = (
         part_of_action(found)
         or other_items(found)

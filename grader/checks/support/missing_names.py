@@ -159,7 +159,7 @@ def unmade(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     makers = (one for one in (package, *package.also) if _makes(one, found.message))
     maker = None if own_message(found, package) else next(makers, None)
     if maker is None:
-        return _unlisted(found, package)
+        return _undefined(found, package) or _unlisted(found, package)
     wanted = re.match(r"cannot import name '(\w+)'", found.message)
     if wanted is not None and "__init__.py" in found.message:  # the build made others
         own = next((one for one in maker.interfaces if wanted[1] in one.classes), None)
@@ -183,6 +183,20 @@ def unmade(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
             # names no file: a repair that does is told behind it
             hint = "list them in add_message_files(…) or add_service_files(…), and call generate_messages(…)"
     return f"the build makes {whose}", hint
+
+
+def _undefined(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
+    """Return the cause and the hint of an import of definitions from a package that has none at all."""
+    source = found.own_frames[-1].source if found.own_frames else ""
+    module, names = (found.kind in IMPORT_ERRORS and _imported_names(source)) or ("", ())
+    kind = {f"{package.name}.msg": "message", f"{package.name}.srv": "service"}.get(module)
+    if kind is None or package.interfaces or f"'{package.name}" not in found.message:
+        return None
+    folder = module.rpartition(".")[2]
+    name = re.sub(r"(Request|Response)$", "", names[0]) if folder == "srv" else names[0]
+    file = f"{folder}/{name}.{folder}" if name != "*" else f"the definition in {folder}/"
+    hint = f"write {file}, list it in add_{kind}_files(…), and call generate_messages(…) in {CMAKE}"
+    return f"the package has no .{folder} file to build it from", hint
 
 
 def _listing(interfaces: Iterable[Interface]) -> str:
@@ -327,6 +341,14 @@ def _other_types(name: str, package: str) -> tuple[str, str] | None:
 def _other_attributes(package: PackageFacts, owner: str, wrong: str, source: str) -> tuple[str, str] | None:
     """Return what a message has, or an object of rospy's, in place of an attribute that it has not."""
     known = ATTRIBUTES.get(owner) or fields_of(package, owner)
+    having = [
+        kind
+        for own in package.interfaces
+        for kind, names in own.members.items()
+        if kind != owner and wrong in names and owner in {*own.classes, *own.members}
+    ]
+    if len(having) == 1 and not near_names(wrong, known):
+        return f"{wrong} is a field of {having[0]}", f"make it as {having[0]}(), not as {owner}()"
     if not known:
         return None
     alike = [name for name in known if min(len(name), len(wrong)) > 2 and _begins_alike(name, wrong)]

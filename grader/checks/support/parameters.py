@@ -211,11 +211,18 @@ def params_given(run: Run) -> dict[str, Given]:
     return {n: Given(n, e.value, NOT_IN_FILE not in e.detail) for n, e in zip(names, events, strict=True)}
 
 
+def _may_rest_on_one(check: Check, verdict: Verdict) -> bool:
+    """Return whether a parameter may be the cause of a loss that nothing explains yet: what a node does upon what it
+    hears, or other words of its own than the lab's."""
+    says = check.name in {"logs", "prints"} and not verdict.unjudged
+    return is_unexplained(check, verdict) or (says and verdict.status.is_lost and not verdict.cause)
+
+
 def explain_by_unread_parameter(
     check: Check, _package: PackageFacts | None, run: object, verdict: Verdict
 ) -> Verdict:
     """Return a lost mark with the parameter that the run sets and that no node asked for, whatever it did instead."""
-    if not is_unexplained(check, verdict) or not isinstance(run, Run) or early_end(run):
+    if not _may_rest_on_one(check, verdict) or not isinstance(run, Run) or early_end(run):
         return verdict
     reads = [(e.actor, absolute_name(e.topic or "")) for _, e in run.actors if e.action == "read"]
     names = {name for _, name in reads}  # a program of the grader's reads some of them itself
@@ -244,7 +251,7 @@ def explain_by_misplaced_parameter(
     check: Check, package: PackageFacts | None, run: object, verdict: Verdict
 ) -> Verdict:
     """Return a lost mark with the parameter that the node reads and a launch file sets somewhere else."""
-    if not is_unexplained(check, verdict) or package is None or not isinstance(run, Run) or early_end(run):
+    if not _may_rest_on_one(check, verdict) or package is None or not isinstance(run, Run) or early_end(run):
         return verdict
     found = next(_misplaced(package, run, _publishing(verdict, run)), None)
     if _is_too_early(run):
@@ -271,7 +278,7 @@ def explain_by_overwritten_parameter(
     check: Check, package: PackageFacts | None, run: object, verdict: Verdict
 ) -> Verdict:
     """Return a lost mark with the line that sets a parameter which the run or the launch file gives another value."""
-    if not is_unexplained(check, verdict) or package is None or not isinstance(run, Run):
+    if not _may_rest_on_one(check, verdict) or package is None or not isinstance(run, Run):
         return verdict
     given, nodes = {name: one.value for name, one in params_given(run).items()}, run.student_nodes()
     found: dict[str, Verdict] = {}  # by the node that sets it

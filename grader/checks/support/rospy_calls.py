@@ -114,7 +114,10 @@ def part_of_action(found: Traceback) -> Meaning | None:
         return f"{takes}, and `{name}` is its type", f"write brackets with its fields: `{name}(…)`"
     cause = f"{takes}, and this is {'an' if kind[0] in 'aeiou' else 'a'} {kind}"
     if lacks[1] is None:
-        return cause, f"make a message of it: `…{part}(…)`"
+        inside = f"a field of the {part.lower()} is a time or a duration, and gets a number"
+        around = "write `rospy.Duration(…)` around the number where the field gets it"
+        is_time = lacks[3] in {"secs", "nsecs"}
+        return (inside, around) if is_time else (cause, f"make a message of it: `…{part}(…)`")
     right = f"{lacks[1]}{part}"
     if isinstance(given, ast.Call) and ast.unparse(given.func).rpartition(".")[2] == kind:
         return cause, rewritten(source, (given.func, ast.unparse(given.func).replace(kind, right)))

@@ -28,7 +28,7 @@ from grader.package.repairs.cmake_calls import (
 from grader.package.repairs.editing import Files, keep_first_version, naming_files, rename_word
 from grader.package.repairs.interfaces import (
     GENERATE,
-    exchange_parts,
+    define_as_asked,
     make_interfaces,
     needs_interfaces,
     wait_for_headers,
@@ -110,7 +110,7 @@ def repair_cmake(
     wait_for_headers(files, package, name)
     if needs_interfaces(files, package, name, scripts):
         make_interfaces(files, package, name, scripts)
-        exchange_parts(files, package, wanted)
+        define_as_asked(files, package, wanted)
     name_programs(files, wanted)
     if not package.folder_beside:  # what it names is right once it lies there itself
         install_scripts(files, package, wanted)

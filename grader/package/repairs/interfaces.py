@@ -9,8 +9,15 @@ from pathlib import PurePosixPath
 from cmake_parser.ast import Command
 
 from grader.installable import noetic_messages
-from grader.model.message_definitions import DIVIDER, DIVIDING, PARTS, exchanged_parts, meant_type
-from grader.model.package import CMAKE, INTERFACE_FOLDERS, PackageFacts
+from grader.model.message_definitions import (
+    DIVIDER,
+    DIVIDING,
+    FULL_NAMES,
+    PARTS,
+    exchanged_parts,
+    meant_type,
+)
+from grader.model.package import CMAKE, INTERFACE_FOLDERS, Interface, InterfaceField, PackageFacts
 from grader.package.repairs.cmake_calls import (
     add_call,
     all_words,
@@ -23,11 +30,13 @@ from grader.package.repairs.cmake_calls import (
 from grader.package.repairs.editing import Files
 from grader.package.repairs.files import is_own
 from grader.package.repairs.names import CPP, Wanted, is_near
-from grader.wording import is_one_edit, join_words, lines_text
+from grader.wording import is_one_edit, join_words, lines_text, numbers_text
 
 OF_GENERATION = re.compile(r"_generate_messages|_gen(cpp|py)$")
 """Targets that generate_messages(…) makes."""
 GENERATE, GENERATION = "generate_messages", "message_generation"
+GENERATORS = {GENERATION, "genmsg", "actionlib_msgs"}
+"""Packages of which each brings the calls that make messages; the last one finds genmsg."""
 
 
 def needs_interfaces(files: Files, package: PackageFacts, name: str, scripts: Collection[str]) -> bool:
@@ -62,7 +71,7 @@ def make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Col
     for call, names in reversed(made.items()):
         _name_definitions(files, call, names, needed)
     of_catkin, named = _components(files)
-    lacks = of_catkin and not {GENERATION, "genmsg"}.intersection(named)
+    lacks = of_catkin and GENERATORS.isdisjoint(named)
     if lacks and not any("$" in word for word in named):
         words = words_of(of_catkin[0])
         near = next((token for token in words if is_one_edit(token.value, GENERATION)), None)
@@ -81,7 +90,7 @@ def _delete_generation(files: Files, package: PackageFacts) -> None:
     """Delete the call of generate_messages(…) that has nothing to make, where CMake does not know it."""
     calls, (of_catkin, named) = calls_of(files, GENERATE), _components(files)
     folders = {PurePosixPath(file.path).suffix.removeprefix(".") for file in package.files}
-    known = {GENERATION, "genmsg"}.intersection(named) or any("$" in word for word in named)
+    known = not GENERATORS.isdisjoint(named) or any("$" in word for word in named)
     if len(calls) != 1 or not of_catkin or known or folders & {*INTERFACE_FOLDERS.values()}:
         return
     _delete(files, calls[0], f"{GENERATE}(…) is called, and there are no messages to make")
@@ -166,20 +175,68 @@ def _name_components(files: Files, names: Sequence[str]) -> None:
     files.change("build-line", CMAKE, changed, message, f"write {new} after {token.value}")
 
 
-def exchange_parts(files: Files, package: PackageFacts, wanted: Wanted) -> None:
-    """Put the parts of a service or an action into their order, where whole parts have changed places."""
+def define_as_asked(files: Files, package: PackageFacts, wanted: Wanted) -> None:
+    """Put the parts of a service or an action into the order of the handout where whole parts have changed places, and
+    between them the `---` that are missing; give fields the handout's types where others cannot stand for them."""
     for path, fields in wanted.definitions:
-        own = next((one for one in package.interfaces if one.path == path and one.fault is None), None)
+        own = next((one for one in package.interfaces if one.path == path), None)
         text = files.text(path)
-        places = exchanged_parts(own.fields, fields) if own else {}
-        if not places or text is None:
+        if own is None or text is None:
             continue
-        order = PARTS[PurePosixPath(path).suffix]
-        parts = [part.strip("\n") for part in DIVIDER.split(text)]
-        changed = "\n---\n".join(parts[order.index(places.get(part, part))] for part in order)
-        moved = join_words(part for part, other in places.items() if part != other)
-        fix = f"the order of the parts is {join_words(order)}, with `---` between them"
-        files.change("build-line", path, f"{changed}\n", f"{path}: {moved} have changed places", fix)
+        if own.fault is not None:
+            _divide(files, own, fields, text)
+            continue
+        if places := exchanged_parts(own.fields, fields):
+            order = PARTS[PurePosixPath(path).suffix]
+            parts = [part.strip("\n") for part in DIVIDER.split(text)]
+            changed = "\n---\n".join(parts[order.index(places.get(part, part))] for part in order)
+            moved = join_words(part for part, other in places.items() if part != other)
+            fix = f"the order of the parts is {join_words(order)}, with `---` between them"
+            files.change("build-line", path, f"{changed}\n", f"{path}: {moved} have changed places", fix)
+            continue
+        types = {(one.part, one.name): one.type for one in fields}
+        for one in own.fields:
+            asked = types.get((one.part, one.name), "")
+            if one.value is None and asked and _cannot_stand_for(one.type, asked, path, package.name or ""):
+                now = files.text(path) or ""
+                lines = now.split("\n")
+                lines[one.line - 1] = re.sub(
+                    rf"^(\s*){re.escape(one.type)}(?=\s)", rf"\g<1>{asked}", lines[one.line - 1]
+                )
+                if "\n".join(lines) == now:
+                    continue  # put right already
+                message = (
+                    f"line {one.line} of {path}: {one.path} is {one.type}, but the handout asks for {asked}"
+                )
+                files.change("build-line", path, "\n".join(lines), message, f"write `{asked} {one.name}`")
+
+
+def _cannot_stand_for(kind: str, asked: str, path: str, package: str) -> bool:
+    """Return whether a field of one type is none of the other: in a service or an action, who calls it needs the very
+    type; in a message, a number of another size does as well."""
+    names = [FULL_NAMES.get(one.partition("[")[0], one.partition("[")[0]) for one in (kind, asked)]
+    lists = [one.partition("[")[2] for one in (kind, asked)]
+    same = names[0].removeprefix(f"{package}/") == names[1].removeprefix(f"{package}/")
+    sizes = re.compile(r"u?int\d+|float\d+")
+    alike = path.endswith(".msg") and all(sizes.fullmatch(one) for one in names)
+    return lists[0] != lists[1] or not (same or alike)
+
+
+def _divide(files: Files, own: Interface, fields: Sequence[InterfaceField], text: str) -> None:
+    """Write the `---` that a definition has not at all, where it is plain between which of its fields they belong."""
+    order, parts = PARTS[PurePosixPath(own.path).suffix], {one.name: one.part for one in fields}
+    there = [(one.line, order.index(parts[one.name])) for one in own.fields if one.name in parts]
+    numbers = [number for _, number in there]
+    is_whole = len(there) == len(own.fields) and numbers == sorted(numbers) and len({*numbers}) == len(order)
+    if DIVIDER.search(text) or not is_whole or len(order) == 1:
+        return
+    below = [max(line for line, number in there if number == part) for part in range(len(order) - 1)]
+    lines = text.split("\n")
+    for line in reversed(below):
+        lines.insert(line, DIVIDING)
+    fault = own.fault.message if own.fault else ""
+    fix = f"write a line `---` below lines {numbers_text(below)}" if len(below) > 1 else ""
+    files.change("build-line", own.path, "\n".join(lines), f"{own.path}: {fault}", fix)
 
 
 def _correct_types(files: Files, package: PackageFacts) -> None:

@@ -97,8 +97,9 @@ def wanted_of(rubric: Rubric, package: str = "") -> Wanted:
 def _definitions(criteria: Iterable[Criterion]) -> Iterator[tuple[str, tuple[InterfaceField, ...]]]:
     for given in (one.parameters for one in criteria if one.check == "definition"):
         file, text = given["file"], given.get("text")
-        parts = (name.rpartition(".") for name in given.get("fields", ()))
-        named = (InterfaceField(part=part, type="", name=name, line=0) for part, _, name in parts)
+        types = dict(given.get("fields", {}))
+        parts = ((*path.rpartition("."), str(kind)) for path, kind in types.items())
+        named = (InterfaceField(part=part, type=kind, name=name, line=0) for part, _, name, kind in parts)
         yield file, tuple(parse_definition(text, PurePosixPath(file).suffix) if text else named)
 
 
@@ -209,6 +210,13 @@ WORDS = {"topic-name": "topic", "service-name": "service", "node-name": "node", 
 _KEY = re.compile(r"^(?P<indent> *)(?P<quote>[\"']?)(?P<key>[A-Za-z_][\w-]*:?)(?P=quote)(?=\s*:(\s|$))")
 
 
+def _called(name: Name, lines: Sequence[str]) -> str:
+    """Return what the name is a name of, in words."""
+    kind = KINDS[name.role]
+    of_action = kind == "service-name" and re.search(r"Action(Server|Client)\b", lines[name.line - 1])
+    return "action" if of_action else WORDS[kind]
+
+
 def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: Wanted) -> None:
     """Find the literals of a script that are slips of what the lab asks for, where it asks for nothing else there."""
     node = next((name.value for name in names if name.role == "node"), "") or _name_node(files, file, wanted)
@@ -296,7 +304,7 @@ def _replace_all(files: Files, file: str, written: Mapping[Name, str], right: st
     each = [f"write {as_code(lines[n - 1].strip())}" for n in numbers]
     more = [f"on line {n}, {one}" for n, one in zip(numbers[1:], each[1:], strict=True)]
     kind = KINDS[first.role]
-    told = f"line {first.line} of {file}: the {WORDS[kind]} {first.value} should be {right}"
+    told = f"line {first.line} of {file}: the {_called(first, lines)} {first.value} should be {right}"
     files.change(kind, file, "\n".join(lines), told, "; ".join([each[0], *more]) if more else "")
 
 
@@ -429,7 +437,7 @@ def _replace_literal(
     line = line[:at] + value + line[at + len(name.value) :]
     lines[name.line - 1] = ANONYMOUS.sub("", line) if plain and name.role == "node" else line
     kind = KINDS[name.role]
-    message = f"line {name.line} of {file}: the {WORDS[kind]} {name.value} should be {right}"
+    message = f"line {name.line} of {file}: the {_called(name, lines)} {name.value} should be {right}"
     files.change(kind, file, "\n".join(lines), message)
 
 
