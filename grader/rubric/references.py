@@ -106,8 +106,13 @@ def _no_debian_package(package: str) -> str:
 def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
     """Yield what a scenario asks for that no machine has."""
     for index, start in as_maps(scenario.get("start")):
-        launch = start.get("launch")
-        if isinstance(launch, str) and " " in launch.strip():
+        launch, course = start.get("launch"), {name for _, name in as_texts(rubric.get("packages"))}
+        key = next((k for k in ("script", "launch") if str(start.get(k)).partition("/")[0] in course), "")
+        if key and "/" in str(start[key]):
+            owner = str(start[key]).partition("/")[0]
+            fault = f"is of {owner}, which the rubric brings along: write program: {start[key]}"
+            yield (*path, "start", index, key), fault
+        elif isinstance(launch, str) and " " in launch.strip():
             fault = f"is the file alone, without its package: {launch.split()[-1]}"
             yield (*path, "start", index, "launch"), fault
         elif isinstance(launch, str) and "/" in launch:
@@ -117,11 +122,6 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
             yield (*path, "start", index, "launch"), fault
         for key, file in (("script", start.get("script")), ("load", start.get("load"))):
             if isinstance(file, str) and (fault := _file_fault(file, rubric)):
-                yield (*path, "start", index, key), fault
-        for key in ("script", "launch"):
-            owner, slash, _ = str(start.get(key)).partition("/")
-            if slash and owner in {name for _, name in as_texts(rubric.get("packages"))}:
-                fault = f"is of {owner}, which the rubric brings along: write program: {start[key]}"
                 yield (*path, "start", index, key), fault
         at = (*path, "start", index, "program")
         yield from _of_machine(at, "program", start.get("program"), rubric)
