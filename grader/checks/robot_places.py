@@ -11,7 +11,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
-from grader.checks.robot_path import DRIVE, metres, never_moves, spot, unreadable, why_still
+from grader.checks.robot_path import DRIVE, metres, never_moves, spot, tell_end, unreadable, why_still
 from grader.checks.support.clocks import LATE_MS, Lateness, excused, no_clock, run_seconds
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.geometry import (
@@ -65,6 +65,9 @@ FASTER = "drive faster, or take a shorter way"
 IN_ITS_WAY = "see on the map what is in its way, and turn away from that before you drive on"
 SEE = "see on the map where it leaves its way, and what it does there"
 """For a robot that knows no position: it steers by what it sees."""
+AWAY, AWAY_LEAST, AIMED_DEG, BEHIND_DEG = 0.8, 5, 10.0, 170.0
+"""A robot turns away from its goal by this share of at least so many velocities; those that it gets where the goal is
+straight ahead, or behind it, do not count."""
 STRAIGHT = 2.0
 """A way that is longer by this factor than it brings the robot nearer is not a slow one, but a wrong one."""
 
@@ -161,7 +164,7 @@ def ends_at(package: PackageFacts, run: Run, params: EndsAtParams) -> Verdict:
         judged = path_to_judge(found, asked, params)
         verdict = _judge_arrival(judged, asked, run, params) if judged else _too_late(asked, params)
         verdict = _fell_silent(package, run, judged, asked, params) or verdict
-        verdict = _excused_end(verdict, judged, run, params) if judged else verdict
+        verdict = _excused_end(tell_end(verdict, package, run), judged, run, params) if judged else verdict
     assert verdict is not None  # noqa: S101 - one of them always is
     return verdict.about(
         expected=params.words,
@@ -253,7 +256,9 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
         return failed(message, hint=hint)
     speed_m_s, hold_s = _speed_m_s(judged), math.inf if params.hold_s is None else params.hold_s
     moves = speed_m_s > SLOW_M_S
-    if moves or any(one.speed and asked.to_s - one.time_s <= hold_s for one in _told(run, asked)[-1:]):
+    if moves or any(
+        one.speed > SLOW_M_S and asked.to_s - one.time_s <= hold_s for one in _told(run, asked)[-1:]
+    ):
         still = f"on its way at {speed_m_s:.2f} m/s" if moves else "told to drive"
         message = f"{at}, and is still {still}"
         nearer_m = math.dist(judged[0].point, params.goal) - math.dist(last.point, params.goal)
@@ -263,6 +268,9 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
         steer = _steer(run, params)
         steer += "; where it does not, it is too slow" if steer == SEE and nearer_m >= 0 else ""
         turn = f"{'it drives away' if nearer_m < 0 else driven}: {steer}"
+        if (strays or around > 1) and (sides := _turns_away(judged, _told(run, asked), params.goal)):
+            message += f", and it turns to the {sides[0]} where the goal is on its {sides[1]}"
+            turn = f"turn towards the goal: a positive angular.z turns to the left, and {STEER}"
         strays = strays or around > 1
         return failed(message, hint=turn if strays else FASTER if moves else IN_ITS_WAY)
     told = _told(run, asked)
@@ -275,6 +283,25 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
         at += f": the last velocity, which is not 0, came {asked.to_s - told[-1].time_s:.1f} s before that"
         hint = f"publish a velocity again and again until {near}"
     return failed(at, hint=hint)
+
+
+def _turns_away(path: Sequence[Pose], told: Sequence[Command], goal: Point) -> tuple[str, str] | None:
+    """Return to which side it is told to turn, and on which the goal is, where it is nearly always the other one."""
+    away, index = [], 0
+    for command in told:
+        while index + 1 < len(path) and path[index + 1].time_s <= command.time_s:
+            index += 1
+        pose = path[index]
+        aside = math.remainder(math.atan2(goal[1] - pose.y, goal[0] - pose.x) - pose.heading, math.tau)
+        if command.turn and AIMED_DEG < abs(math.degrees(aside)) < BEHIND_DEG:
+            away.append(aside if aside * command.turn < 0 else 0.0)
+    if len(away) < AWAY_LEAST or sum(map(bool, away)) < AWAY * len(away):
+        return None
+    return (
+        ("right", "left")
+        if sum(aside > 0 for aside in away) * 2 >= sum(map(bool, away))
+        else ("left", "right")
+    )
 
 
 def _steer(run: Run, params: EndsAtParams) -> str:
@@ -433,7 +460,7 @@ def stays_within(package: PackageFacts, run: Run, params: StaysWithinParams) -> 
     verdict = _unreadable(found, package, run, params) or _no_walls(region)
     if verdict is None and found is not None:
         path = placed(found, params)
-        verdict = _stays(path, region, run, params) if path else _too_short(params)
+        verdict = tell_end(_stays(path, region, run, params), package, run) if path else _too_short(params)
     assert verdict is not None  # noqa: S101 - one of them always is
     share = f" for {params.share:.0%} of the time" if params.share < 1 else ""
     return verdict.about(

@@ -142,6 +142,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (node("    for i in range(9):\n        p.publish(1)\n") + CALLED,
          [("loop-left", 4, "write `while not rospy.is_shutdown():` on line 4")]),
         ("def stop():\n    for i in range(4):\n        p.publish(1)\nrospy.init_node('a')\nstop()\nstop()\n", []),
+        ("def side():\n    while n < 9:\n        p.publish(1)\nfor i in range(4):\n    side()\n", []),
         (node("    for i in range(4):\n        p.publish(1)\n        rospy.sleep(1)\n    p.publish(0)\n") + CALLED,
          [("loop-left", 4, "call rospy.spin() below line 7")]),
         *((node(f"    while rospy.is_shutdown() {end}:\n        p.publish(1)\n") + CALLED,
