@@ -181,7 +181,7 @@ def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
 def never_moves(path: Sequence[Pose], figures: str, run: Run) -> Verdict:
     """Return the loss of a robot that stays where it is, and turns there at most."""
     if turned_rad(path) > TURNING_RAD:
-        hint = f"{DRIVE}: linear.x, and not only angular.z"
+        hint = f"{DRIVE}: linear.x, and not only angular.z; where the script does so, its condition is never true"
         if any(one.forward for channel in run.student_channels() for _, one in commands_of(channel)):
             hint = "look at the condition under which it drives: it is hardly ever true"
         return unjudged("it turns, and never leaves its place", measured=figures, hint=hint)
@@ -260,13 +260,14 @@ def _let_go(run: Run, params: PathParams) -> Words | None:
 
 
 def _by_other_clock(run: Run, params: PathParams, course: Course) -> Words | None:
-    """A robot that comes farther along its way by the computer's clock than by the run's, which is faster."""
-    if run.warp == 1 or not params.relative:
+    """A robot that keeps to its way, or comes farther, by the computer's clock and not by that of the run."""
+    if run.warp == 1 or not params.relative or course.strayed is None:
         return None
     for channel in run.student_channels():
         commands = [one._replace(time_s=time_ns / 1e9) for time_ns, one in commands_of(channel)]
         held = driven(commands, params.hold_s, commands[-1].time_s + STOPS_AFTER_S) if commands else []
-        if followed(relative(held), params.way.points, params.tolerance_m).reached > course.reached:
+        other = followed(relative(held), params.way.points, params.tolerance_m)
+        if other.reached >= course.reached + (other.strayed is not None):
             faster = f"the clock of ROS is {significant(run.warp)} times as fast in this run"
             return Words(
                 f"it drives and turns by the computer's clock, as with time.time() or time.sleep(), and {faster}",

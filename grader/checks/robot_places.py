@@ -65,6 +65,8 @@ FASTER = "drive faster, or take a shorter way"
 IN_ITS_WAY = "see on the map what is in its way, and turn away from that before you drive on"
 SEE = "see on the map where it leaves its way, and what it does there"
 """For a robot that knows no position: it steers by what it sees."""
+SELDOM_S = 0.5
+"""A node that steers by what it sees gets ten scans in a second, and answers them sooner."""
 AWAY, AWAY_LEAST, AIMED_DEG, BEHIND_DEG = 0.8, 5, 10.0, 170.0
 """A robot turns away from its goal by this share of at least so many velocities; those that it gets where the goal is
 straight ahead, or behind it, do not count."""
@@ -164,7 +166,8 @@ def ends_at(package: PackageFacts, run: Run, params: EndsAtParams) -> Verdict:
         judged = path_to_judge(found, asked, params)
         verdict = _judge_arrival(judged, asked, run, params) if judged else _too_late(asked, params)
         verdict = _fell_silent(package, run, judged, asked, params) or verdict
-        verdict = _excused_end(tell_end(verdict, package, run), judged, run, params) if judged else verdict
+        verdict = _answers_late(tell_end(verdict, package, run), run)
+        verdict = _excused_end(verdict, judged, run, params) if judged else verdict
     assert verdict is not None  # noqa: S101 - one of them always is
     return verdict.about(
         expected=params.words,
@@ -365,6 +368,13 @@ def _fell_silent(
     return failed(message, hint=hint, citations=cited)
 
 
+def _answers_late(verdict: Verdict, run: Run) -> Verdict:
+    """Mark the loss of a robot whose node lets long pass between two velocities: a callback of it may wait."""
+    told = _told(run, Stretch(-math.inf, math.inf))
+    seldom = any(b.time_s - a.time_s > SELDOM_S for a, b in pairwise(told) if a.speed or a.turn)
+    return verdict.late() if seldom and verdict.status is Status.FAIL else verdict
+
+
 def _speed_m_s(path: Sequence[Pose]) -> float:
     """Return the speed at the end."""
     recent = [pose for pose in path if pose.time_s >= path[-1].time_s - STILL_S]
@@ -461,6 +471,7 @@ def stays_within(package: PackageFacts, run: Run, params: StaysWithinParams) -> 
     if verdict is None and found is not None:
         path = placed(found, params)
         verdict = tell_end(_stays(path, region, run, params), package, run) if path else _too_short(params)
+        verdict = _answers_late(verdict, run)
     assert verdict is not None  # noqa: S101 - one of them always is
     share = f" for {params.share:.0%} of the time" if params.share < 1 else ""
     return verdict.about(

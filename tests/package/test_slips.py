@@ -83,6 +83,7 @@ def test_slips_are_found_and_named(tmp_path):
         ("a.py", 4, "not-called"),
         ("a.py", 5, "not-called"),
         ("a.py", 6, "input"),
+        ("a.py", 6, "typed-text"),
         ("a.py", 7, "input"),
         ("a.py", 8, "input"),
         ("a.py", 13, "not-called"),
