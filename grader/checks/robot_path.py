@@ -383,7 +383,7 @@ def _turns_alike(path: Sequence[Pose], way: Way, course: Course) -> Words | None
         return None
     asked = math.remainder(_direction(*way.points[1:3]) - _direction(*way.points[:2]), math.tau)
     turned = _first_turn(path)
-    if turned * asked <= 0 or abs(math.degrees(turned - asked)) < SAME_TURN_DEG:
+    if turned * asked <= 0 or not SAME_TURN_DEG <= abs(math.degrees(turned - asked)) <= OTHER_TURN_DEG:
         return None
     right, heading, x, y = [path[0]], 0.0, path[0].x, path[0].y
     for a, b in pairwise(path):

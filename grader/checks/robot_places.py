@@ -62,6 +62,7 @@ STEER = (
     "-pi and pi: math.remainder(angle, 2 * math.pi); dx and dy are the point minus the robot's place"
 )
 FASTER = "drive faster, or take a shorter way"
+OTHER_SIDE = "turn to the other side where the wall is too near: a positive angular.z turns to the left"
 IN_ITS_WAY = "see on the map what is in its way, and turn away from that before you drive on"
 SEE = "see on the map where it leaves its way, and what it does there"
 """For a robot that knows no position: it steers by what it sees."""
@@ -270,10 +271,10 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
         driven = driven if strays else f"it turns around {around:.1f} times on its way"
         steer = _steer(run, params)
         steer += "; where it does not, it is too slow" if steer == SEE and nearer_m >= 0 else ""
-        turn = f"{'it drives away' if nearer_m < 0 else driven}: {steer}"
         if (strays or around > 1) and (sides := _turns_away(judged, _told(run, asked), params.goal)):
             message += f", and it turns to the {sides[0]} where the goal is on its {sides[1]}"
-            turn = f"turn towards the goal: a positive angular.z turns to the left, and {STEER}"
+            steer = f"turn towards the goal: a positive angular.z turns to the left, and {STEER}"
+        turn = f"{'it drives away' if nearer_m < 0 else driven}: {steer}"
         strays = strays or around > 1
         return failed(message, hint=turn if strays else FASTER if moves else IN_ITS_WAY)
     told = _told(run, asked)
@@ -516,9 +517,17 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
     inside = share_inside(path, out)
     figures = f"{inside:.0%} of the time inside, {metres(max(out))} outside at most, {metres(long_m)} long"
     if stands(path) and (params.least_m or not any(out)):
+        hears = topics_with(run, "subscribers", lambda node: node in run.grader_nodes)
+        own = [c for c in run.student_channels() if c.topic in hears or not hears]
+        last = [one for c in own for _, one in commands_of(c)[-1:]]
+        if any(one.forward > SLOW_M_S for one in last) and turned_rad(path) <= TURNING_RAD:
+            message = "it never moves, though it is told to drive"
+            return unjudged(message, measured=figures, hint=IN_ITS_WAY)
         return never_moves(path, figures, run)
     if inside < params.share - ROUNDING or (params.share == 1 and any(out)):
         verdict = _outside(path, out, region, inside, params)
+        if side := _turns_to_wall(path, out, region, run):
+            verdict = verdict.explained(f"it turns to the {side} there, where the wall is", OTHER_SIDE)
     elif long_m < params.least_m:
         message = f"its path is {metres(long_m)} long; {significant(params.least_m)} m are asked for"
         hint = "keep driving while the way is clear"
@@ -536,6 +545,21 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
         return passed(f"it is {region.words} {always}", measured=figures)
     nearly = inside * NEARLY >= params.share and long_m * NEARLY >= params.least_m
     return _excuse_nearly(verdict.about(measured=figures), run, nearly=nearly)
+
+
+def _turns_to_wall(path: Sequence[Pose], out: Sequence[float], region: Region, run: Run) -> str:
+    """Return to which side it is told to turn before it comes too near to a wall, if the wall is there; "" else."""
+    first = next(pose for pose, far in zip(path, out, strict=True) if far)
+    if not isinstance(region, Band) or not Band(region.walls, region.min_m or 0.0, None).out_m(first.point):
+        return ""
+    (x, y), off = first.point, SAME_M
+    dx = region.nearest_m((x - off, y)) - region.nearest_m((x + off, y))
+    dy = region.nearest_m((x, y - off)) - region.nearest_m((x, y + off))
+    aside = math.remainder(math.atan2(dy, dx) - first.heading, math.tau)
+    told = [one.turn * aside for one in _told(run, Stretch(first.time_s - TURNS_S, first.time_s)) if one.turn]
+    if not told or min(told) <= 0 or not AIMED_DEG < abs(math.degrees(aside)) < BEHIND_DEG:
+        return ""
+    return "left" if aside > 0 else "right"
 
 
 def share_inside(path: Sequence[Pose], out: Sequence[float]) -> float:
