@@ -57,7 +57,7 @@ RESTS_M = 0.001
 STOPS_S = 0.3
 STOPS_AFTER_S = 1.0
 """The last velocity of a node that ends holds for so long."""
-OTHER_TURN_DEG, HALF_TURN_DEG = 20.0, 170.0
+SAME_TURN_DEG, OTHER_TURN_DEG, HALF_TURN_DEG = 2.0, 20.0, 170.0
 """A turn by so much more or less is another one; one of nearly half a circle has no side."""
 
 
@@ -78,6 +78,9 @@ class PathParams(Record):
     of: Sender | None = None
     """Whose messages count: the `student`'s nodes', those of a `program` that the scenario starts beside them, or
     `anyone`'s; null: the poses of a program if one publishes them, else the student's messages."""
+    may_go_on: bool = False
+    """Whether it may drive on from the last point, as a robot does that drives around and around: what it does after
+    that does not count."""
 
     @model_validator(mode="after")
     def _is_a_way(self) -> PathParams:
@@ -102,7 +105,7 @@ def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
 
     What it checks
         That the path passes the points in their order, each within the tolerance, stays within the
-        tolerance of the straight lines between them, and ends at the last one.
+        tolerance of the straight lines between them, and ends at the last one, unless it may go on from there.
 
     Why it matters on a robot
         The path follows from time and speed. If a turn lasts a tenth of a second too long, the robot misses
@@ -122,15 +125,21 @@ def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
         verdict = no_clock(run) or nothing_sent(package, run, params.topic, params.of or "student")
     else:
         verdict = unreadable(found, params.topic) or _judge_track(found, run, params)
-        end = explain_early_end(package, run) if verdict.status is Status.FAIL else None
-        if end is not None and not end.by_itself:
-            kind = unjudged if verdict.unjudged else failed
-            verdict = end.verdict(kind, f"{verdict.message}; the node ended: {end.cause}", verdict.measured)
+        verdict = tell_end(verdict, package, run)
     return verdict.about(
         expected=f"a way through {join_words(map(spot, params.points))}, within {metres(params.tolerance_m)}",
         measured=verdict.measured or "no path",
         citations=(cite(run, params.topic),),
     )
+
+
+def tell_end(verdict: Verdict, package: PackageFacts, run: Run) -> Verdict:
+    """Return a loss with the reason why the node ended, where it did so early and not by its script's own end."""
+    end = explain_early_end(package, run) if verdict.status is Status.FAIL else None
+    if end is None or end.by_itself or end.cause in verdict.message:
+        return verdict
+    kind = unjudged if verdict.unjudged else failed
+    return end.verdict(kind, f"{verdict.message}; the node ended: {end.cause}", verdict.measured)
 
 
 def unreadable(found: Track, topic: str) -> Verdict | None:
@@ -147,6 +156,8 @@ def unreadable(found: Track, topic: str) -> Verdict | None:
 def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
     taken = relative(found.path) if params.relative else list(found.path)
     course = followed(taken, params.way.points, params.tolerance_m)
+    if params.may_go_on and course.reached == len(params.way.points):
+        course = course._replace(done=True, strayed=None)
     figures = measured(taken, course, params.way)
     if course.done:
         count = f"{len(params.points)} points" if len(params.points) > 1 else "its point"
@@ -156,6 +167,7 @@ def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
     words = (
         _in_degrees(run)
         or _let_go(run, params)
+        or _by_other_clock(run, params, course)
         or what_is_wrong(taken, params.way, course, mirror=params.relative)
     )
     verdict = failed(words.message, hint=words.hint, measured=figures)
@@ -169,7 +181,7 @@ def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
 def never_moves(path: Sequence[Pose], figures: str, run: Run) -> Verdict:
     """Return the loss of a robot that stays where it is, and turns there at most."""
     if turned_rad(path) > TURNING_RAD:
-        hint = f"{DRIVE}: linear.x, and not only angular.z"
+        hint = f"{DRIVE}: linear.x, and not only angular.z; where the script does so, its condition is never true"
         if any(one.forward for channel in run.student_channels() for _, one in commands_of(channel)):
             hint = "look at the condition under which it drives: it is hardly ever true"
         return unjudged("it turns, and never leaves its place", measured=figures, hint=hint)
@@ -247,6 +259,23 @@ def _let_go(run: Run, params: PathParams) -> Words | None:
     return None
 
 
+def _by_other_clock(run: Run, params: PathParams, course: Course) -> Words | None:
+    """A robot that keeps to its way, or comes farther, by the computer's clock and not by that of the run."""
+    if run.warp == 1 or not params.relative or course.strayed is None:
+        return None
+    for channel in run.student_channels():
+        commands = [one._replace(time_s=time_ns / 1e9) for time_ns, one in commands_of(channel)]
+        held = driven(commands, params.hold_s, commands[-1].time_s + STOPS_AFTER_S) if commands else []
+        other = followed(relative(held), params.way.points, params.tolerance_m)
+        if other.reached >= course.reached + (other.strayed is not None):
+            faster = f"the clock of ROS is {significant(run.warp)} times as fast in this run"
+            return Words(
+                f"it drives and turns by the computer's clock, as with time.time() or time.sleep(), and {faster}",
+                "measure time with rospy.get_time(), and wait with rospy.sleep(…): a simulated robot has its own clock",
+            )
+    return None
+
+
 class Words(NamedTuple):
     """What is wrong with a path, and what to do."""
 
@@ -281,6 +310,7 @@ def what_is_wrong(path: Sequence[Pose], way: Way, course: Course, *, mirror: boo
     return (
         (_explain_mirrored(path, way) if mirror else None)
         or _wrong_start(path, way, course)
+        or (_turns_alike(path, way, course) if mirror else None)
         or _turns_while_driving(path, way, course)
         or _wrong_turn(path, way, course)
         or (_strays(path, way, course) if course.strayed is not None else _ends_short(path, way, course))
@@ -345,6 +375,43 @@ def _wrong_turn(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
         right = f"{abs(asked):.0f}°{_side(asked)}"
         hint = f"turn by {abs(asked):.0f}° there: an angle is angular.z times time, and 180° are math.pi"
     return Words(f"at {name} it turns by {abs(turned):.0f}°{_side(turned)} instead of {right}", hint)
+
+
+def _turns_alike(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
+    """By another angle than asked for, at each corner alike: with turns that are right, the path is the way."""
+    if len(way.points) < 3:
+        return None
+    asked = math.remainder(_direction(*way.points[1:3]) - _direction(*way.points[:2]), math.tau)
+    turned = _first_turn(path)
+    if turned * asked <= 0 or not SAME_TURN_DEG <= abs(math.degrees(turned - asked)) <= OTHER_TURN_DEG:
+        return None
+    right, heading, x, y = [path[0]], 0.0, path[0].x, path[0].y
+    for a, b in pairwise(path):
+        step = math.remainder(b.heading - a.heading, math.tau)
+        off, heading = (asked / turned - 1) * (heading + step / 2), heading + step
+        cos, sin, dx, dy = math.cos(off), math.sin(off), b.x - a.x, b.y - a.y
+        x, y = x + dx * cos - dy * sin, y + dx * sin + dy * cos
+        right.append(Pose(b.time_s, x, y))
+    other = followed(right, way.points, way.tolerance_m)
+    if not other.done and (other.reached <= course.reached or other.reached < len(way.points)):
+        return None
+    message = f"it turns by {abs(math.degrees(turned)):.0f}°{_side(math.degrees(turned))} each time, and "
+    message += f"by {abs(math.degrees(asked)):.0f}° it would pass every point"
+    hint = f"turn by {abs(math.degrees(asked)):.0f}°: an angle is angular.z times time, and 180° are math.pi"
+    return Words(message, hint)
+
+
+def _first_turn(path: Sequence[Pose]) -> float:
+    """Return by how much it turns in place, to the left (rad), the first time that it does."""
+    turned = 0.0
+    for a, b in pairwise(path):
+        if math.dist(a.point, b.point) <= RESTS_M:
+            turned += math.remainder(b.heading - a.heading, math.tau)
+        elif abs(turned) > TURNING_RAD:
+            break
+        else:
+            turned = 0.0
+    return turned
 
 
 def _turns_while_driving(path: Sequence[Pose], way: Way, course: Course) -> Words | None:

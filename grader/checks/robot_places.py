@@ -11,7 +11,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
-from grader.checks.robot_path import DRIVE, metres, never_moves, spot, unreadable, why_still
+from grader.checks.robot_path import DRIVE, metres, never_moves, spot, tell_end, unreadable, why_still
 from grader.checks.support.clocks import LATE_MS, Lateness, excused, no_clock, run_seconds
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.geometry import (
@@ -62,9 +62,15 @@ STEER = (
     "-pi and pi: math.remainder(angle, 2 * math.pi); dx and dy are the point minus the robot's place"
 )
 FASTER = "drive faster, or take a shorter way"
+OTHER_SIDE = "turn to the other side where the wall is too near: a positive angular.z turns to the left"
 IN_ITS_WAY = "see on the map what is in its way, and turn away from that before you drive on"
 SEE = "see on the map where it leaves its way, and what it does there"
 """For a robot that knows no position: it steers by what it sees."""
+SELDOM_S = 0.5
+"""A node that steers by what it sees gets ten scans in a second, and answers them sooner."""
+AWAY, AWAY_LEAST, AIMED_DEG, BEHIND_DEG = 0.8, 5, 10.0, 170.0
+"""A robot turns away from its goal by this share of at least so many velocities; those that it gets where the goal is
+straight ahead, or behind it, do not count."""
 STRAIGHT = 2.0
 """A way that is longer by this factor than it brings the robot nearer is not a slow one, but a wrong one."""
 
@@ -161,6 +167,7 @@ def ends_at(package: PackageFacts, run: Run, params: EndsAtParams) -> Verdict:
         judged = path_to_judge(found, asked, params)
         verdict = _judge_arrival(judged, asked, run, params) if judged else _too_late(asked, params)
         verdict = _fell_silent(package, run, judged, asked, params) or verdict
+        verdict = _answers_late(tell_end(verdict, package, run), run)
         verdict = _excused_end(verdict, judged, run, params) if judged else verdict
     assert verdict is not None  # noqa: S101 - one of them always is
     return verdict.about(
@@ -253,7 +260,9 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
         return failed(message, hint=hint)
     speed_m_s, hold_s = _speed_m_s(judged), math.inf if params.hold_s is None else params.hold_s
     moves = speed_m_s > SLOW_M_S
-    if moves or any(one.speed and asked.to_s - one.time_s <= hold_s for one in _told(run, asked)[-1:]):
+    if moves or any(
+        one.speed > SLOW_M_S and asked.to_s - one.time_s <= hold_s for one in _told(run, asked)[-1:]
+    ):
         still = f"on its way at {speed_m_s:.2f} m/s" if moves else "told to drive"
         message = f"{at}, and is still {still}"
         nearer_m = math.dist(judged[0].point, params.goal) - math.dist(last.point, params.goal)
@@ -262,6 +271,9 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
         driven = driven if strays else f"it turns around {around:.1f} times on its way"
         steer = _steer(run, params)
         steer += "; where it does not, it is too slow" if steer == SEE and nearer_m >= 0 else ""
+        if (strays or around > 1) and (sides := _turns_away(judged, _told(run, asked), params.goal)):
+            message += f", and it turns to the {sides[0]} where the goal is on its {sides[1]}"
+            steer = f"turn towards the goal: a positive angular.z turns to the left, and {STEER}"
         turn = f"{'it drives away' if nearer_m < 0 else driven}: {steer}"
         strays = strays or around > 1
         return failed(message, hint=turn if strays else FASTER if moves else IN_ITS_WAY)
@@ -275,6 +287,25 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
         at += f": the last velocity, which is not 0, came {asked.to_s - told[-1].time_s:.1f} s before that"
         hint = f"publish a velocity again and again until {near}"
     return failed(at, hint=hint)
+
+
+def _turns_away(path: Sequence[Pose], told: Sequence[Command], goal: Point) -> tuple[str, str] | None:
+    """Return to which side it is told to turn, and on which the goal is, where it is nearly always the other one."""
+    away, index = [], 0
+    for command in told:
+        while index + 1 < len(path) and path[index + 1].time_s <= command.time_s:
+            index += 1
+        pose = path[index]
+        aside = math.remainder(math.atan2(goal[1] - pose.y, goal[0] - pose.x) - pose.heading, math.tau)
+        if command.turn and AIMED_DEG < abs(math.degrees(aside)) < BEHIND_DEG:
+            away.append(aside if aside * command.turn < 0 else 0.0)
+    if len(away) < AWAY_LEAST or sum(map(bool, away)) < AWAY * len(away):
+        return None
+    return (
+        ("right", "left")
+        if sum(aside > 0 for aside in away) * 2 >= sum(map(bool, away))
+        else ("left", "right")
+    )
 
 
 def _steer(run: Run, params: EndsAtParams) -> str:
@@ -336,6 +367,13 @@ def _fell_silent(
     hint = f"publish on {params.topic} for as long as the node runs, not only for a while"
     cited = named_at(package, run, "publisher", params.topic)
     return failed(message, hint=hint, citations=cited)
+
+
+def _answers_late(verdict: Verdict, run: Run) -> Verdict:
+    """Mark the loss of a robot whose node lets long pass between two velocities: a callback of it may wait."""
+    told = _told(run, Stretch(-math.inf, math.inf))
+    seldom = any(b.time_s - a.time_s > SELDOM_S for a, b in pairwise(told) if a.speed or a.turn)
+    return verdict.late() if seldom and verdict.status is Status.FAIL else verdict
 
 
 def _speed_m_s(path: Sequence[Pose]) -> float:
@@ -433,7 +471,8 @@ def stays_within(package: PackageFacts, run: Run, params: StaysWithinParams) -> 
     verdict = _unreadable(found, package, run, params) or _no_walls(region)
     if verdict is None and found is not None:
         path = placed(found, params)
-        verdict = _stays(path, region, run, params) if path else _too_short(params)
+        verdict = tell_end(_stays(path, region, run, params), package, run) if path else _too_short(params)
+        verdict = _answers_late(verdict, run)
     assert verdict is not None  # noqa: S101 - one of them always is
     share = f" for {params.share:.0%} of the time" if params.share < 1 else ""
     return verdict.about(
@@ -478,9 +517,17 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
     inside = share_inside(path, out)
     figures = f"{inside:.0%} of the time inside, {metres(max(out))} outside at most, {metres(long_m)} long"
     if stands(path) and (params.least_m or not any(out)):
+        hears = topics_with(run, "subscribers", lambda node: node in run.grader_nodes)
+        own = [c for c in run.student_channels() if c.topic in hears or not hears]
+        last = [one for c in own for _, one in commands_of(c)[-1:]]
+        if any(one.forward > SLOW_M_S for one in last) and turned_rad(path) <= TURNING_RAD:
+            message = "it never moves, though it is told to drive"
+            return unjudged(message, measured=figures, hint=IN_ITS_WAY)
         return never_moves(path, figures, run)
     if inside < params.share - ROUNDING or (params.share == 1 and any(out)):
         verdict = _outside(path, out, region, inside, params)
+        if side := _turns_to_wall(path, out, region, run):
+            verdict = verdict.explained(f"it turns to the {side} there, where the wall is", OTHER_SIDE)
     elif long_m < params.least_m:
         message = f"its path is {metres(long_m)} long; {significant(params.least_m)} m are asked for"
         hint = "keep driving while the way is clear"
@@ -498,6 +545,21 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
         return passed(f"it is {region.words} {always}", measured=figures)
     nearly = inside * NEARLY >= params.share and long_m * NEARLY >= params.least_m
     return _excuse_nearly(verdict.about(measured=figures), run, nearly=nearly)
+
+
+def _turns_to_wall(path: Sequence[Pose], out: Sequence[float], region: Region, run: Run) -> str:
+    """Return to which side it is told to turn before it comes too near to a wall, if the wall is there; "" else."""
+    first = next(pose for pose, far in zip(path, out, strict=True) if far)
+    if not isinstance(region, Band) or not Band(region.walls, region.min_m or 0.0, None).out_m(first.point):
+        return ""
+    (x, y), off = first.point, SAME_M
+    dx = region.nearest_m((x - off, y)) - region.nearest_m((x + off, y))
+    dy = region.nearest_m((x, y - off)) - region.nearest_m((x, y + off))
+    aside = math.remainder(math.atan2(dy, dx) - first.heading, math.tau)
+    told = [one.turn * aside for one in _told(run, Stretch(first.time_s - TURNS_S, first.time_s)) if one.turn]
+    if not told or min(told) <= 0 or not AIMED_DEG < abs(math.degrees(aside)) < BEHIND_DEG:
+        return ""
+    return "left" if aside > 0 else "right"
 
 
 def share_inside(path: Sequence[Pose], out: Sequence[float]) -> float:

@@ -17,7 +17,7 @@ SlipKind = Literal[
     "subscriber", "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes",
     "prints", "argument-text", "unused-import", "lacking-import", "unregistered", "not-started", "start-value",
     "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed", "printed-in-part",
-    "published-in-part", "never-published", "takes-number",
+    "published-in-part", "never-published", "takes-number", "typed-text",
 ]  # fmt: skip
 
 
@@ -39,6 +39,7 @@ class PythonSlip(Placed, Record):
     - `commented-out`: a ROS call in a comment; `name` is `sleep`, or `pub = Publisher`.
     - `input`: the node asks for input, and nodes get none; `name` is `once` where no loop does it again, and `paused`
       in a loop that sleeps.
+    - `typed-text`: what is typed is kept as a text, in `name`: a slip only if a number is needed.
     - `no-init`: a script with topics, or that does more than define names, never calls `init_node`.
     - `never-called`: a function that makes a node, publishes or waits, and that nothing calls.
     - `main-guard`: `__name__` is compared with another word than `__main__`.

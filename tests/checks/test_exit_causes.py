@@ -248,6 +248,31 @@ def test_a_line_is_counted_without_the_first_line_that_the_arena_writes(tmp_path
     assert end.hint == f"on line {line}, write rospy instead of rospu"
 
 
+@pytest.mark.parametrize(
+    ("source", "error", "hint"),
+    [
+        ("dx = goal.x - self.x", "unsupported operand type(s) for -: 'str' and 'float'",
+         "on lines 2 and 3, write `float(input(…))` in place of `input(…)`"),
+        ("while far > tolerance:", "'>' not supported between instances of 'float' and 'str'",
+         "on line 5, write `float(input(…))` in place of `input(…)`"),
+        ("n = side - 1", "unsupported operand type(s) for -: 'str' and 'int'",
+         "turn the text into a number first: `float(…)`"),
+    ],
+)  # fmt: skip
+def test_a_text_that_was_typed_is_made_a_number_where_it_is_asked_for(tmp_path, source, error, hint):
+    (tmp_path / "package.xml").write_text("<package><name>lab</name></package>")
+    asked = (
+        "goal.x = input('x')",
+        "goal.y = input('y')",
+        "side = float(input('side'))",
+        "tolerance = input()",
+    )
+    (tmp_path / "go.py").write_text("\n".join(("#!/usr/bin/env python3", *asked)))
+    package = facts_of(tmp_path)
+    found = said(package, ("go.py", 9, source), error=f"TypeError: {error}")
+    assert explain_traceback(found, package).hint == hint
+
+
 def said(package, *frames, error):
     lines = ["Traceback (most recent call last):"]
     for file, line, source in frames:

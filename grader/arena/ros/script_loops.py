@@ -123,7 +123,7 @@ def stopped_loops(tree):
     """`spin()` in a loop that publishes: the loop does not come round. `break` or `return` in each of its turns, or so
     many turns and no more. And `if` in place of `while`.
     """
-    turned, called = dict(turns(tree)), Counter(map(called_name, walk(tree)))
+    turned, called = dict(turns(tree)), calls_made(tree)
     for loop in walk(tree):
         once = isinstance(loop, ast.If) and is_call(getattr(loop.test, "operand", None), "is_shutdown")
         if once and not turned[loop][1] and calls_in(loop, "publish"):
@@ -164,6 +164,14 @@ def stopped_loops(tree):
             message = "the loop ends the first time around, at the %s on line %d" % (word, left.lineno)
             fix = "remove it from line %d, or put it inside an `if`" % left.lineno
             yield slip(left.lineno, "loop-left", message, fix=fix)
+
+
+def calls_made(tree):
+    """Return how often each name is called: what a loop calls counts twice, since it is called again and again."""
+    called = Counter(map(called_name, walk(tree)))
+    for loop in walk(tree):
+        called.update(map(called_name, ast.walk(loop)) if isinstance(loop, (ast.While, ast.For)) else ())
+    return called
 
 
 def run_after(loop, tree):

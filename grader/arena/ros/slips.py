@@ -83,6 +83,14 @@ def slips(tree):
             fix = "delete line %d, which makes a number of it" % line if line else ""
             fix = (len(found) < SLIPS_LIMIT and decided_by(node, tree)) or fix
             found.append(slip(node.lineno, "input", message, fix=fix, name=how_often(node, tree)))
+            of = next(
+                (dotted(n.targets[0]) for n in walk(tree) if getattr(n, "targets", 0) and n.value is node), ""
+            )
+            found += (
+                [slip(node.lineno, "typed-text", name, name=of)]
+                if of and not line and name == "input"
+                else []
+            )
     finders = (
         names_of_objects, misspelt, loop_rates, resets, never_run, never_reached, stopped_loops,
         published_before, sleepless_loops, sleeps_twice, publishes_twice, callbacks, waiting_callbacks,

@@ -34,6 +34,7 @@ from grader.checks.support.missing_names import (
 )
 from grader.checks.support.processes import Life, early_end, lives, nodes_of, signal_name
 from grader.checks.support.rospy_calls import (
+    of_typed_text,
     other_items,
     part_of_action,
     unfit_value,
@@ -374,6 +375,7 @@ def _misplaced(found: Traceback) -> tuple[str, str] | None:
 def _by_script(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
     """Return what the sides of a sum are, or what other lines of the script are to blame for."""
     sum_ = explain_operand(found, package) if found.kind == "TypeError" else None
+    sum_ = of_typed_text(found, place.file, package) or sum_
     return sum_ or (None if _misplaced(found) else _by_other_lines(found, place, package))
 
 

@@ -359,9 +359,13 @@ class Band(NamedTuple):
         return f"{significant(self.min_m)} to {significant(self.max_m)} m from {what}"
 
     def out_m(self, point: Point) -> float:
-        distance_m = nearest_m(point, self.walls)
+        distance_m = self.nearest_m(point)
         over_m = distance_m - self.max_m if self.max_m is not None else 0.0
         return max(0.0, over_m, (self.min_m or 0.0) - distance_m)
+
+    def nearest_m(self, point: Point) -> float:
+        """Return how far the nearest of the lines and points is (m)."""
+        return nearest_m(point, self.walls)
 
 
 Region = Area | Band

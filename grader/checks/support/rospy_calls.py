@@ -23,6 +23,10 @@ _BAD_TOPIC = re.compile(
 )
 _VALUE_ALONE = re.compile(r"\s*(\w+)\((?:-?[\d.]+|'[^']*'|\"[^\"]*\")\)\s*(?:#.*)?$")
 
+_TEXT_AND_NUMBER = re.compile(
+    r"'str' and '(?:int|float)'|'(?:int|float)' and 'str'|must be real number, not str"
+)
+
 
 def line_tree(source: str) -> ast.AST:
     """Return the syntax tree of a line that may begin a block; an empty one where Python cannot parse it."""
@@ -371,3 +375,16 @@ def fields_of(package: PackageFacts, name: str) -> tuple[str, ...]:
             if name.startswith(stem) and fields:
                 return fields
     return next((fields for types in noetic_messages().values() if (fields := types.get(name, ()))), ())
+
+
+def of_typed_text(found: Traceback, file: str, package: PackageFacts) -> tuple[str, str] | None:
+    """Return the lines that keep what is typed as a text, where a line computes with it, as Python 2 could."""
+    if found.kind != "TypeError" or not _TEXT_AND_NUMBER.search(found.message):
+        return None
+    source = found.own_frames[-1].source
+    typed = [s for s in package.slips if (s.kind, s.file) == ("typed-text", file)]
+    read = [s.line for s in typed if re.search(rf"\b{re.escape(s.name.partition('.')[0])}\b", source)]
+    if not read:
+        return None
+    where = f"line{'s' if len(read) > 1 else ''} {join_words(map(str, read))}"
+    return "input() gives a text in Python 3", f"on {where}, write `float(input(…))` in place of `input(…)`"
