@@ -70,6 +70,7 @@ SLIPS_LIMIT = 100
 def slips(tree):
     """What compiles and is not meant: names that are not called or not there, questions that wait for a keyboard."""
     functions = {n.name for n in walk(tree) if isinstance(n, (ast.FunctionDef, ast.ClassDef))}
+    kept = {id(n.value): dotted(n.targets[0]) for n in walk(tree) if isinstance(n, ast.Assign)}
     found = []
     for node in walk(tree):
         name = uncalled(node, functions)
@@ -77,20 +78,14 @@ def slips(tree):
             message, fix = "`%s` is named but not called" % name, "write `%s()`" % name
             found.append(slip(node.lineno, "not-called", message, fix=fix, name=name))
         name = asked(node, functions)
-        if name:
+        if name and len(found) < SLIPS_LIMIT:  # each looks through the whole script
             message = "`%s()` waits for someone to type, and a graded node gets no input" % name
             line = numbered(node, tree)
             fix = "delete line %d, which makes a number of it" % line if line else ""
-            fix = (len(found) < SLIPS_LIMIT and decided_by(node, tree)) or fix
+            fix = decided_by(node, tree) or fix
             found.append(slip(node.lineno, "input", message, fix=fix, name=how_often(node, tree)))
-            of = next(
-                (dotted(n.targets[0]) for n in walk(tree) if getattr(n, "targets", 0) and n.value is node), ""
-            )
-            found += (
-                [slip(node.lineno, "typed-text", name, name=of)]
-                if of and not line and name == "input"
-                else []
-            )
+            if name == "input" and not line and kept.get(id(node)):
+                found.append(slip(node.lineno, "typed-text", name, name=kept[id(node)]))
     finders = (
         names_of_objects, misspelt, loop_rates, resets, never_run, never_reached, stopped_loops,
         published_before, sleepless_loops, sleeps_twice, publishes_twice, callbacks, waiting_callbacks,
