@@ -122,7 +122,8 @@ def meant_command(name: str) -> str:
 def meant_manifest(name: str) -> str:
     """Return what to do with a file that is there in place of package.xml; empty for any other file."""
     if name == "manifest.xml":
-        return f"{name} is rosbuild's, which catkin does not read: write package.xml, as catkin_create_pkg makes it"
+        written = "write package.xml, and a CMakeLists.txt without rosbuild's lines, as catkin_create_pkg makes them"
+        return f"{name} is rosbuild's, which catkin does not read: {written}"
     plain = re.sub(r"\s|\(\d+\)", "", name.casefold())
     alike = plain == MANIFEST or is_one_edit(plain, MANIFEST) or plain.startswith(f"{MANIFEST}.")
     if name == MANIFEST or not alike:

@@ -118,7 +118,7 @@ def test_the_package_is_found(files, path, hints, tmp_path):
         (
             {"a/manifest.xml": ""},
             "no package.xml",
-            "In a/, manifest.xml is rosbuild's, which catkin does not read",
+            "In a/, manifest.xml is rosbuild's, which catkin does not read: write package.xml, and a CMakeLists.txt w",
         ),
         ({**tree("b:other"), "b/package.xml.orig": ""}, "packages here: other", "Rename to lab1"),
         # A workspace that is called like the lab is not the lab's package.
