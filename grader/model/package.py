@@ -542,8 +542,9 @@ class PackageFacts(Record):
 
     @property
     def own_modules(self) -> set[str]:
-        """What a script of the package may import of the student's own."""
-        files = {f.path.rpartition("/")[2].removesuffix(".py") for f in self.files}
+        """What a script of the package may import of the student's own. (A file `rospy` without `.py` is none: a
+        shell that runs a script without its first line makes such a picture, by ImageMagick's program `import`.)"""
+        files = {f.path.rpartition("/")[2].removesuffix(".py") for f in self.files if f.python}
         return {self.name, *(one.name for one in self.also), *files}
 
     @property

@@ -74,6 +74,8 @@ def tree(*packages: str, **files: str) -> dict[str, str | bytes]:
         (tree("old/lab1") | {"old/COLCON_IGNORE": ""}, "old/lab1", ("old/COLCON_IGNORE",)),
         ({"lab1/src/a.py": "", "lab2/package.xml": manifest("lab2")}, "lab1", ("has no package.xml",)),
         ({"ws/Lab1/CMakeLists.txt": ""}, "ws/Lab1", ("has no package.xml",)),
+        ({"lab1/scripts/talker.py": ""}, "lab1", ("has no package.xml",)),
+        ({"lab1/scripts/talker.py": "", **tree("ws/src/lab1")}, "ws/src/lab1", ()),
         ({"lab1/src/lab1/CMakeLists.txt": ""}, "lab1/src/lab1", ("has no package.xml",)),
     ],
 )
