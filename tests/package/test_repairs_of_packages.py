@@ -428,6 +428,13 @@ CASES = {
     "manifest-of-rosbuild-that-is-there": Case(
         swapped(TALKER, ("import rospy\n", "import rospy\nimport roslib; roslib.load_manifest('lab')\n")), [],
     ),
+    "two-programs-that-nothing-is-linked-to": Case(
+        {CMAKELISTS: CMAKE + "add_executable(a src/a.cpp)\nadd_executable(b src/b.cpp)\n",
+         "src/a.cpp": "int main() {}\n", "src/b.cpp": "int main() {}\n"},
+        ["build-line", "build-line"], "nothing is linked to the program a",
+        after={CMAKELISTS: "(a ${catkin_LIBRARIES})\nadd_executable(b src/b.cpp)\n"
+                           "target_link_libraries(b ${catkin_LIBRARIES})\n"},
+    ),
     "cmake-of-rosbuild": Case(
         {CMAKELISTS: CMAKE.replace("project", "include($ENV{ROS_ROOT}/core/rosbuild/rosbuild.cmake)\nrosbuild_init()\n"
                                    "project")},
