@@ -119,6 +119,12 @@ def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: Ex
     elif obstacles and (unmade := _unmade_wrapper(package, build, found.path)):
         why = "; it also ".join(o.why for o in obstacles)
         verdict = _judge_unmade(f"{found.path} {why}", found.path, unmade)
+    elif obstacles and _asks_for_wrapper(package, found.path):  # and no build was tried
+        why = "; it also ".join(o.why for o in obstacles)
+        message = (
+            f"{found.path} {why}: only the build shows whether catkin_install_python makes a program of it"
+        )
+        verdict = inconclusive(message, hint="; ".join(o.fix for o in obstacles))
     elif obstacles:
         why = "; it also ".join(o.why for o in obstacles)
         message = f"{found.path} {why}{_rosrun_answer(build, found.path)}"

@@ -435,7 +435,7 @@ def _candidate(root: Path, folder: Folder, ignored_by: str | None) -> Candidate 
         name = manifest_name(place, root=root)
         return Candidate(path=folder.path, folder=place, manifest=name, ignored_by=ignored_by)
     has_cmake = CMAKE in files
-    if not has_cmake and "src" not in folder.folders:
+    if not has_cmake and {"src", "scripts"}.isdisjoint(folder.folders):
         return None
     return Candidate(
         path=folder.path,

@@ -396,9 +396,16 @@ class Later:
         of_run = (c for c in self._rubric.criteria if c.scenario == self._criterion.scenario)
         return {str(c.parameters["topic"]) for c in of_run if "topic" in c.parameters} - {self._topic}
 
+    def _in_comment(self) -> bool:
+        """Return whether the topic's publisher is in a comment: those that the script has are not for it."""
+        own = any(f"/{one.message.lstrip('/')}" == self._topic for one in self._of("publisher"))
+        return not own and any(one.name.endswith("Publisher") for one in self._of("commented-out"))
+
     def _published(self) -> Iterator[Fix]:
         published, kind = self._of("publisher"), str(self._wanted.get("type", ""))
         lines = [one.line for one in published if f"/{one.message.lstrip('/')}" == self._topic]
+        if self._in_comment():
+            return
         if len(published) == 1 and not lines and not self._ran:
             other = published[0]
             if f"/{other.message.lstrip('/')}" in self._topics_of_others():
@@ -510,6 +517,8 @@ class Later:
         template = str(self._wanted.get("template", ""))
         said = list({one.message: one for one in self._of("publishes")}.values())
         code = in_language(code_of(template), "python")
+        if self._in_comment():
+            return
         if len(said) != 1:
             types = {one.message for one in self._of("publisher-type")}
             no_text = bool(types) and "String" not in types

@@ -122,7 +122,8 @@ def meant_command(name: str) -> str:
 def meant_manifest(name: str) -> str:
     """Return what to do with a file that is there in place of package.xml; empty for any other file."""
     if name == "manifest.xml":
-        return f"{name} is rosbuild's, which catkin does not read: write package.xml, as catkin_create_pkg makes it"
+        written = "write package.xml, and a CMakeLists.txt without rosbuild's lines, as catkin_create_pkg makes them"
+        return f"{name} is rosbuild's, which catkin does not read: {written}"
     plain = re.sub(r"\s|\(\d+\)", "", name.casefold())
     alike = plain == MANIFEST or is_one_edit(plain, MANIFEST) or plain.startswith(f"{MANIFEST}.")
     if name == MANIFEST or not alike:
@@ -538,8 +539,9 @@ class PackageFacts(Record):
 
     @property
     def own_modules(self) -> set[str]:
-        """What a script of the package may import of the student's own."""
-        files = {f.path.rpartition("/")[2].removesuffix(".py") for f in self.files}
+        """What a script of the package may import of the student's own. (A file `rospy` without `.py` is none: a
+        shell that runs a script without its first line makes such a picture, by ImageMagick's program `import`.)"""
+        files = {f.path.rpartition("/")[2].removesuffix(".py") for f in self.files if f.python}
         return {self.name, *(one.name for one in self.also), *files}
 
     @property

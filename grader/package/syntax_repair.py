@@ -33,6 +33,10 @@ FIXERS = ("print", "except", "exec", "raise", "repr", "ne", "numliterals", "long
 OLD_PRINT = re.compile(r"\bprint\b(?!\s*\()")
 ALL_OVER = ("merged", "tabs", "python2", "braces", "characters")
 OF_SIGNS = re.compile("does not match opening|unmatched|unterminated")
+OF_WHOLE = re.compile(
+    "__future__|future feature|global declaration|outside function|outside loop|not properly in loop"
+)
+"""What Python says only of a file that it could read to its end."""
 OUTERMOST = re.compile(r"(import|from)\s|if\s+__name__\b")
 EMPTY_EXCEPT = re.compile(r"expected an indented block after 'except' statement on line (\d+)")
 OF_BLOCK = re.compile(r"(elif|else|except|finally|try)\b")
@@ -130,6 +134,8 @@ def _is_next(error: Error, left: Error) -> bool:
         return left["kind"] not in spaces
     if OF_SIGNS.search(error["message"]) and not OF_SIGNS.search(left["message"]):
         return left["kind"] not in spaces
+    if OF_WHOLE.search(left["message"]):
+        return not OF_WHOLE.search(error["message"])
     return all("never closed" in one["message"] for one in (error, left)) and left["line"] < error["line"]
 
 

@@ -607,6 +607,22 @@ def test_a_broken_module_of_the_machine_is_not_the_students(tmp_path, files, fra
     assert (LIBRARY in end.cause) == of_machine
 
 
+@pytest.mark.parametrize(
+    ("file", "of_machine"), [("scripts/pygame", True), ("scripts/pygame.py", False), ("msg/Pygame.msg", True)]
+)
+def test_a_picture_with_a_modules_name_is_no_module(tmp_path, file, of_machine):
+    (tmp_path / "package.xml").write_text("<package><name>lab</name></package>")
+    (tmp_path / "a.py").write_text("import pygame\npygame.init()\n")
+    (tmp_path / file).parent.mkdir()
+    (tmp_path / file).write_text("%!PS-Adobe-3.0\n")
+    package = facts_of(tmp_path)
+    error = "ModuleNotFoundError: No module named 'pygame'"
+    assert (
+        explain_traceback(said(package, ("a.py", 1, "import pygame"), error=error), package).of_machine
+        == of_machine
+    )
+
+
 def test_a_module_that_is_used_and_not_imported_is_meant_by_one_that_is_not_there(tmp_path):
     (tmp_path / "package.xml").write_text("<package><name>lab</name></package>")
     (tmp_path / "a.py").write_text("import ros\nrospy.init_node('a')\n")

@@ -73,6 +73,8 @@ def tree(*packages: str, **files: str) -> dict[str, str | bytes]:
         (tree("old/lab1") | {"old/COLCON_IGNORE": ""}, "old/lab1", ("old/COLCON_IGNORE",)),
         ({"lab1/src/a.py": "", "lab2/package.xml": manifest("lab2")}, "lab1", ("has no package.xml",)),
         ({"ws/Lab1/CMakeLists.txt": ""}, "ws/Lab1", ("has no package.xml",)),
+        ({"lab1/scripts/talker.py": ""}, "lab1", ("has no package.xml",)),
+        ({"lab1/scripts/talker.py": "", **tree("ws/src/lab1")}, "ws/src/lab1", ()),
         ({"lab1/src/lab1/CMakeLists.txt": ""}, "lab1/src/lab1", ("has no package.xml",)),
     ],
 )
@@ -117,7 +119,7 @@ def test_the_package_is_found(files, path, hints, tmp_path):
         (
             {"a/manifest.xml": ""},
             "no package.xml",
-            "In a/, manifest.xml is rosbuild's, which catkin does not read",
+            "In a/, manifest.xml is rosbuild's, which catkin does not read: write package.xml, and a CMakeLists.txt w",
         ),
         ({**tree("b:other"), "b/package.xml.orig": ""}, "packages here: other", "Rename to lab1"),
         # A workspace that is called like the lab is not the lab's package.

@@ -465,6 +465,18 @@ CASES = {
     "manifest-of-rosbuild-that-is-there": Case(
         swapped(TALKER, ("import rospy\n", "import rospy\nimport roslib; roslib.load_manifest('lab')\n")), [],
     ),
+    "two-programs-that-nothing-is-linked-to": Case(
+        {CMAKELISTS: CMAKE + "add_executable(a src/a.cpp)\nadd_executable(b src/b.cpp)\n",
+         "src/a.cpp": "int main() {}\n", "src/b.cpp": "int main() {}\n"},
+        ["build-line", "build-line"], "nothing is linked to the program a",
+        after={CMAKELISTS: "(a ${catkin_LIBRARIES})\nadd_executable(b src/b.cpp)\n"
+                           "target_link_libraries(b ${catkin_LIBRARIES})\n"},
+    ),
+    "cmake-of-rosbuild": Case(
+        {CMAKELISTS: CMAKE.replace("project", "include($ENV{ROS_ROOT}/core/rosbuild/rosbuild.cmake)\nrosbuild_init()\n"
+                                   "project")},
+        ["build-line"], "delete the calls on lines 2 and 3", after={CMAKELISTS: "\n\nproject(lab)"},
+    ),
     "cmake-of-a-workspace": Case({CMAKELISTS: "project(Project)\nfind_package(catkin)\ncatkin_workspace()\n"}, []),
     "project-and-package-of-other-names": Case(
         {CMAKELISTS: CMAKE.replace("project(lab)", "project(other)"), XML: MANIFEST.replace(">lab<", ">lessons<"),

@@ -175,6 +175,18 @@ CASES = {
     "bracket": Case(swapped(TALKER, ("queue_size=10)", "queue_size=10")), ["python-syntax"], "never closed"),
     "quote": Case(swapped(TALKER, ("'talker')", "'talker)")), ["python-syntax"], "line 6 of src/talker.py: a quote"),
     "typographic": Case(swapped(TALKER, ("'talker'", "\u2018talker\u2019")), ["python-syntax"], "typographic quote"),
+    "future-behind-imports": Case(
+        swapped(TALKER, ("import rospy\n", "import rospy\nfrom __future__ import print_function\n")),
+        ["python-syntax"], "delete line 3",
+    ),
+    "future-behind-imports-and-python-2": Case(
+        swapped(TALKER, ("import rospy\n", "import rospy\nfrom __future__ import division\n"),
+                ("    rospy.init", "    print 'begins'\n    rospy.init")),
+        ["python-syntax", "python-syntax"], "delete line 3",
+    ),
+    "future-at-the-top": Case(
+        swapped(TALKER, ("import rospy\n", "from __future__ import print_function\nimport rospy\n")), [],
+    ),
     "raw-input": Case(swapped(TALKER, ("    rospy.init", "    raw_input()\n    rospy.init")), ["python-syntax"],
         "raw_"),
     **{

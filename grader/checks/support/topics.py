@@ -206,6 +206,9 @@ def _not_advertised(
     if topic in TF_TOPICS:
         hint = f"send it with a `tf2_ros.{'Static' * (topic != TF_TOPICS[0])}TransformBroadcaster()`"
     if slip := call_in_comment(package, run, "Publisher"):
+        sent = call_in_comment(package, run, "publish")
+        if sent and sent.file == slip.file and sent.fix == f"remove the `#` from line {sent.line}":
+            slip = slip.model_copy(update={"fix": f"{slip.fix} and from line {sent.line}"})
         return _commented_out(what, slip, of_node).about(measured=measured)
     if not published:
         return of_node(f"{what}: no node publishes on it", measured=measured, hint=hint)

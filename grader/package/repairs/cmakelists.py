@@ -43,7 +43,7 @@ from grader.package.repairs.programs import (
     link_programs,
     name_programs,
 )
-from grader.wording import is_one_edit, join_words
+from grader.wording import is_one_edit, join_words, numbers_text
 
 OF_WORKSPACE = "catkin_workspace"
 
@@ -95,6 +95,7 @@ def repair_cmake(
     _spell_commands(files)
     _spell_keywords(files)
     _correct_version(files)
+    _leave_out_rosbuild(files)
     needs = " ".join(wanted.dependencies or ("rospy", "std_msgs"))
     if not has_call(files, package, "project"):
         add_call(files, "project(…)", f"project({name or wanted.package})", ("cmake_minimum_required",))
@@ -290,6 +291,28 @@ def _spell_commands(files: Files) -> None:
             start = text.index(name, start)
             message = f"line {command.line} of {CMAKE}: there is no command {name}; it is called {right}"
             files.change("build-line", CMAKE, text[:start] + right + text[start + len(name) :], message)
+
+
+def _leave_out_rosbuild(files: Files) -> None:
+    """Leave out what only rosbuild has, which was there before catkin: its targets are CMake's own."""
+    made = {"rosbuild_add_executable": "add_executable", "rosbuild_add_library": "add_library"}
+    calls = [c for c in all_calls(files) if c.identifier.lower().startswith("rosbuild_")]
+    calls += [c for c in calls_of(files, "include") if any("rosbuild" in t.value for t in words_of(c))]
+    text = cmake_text(files)
+    for call in sorted(calls, key=lambda one: -one.span.start):
+        new = text[call.span].replace(call.identifier, made.get(call.identifier.lower(), ""), 1)
+        new = new if call.identifier.lower() in made else ""
+        text = text[: call.span.start] + new + text[call.span.stop :]
+    gone = [c.line for c in calls if c.identifier.lower() not in made]
+    spelt = {c.identifier: made[c.identifier.lower()] for c in calls if c.identifier.lower() in made}
+    fixes = (
+        [f"delete the calls on {'lines' if len(gone) > 1 else 'line'} {numbers_text(sorted(gone))}"]
+        if gone
+        else []
+    )
+    fixes += [f"write {new} instead of {old}" for old, new in spelt.items()]
+    message = f"{CMAKE} calls what only rosbuild has, and catkin does not"
+    files.change("build-line", CMAKE, text, message, join_words(fixes))
 
 
 def _correct_include(files: Files) -> None:

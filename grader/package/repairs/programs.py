@@ -30,7 +30,7 @@ INSTALL = "catkin_install_python"
 def link_programs(files: Files) -> None:
     """Link ROS to programs that nothing is linked to. A program without ROS is none the worse for it."""
     linked = {words[0].value for c in calls_of(files, "target_link_libraries") if (words := words_of(c))}
-    for call in calls_of(files, "add_executable"):
+    for call in reversed(calls_of(files, "add_executable")):  # places above stay
         words = words_of(call)
         if words and words[0].value not in linked and "IMPORTED" not in [t.value for t in words]:
             text, line = cmake_text(files), f"target_link_libraries({words[0].value} ${{catkin_LIBRARIES}})"
