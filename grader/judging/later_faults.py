@@ -55,6 +55,7 @@ LOOPS = re.compile(r"\s*while\b.*:")
 PLAIN_NUMBER = re.compile(r"\s*(\w+)\s*=\s*[\d.]+\s*(?:#|$)")
 MAKES_RATE = re.compile(r"\s*([\w.]+)\s*=\s*rospy\.Rate\(")
 OF_LAUNCHES = ("launch-runs", "launch-connects")
+OF_CALLBACKS = ("callback-called", "callback-values")
 OF_TOPICS = ("hears", "topic-type")
 """Checks that say by themselves that a node is on another topic, and not of which type."""
 RATE_SHARE = 0.05
@@ -290,9 +291,16 @@ class Later:
         lines = self._build.file_lines(slip.file) if self._build is not None else []
         body = "\n".join(lines[max(self._function_at(slip) - 1, 0) : slip.line + CALL_LINES])
         named = re.match(r"\s*def (\w+)\((?:self, *)?(\w+)\)", body)
-        call = rf"Subscriber\(.{{0,{CALL_CHARS}}}[ ,.=]{named[1]} *[,)]" if named else "(?!)"
-        is_callback = any(re.search(call, line) for line in lines)
+        is_callback = named is not None and self._is_given(named[1])
         return is_callback and named is not None and not re.search(rf"\b{named[2]}\.|= *{named[2]}\b", body)
+
+    def _is_given(self, callback: str) -> bool:
+        """Return whether a line gives a Subscriber this callback, if perhaps called."""
+        call = re.compile(
+            rf"[^#]*Subscriber\([^#]{{0,{CALL_CHARS}}}[ ,.='\"]{re.escape(callback)}['\"]? *[(,)]"
+        )
+        lines = [one for path in self._paths if self._build for one in self._build.file_lines(path)]
+        return any(call.match(line[:LINE_CHARS]) for line in lines)
 
     def _text_of(self, slip: PythonSlip) -> str:
         lines = self._build.file_lines(slip.file) if self._build is not None else ()
@@ -444,6 +452,12 @@ class Later:
         told = heard and self._ran  # of a node on its topic, what ROS refused says it
         if other and (elsewhere or (not told and f"/{types[0].message}" not in self._verdict.message)):
             yield self._retype("subscribe with", sent[0], types[0])
+        # else ROS has called it, and the verdict says what happened
+        unheard = elsewhere or other or not self._ran
+        for slip in self._of(*OF_CALLBACKS) if unheard and len(heard) <= 1 else ():
+            if self._is_given(slip.name):
+                placed = slip.fix.startswith("on line ")
+                yield Fix(slip.fix if placed else f"on {_line(slip)}, {slip.fix}", (slip.fix,))
         other_type = types[0].message if other else ""
         yield from self._printed(heard, other_type, of_text=own == "String")
         for slip in self._of("takes-number") if other and own == "String" else ():

@@ -47,7 +47,8 @@ class PythonSlip(Placed, Record):
     - `spin-in-loop`: a loop that publishes and waits in `spin()`.
     - `loop-left`: a loop that ends in its first turn, or after a number of them, or a callback that ends the node, or
       the only `publish(…)`, above a loop that waits; `name` is the function that it asks, where a `not` is missing.
-    - `sleep-outside`, `sleep-twice`: a loop whose `sleep()` is outside it, or that waits twice in each turn.
+    - `sleep-outside`, `sleep-twice`: a loop whose `sleep()` is outside it, or that only makes its Rate, or that
+      waits twice in each turn.
     - `publish-twice`: a loop that publishes on one topic more than once in each turn.
     - `deaf`: why the node goes on after Ctrl-C.
     - `callback-called`, `callback-values`, `callback-missing`: a callback that is called where it should only be named,

@@ -319,6 +319,28 @@ def test_a_message_that_is_printed_whole_is_named_behind_another_mistake(callbac
     ) is told
 
 
+@pytest.mark.parametrize(
+    ("run", "given", "told"),
+    [
+        (DEAF, "on_text)", True),
+        (DIES, "on_text)", True),
+        (DEAF, "other)", False),
+        (DEAF, "# on_text)", False),
+    ],
+    ids=["another topic", "a node that dies", "another callback", "a comment"],
+)
+def test_a_callback_that_ros_cannot_call_is_named_behind_another_mistake(
+    run: dict[str, Any], given: str, told: bool
+) -> None:
+    criteria = [NODE | ROOT, HEARS | {"requires": ["node"]}]
+    fix = slip("callback-values", "", 1, fix="write `def on_text(msg):`", name="on_text")
+    source = f"def on_text():\n    pass\nSubscriber('hello', String, {given}\n"
+    hint = hint_of(
+        "node" if run is DIES else "hears", run, criteria, slip("subscriber", "hello"), fix, source=source
+    )
+    assert (f"on line 1 of {FILE}, write `def on_text(msg):`" in hint) is told
+
+
 @pytest.mark.parametrize(("place", "told"), [("%d", True), ("%.2f", True), ("%s", False)])
 def test_a_text_is_not_printed_as_a_number(place: str, told: bool) -> None:
     heard = [NODE | ROOT, HEARS | {"requires": ["node"]}]

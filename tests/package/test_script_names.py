@@ -9,6 +9,11 @@ from grader.package.python import check_syntax
 UNDEFINED = {
     "message": ("p = rospy.Publisher('a', Int32)\nfor i in range(3):\n    number.data = i\n    p.publish(number)\n",
                 "nothing in the file gives `number` a value: above line 4, create the message: `number = Int32()`"),
+    "misspelt-import": ("import mathh\nx = math.sin(1)\n", "`math` is not imported: write `import math` at the top"),
+    "unread": ("p = rospy.Publisher('a', Int32)\nhello_str = 'hi'\np.publish(hello)\n",
+               "`hello` a value, and nothing reads `hello_str`: on line 4, write hello_str instead of hello"),
+    "read": ("p = rospy.Publisher('a', Int32)\nmsg_text = 'hi'\nprint(msg_text)\np.publish(msg)\n",
+             "above line 5, create the message: `msg = Int32()`"),
     "module": ("x = math.sin(1)\n", "`math` is not imported: write `import math` at the top"),
     "module-of-messages": ("p = rospy.Publisher('a', std_msgs.msg.Int8)\n", "write `import std_msgs.msg` at the top"),
     "alias": ("x = np.zeros(3)\n", "`np` is not imported: write `import numpy as np` at the top"),

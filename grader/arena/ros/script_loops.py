@@ -217,7 +217,7 @@ WAITS = ("sleep", "spin", "spin_once", "wait_for_message", "wait_for_service", "
 
 
 def sleepless_loops(tree):
-    """Loops that publish and wait nowhere, where `rate.sleep()` stands outside of them."""
+    """Loops that publish and wait nowhere, where `rate.sleep()` stands outside of them or a Rate is made in them."""
     loops = [n for n in walk(tree) if isinstance(n, (ast.While, ast.For))]
     sleeps = calls_in(tree, "sleep")
     for loop in loops:
@@ -225,7 +225,10 @@ def sleepless_loops(tree):
         before = [n for n in sleeps if n.lineno < loop.lineno and dotted(n.func) not in PAUSES]
         outside = [n for n in sleeps if n.lineno > loop.lineno] or before
         yield from sleeps_in_if(loop)
-        if calls_in(loop, *WAITS) or inner or not outside or not calls_in(loop, "publish"):
+        if calls_in(loop, *WAITS) or inner or not calls_in(loop, "publish"):
+            continue
+        if not outside:
+            yield from rates_in_loop(loop)
             continue
         name = dotted(outside[0].func) or "sleep"
         message = "`%s()` is outside the loop on line %d" % (name, loop.lineno)
@@ -233,6 +236,19 @@ def sleepless_loops(tree):
         fix = "move it into that loop, below line %d, with the same spaces or tabs before it as line %d has"
         fix %= (last.end_lineno, last.lineno)
         yield slip(outside[0].lineno, "sleep-outside", message, fix=fix, name=name)
+
+
+def rates_in_loop(loop):
+    """Yield the Rate that a loop makes in each of its turns, and nothing sleeps by."""
+    made = [n for n in loop.body if isinstance(n, ast.Assign) and is_call(n.value, "Rate")]
+    named = any(isinstance(n, ast.Attribute) and n.attr == "sleep" for n in ast.walk(loop))
+    name = dotted(made[0].targets[0]) if len(made) == 1 and len(loop.body) > 1 and not named else ""
+    if name:
+        message = "a Rate is made in each turn of the loop on line %d, and nothing sleeps" % loop.lineno
+        fix = "move line %d above that loop, and write `%s.sleep()` as the last line in the loop"
+        yield slip(
+            made[0].lineno, "sleep-outside", message, fix=fix % (made[0].lineno, name), name=name + ".sleep"
+        )
 
 
 def sleeps_in_if(loop):

@@ -151,6 +151,7 @@ def misspelt(tree):
     `self` has one of that name, else `undefined`."""
     names = [n for n in walk(tree) if isinstance(n, ast.Name)]
     own = given_names(tree, names)
+    imported = {a.name for n in walk(tree) if isinstance(n, ast.Import) for a in n.names}
     if "*" in own or len(own) > NAMES_LIMIT:
         return
     attributes = {
@@ -173,12 +174,16 @@ def misspelt(tree):
             message = "the key `%s` is written here without quotes" % node.id
             fix = "on line %d, write `%s`" % (node.lineno, keys[id(node)])
             yield slip(node.lineno, "undefined", message, fix=fix, name=node.id)
-        elif node.id not in known and (
-            near := spelt_alike(
-                node.id,
-                stored if id(node) in texts else own - functions if is_value(node, tree) else own,
-                attributes,
+        elif (
+            node.id not in known
+            and (
+                near := spelt_alike(
+                    node.id,
+                    stored if id(node) in texts else (own - functions if is_value(node, tree) else own),
+                    attributes,
+                )
             )
+            and not (node.id in MODULES and near in imported)  # the import has it wrong
         ):
             whole = near == "__name__" and is_guard(node, tree)
             fix = (
@@ -462,6 +467,10 @@ def undefined(node, tree):
         return "`%s` is named here without its value" % name, "write `%s=%s`" % (name, GIVEN_BY_NAME[name])
     if any(called_name(n) == "Publisher" and node in n.args[2:] for n in calls):
         return why, "on line %d, delete `%s` from the call of `Publisher`" % (node.lineno, name)
+    meant = unread_alike(node, tree) if any(called_name(n) == "publish" for n in calls) else []
+    if len(meant) == 1:
+        unread = ", and nothing reads `%s`" % meant[0]
+        return why + unread, "on line %d, write %s instead of %s" % (node.lineno, meant[0], name)
     inner = used.attr if isinstance(used, ast.Attribute) else ""
     module = "%s.%s" % (name, inner) if inner in ("msg", "srv") else ALIASES.get(name, name)
     if module != name or (name in MODULES and inner):
@@ -478,6 +487,20 @@ def idle_functions(tree):
     """Return the functions of the file itself that nothing in it names."""
     named = {n.id for n in walk(tree) if isinstance(n, ast.Name)}
     return [n for n in tree.body if isinstance(n, ast.FunctionDef) and n.name not in named]
+
+
+def unread_alike(node, tree):
+    """Return the variables of its function that get a value above a name, that nothing reads, and whose names contain
+    that name or are part of it."""
+    parents = parents_of(tree)
+    scope = parents.get(node)
+    while scope is not None and not isinstance(scope, (ast.FunctionDef, ast.Module)):
+        scope = parents.get(scope)
+    names = [n for n in walk(tree) if isinstance(n, ast.Name) and len(n.id) > 1]
+    read = {n.id for n in names if isinstance(n.ctx, ast.Load)}
+    own = (n for n in ast.walk(scope or tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store))
+    above = {n.id for n in own if n.lineno < node.lineno and len(n.id) > 1} - read
+    return sorted(one for one in above if one in node.id or node.id in one)
 
 
 def what_to_write(node, used, tree):
