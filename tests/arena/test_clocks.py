@@ -56,6 +56,19 @@ rospy.spin()
     assert _values(run)[:140] == [n % 128 for n in range(140)]
 
 
+def test_a_node_that_looks_at_the_clock_at_once_finds_no_time_gone(tmp_path: Path) -> None:
+    """Until the first message on /clock, rospy's time is 0: what comes next may not be the time of day."""
+    now = "rospy.Time.now().to_sec()"
+    code = COUNTER.format(prepare=f"start, rate = {now}, rospy.Rate(10)", sleep="rate.sleep()").replace(
+        "pub.publish(n)", f"pub.publish(min(127, int(10 * ({now} - start))))"
+    )
+    run = run_script(tmp_path, code, clock="warped", messages={"/count": 60}, limit_s=40)
+    values = _values(run)
+    assert values[0] <= 10
+    assert values == sorted(values)
+    assert values[59] == pytest.approx(values[0] + 59, abs=20)
+
+
 def test_node_that_sleeps_by_the_wall_is_noticed_and_goes_on_in_real_time(tmp_path: Path) -> None:
     code = COUNTER.format(prepare="", sleep="time.sleep(0.1)")
     # on a full machine it takes longer to see: the time that others took is left out

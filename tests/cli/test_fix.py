@@ -145,7 +145,9 @@ def test_a_bit_that_git_lacks_is_told_below_the_report(folder, monkeypatch, caps
     git("init", "-q", ".")
     git("add", ".")
     git("commit", "-qm", "Lab")
-    assert run(["check", str(folder), "--fix", "--yes", "--static"]) == 0  # the build may still make programs of them
+    assert (
+        run(["check", str(folder), "--fix", "--yes", "--static"]) == 0
+    )  # the build may still make programs of them
     assert "git update-index --chmod=+x basic_comms/scripts/talker.py" in capsys.readouterr().out
     assert run(["check", str(folder), "--fix", "--dry-run"]) == 0
 

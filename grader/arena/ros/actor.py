@@ -22,6 +22,7 @@ from wire import LENGTH, now_ns
 SUBSCRIBERS_MAX = 64
 """Of one process."""
 OTHER_TYPES_MAX = 100
+HELD_S = 10.0
 CLOCK = {
     "topic": "/clock",
     "type": "rosgraph_msgs/Clock",
@@ -190,6 +191,10 @@ class Actor:
     def subscribers(self, topic_name):
         return list(self.topics[topic_name].subscribers.values())
 
+    def processes(self, topic_name):
+        """Return the processes whose nodes subscribe."""
+        return {self._whose.get(sock, UNKNOWN_PROCESS) for sock in list(self.topics[topic_name].subscribers)}
+
     def _send(self, topic, sock, frame):
         try:
             if sock.send(frame) == len(frame):
@@ -249,17 +254,21 @@ class Actor:
 
 
 class Clock:
-    """`/clock`, `warp` times faster than the wall in steps of `step_s`, once a node listens.
+    """`/clock`, `warp` times faster than the wall in steps of `step_s`. It begins near 0, as a simulator's does, and
+    waits for the first node of the student's (for `HELD_S`, where only programs beside it listen): until a message
+    comes, the time is 0 to rospy, and the next one may not be far from it.
 
     A late wake-up makes the clock slower, never jumpy: no step is ever caught up.
     """
 
-    def __init__(self, actor, warp, step_s):
+    def __init__(self, actor, warp, step_s, helpers):
         self._actor = actor
+        self._helpers = helpers
         self._step_s = step_s
         self._pause_s = step_s / warp
         self._step_ns = int(step_s * NS)
-        self._now_ns = int(time.time()) * NS
+        self._now_ns = self._step_ns
+        self._held_until_s = None
         self._stopped = False
 
     def start(self):
@@ -277,9 +286,16 @@ class Clock:
             time.sleep(self._pause_s)  # to wait for an event takes half as much CPU again, 400 times a second
             if self._stopped:
                 return
-            if self._actor.subscribers("/clock"):
+            if self._goes():
                 self._now_ns += self._step_ns
                 self._tick()
+
+    def _goes(self):
+        listening = self._actor.processes("/clock")
+        if self._now_ns > self._step_ns or not listening:
+            return bool(listening)
+        self._held_until_s = self._held_until_s or time.monotonic() + HELD_S
+        return time.monotonic() > self._held_until_s or not listening <= self._helpers()
 
     def _tick(self):
         self._actor.publish("/clock", TIME.pack(*divmod(self._now_ns, NS)))
