@@ -49,7 +49,7 @@ WATCHED_MAX = 20
 NS = 1_000_000_000
 READY_S = 15.0
 END_S = 5.0
-GROUPS_S, LOOK_S = 2.0, 0.02
+GROUPS_S, LOOK_S = 5.0, 0.02
 GRAPH_S, GRAPH_EVERY_S = 5.0, 0.25
 CONNECTING_S = 3.0
 """So long at most nodes are waited for that have a topic in common and may yet connect over it."""
@@ -134,10 +134,11 @@ class ArenaSession:
         await self._end()
 
     async def _end(self) -> None:
-        """End the arena, and remove what one that was killed could not remove itself."""
+        """End the arena, and remove the groups that it could not remove itself: it was killed, or the kernel still
+        frees what processes of theirs had."""
         await self._process.end()
         until_s = time.monotonic() + GROUPS_S
-        while not self._done and not remove_groups(self.place.sandbox.cgroups, self._process.pid):
+        while not remove_groups(self.place.sandbox.cgroups, self._process.pid):
             if time.monotonic() > until_s:
                 break
             await asyncio.sleep(LOOK_S)
