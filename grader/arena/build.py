@@ -77,8 +77,7 @@ async def build(
     """
     # On one core, a base beside the build would only make this build later.
     wants_base = place.sandbox.bubblewrap and not has_base(place) and len(os.sched_getaffinity(0)) > 1
-    to_compile = list(python_files)
-    (place.folder / "bin" / "python-files.json").write_text(json.dumps(to_compile))
+    (place.folder / "bin" / "python-files.json").write_text(json.dumps(to_compile := list(python_files)))
     async with ArenaSession(place, writer, master=False, last_run=last_run) as arena:
         beside = [_syntax_spec(place)] if to_compile else []
         ended = await _run_catkin_make(place, arena, beside, with_base=wants_base)

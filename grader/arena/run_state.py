@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 
+from grader.evidence.events import UNNAMED
 from grader.model.message_rate import RateBounds
 
 ROSOUT = "/rosout"
@@ -191,6 +192,7 @@ class RunState:
             self.graph_changed_s, self.graph_picture = now_s, picture
         if set(processes.values()) & self.running - self.registered:
             self.registered_s = now_s
+            self.sought.pop(UNNAMED, None)  # what asked before may be a node now
         self.registered |= set(processes.values())
         self.owners.update(processes)
         self.helper_nodes |= {n for n in nodes if processes.get(n) in self.helpers}

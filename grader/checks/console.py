@@ -11,10 +11,10 @@ from pydantic import Field, model_validator
 
 from grader.checks.registry import ProcessName, check
 from grader.checks.support.console_output import (
-    SUMMARY,
     Level,
     Line,
     Logged,
+    in_summary,
     logged_by,
     split_log_line,
     stream_lines,
@@ -151,7 +151,8 @@ def _read(run: Run, process: str) -> tuple[list[Line], list[Line]]:
     lines: list[Line] = []
     errors: list[Line] = []
     for stream in stream_lines(run, process):
-        read = [line for line in stream[:LINES_MAX] if not SUMMARY.match(line.text)]
+        listed = in_summary(line.text for line in stream[:LINES_MAX])
+        read = [line for line, is_listed in zip(stream, listed, strict=False) if not is_listed]
         found = tracebacks([line.text for line in read])
         hidden = {index for one in found for index in range(one.first, one.last + 1)}
         lines += [line for index, line in enumerate(read) if index not in hidden and line.text.strip()]
@@ -463,7 +464,9 @@ def _is_late(run: Run, params: LogsParams) -> bool:
 def _asked_lines(run: Run, params: LogsParams) -> list[tuple[int, ConsoleLine]]:
     """Return the console's lines of the process that is judged, or of all the student's."""
     asked = {params.process} if params.process else {one.name for one in lives(run)}
-    return [(t, line) for t, line in run.console if line.process in asked and not SUMMARY.match(line.line)]
+    lines = [(t, line) for t, line in run.console if line.process in asked]
+    listed = in_summary(line.line for _, line in lines)
+    return [one for one, is_listed in zip(lines, listed, strict=True) if not is_listed]
 
 
 def _near(run: Run, lines: Iterable[Logged], params: LogsParams) -> Verdict | None:

@@ -110,19 +110,14 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
         verdict = _judge_missing(package, run, probes, missing, params)
     elif not in_order(places):
         message = f"what came on {params.topic} is printed, but not in the order in which it was sent"
-        verdict = failed(
-            message, hint="print in the callback itself, not later from a variable"
-        ).if_repeated()
+        hint = "print in the callback itself, not later from a variable"
+        verdict = failed(message, hint=hint).if_repeated()
     else:
         verdict = passed(f"prints each of the {len(probes)} messages on {params.topic}")
     first, last = (missing[0], missing[-1]) if missing else (probes[0], probes[-1])
     sent = cite(run, "/grader/actor", first.at_ns, last.at_ns)
     count = f"{len(probes) - len(missing)} of {plural(len(probes), 'message')} printed"
-    return verdict.about(
-        expected=expected,
-        measured=verdict.measured or count,
-        citations=(sent,),
-    )
+    return verdict.about(expected=expected, measured=verdict.measured or count, citations=(sent,))
 
 
 def _other_words(

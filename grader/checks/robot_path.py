@@ -268,9 +268,10 @@ def _by_other_clock(run: Run, params: PathParams, course: Course) -> Words | Non
         held = driven(commands, params.hold_s, commands[-1].time_s + STOPS_AFTER_S) if commands else []
         other = followed(relative(held), params.way.points, params.tolerance_m)
         if other.reached >= course.reached + (other.strayed is not None):
-            faster = f"the clock of ROS is {significant(run.warp)} times as fast in this run"
+            faster = f"{significant(run.warp)} times as fast in this run"
             return Words(
-                f"it drives and turns by the computer's clock, as with time.time() or time.sleep(), and {faster}",
+                "its way is right by the computer's clock (time.time(), time.sleep()), and not by the clock of ROS, "
+                f"which is {faster}",
                 "measure time with rospy.get_time(), and wait with rospy.sleep(…): a simulated robot has its own clock",
             )
     return None

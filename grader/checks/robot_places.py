@@ -69,8 +69,7 @@ SEE = "see on the map where it leaves its way, and what it does there"
 SELDOM_S = 0.5
 """A node that steers by what it sees gets ten scans in a second, and answers them sooner."""
 AWAY, AWAY_LEAST, AIMED_DEG, BEHIND_DEG = 0.8, 5, 10.0, 170.0
-"""A robot turns away from its goal by this share of at least so many velocities; those that it gets where the goal is
-straight ahead, or behind it, do not count."""
+"""By this share of at least so many velocities it turns away from a goal that is neither ahead of it nor behind."""
 STRAIGHT = 2.0
 """A way that is longer by this factor than it brings the robot nearer is not a slow one, but a wrong one."""
 
@@ -297,7 +296,11 @@ def _turns_away(path: Sequence[Pose], told: Sequence[Command], goal: Point) -> t
             index += 1
         pose = path[index]
         aside = math.remainder(math.atan2(goal[1] - pose.y, goal[0] - pose.x) - pose.heading, math.tau)
-        if command.turn and AIMED_DEG < abs(math.degrees(aside)) < BEHIND_DEG:
+        if (
+            command.time_s >= path[0].time_s
+            and command.turn
+            and AIMED_DEG < abs(math.degrees(aside)) < BEHIND_DEG
+        ):
             away.append(aside if aside * command.turn < 0 else 0.0)
     if len(away) < AWAY_LEAST or sum(map(bool, away)) < AWAY * len(away):
         return None
@@ -521,8 +524,7 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
         own = [c for c in run.student_channels() if c.topic in hears or not hears]
         last = [one for c in own for _, one in commands_of(c)[-1:]]
         if any(one.forward > SLOW_M_S for one in last) and turned_rad(path) <= TURNING_RAD:
-            message = "it never moves, though it is told to drive"
-            return unjudged(message, measured=figures, hint=IN_ITS_WAY)
+            return unjudged("it never moves, though it is told to drive", measured=figures, hint=IN_ITS_WAY)
         return never_moves(path, figures, run)
     if inside < params.share - ROUNDING or (params.share == 1 and any(out)):
         verdict = _outside(path, out, region, inside, params)

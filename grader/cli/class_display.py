@@ -134,7 +134,8 @@ def list_attention(folder: BatchFolder) -> Iterator[str]:
             yield words.format(count=found[name], folder=folder.path, overrides=folder.path / OVERRIDES)
     by_none = passed_by_none(criteria, letters)
     for place, decided in islice(by_none.items(), NAMES_SHOWN):
-        yield f"none of {decided} passed {criteria[place].id} ({criteria[place].title}): is the rubric right there?"
+        asked = f"{criteria[place].id} ({criteria[place].title})"
+        yield f"none of {decided} got all points of {asked}: is the rubric right there?"
     if by_none:
         yield f"  hint: grade a package that you know to be correct: {shlex.join(grade_one(folder.run))}"
 

@@ -7,7 +7,7 @@ A verdict and the files that were recorded come in; the verdict goes out with th
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 
 from grader.checks.cmake import NOT_CALLED, below_catkin_package
@@ -34,6 +34,7 @@ from grader.wording import join_words, lines_text
 LINE_CHARS = 200
 """A longer line stays out of the result."""
 LINES_READ = 2_000
+LOOPS = re.compile(r"\s*while\b.*:")
 SAYS = {
     "hears": r"\b(?:printf?|log\w+|write|ROS_\w+)\s*\(|\bc(?:out|err)\s*<<",
     "logs": r"\b(?:log\w+|ROS_\w+)\s*\(",
@@ -282,3 +283,16 @@ def _with_text(citation: Citation, build: Run) -> Citation:
     indent = len(text) - len(text.lstrip())
     begin, end = (citation.column or 1) + indent, citation.end_column + indent
     return citation.model_copy(update={"source": text, "column": begin, "end_column": end})
+
+
+def spins_in_loops(lines: Iterable[str]) -> Iterator[int]:
+    """Yield the numbers of the lines on which a loop waits until its node ends."""
+    loop = None
+    for number, line in enumerate(lines, 1):
+        depth = len(line) - len(line.lstrip())
+        if LOOPS.match(line):
+            loop = depth
+        elif line.strip() and loop is not None and depth <= loop:
+            loop = None
+        elif loop is not None and line.strip().startswith("rospy.spin()"):
+            yield number

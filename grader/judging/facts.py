@@ -19,7 +19,7 @@ from grader.checks.support.exit_causes import syntax_hint
 from grader.checks.support.launch_slips import own_script, read_launch
 from grader.checks.support.processes import ended_programs, failed_program, plain_type
 from grader.checks.support.scripts import SYNTAX, find_script, programs, syntax_fault
-from grader.checks.support.text import Language, texts_in
+from grader.checks.support.text import Language, near_names, texts_in
 from grader.checks.support.topics import unheard_programs
 from grader.evidence.events import PACKAGE_RUN, RECORDING_MISSING, RECORDING_PROBLEM
 from grader.evidence.run import Run
@@ -155,18 +155,19 @@ class Facts:
         come of it, whatever a student hands in: `tank publishes on /levels, and the rubric names /level`."""
         names = {node: process for _, event in run.graph for node, process in event.processes.items()}
         channels = [c for c in run.channels if c.callerid in run.grader_nodes]
+        links = [one for _, event in run.graph for one in event.connections]
+        heeded = {one.publisher for one in links if run.is_student_node(one.subscriber)}
+        asking = {event.actor for _, event in run.actors if event.action == "lookup"}
+        heeding = asking | {one.subscriber for one in links if run.is_student_node(one.publisher)}
         unheard = unheard_programs(run)
         for channel in channels:
             who, topic = names[channel.callerid], channel.topic
-            right = next(filter(self._names, unheard.get(topic, ())), "")
-            if right and not self._names(topic):
+            right = next(filter(self._names, near_names(topic, unheard.get(topic, ()))), "")
+            if right and not self._names(topic) and channel.callerid not in heeded:
                 return f"{who} publishes on {topic}, and the rubric names {right}"
-            said = tuple(said_types(topic, self.rubric.handout))
-            if said and plain_type(channel.type) not in said:
-                return (
-                    f"{who} publishes {plain_type(channel.type)} on {topic}, and the handout says {said[0]}"
-                )
-        heeding = {one.subscriber for _, event in run.graph for one in event.connections}
+            kind, said = plain_type(channel.type), set(said_types(topic, self.rubric.handout))
+            if len(said) == 1 and kind not in said and channel.callerid not in heeding:
+                return f"{who} publishes {kind} on {topic}, and the handout says {said.pop()}"
         done = {node for node, process in names.items() if process in ended_programs(run)} - heeding
         for criterion in self.rubric.criteria:
             if not done or criterion.scenario != scenario or criterion.check != REACTS:

@@ -37,7 +37,7 @@ from grader.checks.support.text import (
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.installable import NOTHING_TO_DO, PYTHON_2
-from grader.judging.cited_lines import LINE_CHARS, LINES_READ
+from grader.judging.cited_lines import LINE_CHARS, LINES_READ, LOOPS, spins_in_loops
 from grader.judging.facts import SOURCES, Facts, names_started, scripts_of, sources_of
 from grader.judging.repeats_and_repairs import text_as_handed_in
 from grader.model.package import PackageFacts
@@ -51,7 +51,6 @@ NAMES_SHOWN = 3
 ASKS = re.compile(r"[^#'\"]*\b(?:raw_)?input\s*\(")
 """A line that calls `input()`."""
 SLEEPS_FOR = re.compile(r"[^#'\"]*\brospy\.sleep\(\s*\)")
-LOOPS = re.compile(r"\s*while\b.*:")
 PLAIN_NUMBER = re.compile(r"\s*(\w+)\s*=\s*[\d.]+\s*(?:#|$)")
 MAKES_RATE = re.compile(r"\s*([\w.]+)\s*=\s*rospy\.Rate\(")
 OF_LAUNCHES = ("launch-runs", "launch-connects")
@@ -299,7 +298,9 @@ class Later:
         call = re.compile(
             rf"[^#]*Subscriber\([^#]{{0,{CALL_CHARS}}}[ ,.='\"]{re.escape(callback)}['\"]? *[(,)]"
         )
-        lines = [one for path in self._paths if self._build for one in self._build.file_lines(path)]
+        lines = [
+            one for path in self._paths if self._build for one in self._build.file_lines(path)[:LINES_READ]
+        ]
         return any(call.match(line[:LINE_CHARS]) for line in lines)
 
     def _text_of(self, slip: PythonSlip) -> str:
@@ -357,7 +358,7 @@ class Later:
                 yield Fix(
                     f"write `{plain[1]} = rospy.Rate({hz})` on line {number} of {path}: only a Rate can sleep"
                 )
-        for number in _spins_in_loops(lines):
+        for number in spins_in_loops(lines):
             yield Fix(f"delete `rospy.spin()` on line {number} of {path}, at which the loop stands still")
         if not self._lacks_words("sleep") or not any(LOOPS.match(line) for line in lines):
             return
@@ -581,19 +582,6 @@ def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) 
     if topic := wanted.get("topic"):
         renaming = find_renaming(package, nodes, str(topic))
         yield from [f"in {file.path} {renaming.fix}"] if renaming else []
-
-
-def _spins_in_loops(lines: Iterable[str]) -> Iterator[int]:
-    """Yield the numbers of the lines on which a loop waits until its node ends."""
-    loop = None
-    for number, line in enumerate(lines, 1):
-        depth = len(line) - len(line.lstrip())
-        if LOOPS.match(line):
-            loop = depth
-        elif line.strip() and loop is not None and depth <= loop:
-            loop = None
-        elif loop is not None and line.strip().startswith("rospy.spin()"):
-            yield number
 
 
 def is_other_rate(slip: PythonSlip, hz: float) -> bool:

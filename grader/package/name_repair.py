@@ -9,7 +9,7 @@ from __future__ import annotations
 import ast
 import builtins
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from difflib import get_close_matches
 
 from grader.package.syntax_repair import Step, edited, last_name, nodes_in, span_of, step_to, tree_of
@@ -26,6 +26,8 @@ OBVIOUS_NAMES = {
     **dict.fromkeys(("_name_", "__name", "_name", "name__"), "__name__"),
 }
 NAME_CHARS_MIN = 4
+IDLE_MAX = 20
+"""So many functions that nothing names are tried for a call."""
 """Of shorter names, a letter that is not the same is the larger part."""
 SHORT_NAME_CHARS_MIN = 2
 """Names of one letter are different names."""
@@ -131,6 +133,7 @@ def with_names(text: str) -> Iterator[Step]:
     known = bound | set(dir(builtins)) | {"__file__"}
     loaded = {n.id for n in nodes_in(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
     functions = {n.name for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)}
+    unread = [one for one in tree.body if isinstance(one, ast.FunctionDef) and one.name not in loaded]
     blocks = (
         inner
         for one in tree.body
@@ -142,7 +145,7 @@ def with_names(text: str) -> Iterator[Step]:
         missing = [n for n in nodes_in(block) if isinstance(n, ast.Name) and n.id not in known]
         missing += _read_for_themselves(block, shared)
         stated = (n.value for n in nodes_in(block) if isinstance(n, ast.Expr))
-        values, idle = _values_in(block), _idle_functions(tree, block, loaded)
+        values, idle = _values_in(block), _meant_calls(unread, block)
         alone = {n.id for n in stated if isinstance(n, ast.Name) and is_one_edit(n.id.lower(), "pass")}
         for name in dict.fromkeys(n.id for n in missing):
             guards = name == "name" and any(_is_guard(one) for one in tree.body)
@@ -169,20 +172,28 @@ def _values_in(block: ast.stmt) -> set[str]:
             found += [one.left, one.right]
         elif isinstance(one, ast.Compare):
             found += [one.left, *one.comparators]
-        elif isinstance(one, ast.Call) and ast.unparse(one.func).endswith(("Response", "Result", "Feedback")):
-            found += one.args
+        elif isinstance(one, ast.Call):
+            called = getattr(one.func, "attr", getattr(one.func, "id", ""))
+            found += one.args if called.endswith(("Response", "Result", "Feedback")) else ()
     return {one.id for one in found if isinstance(one, ast.Name)}
 
 
-def _idle_functions(tree: ast.Module, block: ast.stmt, loaded: Collection[str]) -> dict[str, str]:
-    """Return by what is called in a block the one function of the file that nothing names and that takes as many
-    arguments."""
-    idle = [one for one in tree.body if isinstance(one, ast.FunctionDef) and one.name not in loaded]
+def _meant_calls(unread: Sequence[ast.FunctionDef], block: ast.stmt) -> dict[str, str]:
+    """Return by what is called in a block the one function of those that nothing names which takes as many arguments.
+    Within a function it also has a word of the name: `add_server` for `server`."""
     found: dict[str, str] = {}
-    for call in (one for one in nodes_in(block) if isinstance(one, ast.Call) and not one.keywords):
-        fitting = [one.name for one in idle if len(one.args.args) == len(call.args)]
-        if isinstance(call.func, ast.Name) and len(fitting) == 1:
-            found[call.func.id] = fitting[0]
+    for call in (one for one in nodes_in(block) if unread and isinstance(one, ast.Call) and not one.keywords):
+        name = getattr(call.func, "id", "")
+        words = {word for word in name.split("_") if len(word) > 2}
+        fitting = [
+            one.name
+            for one in unread[:IDLE_MAX]
+            if one is not block
+            and len(one.args.args) == len(call.args)
+            and (not isinstance(block, ast.FunctionDef) or words.intersection(one.name.split("_")))
+        ]
+        if len(fitting) == 1:
+            found[name] = fitting[0]
     return found
 
 

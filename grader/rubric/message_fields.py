@@ -311,7 +311,10 @@ def said_types(topic: str, handout: str) -> Iterator[str]:
     """Yield the types of ROS's that the handout says the topic has: `/scan, a sensor_msgs/LaserScan`, or `a
     geometry_msgs/Twist on /cmd_vel`."""
     name, kind, tick = re.escape(topic), r"(\w+)/([A-Z]\w*)", "`?"
-    after = rf"{tick}{name}{tick}(?![\w/])[\s,:(]*(?:(?:an?|as|of type)\s+)*{tick}{kind}"
+    of_other = (
+        rf"(?!\w|{tick}(?:\s+messages?)?\s+(?:on|to)\s+{tick}/)"  # "/level as a std_msgs/Bool on /full"
+    )
+    after = rf"{tick}{name}{tick}(?![\w/])[\s,:(]*(?:(?:an?|as|of type)\s+)*{tick}{kind}{of_other}"
     before = rf"{kind}{tick}(?:\s+messages?)?\s+on\s+(?:the\s+topic\s+)?{tick}{name}{tick}(?![\w/])"
     for pattern in (rf"(?<![\w/]){after}", before):
         for package, message in re.findall(pattern, handout) if topic.startswith("/") else ():

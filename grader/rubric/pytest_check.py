@@ -95,35 +95,42 @@ def test_file_faults(rubric: dict[str, Any], files: Mapping[str, bytes]) -> Iter
 
 def _called_otherwise(tree: ast.Module, handout: str) -> str:
     """Return which file or function of the student's the tests ask for, where the handout has one that is much like
-    it, or with other arguments than the handout has; "" where it says no such thing."""
+    it, or with more arguments than the handout has; "" where it says no such thing."""
     texts = {
         ast.unparse(target): node.value
         for node in tree.body
         if isinstance(node, ast.Assign)
         for target in node.targets
     }
-    files = dict.fromkeys(re.findall(r"[\w./-]+\.py\b", handout))
-    functions = {name: given.split(",") for name, given in re.findall(r"`(\w+)\((\w[\w, ]*)\)`", handout)}
+    files = {PurePosixPath(name).name for name in re.findall(r"[\w./-]+\.py\b", handout)}
+    mentions = re.findall(r"`(\w+)\(((?:[A-Za-z_]\w*(?:, *)?)+)\)`", handout)
+    most: dict[str, int] = {}
+    for name, given in mentions:
+        most[name] = max(most.get(name, 0), len(given.split(",")))
     tries_wrong_calls = any(isinstance(node, ast.Name) and node.id == "TypeError" for node in ast.walk(tree))
     calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call) and node.args]
     for call in calls:
         if ast.unparse(call.func) == "student":
             path = getattr(texts.get(ast.unparse(call.args[0]), call.args[0]), "value", None)
-            if near := _other_name(path, files, handout):
-                return f"line {call.lineno}: the handout has {near}, and not {path}"
-        elif isinstance(call.func, ast.Attribute) and ast.unparse(call.func).startswith("student("):
-            name, given = call.func.attr, functions.get(call.func.attr)
-            if near := _other_name(name, functions, handout):
+            name = PurePosixPath(path).name if isinstance(path, str) else ""
+            if near := _other_name(name, files, handout):
                 return f"line {call.lineno}: the handout has {near}, and not {name}"
-            is_plain = not call.keywords and not any(isinstance(one, ast.Starred) for one in call.args)
-            if given and is_plain and not tries_wrong_calls and len(given) != len(call.args):
-                takes = plural(len(given), "argument")
+        elif isinstance(call.func, ast.Attribute) and ast.unparse(call.func).startswith("student("):
+            name = call.func.attr
+            if near := _other_name(name, most, handout):
+                return f"line {call.lineno}: the handout has {near}, and not {name}"
+            if name in most and not tries_wrong_calls and len(call.args) > most[name]:
+                takes = plural(most[name], "argument")
                 return f"line {call.lineno}: {name} has {takes} in the handout, and {len(call.args)} here"
     return ""
 
 
-def _other_name(name: object, known: Collection[str], handout: str) -> str:
-    return closest(name, known) if isinstance(name, str) and name not in handout else ""
+def _other_name(name: str, known: Collection[str], handout: str) -> str:
+    """Return what the handout has in place of a name; names that differ in their digits alone are others."""
+    if not name or name in handout:
+        return ""
+    near = closest(name, known)
+    return near if re.sub(r"\d", "", near) != re.sub(r"\d", "", name) else ""
 
 
 def _selects(select: str, tests: Sequence[_Test]) -> bool:

@@ -133,7 +133,7 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
 
 def _in_any_folder(launch: str) -> str:
     """Return how a launch file is named, which roslaunch finds by its name alone."""
-    return f"is found in whatever folder it lies: write its name, {PurePosixPath(launch).name}"
+    return f"write the file's name without its folder: {PurePosixPath(launch).name}"
 
 
 def _type_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:

@@ -255,6 +255,8 @@ def test_a_line_is_counted_without_the_first_line_that_the_arena_writes(tmp_path
          "on lines 2 and 3, write `float(input(…))` in place of `input(…)`"),
         ("while far > tolerance:", "'>' not supported between instances of 'float' and 'str'",
          "on line 5, write `float(input(…))` in place of `input(…)`"),
+        ("total = self.n + self.text", "unsupported operand type(s) for +: 'int' and 'str'",
+         "write `str(self.n)` instead of `self.n`"),
         ("n = side - 1", "unsupported operand type(s) for -: 'str' and 'int'",
          "turn the text into a number first: `float(…)`"),
     ],
@@ -266,6 +268,8 @@ def test_a_text_that_was_typed_is_made_a_number_where_it_is_asked_for(tmp_path, 
         "goal.y = input('y')",
         "side = float(input('side'))",
         "tolerance = input()",
+        "names['a'] = input()",
+        "self.name = input()",
     )
     (tmp_path / "go.py").write_text("\n".join(("#!/usr/bin/env python3", *asked)))
     package = facts_of(tmp_path)
@@ -463,6 +467,10 @@ def test_the_message_is_that_of_the_package_that_is_named(tmp_path):
          "go on to this line only if `math.isfinite(point.y)`"),
         ("time.time() - start < goal.wait", "TypeError: '<' not supported between instances of 'float' and 'Duration'",
          "write `.to_sec()` behind that side"),
+        ("end = rospy.Time.now() + 3.0", "TypeError: unsupported operand type(s) for +: 'Time' and 'float'",
+         "write `end = rospy.Time.now() + rospy.Duration(3.0)`"),
+        ("msg.header.stamp = 3 + now", "TypeError: unsupported operand type(s) for +: 'int' and 'Time'",
+         "write `msg.header.stamp = rospy.Duration(3) + now`"),
         ("start < goal.wait", "TypeError: '<' not supported between instances of 'float' and 'Duration'",
          "write `start < goal.wait.to_sec()`"),
         ("return AddResponse(1, 2)",

@@ -10,6 +10,7 @@ from grader.checks import CHECKS
 from grader.judging import judge
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status, Verdict, partial
+from grader.rubric.message_fields import said_types
 from tests.judging.rubrics import (
     ALL,
     CHATTER,
@@ -228,6 +229,7 @@ def test_a_program_of_the_graders_that_fails_is_the_machines_fault(
 
 
 HANDOUT = "The node alarm hears /level, a std_msgs/Float32, and answers on /alarm."
+CONVERTS = "The node percent publishes what it hears on /level as a std_msgs/Float64 on /percent."
 ANSWERS = {
     "id": "answers",
     "check": "reacts",
@@ -260,13 +262,33 @@ ENDS, RUNS_ON = {"exit_s": 0.9, "exit_code": 0}, {"exit_s": 2.0, "stopped_by": "
         # the cause came, or it is the student who hears a topic that the rubric does not have
         ({"values": [1.0, 7.0]}, ENDS, {}, ""),
         ({}, RUNS_ON, {"/level": [], "/levels": ["/alarm"]}, ""),
+        # a node that hears what another run sends, and one by whose hand the program ended
+        ({"topic": "/status"}, RUNS_ON, {}, ""),
+        ({}, {**ENDS, "shut_down": True}, {}, ""),
     ],
-    ids=["topic", "type", "ends", "runs-on", "closed-loop", "came", "students-topic"],
+    ids=[
+        "topic",
+        "type",
+        "ends",
+        "runs-on",
+        "closed-loop",
+        "came",
+        "students-topic",
+        "other-run",
+        "shut-down",
+    ],
 )
 def test_a_program_that_contradicts_the_rubric_costs_no_student_a_mark(
     fed: dict[str, Any], end: dict[str, Any], heard: dict[str, list[str]], otherwise: str
 ) -> None:
     start = [{"name": "tank", "program": "course_sim/tank.py"}, *SCENARIO["start"]]
+    shut_down = {
+        "process": "tank",
+        "at_s": 0.8,
+        "line": "shutdown request: new node registered with same name",
+    }
+    console = [shut_down] if "shut_down" in end else []
+    end = {key: value for key, value in end.items() if key != "shut_down"}
     topics = [FED | fed, ALARM]
     subscribers = {"/level": ["/alarm"], **heard}
     types = dict.fromkeys(subscribers, FED["type"]) | {one["topic"]: one["type"] for one in topics}
@@ -277,14 +299,15 @@ def test_a_program_that_contradicts_the_rubric_costs_no_student_a_mark(
         "publishers": {one["topic"]: [one["callerid"]] for one in topics},
         "subscribers": subscribers,
         "connections": [
-            {"topic": topic, "publisher": sender, "subscriber": hearer}
-            for topic, sender in (("/level", "/tank"), ("/alarm", "/alarm"))
-            for hearer in subscribers.get(topic, ())
+            {"topic": one["topic"], "publisher": one["callerid"], "subscriber": hearer}
+            for one in topics
+            for hearer in subscribers.get(one["topic"], ())
         ],
     }
     run = {
         "topics": topics,
         "graph": [graph],
+        "console": console,
         "processes": [
             {"name": "tank", "role": "grader", **end},
             {"name": "talker", "stopped_by": "INT", "exit_code": 0},
@@ -477,3 +500,9 @@ def test_what_is_named_as_absent_explains_more_than_another_loss() -> None:
     found = {c.id: c for c in judge(asked, build_runs({"runs": {}, "package": package}))}
     assert found["executable"].status.is_lost
     assert found["install"].blocked_by == "cmake"
+
+
+def test_a_type_of_another_topic_in_the_same_sentence_is_not_the_first_ones() -> None:
+    assert list(said_types("/level", HANDOUT)) == ["std_msgs/Float32"]
+    assert list(said_types("/level", CONVERTS)) == []
+    assert list(said_types("/percent", CONVERTS)) == ["std_msgs/Float64"]

@@ -632,10 +632,12 @@ def test_a_rate_may_be_that_of_a_parameter_which_the_run_sets(examples: Path) ->
         (
             '"src/kinematics.py"',
             '"src/kinematic.py"',
-            "line 43: the handout has src/kinematics.py, and not src/kinematic.py",
+            "line 43: the handout has kinematics.py, and not kinematic.py",
         ),
         ("student(FILE).wrap(", "student(FILE).wrapped(", "line 61: the handout has wrap, and not wrapped"),
         ("wrap(angle)\n", "wrap(angle, 1)\n", "line 61: wrap has 1 argument in the handout, and 2 here"),
+        ("src/kinematics.py", "arm/src/kinematics.py", ""),
+        ("student(FILE).wrap(", "student(FILE).wrap2(", ""),
         # what the handout does not have, is worked out, or is called wrongly on purpose
         ("student(FILE).wrap(", "student(FILE).own_name(", ""),
         ("student(FILE).wrap(", "student(f'src/{FILE}').wrap(", ""),
@@ -645,7 +647,17 @@ def test_a_rate_may_be_that_of_a_parameter_which_the_run_sets(examples: Path) ->
             "",
         ),
     ],
-    ids=["syntax", "file", "function", "arguments", "own-name", "worked-out", "on-purpose"],
+    ids=[
+        "syntax",
+        "file",
+        "function",
+        "arguments",
+        "elsewhere",
+        "number",
+        "own-name",
+        "worked-out",
+        "on-purpose",
+    ],
 )
 def test_a_slip_in_an_instructors_test_file_is_refused(
     examples: Path, old: str, new: str, fault: str

@@ -243,7 +243,10 @@ def rates_in_loop(loop):
     made = [n for n in loop.body if isinstance(n, ast.Assign) and is_call(n.value, "Rate")]
     named = any(isinstance(n, ast.Attribute) and n.attr == "sleep" for n in ast.walk(loop))
     name = dotted(made[0].targets[0]) if len(made) == 1 and len(loop.body) > 1 and not named else ""
-    if name:
+    stored = {n.id for n in ast.walk(loop) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    own = {n.id for n in ast.walk(made[0].value) if isinstance(n, ast.Name)} & stored if made else ()
+    skipped = any(isinstance(n, ast.Continue) for n in ast.walk(loop))
+    if name and not own and not skipped and not isinstance(made[0].targets[0], ast.Subscript):
         message = "a Rate is made in each turn of the loop on line %d, and nothing sleeps" % loop.lineno
         fix = "move line %d above that loop, and write `%s.sleep()` as the last line in the loop"
         yield slip(

@@ -166,6 +166,8 @@ def misspelt(tree):
     odd = {*keys, *unbound, *outside}
     unknown = [n for n in names if n.id not in known or id(n) in odd]
     for node in unknown[:USES_LIMIT]:
+        fitting = stored if id(node) in texts else own - functions if is_value(node, tree) else own
+        near = "" if node.id in known else spelt_alike(node.id, fitting, attributes)
         if id(node) in outside and (node.id == "self" or node.id not in known):
             message = "line %d is in the class, but in none of its methods, so it runs before them"
             fix = "indent line %d like the lines of the method above it, or delete it" % node.lineno
@@ -174,17 +176,7 @@ def misspelt(tree):
             message = "the key `%s` is written here without quotes" % node.id
             fix = "on line %d, write `%s`" % (node.lineno, keys[id(node)])
             yield slip(node.lineno, "undefined", message, fix=fix, name=node.id)
-        elif (
-            node.id not in known
-            and (
-                near := spelt_alike(
-                    node.id,
-                    stored if id(node) in texts else (own - functions if is_value(node, tree) else own),
-                    attributes,
-                )
-            )
-            and not (node.id in MODULES and near in imported)  # the import has it wrong
-        ):
+        elif near and not (node.id in MODULES and near in imported):  # there the import has it wrong
             whole = near == "__name__" and is_guard(node, tree)
             fix = (
                 "write `if __name__ == '__main__':`" if whole else "write %s instead of %s" % (near, node.id)
@@ -475,7 +467,7 @@ def undefined(node, tree):
     module = "%s.%s" % (name, inner) if inner in ("msg", "srv") else ALIASES.get(name, name)
     if module != name or (name in MODULES and inner):
         return "`%s` is not imported" % name, "write `import %s` at the top" % module
-    idle = idle_functions(tree) if isinstance(used, ast.Call) and not used.keywords else []
+    idle = idle_functions(node, tree) if isinstance(used, ast.Call) and not used.keywords else []
     fitting = [one.name for one in idle if len(one.args.args) == len(used.args)]
     if len(fitting) == 1:
         fix = "on line %d, write `%s` instead of `%s`" % (node.lineno, fitting[0], name)
@@ -483,15 +475,21 @@ def undefined(node, tree):
     return why, "above line %d, %s" % what_to_write(node, used, tree)
 
 
-def idle_functions(tree):
-    """Return the functions of the file itself that nothing in it names."""
+def idle_functions(node, tree):
+    """Return the functions of the file itself that nothing in it names. Within a function, only those that have a word
+    of the name that stands there."""
     named = {n.id for n in walk(tree) if isinstance(n, ast.Name)}
-    return [n for n in tree.body if isinstance(n, ast.FunctionDef) and n.name not in named]
+    functions = [n for n in walk(tree) if isinstance(n, ast.FunctionDef)]
+    inside = [n for n in functions if n.lineno <= node.lineno <= n.end_lineno]
+    words = {word for word in node.id.split("_") if len(word) > 2}
+    own = (n for n in tree.body if isinstance(n, ast.FunctionDef))
+    idle = [n for n in own if n.name not in named and n not in inside]
+    return [n for n in idle if not inside or words.intersection(n.name.split("_"))]
 
 
 def unread_alike(node, tree):
-    """Return the variables of its function that get a value above a name, that nothing reads, and whose names contain
-    that name or are part of it."""
+    """Return the variables of its function that get a value above a name, that nothing reads, and whose names have a
+    word of it: `hello_str` for `hello`."""
     parents = parents_of(tree)
     scope = parents.get(node)
     while scope is not None and not isinstance(scope, (ast.FunctionDef, ast.Module)):
@@ -499,8 +497,9 @@ def unread_alike(node, tree):
     names = [n for n in walk(tree) if isinstance(n, ast.Name) and len(n.id) > 1]
     read = {n.id for n in names if isinstance(n.ctx, ast.Load)}
     own = (n for n in ast.walk(scope or tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store))
-    above = {n.id for n in own if n.lineno < node.lineno and len(n.id) > 1} - read
-    return sorted(one for one in above if one in node.id or node.id in one)
+    above = {n.id for n in own if n.lineno < node.lineno} - read
+    parts = {part for part in node.id.split("_") if len(part) > 2}
+    return sorted(one for one in above if parts.intersection(one.split("_")))
 
 
 def what_to_write(node, used, tree):

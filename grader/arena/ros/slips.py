@@ -70,7 +70,10 @@ SLIPS_LIMIT = 100
 def slips(tree):
     """What compiles and is not meant: names that are not called or not there, questions that wait for a keyboard."""
     functions = {n.name for n in walk(tree) if isinstance(n, (ast.FunctionDef, ast.ClassDef))}
-    kept = {id(n.value): dotted(n.targets[0]) for n in walk(tree) if isinstance(n, ast.Assign)}
+    assigned = [n for n in walk(tree) if isinstance(n, ast.Assign)]
+    kept = {
+        id(n.value): dotted(n.targets[0]) for n in assigned if not isinstance(n.targets[0], ast.Subscript)
+    }
     found = []
     for node in walk(tree):
         name = uncalled(node, functions)
@@ -84,7 +87,7 @@ def slips(tree):
             fix = "delete line %d, which makes a number of it" % line if line else ""
             fix = decided_by(node, tree) or fix
             found.append(slip(node.lineno, "input", message, fix=fix, name=how_often(node, tree)))
-            if name == "input" and not line and kept.get(id(node)):
+            if name == "input" and not line and kept.get(id(node), "...") != "...":
                 found.append(slip(node.lineno, "typed-text", name, name=kept[id(node)]))
     finders = (
         names_of_objects, misspelt, loop_rates, resets, never_run, never_reached, stopped_loops,

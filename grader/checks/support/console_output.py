@@ -92,7 +92,16 @@ def printed_lines(run: Run) -> tuple[Line, ...]:
 
 
 SUMMARY = re.compile(r"\s*\*\s+/")
-"""How a line of roslaunch's list of parameters begins, which no node prints."""
+"""How a line of roslaunch's list of parameters begins."""
+
+
+def in_summary(texts: Iterable[str]) -> list[bool]:
+    """Return of each line whether it stands in roslaunch's list of parameters, which no node prints."""
+    found, inside = [], False
+    for text in texts:
+        inside = text.strip() == "PARAMETERS" or (inside and text.strip() != "NODES")
+        found.append(inside and SUMMARY.match(text) is not None)
+    return found
 
 
 def stream_lines(run: Run, process: str, *, with_names: bool = False) -> tuple[tuple[Line, ...], ...]:

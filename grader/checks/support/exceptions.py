@@ -17,6 +17,7 @@ from grader.checks.support.rospy_calls import (
     fields_of,
     is_text,
     line_tree,
+    message_operand,
     rewritten,
     uncalled_proxy,
 )
@@ -353,21 +354,7 @@ def _operands(left: str, right: str, source: str) -> Meaning | None:
     if "NoneType" in (left, right):
         return _none(source)
     if message:
-        sides = [
-            n.left if message == left else n.right if isinstance(n, ast.BinOp) else n.comparators[-1]
-            for n in ast.walk(line_tree(source))
-            if isinstance(n, ast.BinOp | ast.Compare)
-        ]
-        name = ast.unparse(sides[0]) if len(sides) == 1 else ""
-        fields = noetic_messages()["std_msgs"].get(message, ())
-        is_time = message in {"Duration", "Time"}
-        field = "to_sec()" if is_time else "data" if fields == ("data",) else ""
-        what = "no number of seconds" if is_time else "the whole message"
-        if name and field:
-            return f"`{shown(name)}` is {what} ({message})", rewritten(source, (sides[0], f"{name}.{field}"))
-        inner = f"`{shown(name)}.…`" if name else "`msg.…`"
-        hint = "write `.to_sec()` behind that side" if is_time else f"take the field that you mean: {inner}"
-        return f"one side is {what} ({message})", hint
+        return message_operand(message, left, source)
     if "^" in source and {left, right} <= {"int", "float"}:
         return "`^` is no power in Python", f"write `{shown(source.replace('^', '**'))}`"
     if "str" in (left, right):
@@ -565,7 +552,7 @@ def _places_added(source: str, beside: Sequence[ast.expr]) -> str:
 
 def explain_operand(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """A text or a message and something else are added: which of both does not fit, where Python marks the place."""
-    if not (match := _ADDED.search(found.message)):
+    if not (match := _ADDED.search(found.message)) or {"Time", "Duration"}.intersection(match.groups()):
         return None
     of_text = bool(match[1]) or "str" in match.groups()
     left = match[3] == "str" or (not of_text and bool(fields_of(package, match[2])))

@@ -112,7 +112,8 @@ def ended_programs(run: Run) -> set[str]:
     """Return the grader's own programs that ended by themselves while the run went on, with exit code 0."""
     starts = [(t, e) for t, e in run.processes if e.role == "grader" and e.event == "start"]
     found = (_life(run, start_ns, start) for start_ns, start in starts)
-    return {one.name for one in found if one.ended_early and one.end is not None and one.end.exit_code == 0}
+    ended = {one.name for one in found if one.ended_early and one.end is not None and one.end.exit_code == 0}
+    return {name for name in ended if not any(SHUT_DOWN in line.line for _, line in run.lines(name))}
 
 
 def how_it_ended(end: ProcessEvent) -> str:

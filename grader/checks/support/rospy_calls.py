@@ -383,8 +383,40 @@ def of_typed_text(found: Traceback, file: str, package: PackageFacts) -> tuple[s
         return None
     source = found.own_frames[-1].source
     typed = [s for s in package.slips if (s.kind, s.file) == ("typed-text", file)]
-    read = [s.line for s in typed if re.search(rf"\b{re.escape(s.name.partition('.')[0])}\b", source)]
+    bases = ((s.line, s.name if s.name.startswith("self.") else s.name.partition(".")[0]) for s in typed)
+    read = [line for line, name in bases if re.search(rf"(?<![\w.]){re.escape(name)}\b", source)]
     if not read:
         return None
     where = f"line{'s' if len(read) > 1 else ''} {join_words(map(str, read))}"
     return "input() gives a text in Python 3", f"on {where}, write `float(input(…))` in place of `input(…)`"
+
+
+def _time_and_number(time: ast.expr, source: str) -> tuple[str, str] | None:
+    sums = [n for n in ast.walk(line_tree(source)) if isinstance(n, ast.BinOp)]
+    compares = any(isinstance(n, ast.Compare) for n in ast.walk(line_tree(source)))
+    if compares or len(sums) != 1 or not isinstance(sums[0].op, ast.Add | ast.Sub):
+        return None
+    other = sums[0].left if ast.dump(sums[0].right) == ast.dump(time) else sums[0].right
+    seconds = f"rospy.Duration({ast.unparse(other)})"
+    return "a Time and a number cannot be added", rewritten(source, (other, seconds))
+
+
+def message_operand(message: str, left: str, source: str) -> tuple[str, str]:
+    """Of a calculation with a whole message of this type, or a time."""
+    sides = [
+        n.left if message == left else n.right if isinstance(n, ast.BinOp) else n.comparators[-1]
+        for n in ast.walk(line_tree(source))
+        if isinstance(n, ast.BinOp | ast.Compare)
+    ]
+    name = ast.unparse(sides[0]) if len(sides) == 1 else ""
+    fields = noetic_messages()["std_msgs"].get(message, ())
+    is_time = message in {"Duration", "Time"}
+    field = "to_sec()" if is_time else "data" if fields == ("data",) else ""
+    what = "no number of seconds" if is_time else "the whole message"
+    if message == "Time" and sides and (sum_ := _time_and_number(sides[0], source)):
+        return sum_
+    if name and field:
+        return f"`{shown(name)}` is {what} ({message})", rewritten(source, (sides[0], f"{name}.{field}"))
+    inner = f"`{shown(name)}.…`" if name else "`msg.…`"
+    hint = "write `.to_sec()` behind that side" if is_time else f"take the field that you mean: {inner}"
+    return f"one side is {what} ({message})", hint
