@@ -393,7 +393,7 @@ class Unpacker:
         if first not in self.executable:
             self.refuse(f"the entry '{brief(path)}' is a link to what is not in it")
         if first != path:
-            # Whoever copies the package or reads all of it meets the file once more.
+            # If the package is copied or all of it is read, the file comes up once more.
             self._meter.data(self._sizes[first])
             self._sizes[path] = self._sizes[first]
             os.link(self._root / first, self._free(path))

@@ -24,7 +24,7 @@ from grader.checks import CHECKS, Check
 from grader.checks.registry import collecting
 from grader.model.verdict import Verdict
 from grader.rubric.course_packages import read_packages, read_starter
-from grader.rubric.pytest_check import BAG, PYTHON, FileFault, pytest_check, read_beside, test_file_faults
+from grader.rubric.pytest_check import BAG, PYTHON, FileFault, faults_of_tests, pytest_check, read_beside
 from grader.rubric.step_faults import bag_faults, played_bags, topics_named
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, criteria_of
 from grader.untrusted_text import visible
@@ -79,7 +79,7 @@ def read_instructor(data: object, folder: Path) -> Beside:
         if path == ("checks",):
             own = run_checks_file(file, files[name])
     handed_out = frozenset(hashlib.sha256(content).hexdigest() for content in starter.values() if content)
-    faults += test_file_faults(rubric, files)
+    faults += faults_of_tests(rubric, files)
     known = known_checks(folder, own.checks)
     return Beside(files=files, own=own, known=known, faults=tuple(faults), handed_out=handed_out)
 

@@ -68,7 +68,7 @@ class _Test(NamedTuple):
     names: tuple[str, ...]
 
 
-def test_file_faults(rubric: dict[str, Any], files: Mapping[str, bytes]) -> Iterator[Fault]:
+def faults_of_tests(rubric: dict[str, Any], files: Mapping[str, bytes]) -> Iterator[Fault]:
     """Yield what is wrong with an instructor's test files: they are no Python, they ask for files and functions that
     the handout calls otherwise, or none of their tests is called as a criterion selects."""
     handout = str(rubric.get("handout") or "")
