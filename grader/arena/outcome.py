@@ -400,10 +400,11 @@ def computes(live: RunState, process: str) -> bool:
 
 
 def is_unnamed(live: RunState, process: str) -> bool:
-    """Return whether a process is a client that looks for a service and is no node (it has no `init_node`)."""
+    """Return whether a process is a client that looks for a service which is not there, and is no node (it has no
+    `init_node`)."""
     lone = live.running - {live.owners.get(node, "") for node in live.here}
-    rest = live.at_rest.get(process)
-    return lone == {process} and rest is not None and rest.programs == 1 and UNNAMED in live.sought
+    rest, absent = live.at_rest.get(process), live.sought.get(UNNAMED, set()) - live.serves - live.services
+    return lone == {process} and rest is not None and rest.programs == 1 and absent != set()
 
 
 def _waits_in_vain(live: RunState, process: str) -> bool:

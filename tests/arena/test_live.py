@@ -7,7 +7,15 @@ from itertools import accumulate
 
 import pytest
 
-from grader.arena.outcome import all_compute, describe_wait, find_outcome, is_settled, is_silent, next_look_s
+from grader.arena.outcome import (
+    all_compute,
+    describe_wait,
+    find_outcome,
+    is_settled,
+    is_silent,
+    next_look_s,
+    starting,
+)
 from grader.arena.run_state import RunState
 from grader.model.message_rate import RateBounds
 from grader.rubric.scenario import Until
@@ -565,6 +573,18 @@ def test_a_client_that_is_no_node_is_not_waited_for_where_nobody_offers_its_serv
     live.note_start("other", 0.0, helper=False)  # which of the two asks is not known
     live.note_rest("other", "loops", 1, 2.0)
     assert find_outcome(live, until, 5.0) is None
+
+
+def test_who_asked_for_a_service_before_init_node_may_become_a_node() -> None:
+    live, until = _resting(server=("spins", 1)), Until(nodes=2)
+    live.note_start("client", 4.0, helper=False)
+    live.note_rest("client", "naps", 1, 5.0)
+    live.services, live.sought["/unnamed"] = {"/clamp"}, {"/clamp"}
+    assert starting(live, until, 9.0) == {"client"}
+    live.services = set()
+    assert starting(live, until, 9.0) == set()
+    live.note_graph(["/client"], {"/client": "client"}, 9.0)
+    assert "/unnamed" not in live.sought
 
 
 def test_a_service_is_sought_by_who_asks_for_it_again() -> None:
