@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import time
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 
 from grader.errors import RubricError
 from grader.model.verdict import Status
+from grader.rubric.find import rubrics_folder
 from grader.rubric.load import load_rubric
 from tests.evidence.bags import CHATTER, write_bag
 from tests.instructor.samples import TESTS, judged, runs, write_rubric
@@ -245,3 +247,51 @@ def test_the_digest_is_of_the_tests_too(tmp_path):
     first = load_rubric(str(path)).digest
     write_rubric(tmp_path, TESTS, tests=MIXED + "\n")
     assert load_rubric(str(path)).digest != first
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ("def hand(", "def hand(:", "line 10: invalid syntax"),
+        (
+            '"src/kinematics.py"',
+            '"src/kinematic.py"',
+            "line 43: the handout has kinematics.py, and not kinematic.py",
+        ),
+        ("student(FILE).wrap(", "student(FILE).wrapped(", "line 61: the handout has wrap, and not wrapped"),
+        ("wrap(angle)\n", "wrap(angle, 1)\n", "line 61: wrap has 1 argument in the handout, and 2 here"),
+        ("src/kinematics.py", "arm/src/kinematics.py", ""),
+        ("student(FILE).wrap(", "student(FILE).wrap2(", ""),
+        # what the handout does not have, is worked out, or is called wrongly on purpose
+        ("student(FILE).wrap(", "student(FILE).own_name(", ""),
+        ("student(FILE).wrap(", "student(f'src/{FILE}').wrap(", ""),
+        (
+            "found = student(FILE).wrap(angle)\n",
+            "with pytest.raises(TypeError): student(FILE).wrap(angle, 1)\n",
+            "",
+        ),
+    ],
+    ids=[
+        "syntax",
+        "file",
+        "function",
+        "arguments",
+        "elsewhere",
+        "number",
+        "own-name",
+        "worked-out",
+        "on-purpose",
+    ],
+)
+def test_a_slip_in_an_instructors_test_file_is_refused(tmp_path, old, new, fault):
+    examples = rubrics_folder() / "examples"
+    tests = (examples / "test_kinematics.py").read_text(encoding="utf-8")
+    assert old in tests
+    (tmp_path / "test_kinematics.py").write_text(tests.replace(old, new, 1), encoding="utf-8")
+    path = Path(shutil.copy(examples / "unit-tests.yaml", tmp_path))
+    if not fault:
+        assert load_rubric(str(path)).rubric.id == "unit-tests"
+        return
+    with pytest.raises(RubricError) as caught:
+        load_rubric(str(path))
+    assert caught.value.faults == [f"{path}:23: criteria[1].with.file: test_kinematics.py, {fault}"]
