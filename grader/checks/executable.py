@@ -105,6 +105,7 @@ def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: Ex
     obstacles = [*of_first_line, *_mode_obstacles(found, remarks)]
     hint = _moved(package, found.path, params.path) or "; ".join(remarks)
     fault = syntax_fault(found)
+    what = f"{found.path} {'; it also '.join(o.why for o in obstacles)}"
     if fault is not None:
         verdict = _syntax_verdict(found, fault, [] if has_wrapper(package, build, found.path) else obstacles)
     elif found.executable and not obstacles:
@@ -117,17 +118,12 @@ def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: Ex
             hint=hint,
         )
     elif obstacles and (unmade := _unmade_wrapper(package, build, found.path)):
-        why = "; it also ".join(o.why for o in obstacles)
-        verdict = _judge_unmade(f"{found.path} {why}", found.path, unmade)
+        verdict = _judge_unmade(what, found.path, unmade)
     elif obstacles and _asks_for_wrapper(package, found.path):  # and no build was tried
-        why = "; it also ".join(o.why for o in obstacles)
-        message = (
-            f"{found.path} {why}: only the build shows whether catkin_install_python makes a program of it"
-        )
+        message = f"{what}: only the build shows whether catkin_install_python makes a program of it"
         verdict = inconclusive(message, hint="; ".join(o.fix for o in obstacles))
     elif obstacles:
-        why = "; it also ".join(o.why for o in obstacles)
-        message = f"{found.path} {why}{_rosrun_answer(build, found.path)}"
+        message = f"{what}{_rosrun_answer(build, found.path)}"
         kind: MistakeKind = "cannot-be-run" if of_first_line else "not-executable"
         verdict = failed(message, hint="; ".join(o.fix for o in obstacles))
         verdict = verdict if found.shebang_fault == "empty-file" else verdict.lost_by(kind, found.path)

@@ -135,7 +135,7 @@ def list_attention(folder: BatchFolder) -> Iterator[str]:
     by_none = passed_by_none(criteria, letters)
     for place, decided in islice(by_none.items(), NAMES_SHOWN):
         asked = f"{criteria[place].id} ({criteria[place].title})"
-        yield f"none of {decided} got all points of {asked}: is the rubric right there?"
+        yield f"none of {decided} got full points for {asked}: is the rubric right there?"
     if by_none:
         yield f"  hint: grade a package that you know to be correct: {shlex.join(grade_one(folder.run))}"
 

@@ -114,11 +114,11 @@ def _called_otherwise(tree: ast.Module, handout: str) -> str:
             path = getattr(texts.get(ast.unparse(call.args[0]), call.args[0]), "value", None)
             name = PurePosixPath(path).name if isinstance(path, str) else ""
             if near := _other_name(name, files, handout):
-                return f"line {call.lineno}: the handout has {near}, and not {name}"
+                return f"line {call.lineno}: the handout says {near}, not {name}"
         elif isinstance(call.func, ast.Attribute) and ast.unparse(call.func).startswith("student("):
             name = call.func.attr
             if near := _other_name(name, most, handout):
-                return f"line {call.lineno}: the handout has {near}, and not {name}"
+                return f"line {call.lineno}: the handout says {near}, not {name}"
             if name in most and not tries_wrong_calls and len(call.args) > most[name]:
                 takes = plural(most[name], "argument")
                 return f"line {call.lineno}: {name} has {takes} in the handout, and {len(call.args)} here"

@@ -105,21 +105,15 @@ def _no_debian_package(package: str) -> str:
 
 def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
     """Yield what a scenario asks for that no machine has."""
+    course = {name for _, name in as_texts(rubric.get("packages"))}
     for index, start in as_maps(scenario.get("start")):
-        launch, course = start.get("launch"), {name for _, name in as_texts(rubric.get("packages"))}
-        key = next((k for k in ("script", "launch") if str(start.get(k)).partition("/")[0] in course), "")
-        if key and "/" in str(start[key]):
-            owner = str(start[key]).partition("/")[0]
-            fault = f"is of {owner}, which the rubric brings along: write program: {start[key]}"
-            yield (*path, "start", index, key), fault
-        elif isinstance(launch, str) and " " in launch.strip():
-            fault = f"is the file alone, without its package: {launch.split()[-1]}"
-            yield (*path, "start", index, "launch"), fault
-        elif isinstance(launch, str) and "/" in launch:
-            yield (*path, "start", index, "launch"), _in_any_folder(launch)
-        elif isinstance(launch, str) and not launch.endswith(LAUNCH_ENDINGS):
-            fault = f'roslaunch takes the file\'s whole name: "{launch}.launch"'
-            yield (*path, "start", index, "launch"), fault
+        for key in ("script", "launch"):
+            owner, slash, _ = str(start.get(key)).partition("/")
+            if slash and owner in course:
+                fault = f"is a file of {owner}, which the rubric brings along: write program: {start[key]}"
+                yield (*path, "start", index, key), fault
+            elif key == "launch" and isinstance(start.get(key), str) and (fault := _launch_fault(start[key])):
+                yield (*path, "start", index, key), fault
         for key, file in (("script", start.get("script")), ("load", start.get("load"))):
             if isinstance(file, str) and (fault := _file_fault(file, rubric)):
                 yield (*path, "start", index, key), fault
@@ -129,6 +123,17 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
         if package in packages_in(rubric):
             key = "launch" if file.endswith(LAUNCH_ENDINGS) else "script"
             yield at, f"is the student's: with program it would count as the grader's. Write {key}: {file}"
+
+
+def _launch_fault(launch: str) -> str:
+    """Return why this is not the name of a launch file as roslaunch takes it, behind the package; empty where it is."""
+    if " " in launch.strip():
+        return f"is the file alone, without its package: {launch.rsplit(maxsplit=1)[-1]}"
+    if "/" in launch:
+        return _in_any_folder(launch)
+    if not launch.endswith(LAUNCH_ENDINGS):
+        return f'roslaunch takes the file\'s whole name: "{launch}.launch"'
+    return ""
 
 
 def _in_any_folder(launch: str) -> str:

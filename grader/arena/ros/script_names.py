@@ -481,10 +481,15 @@ def idle_functions(node, tree):
     named = {n.id for n in walk(tree) if isinstance(n, ast.Name)}
     functions = [n for n in walk(tree) if isinstance(n, ast.FunctionDef)]
     inside = [n for n in functions if n.lineno <= node.lineno <= n.end_lineno]
-    words = {word for word in node.id.split("_") if len(word) > 2}
+    words = words_of(node.id)
     own = (n for n in tree.body if isinstance(n, ast.FunctionDef))
     idle = [n for n in own if n.name not in named and n not in inside]
-    return [n for n in idle if not inside or words.intersection(n.name.split("_"))]
+    return [n for n in idle if not inside or words & words_of(n.name)]
+
+
+def words_of(name):
+    """Return the words of three letters and more that a name is made of."""
+    return {word for word in name.split("_") if len(word) > 2}
 
 
 def unread_alike(node, tree):
@@ -498,8 +503,7 @@ def unread_alike(node, tree):
     read = {n.id for n in names if isinstance(n.ctx, ast.Load)}
     own = (n for n in ast.walk(scope or tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store))
     above = {n.id for n in own if n.lineno < node.lineno} - read
-    parts = {part for part in node.id.split("_") if len(part) > 2}
-    return sorted(one for one in above if parts.intersection(one.split("_")))
+    return sorted(one for one in above if words_of(node.id) & words_of(one))
 
 
 def what_to_write(node, used, tree):

@@ -368,7 +368,7 @@ def todos(run: BatchRun, lines: Sequence[SubmissionRow], out: Path | None) -> It
 def _suspects(run: BatchRun, by_none: Mapping[int, int], out: Path | None) -> Todo:
     return Todo(
         anchor="rubric",
-        title="Criteria of which no one got all points",
+        title="Criteria that no one got full points for",
         advice="The mistake may be the rubric's. Before you publish, grade a package that you know to be correct:",
         items=[
             Item(

@@ -159,7 +159,7 @@ def test_the_page_and_the_terminal_ask_for_a_correct_package(tmp_path) -> None:
 
     told = list(list_attention(SimpleNamespace(run=run, rows=lambda: rows, path=tmp_path)))
     assert told[-2:] == [
-        "none of 9 got all points of manifest (package.xml names lab1): is the rubric right there?",
+        "none of 9 got full points for manifest (package.xml names lab1): is the rubric right there?",
         "  hint: grade a package that you know to be correct: grader grade FOLDER --rubric 'my lab.yaml'",
     ]
 
