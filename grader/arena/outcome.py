@@ -241,7 +241,8 @@ def _silent(live: RunState, until: Until, now_s: float) -> str:
 def _never(live: RunState, until: Until, given: Until, now_s: float) -> str:
     """Return what is waited for and cannot come, and all the rest has been seen; else "". `given` is `until` as the
     rubric has it."""
-    if not is_settled(live, now_s):
+    unanswered = until.connected and live.all_answered_s < live.graph_changed_s + CONNECTED_S
+    if unanswered or not is_settled(live, now_s):
         return ""
     waited = [t for t in until.topics if not live.topics[t].count]
     waited += [t for t, wanted in until.messages.items() if live.topics[t].count < wanted]

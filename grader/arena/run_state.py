@@ -97,6 +97,8 @@ class RunState:
     """When messages arrived, on the topics of `rates`."""
     connected_s: dict[str, float] = field(default_factory=dict)
     """The topics over which nodes are connected now, and since when."""
+    all_answered_s: float = 0.0
+    """When all nodes last said what they are connected to."""
     subscribers: dict[str, set[str]] = field(default_factory=dict)
     """By topic of the grader's, the nodes that have subscribed to it."""
     refused: set[str] = field(default_factory=set)
@@ -234,8 +236,10 @@ class RunState:
             self.sought[node].add(service)
         self.missed.add((node, service))
 
-    def note_connections(self, topics: Iterable[str], now_s: float) -> None:
-        """Take note of the topics over which nodes are connected now, and since when."""
+    def note_connections(self, topics: Iterable[str], now_s: float, *, answered: bool = True) -> None:
+        """Take note of the topics over which nodes are connected now, and since when. `answered` says whether all of
+        them were heard: a node that is late may be connected all the same."""
+        self.all_answered_s = now_s if answered else self.all_answered_s
         self.connected_s = {topic: self.connected_s.get(topic, now_s) for topic in topics}
 
     def note_start(self, process: str, now_s: float, *, helper: bool) -> None:

@@ -389,7 +389,8 @@ class ArenaSession:
             self._note_service_call(time_ns, fields)
         elif status == "graph":
             pairs = [c for c in fields["connections"] if not is_grader_node(c["subscriber"])]
-            self.live.note_connections({c["topic"] for c in pairs}, time.monotonic())
+            topics = {c["topic"] for c in pairs}
+            self.live.note_connections(topics, time.monotonic(), answered=fields["answered"])
             self.live.graphs += 1
         elif status == "spawn-failed":
             message = f"{fields['name']} could not be started: {fields['detail']}"

@@ -14,7 +14,7 @@ from grader.rubric.scenario import Scenario, Start, Until
 from tests.arena.support import SCRIPT, make_place, run
 
 pytestmark = pytest.mark.ros
-FACTS = PackageFacts.model_construct(slips=(), python=(), launch=())
+FACTS = PackageFacts.model_construct(slips=(), python=(), launch=(), files=())
 SANDBOXES = ["auto", "none"]
 TALKER = """
 import rospy
@@ -120,6 +120,17 @@ def test_a_listener_that_says_it_hears(tmp_path: Path) -> None:
     seen = both(tmp_path, TALKER, forged + LISTENER.format(topic="other"))
     assert judged(seen) is Status.FAIL
     assert pairs(seen) & {CHATTER, ("/other", "/talker", "/listener")} == {("/other", "/talker", "/listener")}
+
+
+def test_a_talker_that_has_ended_when_its_word_is_checked(tmp_path: Path) -> None:
+    """The listener takes its time to answer; by then there is no socket of the talker any more."""
+    ends = "\n    import os, threading\n    threading.Timer(0.3, os._exit, [0]).start()\n    code, message"
+    claims = CLAIMS.replace("\n    code, message", ends, 1)
+    waits = FORGED.format(other=HEARS, direction="i", transport="TCPROS")
+    waits = waits.replace("\n    code, message", "\n    import time\n    time.sleep(1)\n    code, message", 1)
+    seen = both(tmp_path, claims + TALKER, waits + LISTENER.format(topic="apart"))
+    assert judged(seen) is Status.FAIL
+    assert CHATTER not in pairs(seen)
 
 
 @pytest.mark.full

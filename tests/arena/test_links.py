@@ -109,7 +109,7 @@ def rounds(monkeypatch: pytest.MonkeyPatch, kernel: Kernel, apis: dict[str, str]
     wire = Wire()
     monkeypatch.setattr(links, "Ties", kernel)
     asked = links.Links("/grader", Known(), Guard(wire))
-    return [asked.of(apis) for _ in range(count)], wire.refused
+    return [asked.of(apis)[0] for _ in range(count)], wire.refused
 
 
 REFUSED = ["process said that /b is connected to /a over /t, which is not so"]
@@ -176,6 +176,16 @@ def test_who_does_not_answer_makes_nobody_a_liar(node, monkeypatch) -> None:
     with socket.create_server(("127.0.0.1", 0)) as mute:
         apis = {"/a": node([serves()]).api, "/b": f"http://127.0.0.1:{mute.getsockname()[1]}/"}
         assert rounds(monkeypatch, Kernel(), apis) == ([[]] * 4, [])
+
+
+def test_who_is_late_is_told_apart_from_who_has_ended(node, monkeypatch) -> None:
+    monkeypatch.setattr(links, "Ties", Kernel())
+    monkeypatch.setattr(links, "BUS_INFO_S", 0.1)
+    asked = links.Links("/grader", Known(), Guard(Wire()))
+    with socket.create_server(("127.0.0.1", 0)) as mute:
+        apis = {"/a": node([]).api, "/b": f"http://127.0.0.1:{mute.getsockname()[1]}/"}
+        assert asked.of(apis) == ([], False)
+    assert asked.of(apis) == ([], True)
 
 
 def test_a_publisher_that_does_not_notice_is_no_liar(node, monkeypatch) -> None:
@@ -323,6 +333,13 @@ def test_whose_other_end_has_gone(two, port, of) -> None:
     subscriber.wait()
     assert joined(two) is False
     assert ties(*two).half_closed(publisher.api) == (port == "data")
+
+
+@pytest.mark.parametrize("ended", [0, 1])
+def test_who_has_ended_since_it_was_asked_is_not_connected(two, ended) -> None:
+    two[ended].process.kill()
+    two[ended].process.wait()
+    assert joined(two) is False
 
 
 def test_what_the_kernel_does_not_say(two, monkeypatch) -> None:

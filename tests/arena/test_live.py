@@ -366,6 +366,7 @@ def test_what_never_comes_ends_the_wait_once_the_graph_has_settled(
 ) -> None:
     live = _resting(node=("spins", 1))
     live.published = {topic: {"/node"} for topic in published}
+    live.note_connections((), 2.9)
     assert find_outcome(live, until, 3.0) is None
     assert find_outcome(live, until, 5.0) == (outcome and ("silent", outcome))
 
@@ -390,6 +391,15 @@ def test_nodes_that_are_connected_in_a_namespace_are_not_waited_for_longer(
     found = find_outcome(live, until, 3.1)
     silent = ("silent", "the nodes are connected over /a of a namespace")
     assert found == (silent if ends else ("complete", "") if "/a" in connected else None)
+
+
+def test_who_has_not_said_yet_what_it_is_connected_to_may_be_connected() -> None:
+    live, until = _resting(node=("spins", 1)), Until(connected=("/a",))
+    live.note_connections((), 1.5)  # asked before a connection could be there
+    live.note_connections((), 4.0, answered=False)
+    assert find_outcome(live, until, 5.0) is None
+    live.note_connections((), 5.0)
+    assert find_outcome(live, until, 5.0) == ("silent", "the graph has settled, without /a")
 
 
 def test_a_window_that_another_topic_needs_is_watched_to_its_end() -> None:

@@ -257,7 +257,8 @@ class Arena:
         """Ask the nodes for their connections, beside the loop: a node that never answers must not stop it."""
 
         def ask():
-            self._wire.status("graph", connections=self._master.tell_connections())
+            found, answered = self._master.tell_connections()
+            self._wire.status("graph", connections=found, answered=answered)
 
         threading.Thread(target=ask, daemon=True).start()
 

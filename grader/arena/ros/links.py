@@ -37,8 +37,8 @@ class Links:
         self._doubts = {}
 
     def of(self, apis):
-        """Return the connections between these nodes (addresses by names), all asked side by side: a node that does
-        not answer in time has none."""
+        """Return the connections between these nodes (addresses by names), all asked side by side, and whether all that
+        can answer have: a node that does not, in time, has none."""
         answers = self._ask(apis)
         ties = Ties(self._owners, {port_of(api) for api in apis.values()})
         found, doubts = [], []
@@ -52,7 +52,8 @@ class Links:
         for (node, said), rounds in self._doubts.items():
             if rounds >= DOUBTED_ROUNDS:
                 self._refuse(node, said, apis)
-        return found[:CONNECTIONS_MAX]
+        late = any(sockets.listening(port_of(api)) for node, api in apis.items() if node not in answers)
+        return found[:CONNECTIONS_MAX], not late
 
     def subscribers(self, api, topic):
         """Return the subscribers that a publisher itself names."""
@@ -139,7 +140,7 @@ class Ties:
 
     def joined(self, publisher, subscriber, transport):
         """Whether two processes, one of each node (an address), hold the ends of a connection; None where the kernel
-        does not say whose sockets they are."""
+        does not say whose sockets they are. A node that has ended since it was asked has none."""
         key = publisher, subscriber, transport == UDP
         if key not in self._joined:
             self._joined[key] = self._join(port_of(publisher), port_of(subscriber), udp=transport == UDP)
@@ -154,7 +155,8 @@ class Ties:
     def _join(self, publisher, subscriber, *, udp):
         ours, theirs = self._listening.get(publisher), self._listening.get(subscriber)
         if not ours or not theirs:
-            return None
+            unknown = [port for port, pids in ((publisher, ours), (subscriber, theirs)) if not pids]
+            return None if all(port is None or sockets.listening(port) for port in unknown) else False
         if not udp:
             return self._streams.meet(ours, theirs, {publisher, subscriber})
         if self._datagrams is None:

@@ -241,14 +241,16 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         if connections:
             on_topics = {node for _, nodes in (*publishers, *subscribers) for node in nodes}
             asked = sorted(n for n in on_topics & apis.keys() if n != ROSOUT and not OWN_NODE.fullmatch(n))
-            record["connections"] = self._links.of({node: apis[node] for node in asked})
+            found = self._links.of({node: apis[node] for node in asked})
+            record["connections"], record["answered"] = found
         return record
 
     def tell_connections(self):
-        """Tell the graph with its connections, as an event; return the connections."""
+        """Tell the graph with its connections, as an event; return the connections, and whether all nodes answered."""
         record = self.graph(connections=True)
+        answered = record.pop("answered")
         self._graph.tell(record)
-        return record["connections"]
+        return record["connections"], answered
 
     def service_api(self, service):
         """Return where a service is offered, or None."""
