@@ -69,11 +69,11 @@ time.sleep(60)
 """
 
 
-def both(tmp_path: Path, talker: str, listener: str, *, sandbox: str = "auto") -> Run:
-    """Two programs until they are connected over `/chatter`, or their graph has not changed for some seconds."""
+def both(tmp_path: Path, talker: str, listener: str, *, sandbox: str = "auto", patience_s: float = 6) -> Run:
+    """Two programs until they are connected over `/chatter`, or their graph has not changed for `patience_s`."""
     files = {"scripts/talker.py": SCRIPT + talker, "scripts/listener.py": SCRIPT + listener}
     starts = (Start(name="talker", script="talker.py"), Start(name="listener", script="listener.py"))
-    until = Until(connected=("/chatter",), silent_s=6, first_message_s=6, limit_s=30)
+    until = Until(connected=("/chatter",), silent_s=patience_s, first_message_s=patience_s, limit_s=90)
     with make_place(files, sandbox=sandbox) as place:
         return run(place, Scenario(title="two", start=starts, until=until), tmp_path / "run.mcap")
 
@@ -97,7 +97,7 @@ REFUSAL = ("talker", "said that /listener is connected to /talker over /chatter,
 
 @pytest.mark.parametrize("sandbox", SANDBOXES)
 def test_nodes_that_are_connected(tmp_path: Path, sandbox: str) -> None:
-    seen = both(tmp_path, TALKER, LISTENER.format(topic="chatter"), sandbox=sandbox)
+    seen = both(tmp_path, TALKER, LISTENER.format(topic="chatter"), sandbox=sandbox, patience_s=60)
     assert seen.outcome.outcome == "complete"
     assert judged(seen) is Status.PASS
     assert pairs(seen) == {CHATTER}
@@ -188,7 +188,7 @@ rospy.Subscriber('rosout_agg', rospy.AnyMsg, lambda message: None)
 def test_a_node_that_publishes_and_subscribes(tmp_path: Path) -> None:
     """It hears itself, a second node, and everybody's log."""
     talker = TALKER.replace("rate =", BOTH_ENDS + "rate =")
-    seen = both(tmp_path, talker, LISTENER.format(topic="chatter"))
+    seen = both(tmp_path, talker, LISTENER.format(topic="chatter"), patience_s=60)
     assert judged(seen) is Status.PASS
     assert {CHATTER, ("/chatter", "/talker", "/talker")} <= pairs(seen)
     assert refused(seen) == []
