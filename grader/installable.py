@@ -37,6 +37,20 @@ OF_ROS = {"genmsg", "rosgraph_msgs", "rosunit"}
 """Packages of ROS that Debian has for Python alone."""
 CMAKE_TOO = {"apriltag", "casadi", "dlib", "dynamixel_sdk", "keyboard", "pigpio", "serial", "torch", "zmq"}
 """Modules of Python whose names packages of ROS or of CMake have too."""
+MODULE_OF = {
+    name: module
+    for module, names in {
+        "math": "sqrt pi sin cos tan asin acos atan atan2 radians degrees hypot",
+        "random": "randint uniform",
+        "collections": "deque defaultdict namedtuple",
+        "threading": "Thread Lock",
+        "cv_bridge": "CvBridge CvBridgeError",
+        "tf.transformations": "euler_from_quaternion quaternion_from_euler",
+        "actionlib": "SimpleActionClient SimpleActionServer",
+    }.items()
+    for name in names.split()
+}
+"""What a script may use without an import, by its name, and the one module that it is taken from."""
 NOTHING_TO_DO = "nothing for you to do: "
 ON_THE_MACHINE = f"{NOTHING_TO_DO}tell your instructor. On the grading machine: "
 """How every hint begins that only the instructor can follow: grading again changes nothing before."""

@@ -217,7 +217,32 @@ _HABITS = (
            ((r"([(,=]\s*)(/\w[\w/]*)(?=\s*[,)])", r"\1'\2'"),)),
     _Habit(r"(?<![\"')\]])(?<![\"')\]]\s)%[sdf]\b(?!\s*[.(\[])",
            "the string has no quotes around it", 'write `"` before and after it'),
+    _Habit(r"^\s*[\w.]+\s*:=", "a line gives a name its value by `=`", "", ((r":=", "="),)),
 )  # fmt: skip
+_LAST_HABITS = (
+    _Habit(r"^\s*def\s.*\(\s*(?:\w+\s*,\s*)*\(\s*(\w+(?:\s*,\s*\w+)+)\s*\)",
+           "parameters in brackets of their own are Python 2",
+           "write one name in its place, `pair`, and `{0} = pair` as the function's first line"),
+    _Habit(r"\blambda\s*\(", "brackets around what a `lambda` takes are Python 2",
+           "write one name, `p`, and `p[0]` and `p[1]` behind the colon"),
+    _Habit(rf"^\s*def\s+\w+\s*\((?:[^()]*,)?\s*({_RESERVED})\s*[,)=]", "`{0}` is a reserved word of Python",
+           "use another name"),
+    _Habit(r"^\s*(?:from|import)\s+[\w.]*\w-\w", "the name of a module has no `-` in it",
+           "a package that others import needs a name with `_` in its place"),
+    _Habit(r"^\s*from\s+[\w.]+\s+import\s+(?:\w+\s*,\s*)*\w+\s+(?!as\b)\w", "a name has no space in it",
+           "write `,` between two names"),
+    _Habit(r"\blambda\b[^:]*$", "a colon `:` is missing behind what the `lambda` takes"),
+    _Habit(r"^\s*(global|nonlocal)\s+(?:\w+\s*,\s*)*\w+\s*=", "`{0}` gives a name no value",
+           "write the name alone, and give it its value on the next line"),
+    _Habit(r"([-+*/%=<>]|\b(?:and|or|not|in))\s*(?:[)\]}:].*)?$", "a value is missing behind `{0}`"),
+    _Habit(r"^\s*elif\b", "there is no `if` that this `elif` belongs to",
+           "begin it below the `i` of its `if`, right behind that block and above any `else:`"),
+    _Habit(r"^\s*else\b", "there is no `if` that this `else` belongs to",
+           "begin it below the `i` of its `if`, right behind that block"),
+    _Habit(r"^\s*(except|finally)\b", "there is no `try:` for this `{0}`",
+           "write `try:` above the lines that it is for"),
+)  # fmt: skip
+"""What a line may have where nothing else is wrong with it."""
 
 
 def parsed(source: str) -> ast.Module:
@@ -235,10 +260,8 @@ def parsed(source: str) -> ast.Module:
 def reason_of_line(line: str) -> Reason:
     """Return what is wrong with a line that does not parse, as far as the table knows it."""
     code, comment, texts = _taken_apart(line[:LINE_CHARS_MAX])
-    for habit in _HABITS:
-        if found := re.search(habit.pattern, code + comment if "include" in habit.pattern else code):
-            word = next(iter(found.groups()), "") or ""
-            return Reason(habit.why.replace("{0}", word), habit.fix.replace("{0}", word))
+    if known := _reason_in(_HABITS, code, comment):
+        return known
     if meant := _keyword(code):
         return Reason(f"Python writes `{meant[1]}`, not `{meant[0]}`")
     if (twice := reason_of_doubled(line)).why:
@@ -249,7 +272,15 @@ def reason_of_line(line: str) -> Reason:
     if apart := next(_with_separator(code, texts), ""):
         sign = "%" if apart.count("%") > code.count("%") else ","
         return Reason(f"`{sign}` is missing between two values")
-    return Reason()
+    return _reason_in(_LAST_HABITS, code) or Reason()
+
+
+def _reason_in(habits: tuple[_Habit, ...], code: str, comment: str = "") -> Reason | None:
+    for habit in habits:
+        if found := re.search(habit.pattern, code + comment if "include" in habit.pattern else code):
+            word = next(iter(found.groups()), "") or ""
+            return Reason(habit.why.replace("{0}", word), habit.fix.replace("{0}", word))
+    return None
 
 
 def reason_of_doubled(line: str) -> Reason:

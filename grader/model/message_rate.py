@@ -100,8 +100,12 @@ class Rhythm(Record):
         count = len(self.gaps_ns)
         if count < LEAST_GAPS:
             return math.inf
-        error = CONFIDENCE * statistics.stdev(self.gaps_ns) / math.sqrt(count)
-        return self.mean_hz * error / statistics.fmean(self.gaps_ns)
+        mean_ns = statistics.fmean(self.gaps_ns)
+        squares = math.fsum([(gap_ns - mean_ns) ** 2 for gap_ns in self.gaps_ns])
+        error = (
+            CONFIDENCE * math.sqrt(squares / (count - 1)) / math.sqrt(count)
+        )  # `stdev`, which takes 20 times as long
+        return self.mean_hz * error / mean_ns
 
     def described(self, low_ns: float, high_ns: float) -> str:
         """`9.98 ± 0.02 Hz over 6.0 s: 60 messages, 98 % of gaps in 0.05 to 0.15 s, longest 0.162 s`."""

@@ -335,11 +335,14 @@ def _published_nothing(tree: ast.Module) -> Iterator[Argument]:
     """Yield `publish()`, or a `publish(x)` of a name that is given no value anywhere, where its function gives a value
     to one name and does nothing with it, or its block to one that nothing else publishes."""
     known = {name for one in tree.body for name in bound_in(ast.Module([one], []))} | set(dir(builtins))
+    made = [n for n in nodes_in(tree) if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)]
+    of_others = {ast.unparse(t) for n in made if _called(n.value) != "Publisher" for t in n.targets}
     for function in (n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)):
         names = [n for n in nodes_in(function) if isinstance(n, ast.Name)]
         read = {n.id for n in names if isinstance(n.ctx, ast.Load)}
         unread = {n.id for n in names if isinstance(n.ctx, ast.Store)} - read
         published = [n for n in nodes_in(function) if isinstance(n, ast.Call) and _called(n) == "publish"]
+        published = [n for n in published if ast.unparse(n.func).rpartition(".")[0] not in of_others]
         calls = [n for n in published if not n.keywords and _gives_nothing(n, known)]
         others = {ast.unparse(given) for n in published if n not in calls for given in n.args}
         beside = _names_beside(function, calls[0]) - others if len(calls) == 1 else set()

@@ -27,6 +27,7 @@ _ENDLESS = re.compile(
 _LEAVES = re.compile(r"\b(?:break|return|throw|goto|spinOnce)\b")
 _SPIN = re.compile(r"\bros::spin\s*\(")
 _SPINS = re.compile(r"spin|Spinner|call(?:Available|One)\b")
+_MAIN = re.compile(r"\bmain\s*\(")
 _LOOP = re.compile(r"\bwhile\s*\([^;{}]*\bok\s*\(\s*\)")
 _SLEEP = re.compile(
     r"\b(?:ros::)?(?:Wall)?Duration\s*\(\s*(?P<s>[\d.]+)\s*\)\s*\.\s*sleep\s*\(|\bus?leep\s*\(\s*(?P<us>\d+)"
@@ -92,8 +93,8 @@ def _waiting(path: str, code: str) -> Iterator[PythonSlip]:
 def _unspun(path: str, code: str) -> Iterator[PythonSlip]:
     """Yield the loop of a node that subscribes, or offers a service, and never lets ROS call anything."""
     loop = _LOOP.search(code)
-    if loop is None or not _LISTENS.search(code) or _SPINS.search(code):
-        return
+    if loop is None or not _LISTENS.search(code) or _SPINS.search(code) or not _MAIN.search(code):
+        return  # of a class, the file with its main() may spin
     line = code.count("\n", 0, loop.start()) + 1
     message = f"the loop on line {line} never calls ros::spinOnce(), so that no callback is ever called"
     fix = f"write `ros::spinOnce();` in the loop on line {line}"

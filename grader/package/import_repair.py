@@ -12,6 +12,7 @@ import re
 from collections.abc import Collection, Iterator
 from difflib import get_close_matches
 
+from grader.installable import MODULE_OF
 from grader.package.name_repair import bound_in, meant_by
 from grader.package.syntax_repair import (
     Step,
@@ -205,10 +206,8 @@ def with_imports(text: str, types: list[str]) -> Iterator[Step]:
         elif name in packages and (meant := _imported_instead(tree, name, packages[name], types)):
             yield from _with_class(text, name, meant)
             return
-        elif name in packages:
-            after = _add_import(
-                text, f"from {packages[name]}.msg import {name}", f"{packages[name]}.msg", name
-            )
+        elif module := f"{packages[name]}.msg" if name in packages else MODULE_OF.get(name):
+            after = _add_import(text, f"from {module} import {name}", module, name)
         else:
             continue
         for step in step_to("import", missing[name], text, after, name):

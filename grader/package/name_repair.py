@@ -219,6 +219,8 @@ def _is_guard(node: ast.stmt) -> bool:
 def meant_by(name: str, own: set[str], unused: Collection[str] = ()) -> str:
     """Return the one name of the script's own that is meant by one that has no value; "" where there is not one. Of the
     `unused`, one that is nearly the same is meant before all others."""
+    if name[:1].isupper():  # a class is not meant by a variable with a name like it
+        own = {one for one in own if one[:1].isupper() or one.lower() == name.lower()}
     always = ("__name__", "True", "False", "None", *({"self", "rospy", "sys"} & own))
     if sure := [one for one in always if is_one_edit(name, one)]:
         return sure[0]

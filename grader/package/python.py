@@ -49,6 +49,7 @@ _VAGUE = (
     "expected 'except'",
     *(
         "Function parameters cannot be parenthesized",
+        "Lambda expression parameters cannot",
         "invalid syntax",
         "expected ':'",
         "invalid decimal",
@@ -62,6 +63,7 @@ _VAGUE = (
 _EMPTY_BLOCK = re.compile(r"expected an indented block after .* on line (\d+)")
 _EXCEPT = re.compile(r"\s*(except|finally)\b")
 _NEXT_BLOCK = re.compile(r"\s*(?:@|(?:def|async def|class|if __name__)\b)")
+_SAME_QUOTES = re.compile(r"""\b[rR]?[fF](['"])[^'"{]*\{[^'"}]*[\[(]\1""")
 _NEVER_ENDED = re.compile("never closed|EOL while|unterminated (f-)?string")
 _UNCLOSED = re.compile(r"'([(\[{])' was never closed")
 _OUT_OF_BLOCK = "this line is indented less than the lines around it, which belong to one block"
@@ -98,6 +100,10 @@ _MESSAGES: tuple[tuple[str, ...], ...] = (
     (r"expected 'except' or 'finally'",
      "a `try:` has no `except` below it", "write `except rospy.ROSInterruptException:` there, and `pass` below that"),
     (r"future feature|__future__ imports must", "Python 3 needs nothing from `__future__`", DELETE_LINE),
+    (r"non-default argument|parameter without a default",
+     "a parameter without a default comes behind one with a default", "move it before that one"),
+    (r"no binding for nonlocal '(\w+)'", "no function around this one has a variable {0}",
+     "write `global {0}` for one of the whole file"),
     (r"keyword argument repeated", "an argument is given twice", "remove one of the two"),
     (r"positional argument follows keyword",
      "a value without a name comes after one with a name", "move what has `=` to the end of the call"),
@@ -319,7 +325,8 @@ def reason_of(
 
 
 def _reason_of_block(message: str, text: str, *, mixed: bool) -> Reason | None:
-    """Return what is wrong with the lines of a block; None where it is something else."""
+    """Return what is wrong with the lines of a block, or with the braces of an f-string; None where it is something
+    else."""
     if "unindent does not match" in message and mixed:
         why = "tabs and spaces are mixed in the indentation of this file"
         return Reason(why, "use four spaces everywhere")
@@ -327,6 +334,9 @@ def _reason_of_block(message: str, text: str, *, mixed: bool) -> Reason | None:
         return Reason(
             f"there is no `try:` for this `{lone[1]}`", "write `try:` above the lines that it is for"
         )
+    if message.startswith("f-string") and _SAME_QUOTES.search(text):
+        why = "the quote inside the braces of this f-string ends it"
+        return Reason(why, "write the other kind of quotes inside the braces")
     empty = _EMPTY_BLOCK.match(message)
     if empty and _EXCEPT.match(text):
         return Reason(

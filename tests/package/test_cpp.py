@@ -124,5 +124,7 @@ def test_a_sine_of_degrees(line: str, fix: str) -> None:
     ],
 )
 def test_a_loop_in_which_no_callback_is_called(loop: str, told: list[str]) -> None:
-    found = slips_of("src/node.cpp", f'auto sub = node.subscribe("/distance", 10, hear);\n{loop}\n')
+    code = f'auto sub = node.subscribe("/distance", 10, hear);\n{loop}\n'
+    found = slips_of("src/node.cpp", f"int main() {{ {code}}}")
     assert [f"{one.line}: {one.message.partition(', so')[0]}" for one in found] == told
+    assert list(slips_of("src/node.cpp", code)) == []  # what spins may be beside the main() of another file

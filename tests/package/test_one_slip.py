@@ -437,6 +437,19 @@ def test_the_name_of_a_message_class_may_be_a_parameter(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    "body",
+    [
+        "    robot = Driver()\n    speed = 1\n    robot.publish()\n",  # its own method needs no message
+        "    pixel_region = PixelRegion()\n    pub.publish(str(pixel_region))\n",  # a class is not the variable
+    ],
+)
+def test_what_another_module_may_have_is_left_alone(body: str, tmp_path: Path) -> None:
+    both = f"from driver import Driver\ndef drive():\n{body}def talk():\n    drive()\n"
+    folder = package(tmp_path, {**FILES, TALKER: FILES[TALKER].replace("def talk():\n", both)})
+    assert [one for one in repair_all(folder, WANTED) if one.file == TALKER] == []
+
+
+@pytest.mark.parametrize(
     ("right", "wrong"),
     [
         ("loginfo('I heard {}'.format(msg.data))", "loginfo('I heard {}',format(msg.data))"),

@@ -3,6 +3,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -32,6 +33,23 @@ CASES = {
     "colon_main": ('if __name__ == "__main__"\n  pass\n', 1, "a colon"),
     "colon_and_more": ("while x < 3:-\n  pass\n", 1, "after the `:`"),
     "else_if": ("if x:\n  pass\nelse if y:\n  pass\n", 3, "`elif`"),
+    "elif_alone": (
+        "if x:\n  pass\ny = 1\nelif z:\n  pass\n",
+        4,
+        "there is no `if` that this `elif` belongs to",
+    ),
+    "else_deeper": ("if x:\n  y = 1\n  else:\n  y = 2\n", 3, "right behind that block"),
+    "except_alone": ("x = 1\nexcept E:\n  pass\n", 2, "there is no `try:` for this `except`"),
+    "pair": ("def f(x, (a, b)):\n  pass\n", 1, "write one name in its place, `pair`, and `a, b = pair`"),
+    "lambda_pair": ("f = lambda (a, b): a\n", 1, "what a `lambda` takes"),
+    "lambda_colon": ("f = lambda m print(m)\n", 1, "a colon `:` is missing behind what the `lambda` takes"),
+    "reserved": ("def f(self, class):\n  pass\n", 1, "`class` is a reserved word"),
+    "module_dash": ("from my-pkg.msg import A\n", 1, "has no `-` in it"),
+    "import_space": ("from a.srv import add two Ints, B\n", 1, "a name has no space in it"),
+    "global_value": ("def f():\n  global x = 3\n", 2, "give it its value on the next line"),
+    "no_value": ("x = 3 +\n", 1, "a value is missing behind `+`"),
+    "no_value_inside": ("print('%d' % )\n", 1, "a value is missing behind `%`"),
+    "default_first": ("def f(a=1, b):\n  pass\n", 1, "a parameter without a default"),
     "assign": ("if x = 1:\n  pass\n", 1, "write `==`"),
     "bracket": ("x = f(1\ny = 2\n", None, "never closed"),
     "bracket_end": ("x = f(1\n", 1, "never closed"),
@@ -135,6 +153,12 @@ def test_faults_have_line_and_plain_cause(tmp_path):
 
 @pytest.mark.full
 @pytest.mark.slow
+@pytest.mark.skipif(sys.version_info >= (3, 12), reason="this Python allows it")
+def test_a_quote_inside_of_the_braces_ends_the_f_string(tmp_path):
+    (tmp_path / "a.py").write_text("d = {}\nx = f'n: {d['a']}'\n")
+    assert "the other kind of quotes" in check_syntax(tmp_path, ["a.py"]).faults["a.py"].explanation
+
+
 @pytest.mark.parametrize("python", PYTHONS)
 def test_other_pythons_lead_to_the_same_causes(tmp_path, python):
     paths = write(tmp_path, {name: text for name, (text, _, _) in CASES.items()}) + write(tmp_path, GOOD)
@@ -258,6 +282,7 @@ HABITS = {
     "text = '100 % sure": "text = '100 % sure'",
     "text = 'a && b' + n++": "",
     "text = hello world %s": "",
+    "x := 3": "x = 3",
     "class = 3": "",
     "$ chmod +x talker.py": "",
     "using namespace std;": "",

@@ -71,7 +71,8 @@ def test_slips_are_found_and_named(tmp_path):
     text = (
         "import rospy, sys\ndef main():\n    rate = rospy.Rate(10)\n    while not rospy.is_shutdown:\n"
         "        rate.sleep\n        x = input('?')\n        y = raw_input()\n    z = sys.stdin.readline()\n"
-        "    rate.sleep()\n    main.note = 1\n'text'\nif __name__ == '__main__':\n    main\n    f().g\n"
+        "    rate.sleep()\n    main.note = 1\n'text'\n"
+        "if __name__ == '__main__':\n    main\n    f().sleep\n    m.pose.x\n"
     )
     (tmp_path / "a.py").write_text(text)
     (tmp_path / "own.py").write_text("def input():\n    pass\ninput()\n")
@@ -91,6 +92,7 @@ def test_slips_are_found_and_named(tmp_path):
         ("own.py", 1, "no-init"),
     ]
     assert (slips[3].name, slips[3].fix) == ("rate.sleep", "write `rate.sleep()`")
+    assert slips[9].fix == "write `f(…).sleep()`"
 
 
 def node(body: str) -> str:
@@ -114,6 +116,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (node("    rospy.spin()\n") + "threading.Thread(target=main)\n", []),
         ("class A:\n    def __init__(self):\n        self.p = 1\n    def go(self):\n        self.p.publish(1)\nA()\n",
          [("never-called", 4, "nothing calls `go()`")]),
+        ("class A(threading.Thread):\n    def run(self):\n        p.publish(1)\nA().start()\n", []),
         (node("    while True:\n        pass\n    p.publish(1)\n") + CALLED,
          [("never-reached", 4, "the loop on line 4 never ends")]),
         (node(LOOP + "        rate.sleep()\n    p.publish(1)\n") + CALLED,
@@ -195,6 +198,11 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         ("def f(m):\n    pass\nrospy.Subscriber('a', A, f)\n", []),
         ("def f(m, a):\n    pass\nrospy.Subscriber('a', A, f, 3)\n", []),
         ("def f(*a):\n    pass\nrospy.Timer(d, f)\n", []),
+        ("def f(event):\n    pass\nrospy.Timer(d, f, True)\n", []),
+        ("def f(m):\n    pass\nrospy.Subscriber('a', A, f, callback_args=None)\n", []),
+        ("def f(goal):\n    pass\ns = actionlib.SimpleActionServer('a', A, f, False)\ns.start()\n", []),
+        ("def f():\n    pass\ns = actionlib.SimpleActionServer('a', A, f, False)\ns.start()\n",
+         [("callback-values", 1, "ROS passes it the goal: write `def f(goal):`")]),
         ("def f():\n    return lambda m: 0\nrospy.Subscriber('a', A, f())\n", []),
         ("class A:\n    def f(m):\n        pass\n    def g(self):\n        rospy.Service('a', T, self.f)\n",
          [("callback-values", 2, "its first parameter has to be `self`: write `def f(self, m):`")]),

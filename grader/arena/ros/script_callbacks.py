@@ -43,7 +43,8 @@ def callbacks(tree):
         ):
             fix = "write the function's name as its third value"
             yield slip(node.lineno, "callback-missing", "`Subscriber(…)` gets no callback", fix=fix)
-        values += any(k.arg == "callback_args" for k in node.keywords) or len(node.args) > place + 1
+        handed = argument(node, place + 1, "callback_args") if name == "Subscriber" else []
+        values += any(getattr(one, "value", "") is not None for one in handed)
         for one in given[:1]:
             text = text_of(one)
             if text.isidentifier():
@@ -63,7 +64,8 @@ def callbacks(tree):
                     "signal": "the signal's number and a frame",
                 }.get(name, "the %s" % VALUES.get(name, "message"))
                 message, fix = wrong_callback(own, node, functions, isinstance(meant, ast.Attribute), values)
-                message = message or "`%s` takes %d arguments, but ROS passes it %s" % (own.name, least, what)
+                number = "1 argument" if least == 1 else "%d arguments" % least
+                message = message or "`%s` takes %s, but ROS passes it %s" % (own.name, number, what)
                 yield slip(own.lineno, "callback-values", message, fix=fix, name=own.name)
 
 

@@ -13,6 +13,19 @@ NAMES_LIMIT = 500
 USES_LIMIT = 40
 """So many uses of unknown names are explained in a file: each takes a look at all of it."""
 MODULE_NAMES = {"__file__", "__builtins__", "__annotations__", "WindowsError", "exit", "quit"}
+OLD_NAMES = {
+    "xrange",
+    "raw_input",
+    "unicode",
+    "basestring",
+    "unichr",
+    "long",
+    "reduce",
+    "reload",
+    "execfile",
+    "cmp",
+}
+"""Of Python 2: the traceback is explained by what Python 3 has in their place."""
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 
@@ -167,7 +180,7 @@ def misspelt(tree):
     unknown = [n for n in names if n.id not in known or id(n) in odd]
     for node in unknown[:USES_LIMIT]:
         fitting = stored if id(node) in texts else own - functions if is_value(node, tree) else own
-        near = "" if node.id in known else spelt_alike(node.id, fitting, attributes)
+        near = "" if node.id in known | OLD_NAMES else spelt_alike(node.id, fitting, attributes)
         if id(node) in outside and (node.id == "self" or node.id not in known):
             message = "line %d is in the class, but in none of its methods, so it runs before them"
             fix = "indent line %d like the lines of the method above it, or delete it" % node.lineno
@@ -191,7 +204,7 @@ def misspelt(tree):
             fix = "on line %d, write `'%s'`" % (node.lineno, node.id)
             yield slip(node.lineno, "undefined", message, fix=fix, name=node.id)
         elif id(node) in unbound:
-            message, fix = undefined(node, tree) if node.id not in known else known_elsewhere(node, tree)
+            message, fix = why_unbound(node, tree, known)
             if message:
                 yield slip(node.lineno, "undefined", message, fix=fix, name=node.id)
 
@@ -282,6 +295,8 @@ def spelt_alike(name, own, attributes):
         return "self." + name
     if name.strip("_") == "name":
         return "__name__"
+    if name[:1].isupper():  # a class is not meant by a variable with a name like it
+        own = {one for one in own if one[:1].isupper() or one.lower() == name.lower()}
     near = difflib.get_close_matches(name[:TEXT_LIMIT], sorted(own), 1, 0.8)
     return next(iter(near or [one for one in sorted(own) if sorted(one) == sorted(name)]), "")
 
@@ -444,6 +459,7 @@ GIVEN_BY_NAME = {"queue_size": "10", "anonymous": "True", "latch": "True"}
 
 CALL_BACK = ("Subscriber", "Service", "Timer")
 """What is given a function that rospy calls."""
+EXCEPTION_NAMES = {"e", "err", "error", "ex", "exc", "exception"}
 MADE = {"publish": "rospy.Publisher('…', …, queue_size=10)", "sleep": "rospy.Rate(…)"}
 """What a variable has to be given by the method that is called of it."""
 
@@ -473,6 +489,28 @@ def undefined(node, tree):
         fix = "on line %d, write `%s` instead of `%s`" % (node.lineno, fitting[0], name)
         return "%s, and nothing calls `%s`" % (why, fitting[0]), fix
     return why, "above line %d, %s" % what_to_write(node, used, tree)
+
+
+def why_unbound(node, tree, known):
+    """Return why nothing around a name gives it a value, and what to do."""
+    return unnamed_exception(node, tree) or (known_elsewhere if node.id in known else undefined)(node, tree)
+
+
+def unnamed_exception(node, tree):
+    """Return why a name is not there that is called like an exception, in an `except …:` that does not name its own or
+    names it in another way (`except X(e):`, `except X.e:`), and what to do; "" for any other name."""
+    parents, one = parents_of(tree), node
+    while one is not None and not isinstance(one, ast.ExceptHandler):
+        one = parents.get(one)
+    if one is None or one.name or one.type is None or isinstance(one.type, ast.Tuple):
+        return None
+    in_clause = isinstance(one.type, ast.Call) and node in one.type.args
+    if not in_clause and node.id not in EXCEPTION_NAMES:
+        return None
+    caught = dotted(getattr(one.type, "func", one.type))
+    caught = caught[: -len(node.id) - 1] if caught.endswith("." + node.id) else caught
+    message = "`%s` would be the exception, which line %d does not name" % (node.id, one.lineno)
+    return message, "on line %d, write `except %s as %s:`" % (one.lineno, caught, node.id)
 
 
 def idle_functions(node, tree):

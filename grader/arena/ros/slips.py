@@ -141,7 +141,11 @@ def never_run(tree):
     named |= {n.attr for n in walk(tree) if isinstance(n, ast.Attribute)}
     made = [n for n in walk(tree) if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)]
     objects = {dotted(n.value.func): dotted(n.targets[0]) for n in made}
-    of_class = {id(f): c.name for c in walk(tree) if isinstance(c, ast.ClassDef) for f in c.body}
+    classes = [n for n in walk(tree) if isinstance(n, ast.ClassDef)]
+    of_class = {id(f): c.name for c in classes for f in c.body}
+    plain = {c.name for c in classes} | {"object"}
+    # what a class of another module is the base of, that module may call
+    named |= {f.name for c in classes if {dotted(b) for b in c.bases} - plain for f in functions_of(c)}
     for node in walk(tree):
         if isinstance(node, ast.FunctionDef) and node.name not in named and not node.decorator_list:
             if calls_in(node, *WORKS) and not node.name.startswith("__"):
@@ -158,6 +162,10 @@ def never_run(tree):
             word = getattr(node.comparators[0], "value", "__main__")
             if word != "__main__" and isinstance(node.ops[0], (ast.Eq, ast.Is)):
                 yield slip(node.lineno, "main-guard", "`__name__` is never %r" % (word,))
+
+
+def functions_of(owner):
+    return [one for one in owner.body if isinstance(one, ast.FunctionDef)]
 
 
 def handed_over(function, tree, owner):
@@ -215,9 +223,21 @@ def is_nan(node):
     return isinstance(node, ast.Attribute) and node.attr.lower() == "nan"
 
 
+METHODS = {
+    "sleep", "spin", "publish", "loginfo", "init_node", "close", "start", "stop", "unregister", "shutdown",
+    "signal_shutdown", "wait_for_server", "wait_for_result", "send_goal", "set_accepted", "set_succeeded",
+    "set_aborted", "set_preempted", "publish_feedback",
+}  # fmt: skip
+"""Of rospy and of what it makes: called for what they do."""
+
+
 def uncalled(node, functions):
+    """Return the function or method that a line names without brackets, and that it calls elsewhere or is known."""
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Attribute):
-        return dotted(node.value)
+        owner, method = node.value.value, node.value.attr
+        known = method in METHODS or method in functions
+        made = "%s(…).%s" % (dotted(owner.func), method) if isinstance(owner, ast.Call) else ""
+        return (made or dotted(node.value)) if known else None
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Name) and node.value.id in functions:
         return node.value.id
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):

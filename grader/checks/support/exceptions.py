@@ -66,7 +66,8 @@ SLIPS = {
      "remove `raw_input(…)`, and put its value in the code: a node cannot ask for input"),
     **{f"name '{old}' is not defined": (f"`{old}` is Python 2", f"write `{new}`, as in Python 3")
        for old, new in {"xrange": "range", "unicode": "str", "basestring": "str", "long": "int", "unichr": "chr",
-                        "reduce": "functools.reduce", "file": "open"}.items()},
+                        "reduce": "functools.reduce", "reload": "importlib.reload",
+                        "file": "open"}.items()},
     **{f"name '{old}' is not defined": (f"Python has no `{old}`", f"write `{new}` instead of `{old}`")
        for old, new in {"true": "True", "false": "False", "TRUE": "True", "FALSE": "False", "null": "None",
                         "NULL": "None", "nullptr": "None", "nil": "None", "none": "None", "this": "self",

@@ -17,6 +17,7 @@ from grader.checks.support.rospy_calls import fields_of
 from grader.checks.support.scripts import OF_FILES, SYNTAX, cmake_calls, is_product, path_in_package
 from grader.checks.support.text import near_names, shown
 from grader.installable import (
+    MODULE_OF,
     PYTHON_2,
     ROS_2,
     TUTORIALS,
@@ -437,8 +438,9 @@ def name_slip(slip: PythonSlip, package: PackageFacts) -> NameSlip | None:
     made = [
         f"{p.name}.{i.module}" for p in (package, *package.also) for i in p.interfaces if name in i.classes
     ]
-    lines = tuple(f"from {module} import {name}" for module in made or having)
-    if name[:1].isupper() and lines and "<package>" in fix:
+    of_python = [MODULE_OF[name]] if name in MODULE_OF else []
+    lines = tuple(f"from {module} import {name}" for module in of_python or made or having)
+    if of_python or (name[:1].isupper() and lines and "<package>" in fix):
         why, fix = (
             f"{name} is not imported",
             f"write {join_words([f'`{one}`' for one in lines], 'or')} at the top",
