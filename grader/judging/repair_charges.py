@@ -81,7 +81,7 @@ def charge_repairs(
         own = [c for c in rubric.criteria if repair.kind == "node-name" and _names(c, repair)]
         if any(first[c.id].status.is_lost and c.id not in better for c in own):
             continue  # the criterion of the name says by itself what is wrong with it
-        failed_by_it = [c for c in criteria_of_runs if c.id not in better and _fails_in(first[c.id], repair)]
+        failed_by_it = [c for c in criteria_of_runs if c.id not in better and fails_in(first[c.id], repair)]
         if repair.kind in OF_SYNTAX and failed_by_it:
             continue  # that the copy shows nothing of that criterion is no reason to charge another
         possible = [c for c in criteria if repair in needs[c.id] and _may_ask_for(first[c.id], repair)]
@@ -102,7 +102,7 @@ def _may_ask_for(found: Verdict, repair: Repair) -> bool:
     return repair.kind not in DONE_BEFORE_RUNS or PurePosixPath(repair.file).name in found.message
 
 
-def _fails_in(found: Verdict, repair: Repair) -> bool:
+def fails_in(found: Verdict, repair: Repair) -> bool:
     """Return whether a criterion is lost by itself, and cites a line of what was repaired."""
     lines = set(range(repair.line or 0, (repair.line or 0) + len(repair.before.split("\n"))))
     cited = {line for file, line in cited_lines(found.citations) if file == repair.file}

@@ -262,16 +262,37 @@ def test_words_that_stand_nowhere_in_the_source_are_named() -> None:
         assert "then" not in hint_of("node", DIES, criteria, source=f"{LACKS}say('{words}')\n")
 
 
+ONLY_DATA = " and use `data`, the only field of String, in place of"
+
+
 @pytest.mark.parametrize(
-    ("kind", "told"),
-    [("Int8", f"; then write String instead of Int8 on lines 2 and 4 of {FILE}"), ("Header", "")],
-)
-def test_other_lines_that_make_a_wrong_type_are_named(kind: str, told: str) -> None:
+    ("kind", "line", "fields"),
+    [
+        ("Int8", "msg.data = 1", ""),
+        ("Header", "msg.stamp = msg.frame_id", f"{ONLY_DATA} `stamp` and `frame_id` on line 5 of {FILE}"),
+        ("Header", "msg.serialize(f)", ""),
+    ],
+)  # fmt: skip
+def test_other_lines_that_make_a_wrong_type_are_named(kind: str, line: str, fields: str) -> None:
     run = {"processes": [STARTED], "topics": [{"topic": "/chatter", "type": f"std_msgs/{kind}", "count": 61}]}
-    source = f"# {kind}()\nmsg = {kind}()\npub = Publisher('chatter', {kind})\npub.publish({kind}(1))\n"
+    source = (
+        f"# {kind}()\nmsg = {kind}()\npub = Publisher('chatter', {kind})\npub.publish({kind}(1))\n{line}\n"
+    )
     slips = [slip("publisher", "chatter", 3), slip("publisher-type", kind, 3)]
     hint = hint_of("chatter", run, [NODE | ROOT, CHATTER], *slips, source=source)
-    assert hint.endswith(f"rospy.Publisher('/chatter', String, queue_size=10){told}")
+    told = f"then write String instead of {kind} on lines 2 and 4 of {FILE}{fields}"
+    assert hint.endswith(f"rospy.Publisher('/chatter', String, queue_size=10); {told}")
+
+
+def test_a_callback_that_takes_other_fields_is_told() -> None:
+    source = (
+        "def other(p):\n    p.y = 1\n\ndef heard(p):\n    print(p.x, p.data)\n\n    use(p.x)\np.z = 1\n"
+        "rospy.Subscriber('chatter', Point, heard)\n"
+    )
+    heard = [NODE | ROOT, HEARS | {"requires": ["node"]}]
+    slips = [slip("subscriber", "chatter", 9), slip("subscriber-type", "Point", 9)]
+    hint = hint_of("node", DIES, heard, *slips, source=source)
+    assert f"use `data`, the only field of String, in place of `x` on lines 5 and 7 of {FILE}" in hint
 
 
 def test_what_a_callback_does_besides_comes_after_the_print() -> None:

@@ -328,6 +328,9 @@ class Printing:
             return None
         line, kind = call.lineno, "not-printed"
         fix = "on line %d, print `%s`" % (line, self.value)
+        if not any(call is getattr(one, "value", None) for one in self.body) and not late:
+            message = "no `print` or `log` in %s has the message's value in it" % self.name
+            return line, kind, message, "print `%s` on the first line of %s" % (self.value, self.name)
         if late:
             since = self.known[late[0]][0][0]
             message = "line %d prints `%s`, which gets the message's value only on line %d" % (

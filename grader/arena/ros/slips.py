@@ -282,7 +282,10 @@ def imports(tree):
     """Imports of what nothing in the script uses, and of modules that this Python does not find; the standard library's
     and rospy are there and cost nothing."""
     names = [n for n in walk(tree) if isinstance(n, ast.Name)]
-    used = {n.id for n in names} - {n.id for n in names if isinstance(n.ctx, ast.Store)}
+    hidden = {n.id for n in names if isinstance(n.ctx, ast.Store)}
+    # `String = String()` reads the import, or was meant to
+    hidden -= {called_name(n.value) for n in walk(tree) if isinstance(n, ast.Assign)}
+    used = {n.id for n in names} - hidden
     tried = {id(n) for one in walk(tree) if isinstance(one, ast.Try) for n in ast.walk(one)}
     found = [n for n in walk(tree) if isinstance(n, (ast.Import, ast.ImportFrom)) and id(n) not in tried]
     for node in found[:IMPORTS_LIMIT]:
