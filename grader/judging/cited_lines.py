@@ -301,6 +301,8 @@ def spins_in_loops(lines: Iterable[str]) -> Iterator[int]:
 
 OF_DATA = re.compile(r"String|Bool|Byte|Char|U?Int\d+|Float\d+")
 """Types of std_msgs with one plain value, `data`."""
+OF_NUMBERS = re.compile(r"%[-+0-9.]*[dioxXeEfFgG]\b")
+"""What takes no text in place of it."""
 FIELDS_SHOWN, MESSAGES_READ = 3, 5
 
 
@@ -322,10 +324,14 @@ def unknown_fields(lines: Sequence[str], slip: PythonSlip, wanted: str) -> str:
     either = "|".join(map(re.escape, list(dict.fromkeys(names))[:MESSAGES_READ]))
     field = re.compile(rf"(?<![\w.])(?:{either})\.(?!data\b)([A-Za-z]\w*)\b(?! *\()")
     taken = [(at + 1, field.findall(texts[at])) for at in range(first, last)]
-    fields = list(dict.fromkeys(f"`{one}`" for _, found in taken for one in found))
+    fields = list(dict.fromkeys(one for _, found in taken for one in found))
     if not either or not fields or not OF_DATA.fullmatch(wanted):
         return ""
     numbers = [number for number, found in taken if found]
-    where = f"line{'s' if len(numbers) > 1 else ''} {numbers_text(numbers)}"
-    named = join_words(fields, most=FIELDS_SHOWN)
-    return f"use `data`, the only field of {wanted}, in place of {named} on {where} of {slip.file}"
+    where = f"line{'s' if len(numbers) > 1 else ''} {numbers_text(numbers)} of {slip.file}"
+    value = {"String": "a text", "Bool": "True or False"}.get(wanted, "a number")
+    use = "use `data`" if slip.kind == "subscriber-type" else f"put {value} into `data`"
+    shown = (OF_NUMBERS.search(texts[number - 1]) for number in numbers if wanted == "String")
+    text = next((f", and %s in place of {found[0]}" for found in shown if found), "")
+    fields = [f"`{one}`" for one in fields]
+    return f"{use}, the only field of {wanted}, in place of {join_words(fields, most=FIELDS_SHOWN)} on {where}{text}"

@@ -37,7 +37,15 @@ from grader.checks.support.text import (
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.installable import NOTHING_TO_DO, PYTHON_2
-from grader.judging.cited_lines import LINE_CHARS, LINES_READ, LOOPS, OF_DATA, spins_in_loops, unknown_fields
+from grader.judging.cited_lines import (
+    LINE_CHARS,
+    LINES_READ,
+    LOOPS,
+    OF_DATA,
+    OF_NUMBERS,
+    spins_in_loops,
+    unknown_fields,
+)
 from grader.judging.facts import SOURCES, Facts, is_other_rate, names_started, scripts_of, sources_of
 from grader.judging.repeats_and_repairs import text_as_handed_in
 from grader.model.package import PackageFacts
@@ -59,8 +67,6 @@ OF_TOPICS = ("hears", "topic-type")
 """Checks that say by themselves that a node is on another topic, and not of which type."""
 
 
-OF_NUMBERS = re.compile(r"%[-+0-9.]*[dioxXeEfFgG]\b")
-"""What takes no text in place of it."""
 CALL_LINES = 2
 """How many more lines a call that prints may have."""
 CALL_CHARS = 200

@@ -262,7 +262,7 @@ def test_words_that_stand_nowhere_in_the_source_are_named() -> None:
         assert "then" not in hint_of("node", DIES, criteria, source=f"{LACKS}say('{words}')\n")
 
 
-ONLY_DATA = " and use `data`, the only field of String, in place of"
+ONLY_DATA = " and put a text into `data`, the only field of String, in place of"
 
 
 @pytest.mark.parametrize(
@@ -286,13 +286,16 @@ def test_other_lines_that_make_a_wrong_type_are_named(kind: str, line: str, fiel
 
 def test_a_callback_that_takes_other_fields_is_told() -> None:
     source = (
-        "def other(p):\n    p.y = 1\n\ndef heard(p):\n    print(p.x, p.data)\n\n    use(p.x)\np.z = 1\n"
+        "def other(p):\n    p.y = 1\n\ndef heard(p):\n    print('%.2f' % p.x, p.data)\n\n    use(p.x)\np.z = 1\n"
         "rospy.Subscriber('chatter', Point, heard)\n"
     )
     heard = [NODE | ROOT, HEARS | {"requires": ["node"]}]
     slips = [slip("subscriber", "chatter", 9), slip("subscriber-type", "Point", 9)]
     hint = hint_of("node", DIES, heard, *slips, source=source)
-    assert f"use `data`, the only field of String, in place of `x` on lines 5 and 7 of {FILE}" in hint
+    assert (
+        f"use `data`, the only field of String, in place of `x` on lines 5 and 7 of {FILE}, and %s in place of %.2f"
+        in hint
+    )
 
 
 def test_what_a_callback_does_besides_comes_after_the_print() -> None:
