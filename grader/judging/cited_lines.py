@@ -286,7 +286,7 @@ def _with_text(citation: Citation, build: Run) -> Citation:
     return citation.model_copy(update={"source": text, "column": begin, "end_column": end})
 
 
-def spins_in_loops(lines: Iterable[str]) -> Iterator[int]:
+def loop_spins(lines: Iterable[str]) -> Iterator[int]:
     """Yield the numbers of the lines on which a loop waits until its node ends."""
     loop = None
     for number, line in enumerate(lines, 1):
@@ -301,12 +301,12 @@ def spins_in_loops(lines: Iterable[str]) -> Iterator[int]:
 
 OF_DATA = re.compile(r"String|Bool|Byte|Char|U?Int\d+|Float\d+")
 """Types of std_msgs with one plain value, `data`."""
-OF_NUMBERS = re.compile(r"%[-+0-9.]*[dioxXeEfFgG]\b")
-"""What takes no text in place of it."""
+PLACES = re.compile(r"%[-+0-9.]*[dioxXeEfFgG]\b")
+"""A number's place in a text: no text can be put there."""
 FIELDS_SHOWN, MESSAGES_READ = 3, 5
 
 
-def unknown_fields(lines: Sequence[str], slip: PythonSlip, wanted: str) -> str:
+def lost_fields(lines: Sequence[str], slip: PythonSlip, wanted: str) -> str:
     """Return which fields of the slip's type a script uses that the wanted one has not: of the messages that it makes,
     or of the one that its callback gets. "" where it uses none."""
     texts = [line[:LINE_CHARS].partition("#")[0] for line in lines[:LINES_READ]]
@@ -331,7 +331,7 @@ def unknown_fields(lines: Sequence[str], slip: PythonSlip, wanted: str) -> str:
     where = f"line{'s' if len(numbers) > 1 else ''} {numbers_text(numbers)} of {slip.file}"
     value = {"String": "a text", "Bool": "True or False"}.get(wanted, "a number")
     use = "use `data`" if slip.kind == "subscriber-type" else f"put {value} into `data`"
-    shown = (OF_NUMBERS.search(texts[number - 1]) for number in numbers if wanted == "String")
+    shown = (PLACES.search(texts[number - 1]) for number in numbers if wanted == "String")
     text = next((f", and %s in place of {found[0]}" for found in shown if found), "")
     fields = [f"`{one}`" for one in fields]
     return f"{use}, the only field of {wanted}, in place of {join_words(fields, most=FIELDS_SHOWN)} on {where}{text}"

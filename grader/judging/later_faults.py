@@ -37,15 +37,7 @@ from grader.checks.support.text import (
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.installable import NOTHING_TO_DO, PYTHON_2
-from grader.judging.cited_lines import (
-    LINE_CHARS,
-    LINES_READ,
-    LOOPS,
-    OF_DATA,
-    OF_NUMBERS,
-    spins_in_loops,
-    unknown_fields,
-)
+from grader.judging.cited_lines import LINE_CHARS, LINES_READ, LOOPS, OF_DATA, PLACES, loop_spins, lost_fields
 from grader.judging.facts import SOURCES, Facts, is_other_rate, names_started, scripts_of, sources_of
 from grader.judging.repeats_and_repairs import text_as_handed_in
 from grader.model.package import PackageFacts
@@ -361,7 +353,7 @@ class Later:
                 yield Fix(
                     f"write `{plain[1]} = rospy.Rate({hz})` on line {number} of {path}: only a Rate can sleep"
                 )
-        for number in spins_in_loops(lines):
+        for number in loop_spins(lines):
             yield Fix(f"delete `rospy.spin()` on line {number} of {path}, at which the loop stands still")
         if not self._lacks_words("sleep") or not any(LOOPS.match(line) for line in lines):
             return
@@ -484,7 +476,7 @@ class Later:
         right = [one for one in said if says(one.message, template)]
         if right and len(heard) == 1 and self._has_no_field(right[0]):
             yield Fix(f"print the `data` of the message on {_line(right[0])}")
-        if right and other_type and of_text and (place := OF_NUMBERS.search(self._text_of(right[0]))):
+        if right and other_type and of_text and (place := PLACES.search(self._text_of(right[0]))):
             yield Fix(f"write %s instead of {place[0]} on {_line(right[0])}")
         if right:
             return
@@ -524,7 +516,7 @@ class Later:
                 yield Fix(f"{slip.fix}: {slip.message}", (slip.fix,))
 
     def _fields(self, wanted: str, slip: PythonSlip) -> Iterator[Fix]:
-        yield from map(Fix, filter(None, [unknown_fields(self._lines(slip.file), slip, wanted)]))
+        yield from map(Fix, filter(None, [lost_fields(self._lines(slip.file), slip, wanted)]))
 
     def _retype(self, verb: str, wanted: str, slip: PythonSlip) -> Iterator[Fix]:
         others = self._making(slip)
