@@ -325,8 +325,14 @@ def lost_fields(lines: Sequence[str], slip: PythonSlip, wanted: str) -> str:
     field = re.compile(rf"(?<![\w.])(?:{either})\.(?!data\b)([A-Za-z]\w*)\b(?! *\()")
     taken = [(at + 1, field.findall(texts[at])) for at in range(first, last)]
     fields = list(dict.fromkeys(one for _, found in taken for one in found))
-    if not either or not fields or not OF_DATA.fullmatch(wanted):
+    if not OF_DATA.fullmatch(wanted):
         return ""
+    alone = slip.kind == "publisher-type" and sum("Publisher(" in text for text in texts) == 1
+    sent = [n for n, text in enumerate(texts, 1) if alone and _sends_several(text)]
+    lines_sent = f"line{'s' if len(sent) > 1 else ''} {numbers_text(sent)} of {slip.file}"
+    single = f"publish one value on {lines_sent}, as {wanted} has only `data`" if sent else ""
+    if not either or not fields:
+        return single
     numbers = [number for number, found in taken if found]
     where = f"line{'s' if len(numbers) > 1 else ''} {numbers_text(numbers)} of {slip.file}"
     value = {"String": "a text", "Bool": "True or False"}.get(wanted, "a number")
@@ -334,4 +340,15 @@ def lost_fields(lines: Sequence[str], slip: PythonSlip, wanted: str) -> str:
     shown = (PLACES.search(texts[number - 1]) for number in numbers if wanted == "String")
     text = next((f", and %s in place of {found[0]}" for found in shown if found), "")
     fields = [f"`{one}`" for one in fields]
-    return f"{use}, the only field of {wanted}, in place of {join_words(fields, most=FIELDS_SHOWN)} on {where}{text}"
+    named = join_words(fields, most=FIELDS_SHOWN)
+    return f"{use}, the only field of {wanted}, in place of {named} on {where}{text}{single and f', and {single}'}"
+
+
+def _sends_several(line: str) -> bool:
+    """Return whether a line gives `publish(…)` several values."""
+    depth, behind = 1, re.sub(r"'[^']*'|\"[^\"]*\"", "''", line).partition(".publish(")[2]
+    for letter in behind:
+        depth += (letter in "([{") - (letter in ")]}")
+        if not depth or (depth == 1 and letter == ","):
+            return depth == 1
+    return False

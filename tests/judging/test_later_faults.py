@@ -271,6 +271,8 @@ ONLY_DATA = " and put a text into `data`, the only field of String, in place of"
         ("Int8", "msg.data = 1", ""),
         ("Header", "msg.stamp = msg.frame_id", f"{ONLY_DATA} `stamp` and `frame_id` on line 5 of {FILE}"),
         ("Header", "msg.serialize(f)", ""),
+        ("Header", "p.publish(1, f(), 'a')", f" and publish one value on line 5 of {FILE}, as String has only `data`"),
+        ("Header", "p.publish('a, %s' % (n, 1))", ""),
     ],
 )  # fmt: skip
 def test_other_lines_that_make_a_wrong_type_are_named(kind: str, line: str, fields: str) -> None:
