@@ -148,6 +148,20 @@ def test_a_text_is_published_where_it_can_change(text: str, line: int, tmp_path:
     assert [s.line for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "publishes"] == [line]
 
 
+TWO = "def cb(m):\n    global n\n    n = m.data\n\ndef other(m):\n    text = n + m.data\n    print(%s)\n"
+
+
+@pytest.mark.parametrize(("printed", "kinds"), [("text", ["printed-in-part"]), ("m.data", [])])
+def test_a_message_that_another_topic_s_callback_prints(
+    printed: str, kinds: list[str], tmp_path: Path
+) -> None:
+    text = TWO % printed + "rospy.Subscriber('c', String, cb)\nrospy.Subscriber('d', String, other)\n"
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if "print" in s.kind and s.name == "c"]
+    assert [s.kind for s in slips] == kinds
+    assert [s.fix for s in slips] == ["print `m.data` in the callback `cb` too" for _ in kinds]
+
+
 KEEPS = "def cb(m):\n    global n\n    n = m.data * 2\nrospy.Subscriber('c', Int32, cb)\n"
 
 

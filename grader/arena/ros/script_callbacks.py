@@ -296,6 +296,23 @@ class Printing:
                     )
                     fix = "print `%s` in %s" % (self.value, self.name)
                     return call.lineno, "printed-in-part", message % (call.lineno, min(kept)), fix
+        return self.kept_for_another(tree)
+
+    def kept_for_another(self, tree):
+        """What the callback keeps, and the callback of another topic prints, with what comes there."""
+        taken = [argument(n, 2, "callback") for n in walk(tree) if called_name(n) == "Subscriber"]
+        others = dict.fromkeys(dotted(one).rpartition(".")[2] for given in taken for one in given)
+        for other in [self.functions[name] for name in others if name in self.functions]:
+            held = set(self.shared)
+            told = ast.walk(other) if other is not self.own else ()
+            for n in [n for n in told if isinstance(n, ast.Assign) or is_print(n)]:
+                names = {dotted(one) for one in ast.walk(n) if isinstance(one, (ast.Name, ast.Attribute))}
+                if isinstance(n, ast.Assign) and names & held:
+                    held.update(map(dotted, n.targets))
+                if is_print(n) and names & held:
+                    message = "line %d prints it only when `%s` is called, for a message of another topic"
+                    fix = "print `%s` in %s too" % (self.value, self.name)
+                    return n.lineno, "printed-in-part", message % (n.lineno, other.name), fix
         return None
 
     def silent(self, level):
