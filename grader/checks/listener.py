@@ -278,7 +278,7 @@ def _judge_missing(
         or _subscribed_again(package, run, probes, missing)
         or _unregistered(package, run, probes, missing)
         or _waiting(package, run, probes, missing)
-        or _by_callback(package, run, probes, missing, params.topic)
+        or _by_callback(package, run, probes, missing, params)
         or _some_numbers(probes, missing, lines)
         or _only_again(probes, missing)
         or _some_in_other_words(probes, missing, lines, params)
@@ -365,12 +365,12 @@ def _waiting(
 
 
 def _by_callback(
-    package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe], topic: str
+    package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe], params: HearsParams
 ) -> Verdict | None:
     """What the source of the topic's callback says of it: it prints nothing of a message, or not each of them."""
     told = run_slips(package, run, "not-printed", "printed-in-part")
     found = [
-        s for s in told if not s.name or is_written_as(s.name, topic)
+        s for s in told if not s.name or is_written_as(s.name, params.topic)
     ]  # a name in a variable is not known
     few = 2 * len(missing) < len(probes)  # another number may happen to be one that was sent
     if len(found) != 1 or (found[0].kind == "not-printed" and few):
@@ -380,7 +380,10 @@ def _by_callback(
         return None
     verdict = _some_numbers(probes, missing, lines) or _only_again(probes, missing)
     verdict = verdict or _by_number(probes, missing, lines, None)
-    return verdict.explained(f"in {slip.file}, {slip.message}", f"in {slip.file}, {slip.fix}", (slip.place,))
+    form = f", as '{in_words(params.template)}'" if params.template != VALUE and "print" in slip.fix else ""
+    return verdict.explained(
+        f"in {slip.file}, {slip.message}", f"in {slip.file}, {slip.fix}{form}", (slip.place,)
+    )
 
 
 def _by_number(
