@@ -337,8 +337,16 @@ def lost_fields(lines: Sequence[str], slip: PythonSlip, wanted: str) -> str:
     where = f"line{'s' if len(numbers) > 1 else ''} {numbers_text(numbers)} of {slip.file}"
     value = {"String": "a text", "Bool": "True or False"}.get(wanted, "a number")
     use = "use `data`" if slip.kind == "subscriber-type" else f"put {value} into `data`"
-    shown = (PLACES.search(texts[number - 1]) for number in numbers if wanted == "String")
+    own = texts[first:last] if wanted == "String" else []
+    shown = (PLACES.search(texts[number - 1]) for number in numbers if own)
     text = next((f", and %s in place of {found[0]}" for found in shown if found), "")
+    with_number = re.compile(
+        rf"\b(?:{either})\.\w+ *(?:[-+*/]=|[-*/<>]|\+ *\d|[!=]=)|[-*/<>] *(?:{either})\."
+    )
+    if sums := [n for n, line in enumerate(own, first + 1) if with_number.search(line)]:
+        text += (
+            f"; leave out the calculation with it on line{'s' if len(sums) > 1 else ''} {numbers_text(sums)}"
+        )
     fields = [f"`{one}`" for one in fields]
     named = join_words(fields, most=FIELDS_SHOWN)
     return f"{use}, the only field of {wanted}, in place of {named} on {where}{text}{single and f', and {single}'}"

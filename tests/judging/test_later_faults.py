@@ -262,6 +262,7 @@ def test_words_that_stand_nowhere_in_the_source_are_named() -> None:
         assert "then" not in hint_of("node", DIES, criteria, source=f"{LACKS}say('{words}')\n")
 
 
+ON_5 = f" on line 5 of {FILE}"
 ONLY_DATA = " and put a text into `data`, the only field of String, in place of"
 
 
@@ -270,6 +271,8 @@ ONLY_DATA = " and put a text into `data`, the only field of String, in place of"
     [
         ("Int8", "msg.data = 1", ""),
         ("Header", "msg.stamp = msg.frame_id", f"{ONLY_DATA} `stamp` and `frame_id` on line 5 of {FILE}"),
+        ("Header", "msg.seq += 1", f"{ONLY_DATA} `seq`{ON_5}; leave out the calculation with it on line 5"),
+        ("Header", "x = 'a' + msg.seq + 'b'", f"{ONLY_DATA} `seq`{ON_5}"),
         ("Header", "msg.serialize(f)", ""),
         ("Header", "p.publish(1, f(), 'a')", f" and publish one value on line 5 of {FILE}, as String has only `data`"),
         ("Header", "p.publish('a, %s' % (n, 1))", ""),
