@@ -255,6 +255,8 @@ class Later:
                 passed = slip.fix.startswith("pass it")
                 whole = slip.fix if passed else f"call `{slip.name}()`, which nothing in {slip.file} calls"
                 yield Fix(renamed.get((slip.file, slip.line), whole))
+        for slip in self._of("float-index"):
+            yield Fix(f"{slip.fix} ({slip.file})", (slip.fix,))
         for slip in self._of("main-guard"):
             yield Fix(f"write {MAIN} on {_line(slip)}", (f"on {_line(slip)}, write {MAIN}",))
         for slip in self._of("loop-left"):

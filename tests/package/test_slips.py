@@ -555,3 +555,16 @@ def test_a_message_with_the_name_of_its_class(text: str, fixes: list[str], tmp_p
     slips = check_syntax(tmp_path, ["a.py"]).slips
     assert [s.fix for s in slips if s.kind == "hides-class"] == fixes
     assert not fixes or "unused-import" not in [s.kind for s in slips]
+
+
+@pytest.mark.parametrize(
+    ("line", "fixes"),
+    [
+        ("print(rows[n / 25])", ["on line 1, write `//` instead of `/` in the index"]),
+        ("print(rows[n // 25], rows[int(n / 25)], n / rows[2])", []),
+    ],
+)
+def test_an_index_that_is_a_float(line: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"{line}\n", encoding="utf-8")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.fix for s in slips if s.kind == "float-index"] == fixes
