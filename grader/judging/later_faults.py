@@ -255,8 +255,7 @@ class Later:
                 passed = slip.fix.startswith("pass it")
                 whole = slip.fix if passed else f"call `{slip.name}()`, which nothing in {slip.file} calls"
                 yield Fix(renamed.get((slip.file, slip.line), whole))
-        for slip in self._of("float-index"):
-            yield Fix(f"{slip.fix} ({slip.file})", (slip.fix,))
+        yield from (Fix(f"{slip.fix} ({slip.file})", (slip.fix,)) for slip in self._of("float-index"))
         for slip in self._of("main-guard"):
             yield Fix(f"write {MAIN} on {_line(slip)}", (f"on {_line(slip)}, write {MAIN}",))
         for slip in self._of("loop-left"):
@@ -521,11 +520,14 @@ class Later:
         yield from map(Fix, filter(None, [lost_fields(self._lines(slip.file), slip, wanted)]))
 
     def _retype(self, verb: str, wanted: str, slip: PythonSlip) -> Iterator[Fix]:
-        others = self._making(slip)
-        more = f" (made on line{'s' if len(others) > 1 else ''} {numbers_text(others)})" if others else ""
-        text = f"{verb} {wanted} on {_line(slip)}, not {slip.message}{more}"
-        yield Fix(text, types=(wanted, slip.message))
-        yield from self._fields(wanted.rpartition("/")[2], slip)
+        others, (package, _, name) = self._making(slip), wanted.partition("/")
+        notes = [f"made on line{'s' if len(others) > 1 else ''} {numbers_text(others)}"] if others else []
+        known = re.compile(rf"[^#]*\bimport\b.*(\b{name}\b|\*)")
+        if not any(known.match(line[:LINE_CHARS]) for line in self._lines(slip.file) or ["import *"]):
+            notes.append(f"with `from {package}.msg import {name}` at the top")
+        more = f" ({'; '.join(notes)})" if notes else ""
+        yield Fix(f"{verb} {wanted} on {_line(slip)}, not {slip.message}{more}", types=(wanted, slip.message))
+        yield from self._fields(name, slip)
 
     def _lacks_words(self, words: str) -> bool:
         """Return whether the words stand in no line of the sources, which are known."""

@@ -262,6 +262,7 @@ def test_words_that_stand_nowhere_in_the_source_are_named() -> None:
         assert "then" not in hint_of("node", DIES, criteria, source=f"{LACKS}say('{words}')\n")
 
 
+IMPORTED = " (with `from std_msgs.msg import String` at the top)"
 ON_5 = f" on line 5 of {FILE}"
 ONLY_DATA = " and put a text into `data`, the only field of String, in place of"
 
@@ -307,7 +308,7 @@ def test_what_a_callback_does_besides_comes_after_the_print() -> None:
     heard = [NODE | ROOT, HEARS | {"requires": ["node"]}]
     slips = [slip("subscriber", "chatter"), slip("subscriber-type", "Int32")]
     hint = hint_of("node", DIES, heard, *slips, source=LACKS)
-    assert hint.endswith("not Int32 and print 'I heard <message>' first in the callback")
+    assert hint.endswith(f"not Int32{IMPORTED} and print 'I heard <message>' first in the callback")
 
 
 def test_a_loop_that_needs_a_number_gives_way_to_spin_where_a_text_is_asked_for() -> None:
@@ -324,7 +325,7 @@ def test_a_text_that_another_function_prints_is_not_the_messages() -> None:
         slip("subscriber", "colour"), slip("subscriber-type", "Colour"), slip("prints", "I send {data}", 9),
     ]  # fmt: skip
     hint = hint_of("node", DIES, heard, *slips, source=LACKS)
-    assert hint.endswith("not Colour and print 'I heard <message>' first in the callback")
+    assert hint.endswith(f"not Colour{IMPORTED} and print 'I heard <message>' first in the callback")
 
 
 @pytest.mark.parametrize(
