@@ -229,7 +229,8 @@ def test_a_type_that_the_lab_does_not_want_is_not_imported_first() -> None:
         f"from std_msgs.msg import String; then publish std_msgs/String on line 5 of {FILE}, not JointState"
     )
     assert told.startswith(retyped)
-    source = "#!/usr/bin/env python3\n\n\n\nrospy.Publisher('chatter', JointState)\n# JointState()\nm = JointState()\n"
+    source = "#!/usr/bin/env python3\nfrom std_msgs.msg import String\n\n\nrospy.Publisher('chatter', JointState)\n"
+    source += "# JointState()\nm = JointState()\n"
     slips = slip("publisher", "chatter"), slip("publisher-type", "JointState")
     told = hint_of("node", run, TALKER, *slips, source=source)
     assert told.startswith(f"{retyped} (made on line 7)")
