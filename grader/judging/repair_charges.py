@@ -294,7 +294,8 @@ def is_next_fault(one: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> boo
     again = cited_lines(copy.citations)
     again -= lines_read_now(repairs)
     in_repaired = found != set() or one.unjudged
-    return in_repaired and not copy.unjudged and not found & again and _is_other_fault(one, copy)
+    shown = not copy.unjudged or (one.unjudged and found != set())
+    return in_repaired and shown and not found & again and _is_other_fault(one, copy)
 
 
 def lines_read_now(repairs: Iterable[Repair]) -> set[tuple[str, int]]:
