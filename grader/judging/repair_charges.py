@@ -259,7 +259,9 @@ def _is_told(repair: Repair, hint: str) -> bool:
         return repair.file in hint and "chmod" in hint
     if repair.kind == "parameter-name" and repair.before.strip() == repair.after.strip():
         return f"line {repair.line}" in hint
-    new = _new_words(repair)
+    new = {
+        word for word in _new_words(repair) if not word.endswith("depend")
+    }  # one tag is as good as the other
     of_package = repair.kind in {"package-name", *OF_BUILDS} and repair.file in OF_PACKAGES
     return of_package and new <= words_of(hint) and new != set()
 
