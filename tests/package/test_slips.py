@@ -407,7 +407,7 @@ def test_why_a_node_goes_on_after_ctrl_c(tmp_path, code, told):
 @pytest.mark.parametrize(
     ("condition", "fix"),
     [
-        ("n < 9 and on", "on line 1, write ` and not rospy.is_shutdown()` before the colon"),
+        ("n < 9 and on", "on line 1, write `and not rospy.is_shutdown()` before the colon"),
         ("(n <\n 9)", "on line 2, write"),
         ("n < 9 or on", "check `rospy.is_shutdown()` in it"),
         ("n := look()", "check `rospy.is_shutdown()` in it"),
