@@ -182,6 +182,8 @@ WITH_DATA = {
 }  # fmt: skip
 """Types of std_msgs whose value is in `data`."""
 ALWAYS, NEVER, UNKNOWN = "always", "never", "unknown"
+OTHERS_LIMIT = 10
+"""Callbacks of so many other topics are searched for what one keeps."""
 LEAVES = (ast.Return, ast.Raise)
 
 
@@ -300,9 +302,11 @@ class Printing:
 
     def kept_for_another(self, tree):
         """What the callback keeps, and the callback of another topic prints, with what comes there."""
-        taken = [argument(n, 2, "callback") for n in walk(tree) if called_name(n) == "Subscriber"]
-        others = dict.fromkeys(dotted(one).rpartition(".")[2] for given in taken for one in given)
-        for other in [self.functions[name] for name in others if name in self.functions]:
+        if not hasattr(tree, "all_callbacks"):  # each callback asks for them
+            taken = [argument(n, 2, "callback") for n in walk(tree) if called_name(n) == "Subscriber"]
+            names = dict.fromkeys(dotted(one).rpartition(".")[2] for given in taken for one in given)
+            tree.all_callbacks = [self.functions[name] for name in names if name in self.functions]
+        for other in tree.all_callbacks[:OTHERS_LIMIT]:
             held = set(self.shared)
             told = ast.walk(other) if other is not self.own else ()
             for n in [n for n in told if isinstance(n, ast.Assign) or is_print(n)]:
