@@ -50,7 +50,7 @@ from grader.checks.support.topics import (
 )
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
-from grader.model.python_slip import PythonSlip
+from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
 from grader.wording import join_words, plural, significant
@@ -212,22 +212,37 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
         message = f"the node never subscribes to {topic}: in {slip.file}, line {slip.line}, {slip.message}"
         verdict = failed(message, hint=slip.fix, citations=(slip.place,))
     elif verdict is None:
-        near = near_names(topic, subscribed)
-        other = f"; it subscribes to {join_words(near or subscribed)}" if subscribed else ""
-        spare = run_slip(package, run, "callback-missing")
-        callback = (spare.name if spare else "") or "callback"
-        call = subscriber(topic, f"{TYPE_SLOT}, {callback}")
-        hint = f"name the topic {topic} in {call}" if near else f"add {call}"
-        if copied := copied_topic(package, run, "subscriber"):
-            other = f"{other}, on {copied}"
-            hint = f"write {topic} on the one of {copied} whose callback is for it"
-        elif len(subscribed) == 1 and not near and not probes_on(run, subscribed[0]):
-            hint = f"{hint}, or rename {subscribed[0]} if that is meant to be it"
-        meant = near or (subscribed if len(subscribed) == 1 else [])
-        cited = named_at(package, run, "subscriber", meant[0]) if meant else ()
-        verdict = failed(f"the node never subscribes to {topic}{other}", hint=hint, citations=cited)
-        verdict = verdict.about(said=" ".join(meant))
+        verdict = _never_subscribed(package, run, topic, subscribed)
     return verdict.about(measured=measured, citations=(cite(run, "/grader/graph"),))
+
+
+def _never_subscribed(package: PackageFacts, run: Run, topic: str, subscribed: Sequence[str]) -> Verdict:
+    """The node subscribes to other topics, or to none; one that publishes instead may be a copy of the talker."""
+    near = near_names(topic, subscribed)
+    other = f"; it subscribes to {join_words(near or subscribed)}" if subscribed else ""
+    spare = run_slip(package, run, "callback-missing")
+    callback = (spare.name if spare else "") or "callback"
+    call = subscriber(topic, f"{TYPE_SLOT}, {callback}")
+    hint = f"name the topic {topic} in {call}" if near else f"add {call}"
+    publishes = topic in topics_with(run, "publishers")
+    if not subscribed and publishes:
+        other = f", but publishes on {topic}, as a talker does"
+        above = "" if spare and spare.name else f" with `def {callback}(msg):` above it,"
+        hint = f"write {call} in place of the publisher,{above} and `rospy.spin()` in place of the loop"
+    elif len(subscribed) == 1 and publishes and not near and not probes_on(run, subscribed[0]):
+        other = f"{other}, and publishes on {topic}"
+        hint = f"swap {topic} and {subscribed[0]}: it should subscribe to {topic}, and not publish on it"
+    elif copied := copied_topic(package, run, "subscriber"):
+        other = f"{other}, on {copied}"
+        hint = f"write {topic} on the one of {copied} whose callback is for it"
+    elif len(subscribed) == 1 and not near and not probes_on(run, subscribed[0]):
+        hint = f"{hint}, or rename {subscribed[0]} if that is meant to be it"
+    meant = near or (subscribed if len(subscribed) == 1 else [])
+    end: SlipKind = "subscriber" if subscribed else "publisher"
+    named = next(iter(meant), "" if subscribed else topic)
+    cited = named_at(package, run, end, named) if named else ()
+    verdict = failed(f"the node never subscribes to {topic}{other}", hint=hint, citations=cited)
+    return verdict.about(said=" ".join(meant))
 
 
 def _taken_off(message: str, slip: PythonSlip) -> Verdict:
@@ -263,7 +278,7 @@ def _judge_missing(
         or _subscribed_again(package, run, probes, missing)
         or _unregistered(package, run, probes, missing)
         or _waiting(package, run, probes, missing)
-        or _by_callback(package, run, probes, missing, params.topic)
+        or _by_callback(package, run, probes, missing, params)
         or _some_numbers(probes, missing, lines)
         or _only_again(probes, missing)
         or _some_in_other_words(probes, missing, lines, params)
@@ -350,12 +365,12 @@ def _waiting(
 
 
 def _by_callback(
-    package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe], topic: str
+    package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe], params: HearsParams
 ) -> Verdict | None:
     """What the source of the topic's callback says of it: it prints nothing of a message, or not each of them."""
     told = run_slips(package, run, "not-printed", "printed-in-part")
     found = [
-        s for s in told if not s.name or is_written_as(s.name, topic)
+        s for s in told if not s.name or is_written_as(s.name, params.topic)
     ]  # a name in a variable is not known
     few = 2 * len(missing) < len(probes)  # another number may happen to be one that was sent
     if len(found) != 1 or (found[0].kind == "not-printed" and few):
@@ -365,7 +380,10 @@ def _by_callback(
         return None
     verdict = _some_numbers(probes, missing, lines) or _only_again(probes, missing)
     verdict = verdict or _by_number(probes, missing, lines, None)
-    return verdict.explained(f"in {slip.file}, {slip.message}", f"in {slip.file}, {slip.fix}", (slip.place,))
+    form = f", as '{in_words(params.template)}'" if params.template != VALUE and "print" in slip.fix else ""
+    return verdict.explained(
+        f"in {slip.file}, {slip.message}", f"in {slip.file}, {slip.fix}{form}", (slip.place,)
+    )
 
 
 def _by_number(

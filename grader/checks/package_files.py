@@ -13,7 +13,7 @@ from grader.checks.support.text import near_names, shown
 from grader.model.package import MANIFEST, Dependency, Manifest, PackageFacts, meant_manifest
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
-from grader.wording import is_word_of, join_words, plural
+from grader.wording import is_word_of, join_words, numbers_text, plural
 
 OTHERS = {
     "launch": ("launcher", "launchers", "launchfile", "launchfiles", "launch_files"),
@@ -373,6 +373,9 @@ def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
     if joined := _in_one_tag(found, missing):
         return joined
     hints = [_respell(n, d, deps) for n, deps in slips.items() for d in deps]
+    names_too = {d.name for d in misspelt}
+    if also := sorted(d.line for d in found.dependencies if d.name in names_too and d not in misspelt):
+        hints.append(f"do the same on line{'s' if len(also) > 1 else ''} {numbers_text(also)}")
     if absent := [n for n in missing if n not in slips]:
         hints.append(f"add {' '.join(f'<{tag}>{n}</{tag}>' for n in absent)} below line {last}")
     verdict = failed(

@@ -26,10 +26,11 @@ from grader.checks.support.scripts import (
 from grader.evidence.run import Run
 from grader.judging.facts import Facts, names_started, scripts_of, sources_of
 from grader.model.package import CMAKE, PackageFacts
+from grader.model.python_slip import PythonSlip
 from grader.model.repair import Repair
 from grader.model.verdict import Citation, FileCitation, Status, Verdict
 from grader.rubric.model import Criterion
-from grader.wording import join_words, lines_text
+from grader.wording import join_words, lines_text, numbers_text
 
 LINE_CHARS = 200
 """A longer line stays out of the result."""
@@ -285,7 +286,7 @@ def _with_text(citation: Citation, build: Run) -> Citation:
     return citation.model_copy(update={"source": text, "column": begin, "end_column": end})
 
 
-def spins_in_loops(lines: Iterable[str]) -> Iterator[int]:
+def loop_spins(lines: Iterable[str]) -> Iterator[int]:
     """Yield the numbers of the lines on which a loop waits until its node ends."""
     loop = None
     for number, line in enumerate(lines, 1):
@@ -296,3 +297,66 @@ def spins_in_loops(lines: Iterable[str]) -> Iterator[int]:
             loop = None
         elif loop is not None and line.strip().startswith("rospy.spin()"):
             yield number
+
+
+OF_DATA = re.compile(r"String|Bool|Byte|Char|U?Int\d+|Float\d+")
+"""Types of std_msgs with one plain value, `data`."""
+PLACES = re.compile(r"%[-+0-9.]*[dioxXeEfFgG]\b")
+"""A number's place in a text: no text can be put there."""
+FIELDS_SHOWN, MESSAGES_READ = 3, 5
+
+
+def lost_fields(lines: Sequence[str], slip: PythonSlip, wanted: str) -> str:
+    """Return which fields of the slip's type a script uses that the wanted one has not: of the messages that it makes,
+    or of the one that its callback gets. "" where it uses none."""
+    texts = [line[:LINE_CHARS].partition("#")[0] for line in lines[:LINES_READ]]
+    made = re.compile(rf"\s*([\w.]+) *= *(?:[\w.]+\.)?{re.escape(slip.message)}\(")
+    names, first, last = [found[1] for text in texts if (found := made.match(text))], 0, len(texts)
+    if slip.kind == "subscriber-type":
+        call = texts[slip.line - 1] if slip.line <= len(texts) else ""
+        given = re.search(r"Subscriber\([^,]*,[^,]*, *(?:callback *= *)?(?:self\.)?(\w+)", call)
+        head = re.compile(rf"(\s*)def {given[1] if given else '-'}\((?:self, *)?(\w+)")
+        heads = [(at, found) for at, text in enumerate(texts) if (found := head.match(text))]
+        names = [found[2] for _, found in heads[:1]]
+        for at, found in heads[:1]:
+            within = re.compile(rf"{found[1]}\s|\s*$")
+            first, last = at + 1, next((n for n in range(at + 1, last) if not within.match(texts[n])), last)
+    either = "|".join(map(re.escape, list(dict.fromkeys(names))[:MESSAGES_READ]))
+    field = re.compile(rf"(?<![\w.])(?:{either})\.(?!data\b)([A-Za-z]\w*)\b(?! *\()")
+    taken = [(at + 1, field.findall(texts[at])) for at in range(first, last)]
+    fields = list(dict.fromkeys(one for _, found in taken for one in found))
+    if not OF_DATA.fullmatch(wanted):
+        return ""
+    alone = slip.kind == "publisher-type" and sum("Publisher(" in text for text in texts) == 1
+    sent = [n for n, text in enumerate(texts, 1) if alone and _sends_several(text)]
+    lines_sent = f"line{'s' if len(sent) > 1 else ''} {numbers_text(sent)} of {slip.file}"
+    single = f"publish one value on {lines_sent}, as {wanted} has only `data`" if sent else ""
+    if not either or not fields:
+        return single
+    numbers = [number for number, found in taken if found]
+    where = f"line{'s' if len(numbers) > 1 else ''} {numbers_text(numbers)} of {slip.file}"
+    value = {"String": "a text", "Bool": "True or False"}.get(wanted, "a number")
+    use = "use `data`" if slip.kind == "subscriber-type" else f"put {value} into `data`"
+    own = texts[first:last] if wanted == "String" else []
+    shown = (PLACES.search(texts[number - 1]) for number in numbers if own)
+    text = next((f", and %s in place of {found[0]}" for found in shown if found), "")
+    with_number = re.compile(
+        rf"\b(?:{either})\.\w+ *(?:[-+*/]=|[-*/<>]|\+ *\d|[!=]=)|[-*/<>] *(?:{either})\."
+    )
+    if sums := [n for n, line in enumerate(own, first + 1) if with_number.search(line)]:
+        text += (
+            f"; leave out the calculation with it on line{'s' if len(sums) > 1 else ''} {numbers_text(sums)}"
+        )
+    fields = [f"`{one}`" for one in fields]
+    named = join_words(fields, most=FIELDS_SHOWN)
+    return f"{use}, the only field of {wanted}, in place of {named} on {where}{text}{single and f', and {single}'}"
+
+
+def _sends_several(line: str) -> bool:
+    """Return whether a line gives `publish(…)` several values."""
+    depth, behind = 1, re.sub(r"'[^']*'|\"[^\"]*\"", "''", line).partition(".publish(")[2]
+    for letter in behind:
+        depth += (letter in "([{") - (letter in ")]}")
+        if not depth or (depth == 1 and letter == ","):
+            return depth == 1
+    return False

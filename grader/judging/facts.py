@@ -25,6 +25,7 @@ from grader.evidence.events import PACKAGE_RUN, RECORDING_MISSING, RECORDING_PRO
 from grader.evidence.run import Run
 from grader.installable import NOTHING_TO_DO
 from grader.model.package import LaunchFile, PackageFacts
+from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, machine_lacks, unjudged
 from grader.rubric.message_fields import said_types
@@ -423,3 +424,12 @@ def _written_in(package: PackageFacts, path: str) -> Language:
         return "python"
     built = any(name.stem == one.target or one.is_called(name.name) for one in programs(package))
     return "cpp" if built or name.suffix in SOURCES else "python"
+
+
+RATE_SHARE = 0.05
+"""By so much a rate that a script asks for may differ from the right one."""
+
+
+def is_other_rate(slip: PythonSlip, hz: float) -> bool:
+    """Return whether the rate that a script asks for is plainly not the lab's."""
+    return abs(float(slip.message) - hz) > RATE_SHARE * hz

@@ -56,8 +56,8 @@ from grader.judging.cited_lines import (
     cite_unused_argument,
     show_lines,
 )
-from grader.judging.facts import NOT_RUN, Facts, try_facts, views_of
-from grader.judging.later_faults import add_later_faults, is_other_rate
+from grader.judging.facts import NOT_RUN, Facts, is_other_rate, try_facts, views_of
+from grader.judging.later_faults import add_later_faults
 from grader.judging.repeats_and_repairs import (
     apply_repaired_copy,
     drop_unrepeated_losses,

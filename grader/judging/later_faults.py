@@ -37,8 +37,8 @@ from grader.checks.support.text import (
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.installable import NOTHING_TO_DO, PYTHON_2
-from grader.judging.cited_lines import LINE_CHARS, LINES_READ, LOOPS, spins_in_loops
-from grader.judging.facts import SOURCES, Facts, names_started, scripts_of, sources_of
+from grader.judging.cited_lines import LINE_CHARS, LINES_READ, LOOPS, OF_DATA, PLACES, loop_spins, lost_fields
+from grader.judging.facts import SOURCES, Facts, is_other_rate, names_started, scripts_of, sources_of
 from grader.judging.repeats_and_repairs import text_as_handed_in
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
@@ -57,18 +57,12 @@ OF_LAUNCHES = ("launch-runs", "launch-connects")
 OF_CALLBACKS = ("callback-called", "callback-values")
 OF_TOPICS = ("hears", "topic-type")
 """Checks that say by themselves that a node is on another topic, and not of which type."""
-RATE_SHARE = 0.05
-"""By so much a rate that a script asks for may differ from the right one."""
 
 
-OF_NUMBERS = re.compile(r"%[-+0-9.]*[dioxXeEfFgG]\b")
-"""What takes no text in place of it."""
 CALL_LINES = 2
 """How many more lines a call that prints may have."""
 CALL_CHARS = 200
 """How long a call of `Subscriber(…)` is up to its callback: a search without an end takes ages on a hostile line."""
-OF_DATA = re.compile(r"String|Bool|Byte|Char|U?Int\d+|Float\d+")
-"""Types of std_msgs with one plain value, `data`."""
 
 
 class Fix(NamedTuple):
@@ -210,9 +204,12 @@ class Later:
     def _of(self, *kinds: str) -> list[PythonSlip]:
         return [slip for slip in self._slips if slip.kind in kinds]
 
+    def _lines(self, path: str) -> Sequence[str]:
+        return self._build.file_lines(path) if self._build is not None else ()
+
     def _texts_of_cpp(self) -> Iterator[PythonSlip]:
         for path in sorted(path for path in self._paths if PurePosixPath(path).suffix in SOURCES):
-            lines = self._build.file_lines(path)[:LINES_READ] if self._build is not None else []
+            lines = self._lines(path)[:LINES_READ]
             for kind, line, text in texts_of_cpp(text[:LINE_CHARS] for text in lines):
                 yield PythonSlip(file=path, line=line, kind=kind, message=text)
 
@@ -258,6 +255,7 @@ class Later:
                 passed = slip.fix.startswith("pass it")
                 whole = slip.fix if passed else f"call `{slip.name}()`, which nothing in {slip.file} calls"
                 yield Fix(renamed.get((slip.file, slip.line), whole))
+        yield from (Fix(f"{slip.fix} ({slip.file})", (slip.fix,)) for slip in self._of("float-index"))
         for slip in self._of("main-guard"):
             yield Fix(f"write {MAIN} on {_line(slip)}", (f"on {_line(slip)}, write {MAIN}",))
         for slip in self._of("loop-left"):
@@ -282,12 +280,12 @@ class Later:
 
     def _function_at(self, slip: PythonSlip) -> int:
         """Return the line of the last `def` above the slip: what gives a name its value there is of use below it."""
-        lines = self._build.file_lines(slip.file)[: slip.line] if self._build is not None else []
+        lines = self._lines(slip.file)[: slip.line]
         return max((n for n, text in enumerate(lines, 1) if text.lstrip().startswith("def ")), default=0)
 
     def _has_no_field(self, slip: PythonSlip) -> bool:
         """Return whether a topic's callback prints its argument, and takes no field of it up to there."""
-        lines = self._build.file_lines(slip.file) if self._build is not None else []
+        lines = self._lines(slip.file)
         body = "\n".join(lines[max(self._function_at(slip) - 1, 0) : slip.line + CALL_LINES])
         named = re.match(r"\s*def (\w+)\((?:self, *)?(\w+)\)", body)
         is_callback = named is not None and self._is_given(named[1])
@@ -298,13 +296,11 @@ class Later:
         call = re.compile(
             rf"[^#]*Subscriber\([^#]{{0,{CALL_CHARS}}}[ ,.='\"]{re.escape(callback)}['\"]? *[(,)]"
         )
-        lines = [
-            one for path in self._paths if self._build for one in self._build.file_lines(path)[:LINES_READ]
-        ]
+        lines = [one for path in self._paths for one in self._lines(path)[:LINES_READ]]
         return any(call.match(line[:LINE_CHARS]) for line in lines)
 
     def _text_of(self, slip: PythonSlip) -> str:
-        lines = self._build.file_lines(slip.file) if self._build is not None else ()
+        lines = self._lines(slip.file)
         return lines[slip.line - 1] if slip.line <= len(lines) else ""
 
     def _asked(self) -> set[tuple[str, int]]:
@@ -317,7 +313,7 @@ class Later:
         asked = {(slip.file, slip.line) for slip in self._of("input")} | {
             (one.path, number)
             for one in files
-            for number, line in enumerate(self._build.file_lines(one.path) if self._build else (), 1)
+            for number, line in enumerate(self._lines(one.path), 1)
             if ASKS.match(line[:LINE_CHARS])
         }
         return set() if asked & cited_lines(self._verdict.citations) else asked
@@ -344,7 +340,7 @@ class Later:
             if not slip.name:
                 yield Fix(f"{slip.fix}, since {slip.message}", (slip.fix,))
         for path in sorted(self._paths) if not self._ran else ():
-            lines = [line[:LINE_CHARS] for line in self._build.file_lines(path)] if self._build else []
+            lines = [line[:LINE_CHARS] for line in self._lines(path)]
             yield from self._rate_of_lines(path, lines, significant(hz))
 
     def _rate_of_lines(self, path: str, lines: Sequence[str], hz: str) -> Iterator[Fix]:
@@ -358,7 +354,7 @@ class Later:
                 yield Fix(
                     f"write `{plain[1]} = rospy.Rate({hz})` on line {number} of {path}: only a Rate can sleep"
                 )
-        for number in spins_in_loops(lines):
+        for number in loop_spins(lines):
             yield Fix(f"delete `rospy.spin()` on line {number} of {path}, at which the loop stands still")
         if not self._lacks_words("sleep") or not any(LOOPS.match(line) for line in lines):
             return
@@ -432,7 +428,7 @@ class Later:
         if self._ran and lines:
             yield from self._made_elsewhere(kind, types)
         elif len(types) == 1 and types[0].message != kind.rpartition("/")[2]:
-            yield self._retype("publish", kind, types[0])
+            yield from self._retype("publish", kind, types[0])
 
     def _heard(self) -> Iterator[Fix]:
         scenario = self._rubric.scenarios.get(self._criterion.scenario or "")
@@ -452,7 +448,9 @@ class Later:
         other = sent and len(types) == 1 and types[0].message != own
         told = heard and self._ran  # of a node on its topic, what ROS refused says it
         if other and (elsewhere or (not told and f"/{types[0].message}" not in self._verdict.message)):
-            yield self._retype("subscribe with", sent[0], types[0])
+            yield from self._retype("subscribe with", sent[0], types[0])
+        elif other and told:
+            yield from self._fields(own, types[0])
         # else ROS has called it, and the verdict says what happened
         unheard = elsewhere or other or not self._ran
         for slip in self._of(*OF_CALLBACKS) if unheard and len(heard) <= 1 else ():
@@ -474,11 +472,12 @@ class Later:
         said = [one for one in said if SAID_DATA in one.message]
         unheard = not self._ran or not (isinstance(self._run, Run) and probes_on(self._run, self._topic))
         if not unheard or template == VALUE:
+            yield from self._unprinted() if unheard and len(heard) <= 1 else ()
             return
         right = [one for one in said if says(one.message, template)]
         if right and len(heard) == 1 and self._has_no_field(right[0]):
             yield Fix(f"print the `data` of the message on {_line(right[0])}")
-        if right and other_type and of_text and (place := OF_NUMBERS.search(self._text_of(right[0]))):
+        if right and other_type and of_text and (place := PLACES.search(self._text_of(right[0]))):
             yield Fix(f"write %s instead of {place[0]} on {_line(right[0])}")
         if right:
             return
@@ -496,33 +495,46 @@ class Later:
             yield Fix(f"print {what} on {_line(only)}", general=f"print {what}, {IN_OWN_WORDS}")
 
     def _made_elsewhere(self, wanted: str, types: Iterable[PythonSlip]) -> Iterator[Fix]:
-        """Yield the other lines that make messages of the wrong type, where both types have the one field `data`."""
-        package, _, name = wanted.partition("/")
+        """Yield the other lines that make messages of the wrong type, and the fields that only these have."""
+        name = wanted.rpartition("/")[2]
         for slip in types:
-            told = f"{package}/{slip.message} on" in self._verdict.message and OF_DATA.fullmatch(slip.message)
-            others = self._making(slip) if told and OF_DATA.fullmatch(name) else ()
+            told = f"/{slip.message} on" in self._verdict.message and OF_DATA.fullmatch(name)
+            others = self._making(slip) if told else ()
             if others:
                 where = f"line{'s' if len(others) > 1 else ''} {numbers_text(others)} of {slip.file}"
                 yield Fix(f"write {name} instead of {slip.message} on {where}")
+                yield from self._fields(name, slip)
 
     def _making(self, slip: PythonSlip) -> list[int]:
         """Return the other lines that make a message of the slip's type."""
-        lines = self._build.file_lines(slip.file) if self._build is not None else []
+        lines = self._lines(slip.file)
         making = re.compile(rf"^[^#]*(?<![\w.]){slip.message}\(")
         return [n for n, text in enumerate(lines, 1) if n != slip.line and making.search(text)]
 
-    def _retype(self, verb: str, wanted: str, slip: PythonSlip) -> Fix:
-        others = self._making(slip)
-        more = f" (made on line{'s' if len(others) > 1 else ''} {numbers_text(others)})" if others else ""
-        text = f"{verb} {wanted} on {_line(slip)}, not {slip.message}{more}"
-        return Fix(text, types=(wanted, slip.message))
+    def _unprinted(self) -> Iterator[Fix]:
+        for slip in self._of("not-printed", "printed-in-part"):
+            if slip.name.strip("/") == self._topic.strip("/"):
+                yield Fix(f"{slip.fix}: {slip.message}", (slip.fix,))
+
+    def _fields(self, wanted: str, slip: PythonSlip) -> Iterator[Fix]:
+        yield from map(Fix, filter(None, [lost_fields(self._lines(slip.file), slip, wanted)]))
+
+    def _retype(self, verb: str, wanted: str, slip: PythonSlip) -> Iterator[Fix]:
+        others, (package, _, name) = self._making(slip), wanted.partition("/")
+        notes = [f"made on line{'s' if len(others) > 1 else ''} {numbers_text(others)}"] if others else []
+        known = re.compile(rf"[^#]*\bimport\b.*(\b{name}\b|\*)")
+        if not any(known.match(line[:LINE_CHARS]) for line in self._lines(slip.file) or ["import *"]):
+            notes.append(f"with `from {package}.msg import {name}` at the top")
+        more = f" ({'; '.join(notes)})" if notes else ""
+        yield Fix(f"{verb} {wanted} on {_line(slip)}, not {slip.message}{more}", types=(wanted, slip.message))
+        yield from self._fields(name, slip)
 
     def _lacks_words(self, words: str) -> bool:
         """Return whether the words stand in no line of the sources, which are known."""
         lines = [
             line.partition("#" if path.endswith(".py") else "//")[0]
             for path in self._paths
-            for line in (self._build.file_lines(path) if self._build is not None else ())
+            for line in self._lines(path)
         ]
         return bool(lines) and not any(
             words.strip().casefold() in " ".join(line.split()).casefold() for line in lines
@@ -582,11 +594,6 @@ def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) 
     if topic := wanted.get("topic"):
         renaming = find_renaming(package, nodes, str(topic))
         yield from [f"in {file.path} {renaming.fix}"] if renaming else []
-
-
-def is_other_rate(slip: PythonSlip, hz: float) -> bool:
-    """Return whether the rate that a script asks for is plainly not the lab's."""
-    return abs(float(slip.message) - hz) > RATE_SHARE * hz
 
 
 def _line(slip: PythonSlip) -> str:

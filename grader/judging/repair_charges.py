@@ -81,7 +81,7 @@ def charge_repairs(
         own = [c for c in rubric.criteria if repair.kind == "node-name" and _names(c, repair)]
         if any(first[c.id].status.is_lost and c.id not in better for c in own):
             continue  # the criterion of the name says by itself what is wrong with it
-        failed_by_it = [c for c in criteria_of_runs if c.id not in better and _fails_in(first[c.id], repair)]
+        failed_by_it = [c for c in criteria_of_runs if c.id not in better and fails_in(first[c.id], repair)]
         if repair.kind in OF_SYNTAX and failed_by_it:
             continue  # that the copy shows nothing of that criterion is no reason to charge another
         possible = [c for c in criteria if repair in needs[c.id] and _may_ask_for(first[c.id], repair)]
@@ -102,7 +102,7 @@ def _may_ask_for(found: Verdict, repair: Repair) -> bool:
     return repair.kind not in DONE_BEFORE_RUNS or PurePosixPath(repair.file).name in found.message
 
 
-def _fails_in(found: Verdict, repair: Repair) -> bool:
+def fails_in(found: Verdict, repair: Repair) -> bool:
     """Return whether a criterion is lost by itself, and cites a line of what was repaired."""
     lines = set(range(repair.line or 0, (repair.line or 0) + len(repair.before.split("\n"))))
     cited = {line for file, line in cited_lines(found.citations) if file == repair.file}
@@ -259,7 +259,9 @@ def _is_told(repair: Repair, hint: str) -> bool:
         return repair.file in hint and "chmod" in hint
     if repair.kind == "parameter-name" and repair.before.strip() == repair.after.strip():
         return f"line {repair.line}" in hint
-    new = _new_words(repair)
+    new = {
+        word for word in _new_words(repair) if not word.endswith("depend")
+    }  # one tag is as good as the other
     of_package = repair.kind in {"package-name", *OF_BUILDS} and repair.file in OF_PACKAGES
     return of_package and new <= words_of(hint) and new != set()
 
@@ -294,7 +296,8 @@ def is_next_fault(one: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> boo
     again = cited_lines(copy.citations)
     again -= lines_read_now(repairs)
     in_repaired = found != set() or one.unjudged
-    return in_repaired and not copy.unjudged and not found & again and _is_other_fault(one, copy)
+    shown = not copy.unjudged or (one.unjudged and found != set())
+    return in_repaired and shown and not found & again and _is_other_fault(one, copy)
 
 
 def lines_read_now(repairs: Iterable[Repair]) -> set[tuple[str, int]]:

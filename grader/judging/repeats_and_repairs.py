@@ -34,6 +34,7 @@ from grader.judging.repair_charges import (
     charge_repairs,
     charged_verdict,
     cites_file,
+    fails_in,
     is_next_fault,
     is_unmade,
     lines_read_now,
@@ -151,7 +152,12 @@ def apply_repaired_copy(
         c.id
         for c in rubric.criteria
         if first[c.id].status.is_lost
-        and (not _is_worse(first, on_copy, c) or is_next_fault(first[c.id], on_copy[c.id], needs[c.id]))
+        and (
+            not _is_worse(first, on_copy, c)
+            or is_next_fault(first[c.id], on_copy[c.id], needs[c.id])
+            # lost by a repaired line, and behind that line by what the machine lacks
+            or (on_copy[c.id].of_machine and any(fails_in(first[c.id], one) for one in needs[c.id]))
+        )
     }
     charges = charge_repairs(rubric, first, better, needs)
     for criterion in rubric.criteria:

@@ -16,6 +16,7 @@ SlipKind = Literal[
     "clock-value", "queue-size", "deaf", "node-name", "no-init", "commented-out", "publisher", "publisher-type",
     "subscriber", "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes",
     "prints", "argument-text", "unused-import", "lacking-import", "unregistered", "not-started", "start-value",
+    "hides-class", "float-index",
     "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed", "printed-in-part",
     "published-in-part", "never-published", "takes-number", "typed-text",
 ]  # fmt: skip
@@ -34,6 +35,8 @@ class PythonSlip(Placed, Record):
     - `object`: why an object of a class lacks an attribute where it is read, or that the class is used in its place.
     - `outside-method`: a call in a class, but outside its methods, that uses an unknown name.
     - `defined-twice`: a callback that a second function of its name hides, or an imported name that a class hides.
+    - `float-index`: an index is worked out with `/`, which makes a float.
+    - `hides-class`: a message is given the name of its class: `String = String()`.
     - `no-effect`, `compared`: a statement such as `++i`, or `i == 0`; or a loop that publishes what only a line above
       it made, `name`.
     - `commented-out`: a ROS call in a comment; `name` is `sleep`, or `pub = Publisher`.

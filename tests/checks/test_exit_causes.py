@@ -142,7 +142,7 @@ speed_pub = rospy.Publisher('cmd_vel', Twist)
         (6, "reading.header.frame_id = 'a'", "AttributeError: 'member_descriptor' object has no attribute 'frame_id'",
          "write brackets where it is made: `reading = …()`"),
         (6, "if reading.temperature > LIMIT:", "TypeError: '>' not supported between instances of 'str' and 'float'",
-         "turn the text into a number first, or leave out `str(…)`"),
+         "turn the text into a number first, or compare it with a text"),
         (6, "hear()", "TypeError: hear() missing 1 required positional argument: 'msg'",
          "put 'msg' into its brackets, or remove the call: ROS calls a callback by itself"),
         (6, "text = text + str(3)", "TypeError: 'str' object is not callable", "give the variable `str` another name"),

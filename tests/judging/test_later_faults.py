@@ -229,7 +229,8 @@ def test_a_type_that_the_lab_does_not_want_is_not_imported_first() -> None:
         f"from std_msgs.msg import String; then publish std_msgs/String on line 5 of {FILE}, not JointState"
     )
     assert told.startswith(retyped)
-    source = "#!/usr/bin/env python3\n\n\n\nrospy.Publisher('chatter', JointState)\n# JointState()\nm = JointState()\n"
+    source = "#!/usr/bin/env python3\nfrom std_msgs.msg import String\n\n\nrospy.Publisher('chatter', JointState)\n"
+    source += "# JointState()\nm = JointState()\n"
     slips = slip("publisher", "chatter"), slip("publisher-type", "JointState")
     told = hint_of("node", run, TALKER, *slips, source=source)
     assert told.startswith(f"{retyped} (made on line 7)")
@@ -262,23 +263,53 @@ def test_words_that_stand_nowhere_in_the_source_are_named() -> None:
         assert "then" not in hint_of("node", DIES, criteria, source=f"{LACKS}say('{words}')\n")
 
 
+IMPORTED = " (with `from std_msgs.msg import String` at the top)"
+ON_5 = f" on line 5 of {FILE}"
+ONLY_DATA = " and put a text into `data`, the only field of String, in place of"
+
+
 @pytest.mark.parametrize(
-    ("kind", "told"),
-    [("Int8", f"; then write String instead of Int8 on lines 2 and 4 of {FILE}"), ("Header", "")],
-)
-def test_other_lines_that_make_a_wrong_type_are_named(kind: str, told: str) -> None:
+    ("kind", "line", "fields"),
+    [
+        ("Int8", "msg.data = 1", ""),
+        ("Header", "msg.stamp = msg.frame_id", f"{ONLY_DATA} `stamp` and `frame_id` on line 5 of {FILE}"),
+        ("Header", "msg.seq += 1", f"{ONLY_DATA} `seq`{ON_5}; leave out the calculation with it on line 5"),
+        ("Header", "x = 'a' + msg.seq + 'b'", f"{ONLY_DATA} `seq`{ON_5}"),
+        ("Header", "msg.serialize(f)", ""),
+        ("Header", "p.publish(1, f(), 'a')", f" and publish one value on line 5 of {FILE}, as String has only `data`"),
+        ("Header", "p.publish('a, %s' % (n, 1))", ""),
+    ],
+)  # fmt: skip
+def test_other_lines_that_make_a_wrong_type_are_named(kind: str, line: str, fields: str) -> None:
     run = {"processes": [STARTED], "topics": [{"topic": "/chatter", "type": f"std_msgs/{kind}", "count": 61}]}
-    source = f"# {kind}()\nmsg = {kind}()\npub = Publisher('chatter', {kind})\npub.publish({kind}(1))\n"
+    source = (
+        f"# {kind}()\nmsg = {kind}()\npub = Publisher('chatter', {kind})\npub.publish({kind}(1))\n{line}\n"
+    )
     slips = [slip("publisher", "chatter", 3), slip("publisher-type", kind, 3)]
     hint = hint_of("chatter", run, [NODE | ROOT, CHATTER], *slips, source=source)
-    assert hint.endswith(f"rospy.Publisher('/chatter', String, queue_size=10){told}")
+    told = f"then write String instead of {kind} on lines 2 and 4 of {FILE}{fields}"
+    assert hint.endswith(f"rospy.Publisher('/chatter', String, queue_size=10); {told}")
+
+
+def test_a_callback_that_takes_other_fields_is_told() -> None:
+    source = (
+        "def other(p):\n    p.y = 1\n\ndef heard(p):\n    print('%.2f' % p.x, p.data)\n\n    use(p.x)\np.z = 1\n"
+        "rospy.Subscriber('chatter', Point, heard)\n"
+    )
+    heard = [NODE | ROOT, HEARS | {"requires": ["node"]}]
+    slips = [slip("subscriber", "chatter", 9), slip("subscriber-type", "Point", 9)]
+    hint = hint_of("node", DIES, heard, *slips, source=source)
+    assert (
+        f"use `data`, the only field of String, in place of `x` on lines 5 and 7 of {FILE}, and %s in place of %.2f"
+        in hint
+    )
 
 
 def test_what_a_callback_does_besides_comes_after_the_print() -> None:
     heard = [NODE | ROOT, HEARS | {"requires": ["node"]}]
     slips = [slip("subscriber", "chatter"), slip("subscriber-type", "Int32")]
     hint = hint_of("node", DIES, heard, *slips, source=LACKS)
-    assert hint.endswith("not Int32 and print 'I heard <message>' first in the callback")
+    assert hint.endswith(f"not Int32{IMPORTED} and print 'I heard <message>' first in the callback")
 
 
 def test_a_loop_that_needs_a_number_gives_way_to_spin_where_a_text_is_asked_for() -> None:
@@ -295,7 +326,7 @@ def test_a_text_that_another_function_prints_is_not_the_messages() -> None:
         slip("subscriber", "colour"), slip("subscriber-type", "Colour"), slip("prints", "I send {data}", 9),
     ]  # fmt: skip
     hint = hint_of("node", DIES, heard, *slips, source=LACKS)
-    assert hint.endswith("not Colour and print 'I heard <message>' first in the callback")
+    assert hint.endswith(f"not Colour{IMPORTED} and print 'I heard <message>' first in the callback")
 
 
 @pytest.mark.parametrize(

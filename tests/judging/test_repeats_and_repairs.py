@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
@@ -400,6 +401,28 @@ def test_a_build_that_the_manifest_blocks_is_judged_on_the_copy() -> None:
     manifest, build = judge(asked, {**runs, "repaired-1/package": replace(copy, metadata=about)})
     assert (manifest.points, manifest.hint) == (0, f"package.xml line 5: write `{tag.fix}`")
     assert (build.status.value, build.points, build.hint) == ("partial", 5, "")
+
+
+def test_a_dependency_is_told_with_one_tag() -> None:
+    tag = Repair(
+        kind="manifest-line",
+        file="package.xml",
+        line=5,
+        before="<buildtool_depend>catkin</buildtool_depend>",
+        after="<buildtool_depend>catkin</buildtool_depend>\n<depend>rospy</depend>",
+        message="package.xml does not name rospy",
+        fix="<depend>rospy</depend>",
+    )
+    asked = rubric(
+        {"id": "manifest", "check": "manifest", "with": {"name": "lab1", "dependencies": ["rospy"]}},
+        {"id": "build", "check": "build", "requires": ["manifest"]},
+    )
+    depends = [["buildtool_depend", "catkin"]]
+    runs = built({"manifest": {"dependencies": depends}}, exit_code=1)
+    copy = built({"manifest": {"dependencies": [*depends, ["depend", "rospy"]]}}, exit_code=0)["package"]
+    about = {**copy.metadata, "repairs": json.dumps([tag.model_dump()])}
+    manifest, _ = judge(asked, {**runs, "repaired-1/package": replace(copy, metadata=about)})
+    assert re.fullmatch(r"add <exec_depend>rospy</exec_depend> below line \d+", manifest.hint)
 
 
 def test_a_line_of_the_build_is_charged_to_a_build_that_another_fault_blocks() -> None:

@@ -121,6 +121,22 @@ def test_a_loop_that_counts_more_than_it_publishes(turn: str, message: str, tmp_
     assert [(s.message, s.name) for s in slips] == ([(message, "n")] if message else [])
 
 
+def test_each_topic_of_an_if_is_told(tmp_path: Path) -> None:
+    head = "pub = rospy.Publisher('n', Int8)\nother = rospy.Publisher('t', String)\ni = 0\nwhile on():\n"
+    turn = "    if i % 2:\n        pub.publish(i)\n    elif i:\n        other.publish('a')\n    i += 1\n"
+    (tmp_path / "a.py").write_text(head + turn, encoding="utf-8")
+    (tmp_path / "b.py").write_text(head + turn + "    other.publish('b')\n", encoding="utf-8")
+    slips = check_syntax(tmp_path, ["a.py", "b.py"]).slips
+    found = [(s.file, s.name, s.message, s.fix) for s in slips if s.kind == "published-in-part"]
+    says = "line %d publishes only under a condition of the `if` on line 5"
+    fix = "publish outside the `if` on line 5, so that it happens each time around the loop"
+    assert found == [
+        ("a.py", "n", says % 6, fix),
+        ("a.py", "t", says % 8, fix),
+        ("b.py", "n", says % 6, fix),
+    ]
+
+
 @pytest.mark.parametrize(("text", "line"), [
     ("m = 'one'\nwhile on():\n    p.publish(m)\n", 3),
     ("while on():\n    m = 'one'\n    p.publish(m)\n", 2),
@@ -130,6 +146,20 @@ def test_a_loop_that_counts_more_than_it_publishes(turn: str, message: str, tmp_
 def test_a_text_is_published_where_it_can_change(text: str, line: int, tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(text, encoding="utf-8")
     assert [s.line for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "publishes"] == [line]
+
+
+TWO = "def cb(m):\n    global n\n    n = m.data\n\ndef other(m):\n    text = n + m.data\n    print(%s)\n"
+
+
+@pytest.mark.parametrize(("printed", "kinds"), [("text", ["printed-in-part"]), ("m.data", [])])
+def test_a_message_that_another_topic_s_callback_prints(
+    printed: str, kinds: list[str], tmp_path: Path
+) -> None:
+    text = TWO % printed + "rospy.Subscriber('c', String, cb)\nrospy.Subscriber('d', String, other)\n"
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if "print" in s.kind and s.name == "c"]
+    assert [s.kind for s in slips] == kinds
+    assert [s.fix for s in slips] == ["print `m.data` in the callback `cb` too" for _ in kinds]
 
 
 KEEPS = "def cb(m):\n    global n\n    n = m.data * 2\nrospy.Subscriber('c', Int32, cb)\n"

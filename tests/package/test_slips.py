@@ -415,7 +415,7 @@ def test_why_a_node_goes_on_after_ctrl_c(tmp_path, code, told):
 @pytest.mark.parametrize(
     ("condition", "fix"),
     [
-        ("n < 9 and on", "on line 1, write ` and not rospy.is_shutdown()` before the colon"),
+        ("n < 9 and on", "on line 1, write `and not rospy.is_shutdown()` before the colon"),
         ("(n <\n 9)", "on line 2, write"),
         ("n < 9 or on", "check `rospy.is_shutdown()` in it"),
         ("n := look()", "check `rospy.is_shutdown()` in it"),
@@ -540,3 +540,39 @@ def test_names_that_ros_is_given_without_quotes(tmp_path, code, fixes):
 def test_every_kind_is_described() -> None:
     rows = re.findall(r"^- (`.*?`):", inspect.getdoc(PythonSlip) or "", re.MULTILINE)
     assert sorted(re.findall(r"`([\w-]+)`", " ".join(rows))) == sorted(get_args(SlipKind))
+
+
+@pytest.mark.parametrize(
+    ("text", "fixes"),
+    [
+        (
+            "pub = rospy.Publisher('c', String)\nString = String()\nString.data = 'a'\npub.publish(String)\n",
+            ["on lines 3, 4 and 5, call the message `msg`, as in `msg = String()`"],
+        ),
+        (
+            "def f(msg):\n    String = String(msg.data)\n",
+            ["on line 3, call the message `message`, as in `message = String(…)`"],
+        ),
+        ("string = String()\nString.data = 'a'\n", []),
+        ("Int8 = Int8()\n", []),
+    ],
+)
+def test_a_message_with_the_name_of_its_class(text: str, fixes: list[str], tmp_path: Path) -> None:
+    source = "from std_msgs.msg import String\n" + text
+    (tmp_path / "a.py").write_text(source, encoding="utf-8")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.fix for s in slips if s.kind == "hides-class"] == fixes
+    assert not fixes or "unused-import" not in [s.kind for s in slips]
+
+
+@pytest.mark.parametrize(
+    ("line", "fixes"),
+    [
+        ("print(rows[n / 25])", ["on line 1, write `//` instead of `/` in the index"]),
+        ("print(rows[n // 25], rows[int(n / 25)], n / rows[2])", []),
+    ],
+)
+def test_an_index_that_is_a_float(line: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"{line}\n", encoding="utf-8")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.fix for s in slips if s.kind == "float-index"] == fixes

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from grader.package.python import check_syntax
@@ -208,3 +210,23 @@ def test_the_second_number_of_a_duration_counts_nanoseconds(tmp_path, pause, hz)
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "rate-number"]
     assert [s.message for s in slips] == [hz]
     assert all(("nanoseconds" in s.fix) == (pause.startswith("0, ")) for s in slips)
+
+
+@pytest.mark.parametrize(
+    ("line", "counts"),
+    [
+        ("n = n + 1", True),
+        ("n = (n + 1) % 128", True),
+        ("n = after(n)", True),
+        ("n = self.after(n)", True),
+        ("n = not n", True),
+        ("n = int(n)", False),
+        ("n = n.strip()", False),
+        ("n = n()", False),
+    ],
+)
+def test_what_counts_up_adds_something(line: str, counts: bool, tmp_path: Path) -> None:
+    text = f"pub = rospy.Publisher('n', Int8)\nn = 0\nwhile on():\n    {line}\n    pub.publish(n)\n"
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    kinds = [s.kind for s in check_syntax(tmp_path, ["a.py"]).slips]
+    assert ("added-first" in kinds) is counts

@@ -184,6 +184,8 @@ WITH_DATA = {
 }  # fmt: skip
 """Types of std_msgs whose value is in `data`."""
 ALWAYS, NEVER, UNKNOWN = "always", "never", "unknown"
+OTHERS_LIMIT = 10
+"""Callbacks of so many other topics are searched for what one keeps."""
 LEAVES = (ast.Return, ast.Raise)
 
 
@@ -298,6 +300,25 @@ class Printing:
                     )
                     fix = "print `%s` in %s" % (self.value, self.name)
                     return call.lineno, "printed-in-part", message % (call.lineno, min(kept)), fix
+        return self.kept_for_another(tree)
+
+    def kept_for_another(self, tree):
+        """What the callback keeps, and the callback of another topic prints, with what comes there."""
+        if not hasattr(tree, "all_callbacks"):  # each callback asks for them
+            taken = [argument(n, 2, "callback") for n in walk(tree) if called_name(n) == "Subscriber"]
+            names = dict.fromkeys(dotted(one).rpartition(".")[2] for given in taken for one in given)
+            tree.all_callbacks = [self.functions[name] for name in names if name in self.functions]
+        for other in tree.all_callbacks[:OTHERS_LIMIT]:
+            held = set(self.shared)
+            told = ast.walk(other) if other is not self.own else ()
+            for n in [n for n in told if isinstance(n, ast.Assign) or is_print(n)]:
+                names = {dotted(one) for one in ast.walk(n) if isinstance(one, (ast.Name, ast.Attribute))}
+                if isinstance(n, ast.Assign) and names & held:
+                    held.update(map(dotted, n.targets))
+                if is_print(n) and names & held:
+                    message = "line %d prints it only when `%s` is called, for a message of another topic"
+                    fix = "print `%s` in %s too" % (self.value, self.name)
+                    return n.lineno, "printed-in-part", message % (n.lineno, other.name), fix
         return None
 
     def silent(self, level):
@@ -330,6 +351,9 @@ class Printing:
             return None
         line, kind = call.lineno, "not-printed"
         fix = "on line %d, print `%s`" % (line, self.value)
+        if not any(call is getattr(one, "value", None) for one in self.body) and not late:
+            message = "no `print` or `log` in %s has the message's value in it" % self.name
+            return line, kind, message, "print `%s` on the first line of %s" % (self.value, self.name)
         if late:
             since = self.known[late[0]][0][0]
             message = "line %d prints `%s`, which gets the message's value only on line %d" % (

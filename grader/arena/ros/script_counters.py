@@ -5,6 +5,7 @@ a clock. Nothing is executed. Python 3.8, standard library only.
 """
 
 import ast
+import builtins
 
 from script_loops import turns
 from script_names import called_name, calls_in, dotted, functions_in, is_call, slip, text_of, walk
@@ -84,7 +85,16 @@ def is_increment(node, target, value):
     """Whether a name is given what it was before, and something more: `n += 1`, `n = (n + 1) % 128`."""
     if isinstance(node, ast.AugAssign):
         return isinstance(node.op, ast.Add) and isinstance(value, ast.Constant)
-    return any(dotted(part) == dotted(target) for part in ast.walk(value) if isinstance(part, type(target)))
+    parts = list(ast.walk(value))
+    called = {id(one.func): one.func for one in parts if isinstance(one, ast.Call)}
+    # `n = int(n)` and `String = String()` add nothing
+    adds = any(isinstance(one, (ast.BinOp, ast.UnaryOp)) for one in parts) or any(
+        dotted(one).startswith("self.") if isinstance(one, ast.Attribute) else not hasattr(builtins, one.id)
+        for one in called.values()
+        if isinstance(one, (ast.Attribute, ast.Name))
+    )
+    own = [one for one in parts if isinstance(one, type(target)) and id(one) not in called]
+    return adds and any(dotted(one) == dotted(target) for one in own)
 
 
 def counter_slips(tree):
@@ -275,6 +285,8 @@ RANDOM = {
     "getrandbits",
     "urandom",
 }
+TOPICS_LIMIT = 5
+"""Of so many topics, each that an `if` publishes on is told."""
 IFS_LIMIT = CALLS_LIMIT = 20
 """Of a loop, and of a file."""
 CLOCK_METHODS = {"to_sec", "to_nsec"}
@@ -313,23 +325,34 @@ def values_left_out(tree):
             chain = [n for part in [*one.body, *one.orelse] for n in calls_in(part, "publish")]
             if not chain:  # its condition publishes
                 continue
-            sent = [n for part in one.body for n in calls_in(part, "publish")] or chain
             inside = set(ast.walk(one))
             counted = {dotted(t) for n in ast.walk(loop) if n not in inside for t in increments(n)}
             outside = {ast.dump(n.func) for n in calls_in(loop, "publish") if n not in chain}
-            asks = names_in(one.test) & counted if counted else not calls_in(one.test, "is_shutdown")
-            if not asks or ast.dump(sent[0].func) in outside or publishes_always([one], sent[0]):
+            if not (names_in(one.test) & counted if counted else not calls_in(one.test, "is_shutdown")):
                 continue
-            lines = (sent[0].lineno, one.lineno)
-            message = "line %d publishes only under the condition on line %d" % lines
-            fix = "move line %d out of the `if` on line %d, so that it runs each time around the loop" % lines
-            if len(chain) > 1:
-                numbers = sorted({n.lineno for n in chain})
-                lines = (numbers[0], numbers[-1], one.lineno)
-                message = "lines %d to %d publish only under the conditions of the `if` on line %d" % lines
-                fix = "publish outside the `if` on line %d, so that it happens each time around the loop"
-                fix %= one.lineno
-            yield slip(sent[0].lineno, "published-in-part", message, fix=fix, name=source.topic(sent[0]))
+            sent = {}
+            for call in chain:
+                sent.setdefault(ast.dump(call.func), []).append(call)
+            for calls in [sent[func] for func in sent if func not in outside][:TOPICS_LIMIT]:
+                if not publishes_always([one], calls[0]):
+                    topic = source.topic(calls[0])
+                    yield from left_out(one, calls, topic, alone=len(chain) == 1)
+
+
+def left_out(one, calls, topic, *, alone):
+    """Yield that an `if` publishes on a topic in some turns; `alone` says whether that is all that it publishes."""
+    numbers = sorted({n.lineno for n in calls})
+    message = "line %d publishes only under the condition on line %d" % (numbers[0], one.lineno)
+    if len(calls) > 1:
+        lines = (numbers[0], numbers[-1], one.lineno)
+        message = "lines %d to %d publish only under the conditions of the `if` on line %d" % lines
+    elif not alone:
+        message = "line %d publishes only under a condition of the `if` on line %d" % (numbers[0], one.lineno)
+    fix = "publish outside the `if` on line %d, so that it happens each time around the loop" % one.lineno
+    if alone:
+        lines = (numbers[0], one.lineno)
+        fix = "move line %d out of the `if` on line %d, so that it runs each time around the loop" % lines
+    yield slip(numbers[0], "published-in-part", message, fix=fix, name=topic)
 
 
 def publishes_always(block, call):

@@ -474,7 +474,7 @@ ENDS = (ast.Break, ast.Return, ast.Raise)
 RAISING = ("wait_for_message", "wait_for_service")
 """Calls that end with an exception on Ctrl-C. `rate.sleep()` is none of them: by the real clock it sleeps on."""
 ASKS = "check `rospy.is_shutdown()` in it: `while not rospy.is_shutdown():`"
-ASKS_TOO = "on line %d, write ` and not rospy.is_shutdown()` before the colon"
+ASKS_TOO = "on line %d, write `and not rospy.is_shutdown()` before the colon"
 
 
 def deaf_loops(tree):

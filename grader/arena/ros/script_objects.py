@@ -10,6 +10,7 @@ import difflib
 
 from script_names import (
     CALL_BACK,
+    NAMED,
     TEXT_LIMIT,
     argument,
     bound_names,
@@ -284,6 +285,7 @@ def hidden_names(tree):
             functions.setdefault(node.name, []).append(node)
     imports = [(n, a) for n in walk(tree) if isinstance(n, ast.ImportFrom) for a in n.names]
     imported = {a.asname or a.name: "%s.%s" % (n.module, a.name) for n, a in imports}
+    yield from hidden_classes(tree, imported)
     for node in walk(tree):
         name = called_name(node)
         given = node.args[2:3] if name == "Subscriber" else []
@@ -302,6 +304,30 @@ def hidden_names(tree):
             yield slip(
                 node.lineno, "defined-twice", message % (classes[name].lineno, name), fix=fix, name=name
             )
+
+
+def hidden_classes(tree, imported):
+    """Yield the first message that takes the name of its class, which an import gives: `String = String()`."""
+    made = [n for n in walk(tree) if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)]
+    made = [
+        n for n in made if dotted(n.value.func) in imported and dotted(n.value.func) in map(dotted, n.targets)
+    ]
+    for node in made[:1]:
+        name = dotted(node.value.func)
+        classes = {id(n.func) for n in walk(tree) if isinstance(n, ast.Call)}
+        classes |= {
+            id(one) for n in walk(tree) if called_name(n) in NAMED for one in argument(n, 1, "data_class")
+        }
+        names = {n.id for n in walk(tree) if isinstance(n, ast.Name)}
+        other = next((one for one in ("msg", "message") if one not in names), "own_" + name.lower())
+        meant = [n for n in walk(tree) if getattr(n, "id", "") == name and id(n) not in classes]
+        lines = sorted({n.lineno for n in meant})
+        where = ", ".join(map(str, lines[:-1])) + " and %d" % lines[-1] if lines[1:] else "%d" % lines[0]
+        message = "line %d calls a message `%s`, and hides the class of that name" % (node.lineno, name)
+        given = "…" if node.value.args or node.value.keywords else ""
+        fix = "on line%s %s, call the message `%s`, as in `%s = %s(%s)`"
+        fix %= ("s" if lines[1:] else "", where, other, other, name, given)
+        yield slip(node.lineno, "hides-class", message, fix=fix, name=name)
 
 
 def queue_sizes(tree):

@@ -46,6 +46,7 @@ from script_names import (
     calls_in,
     dotted,
     graph_names,
+    key_of,
     misspelt,
     parents_of,
     slip,
@@ -184,7 +185,8 @@ IN_DEGREES = ("degrees", "rad2deg")
 
 
 def wrong_values(tree):
-    """Comparisons with NaN, angles in degrees of which a sine is taken, and answers of services that are dropped."""
+    """Comparisons with NaN, angles in degrees of which a sine is taken, answers of services that are dropped, and an
+    index that is a float."""
     made = [n for n in walk(tree) if isinstance(n, ast.Assign) and called_name(n.value) in IN_DEGREES]
     degrees = {dotted(target) for n in made for target in n.targets}
     for node in walk(tree):
@@ -204,6 +206,10 @@ def wrong_values(tree):
                 message = "`%s` takes radians, and gets degrees" % called_name(node)
                 fix = "leave out `degrees(…)`: the angle is already in radians"
                 yield slip(node.lineno, "wrong-value", message, fix=fix, name="degrees")
+        elif isinstance(node, ast.Subscript) and isinstance(getattr(key_of(node), "op", None), ast.Div):
+            message = "`/` makes a float, also of whole numbers, and an index is a whole number"
+            fix = "on line %d, write `//` instead of `/` in the index" % node.lineno
+            yield slip(node.lineno, "float-index", message, fix=fix, name=dotted(node.value))
         elif isinstance(node, ast.Expr) and called_name(node.value).endswith("Response"):
             name = called_name(node.value)
             fix = "write `return %s(…)`" % name
@@ -302,7 +308,10 @@ def imports(tree):
     """Imports of what nothing in the script uses, and of modules that this Python does not find; the standard library's
     and rospy are there and cost nothing."""
     names = [n for n in walk(tree) if isinstance(n, ast.Name)]
-    used = {n.id for n in names} - {n.id for n in names if isinstance(n.ctx, ast.Store)}
+    hidden = {n.id for n in names if isinstance(n.ctx, ast.Store)}
+    # `String = String()` reads the import, or was meant to
+    hidden -= {called_name(n.value) for n in walk(tree) if isinstance(n, ast.Assign)}
+    used = {n.id for n in names} - hidden
     tried = {id(n) for one in walk(tree) if isinstance(one, ast.Try) for n in ast.walk(one)}
     found = [n for n in walk(tree) if isinstance(n, (ast.Import, ast.ImportFrom)) and id(n) not in tried]
     for node in found[:IMPORTS_LIMIT]:

@@ -277,12 +277,14 @@ def syntax_fault(error, data):
     lines = io.StringIO(data.decode(encoding), newline=None).read().split("\n")
     line = getattr(error, "lineno", None)
     known = line is not None and 0 < line <= len(lines)
-    braced = next(
-        (n for n in range(line or 0) if len(lines[n]) <= TEXT_LIMIT and BRACE.match(lines[n])), None
+    # within brackets, Python trips over a line below git's marker
+    strange = (
+        n for n in range(line or 0) if MARKER.match(lines[n]) or BRACE.match(lines[n][: TEXT_LIMIT + 1])
     )
-    if known and braced is not None:
-        at = lines[braced].index("{") + 1
-        return fault("SyntaxError", braced + 1, at, "invalid syntax", text=lines[braced])
+    first = next(strange, None) if known else None
+    if first is not None and lines[first][:1] not in "=>|":
+        at = lines[first].find("{") + 1 or 1
+        return fault("SyntaxError", first + 1, at, "invalid syntax", text=lines[first])
     head = commented_head(lines, line) if known and "unexpected indent" in str(error) else None
     if head is not None:
         at, text = lines[head].index("#") + 1, lines[head]

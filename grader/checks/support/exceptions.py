@@ -298,7 +298,8 @@ def _no_number(message: str, source: str) -> Meaning | None:
     ):  # rospy's own words, of a service's request
         return "this is the whole message", "take its field, as in `msg.data`"
     if re.search(r" of (?:'str' and '(?:int|float)|'(?:int|float)' and 'str)'", message):
-        return "text is compared with a number", "turn the text into a number first, or leave out `str(…)`"
+        other = "leave out `str(…)`" if "str(" in source else "compare it with a text"
+        return "text is compared with a number", f"turn the text into a number first, or {other}"
     if wanted := _WANTS_NUMBER.search(message):
         hint = "write %s for %d or %f" if "%" in source else "turn the text into a number: `float(…)`"
         return f"a number is needed here, but it is of the type {wanted[1] or wanted[2]}", hint

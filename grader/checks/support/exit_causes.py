@@ -399,13 +399,15 @@ def _of_broken_machine(found: Traceback, broken: str, place: FileCitation | None
 
 def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
     """Return the cause and the hint of an error that other lines of the file explain."""
+    own = [s for s in package.slips if s.file == place.file]
+    said = f"{found.message} {found.own_frames[-1].source}"
+    hidden = [s for s in own if s.kind == "hides-class" and re.search(rf"\b{s.name}\b", said)]
+    if found.kind == "TypeError":
+        hidden += [s for s in own if (s.kind, s.line) == ("defined-twice", place.line)]
+    if hidden and found.kind in {"TypeError", "UnboundLocalError", "ValueError"}:
+        return hidden[0].message, hidden[0].fix
     if found.kind in {"NameError", "UnboundLocalError"}:
         return _misspelt(found, place, package)
-    hidden = (
-        s for s in package.slips if (s.kind, s.file, s.line) == ("defined-twice", place.file, place.line)
-    )
-    if found.kind == "TypeError" and (slip := next(hidden, None)):
-        return slip.message, slip.fix
     if found.kind == "AttributeError" or "missing 1 required positional argument: 'self'" in found.message:
         here = (
             s
