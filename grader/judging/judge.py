@@ -306,7 +306,8 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
             package, run = facts.package_of(criterion), asked.get("run")
             for explain in EXPLANATIONS:
                 found = explain(check, package, run, found)
-            found = explain_by_build(package, facts.runs.get(PACKAGE_RUN), found)
+            asked_for = [s.script for s in facts.rubric.starts_of(criterion) if s.script]
+            found = explain_by_build(package, facts.runs.get(PACKAGE_RUN), found, asked_for)
         found = fill_slots(choose_hint_language(found, criterion, facts), criterion, facts.rubric)
         found = _with_package_name(name_other_lines(found, facts), criterion, facts)
         return _without_git(found, facts.package)

@@ -114,11 +114,8 @@ class Requirements:
 
     def _is_compiled(self, criterion: Criterion) -> bool:
         """Return whether it is about a program that only a build makes: a script runs from its source."""
-        scenario = self._rubric.scenarios.get(criterion.scenario or "")
-        starts = scenario.start if scenario is not None else ()
-        process = str(criterion.parameters.get("process")).partition("/")[0]
-        about = [start for start in starts if start.name == process and not start.is_rostest] or starts
-        return any(start.built or (start.script and not PurePath(start.script).suffix) for start in about)
+        starts = self._rubric.starts_of(criterion)
+        return any(start.built or (start.script and not PurePath(start.script).suffix) for start in starts)
 
 
 def _graph_names(criterion: Criterion) -> set[str]:

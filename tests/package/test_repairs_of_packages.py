@@ -381,6 +381,10 @@ CASES = {
         ["build-line"] * 2, "write geometry_msgs after DEPENDENCIES",
         after={CMAKELISTS: "DEPENDENCIES geometry_msgs std"},
     ),
+    "own-message-with-a-header-that-another-package-brings": Case(
+        {**OWN, "msg/Level.msg": "Header header\ngeometry_msgs/Point at\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES geometry_msgs)\ncatkin_p")}, [],
+    ),
     "messages-of-no-definition": Case(
         {CMAKELISTS: CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES std_msgs)\ncatkin_p")}, ["build-line"],
         "delete line 4, generate_messages(…)", after={CMAKELISTS: "rospy)\n\ncatkin_package()"},

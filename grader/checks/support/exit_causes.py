@@ -194,6 +194,7 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
 
 
 NO_PROGRAM = re.compile(r"cannot launch node of type \[([^/\]]+)/([^\]]+)\]: Cannot locate node")
+UNKNOWN_PACKAGE = re.compile(r"cannot launch node of type \[([^/\]]+)/[^\]]+\]: \1$")
 MAKES_NODES = {
     "init_node": "node-name",
     "Publisher": "publisher",
@@ -211,6 +212,9 @@ def _ran_to_the_end(printed: Sequence[str]) -> Ending:
         cause = f"roslaunch finds no program {shown(found[2])} in the package {shown(found[1])}"
         near = near_names(found[2], PROGRAMS_OF.get(found[1], ()))
         return Ending(cause, f'write type="{near[0]}"' if near else programs_hint(found[1]))
+    if found := next(filter(None, map(UNKNOWN_PACKAGE.search, printed)), None):
+        hint = "write the name of the package that has the program as pkg"
+        return Ending(f"roslaunch finds no package {shown(found[1])}", hint)
     hint = f"a node has to stay alive: `{SPIN}`, or a loop `{LOOP}`"
     if not PRINTED_ERROR.search(last):
         return Ending("its script ran to the end", hint, by_itself=True)

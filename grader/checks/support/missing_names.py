@@ -14,7 +14,14 @@ from typing import NamedTuple
 from grader.checks.support.console_output import Traceback
 from grader.checks.support.exceptions import SLIPS
 from grader.checks.support.rospy_calls import fields_of
-from grader.checks.support.scripts import OF_FILES, SYNTAX, cmake_calls, is_product, path_in_package
+from grader.checks.support.scripts import (
+    BUILD_FIRST_HINT,
+    OF_FILES,
+    SYNTAX,
+    cmake_calls,
+    is_product,
+    path_in_package,
+)
 from grader.checks.support.text import near_names, shown
 from grader.installable import (
     PYTHON_2,
@@ -173,7 +180,7 @@ def unmade(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
         hint = f"write the definition in {asked[1]}/, and list it in add_{kind}_files(…)"
         return f"the package has no .{asked[1]} file to build it from", hint
     whose = "the package's own messages" if maker is package else f"the messages of {maker.name}"
-    hint = "first get the build to pass: catkin_make"
+    hint = BUILD_FIRST_HINT
     if maker.file(CMAKE) is None:
         hint = f"first add the {CMAKE} that `catkin_create_pkg` writes. In it, {_listing(maker.interfaces)}"
         hint += ", and call generate_messages(…)"
