@@ -143,12 +143,24 @@ def judge_build(package: PackageFacts, build: Run) -> Verdict:
 
 
 def explain_by_build(
-    package: PackageFacts | None, build: Run | None, verdict: Verdict, asked: Sequence[str] = ()
+    package: PackageFacts | None,
+    build: Run | None,
+    verdict: Verdict,
+    asked: Sequence[str] = (),
+    beside: Sequence[str] = (),
 ) -> Verdict:
     """Return a loss of what the build alone makes as `inconclusive` where the machine is why it was not built, and one
-    of what is not there, of all that was `asked` for, with its name."""
+    of what is not there, of all that was `asked` for, with its name. So is a loss `beside` which a program did not
+    run."""
     if verdict.hint == NO_SCRIPT_HINT and package is not None:
         verdict = _name_missing(package, build, verdict, asked)
+    elif (
+        beside and package is not None and verdict.status.is_lost and not (verdict.unjudged or verdict.cause)
+    ):
+        one = _name_missing(package, build, unjudged("there is no script to run"), beside)
+        if one.unbuilt:
+            message = f"{verdict.message}; {one.message}, which runs beside it"
+            verdict = one.model_copy(update={"message": message}).about(expected=verdict.expected)
     if not (verdict.unbuilt and verdict.status.is_lost) or package is None or build is None:
         return verdict
     built = judge_build(package, build)

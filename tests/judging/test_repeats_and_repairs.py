@@ -672,3 +672,27 @@ def test_a_copy_of_a_script_that_is_not_the_one_that_runs_explains_nothing() -> 
     files = ("src/numeric_talker.py", "old/numeric_talker.py", "src/other.py")
     package = complete_facts({"files": [{"path": path} for path in files]})
     assert never_run(package, rubric(*ALL)) == {"old/numeric_talker.py"}
+
+
+def test_what_runs_beside_a_program_that_was_not_built_is_left_open() -> None:
+    tf = 'CMake Error: Could not find a package configuration file provided by "tf" with any of the following'
+    package = {
+        "name": "lab1",
+        "files": [SCRIPT, {"path": "src/mean.cpp"}, {"path": "CMakeLists.txt"}],
+        "manifest": {},
+        "cmake": {"calls": [["add_executable", "mean", "src/mean.cpp"]]},
+    }
+    scenario = {**SCENARIO, "start": [*SCENARIO["start"], {"name": "mean", "script": "mean"}]}
+    done = {
+        "id": "done",
+        "check": "prints",
+        "with": {"process": "talker", "text": "done"},
+        "scenario": "talker",
+    }
+    said = [{"process": "talker", "line": "waiting"}]
+    runs = build_runs({"runs": {"talker": {**GOOD_RUN, "console": said}}, "package": package})
+    for exit_code, status in ((1, "inconclusive"), (0, "fail")):
+        runs |= built(package, exit_code=exit_code, said=[tf] if exit_code else [])
+        (found,) = judge(rubric(done, scenarios={"talker": scenario}), runs)
+        assert found.status.value == status
+        assert ("did not make the program mean, which runs beside it" in found.message) == bool(exit_code)

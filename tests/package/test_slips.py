@@ -27,6 +27,16 @@ pytestmark = pytest.mark.usefixtures("without_processes")
         ("x = math.cos(math.radians(a))\n", None),
         ("def f(req):\n    AddResponse(sum=1)\n", ("return", "write `return AddResponse(…)`")),
         ("def f(req):\n    return AddResponse(sum=1)\n", None),
+        (
+            "def f(req):\n    a = AddResponse()\n    s = req.a\n    return a\n",
+            ("empty", "set it above the `return`: `a.<field> = …`"),
+        ),
+        ("def f(req):\n    a = AddResponse()\n    a.sum = req.a\n    return a\n", None),
+        ("def f(req):\n    a = AddResponse()\n    fill(a)\n    return a\n", None),
+        (
+            "def f(req):\n    a = AddResponse()\n    if req.a:\n        return AddResponse(1)\n    return a\n",
+            None,
+        ),
     ],
 )
 def test_values_that_are_none(text: str, said: tuple[str, str] | None, tmp_path: Path) -> None:

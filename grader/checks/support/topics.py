@@ -417,7 +417,7 @@ def is_unexplained(check: Check, verdict: Verdict) -> bool:
     return check.of_callbacks and verdict.status.is_lost and not verdict.cause
 
 
-SEEN_AS = {"nan": "nan", "degrees": "value", "return": "nothing"}
+SEEN_AS = {"nan": "nan", "degrees": "value", "return": "nothing", "empty": "value"}
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so."""
 
 
