@@ -186,7 +186,7 @@ def charged_verdict(
         clauses = [clause for clause in clauses if any(_is_told(one, clause) for one in told)]
     hints = clauses + advice_on(one for one in repairs if one not in told)
     said = verdict.message
-    unsaid = [one for one in repairs if PurePosixPath(one.file).name not in said]
+    unsaid = [one for one in repairs if one.kind == "node-name" or PurePosixPath(one.file).name not in said]
     words = [said, *(one for one in messages_of(unsaid) if (_PLACE.sub("", one) or one) not in said)]
     is_new = not copy.hint or not set(copy.hint.split("; ")) <= set(hints)
     if further:
