@@ -174,7 +174,8 @@ def _fits(line: Line, params: PrintsParams) -> bool:
 def _not_printed(
     one: Life, lines: Sequence[Line], package: PackageFacts, run: Run, params: PrintsParams
 ) -> Verdict:
-    other = [line for line in lines if any(params.found_in(line))]
+    refused = any(OTHER_DEFINITION in line.text for line in lines)  # no number in that line is an answer
+    other = [line for line in lines if any(params.found_in(line)) and not refused]
     hint = f"print {params.words} where it happens"
     failing = one.ended_early and (one.end is None or one.end.exit_code != 0)
     asked = _asked_services(one, run)
@@ -267,6 +268,10 @@ def _unserved(
     asked: Mapping[str, bool], lacking: str, own: Sequence[Line], run: Run, never: str
 ) -> Verdict | None:
     """Of a client: what its service does wrong, or that it asks for another one, or before a node offers it."""
+    if any(OTHER_DEFINITION in line.text for line in own):
+        hint = "give the .srv file the handout's fields, in their order and with their types, and build again"
+        why = "its call failed, as the service has another definition of that type"
+        return unjudged(f"{never}: {why}", hint=hint)
     for said, wrong in WRONG_ANSWERS.items():
         if any(said in line.text for line in own):
             hint = "end the service's callback with `return …Response(…)`"
@@ -364,6 +369,7 @@ def callbacks_clean(package: PackageFacts, run: Run, params: CallbacksCleanParam
 
 
 ALIKE = 0.7
+OTHER_DEFINITION = "md5sums do not match"
 WRONG_ANSWERS = {
     "service handler returned None": "nothing",
     "handler returned wrong number of values": "something that is not a response",

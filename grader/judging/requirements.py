@@ -79,7 +79,8 @@ class Requirements:
         if not verdict.status.is_lost or is_unmade(verdict):
             return False  # a program that the build did not make is no reason for the build to fail
         named = verdict.unjudged and any(text in found.message for text in _paths(self._criteria[required]))
-        if same_run and found.cause not in {"", verdict.cause} and not named and not same_line:
+        unbuilt = found.unbuilt and verdict.unbuilt
+        if same_run and found.cause not in {"", verdict.cause} and not (named or same_line or unbuilt):
             return False  # its process ended of something else
         if verdict.unjudged:
             return True

@@ -542,3 +542,20 @@ def test_names_that_ros_is_given_without_quotes(tmp_path, code, fixes):
 def test_every_kind_is_described() -> None:
     rows = re.findall(r"^- (`.*?`):", inspect.getdoc(PythonSlip) or "", re.MULTILINE)
     assert sorted(re.findall(r"`([\w-]+)`", " ".join(rows))) == sorted(get_args(SlipKind))
+
+
+@pytest.mark.parametrize(
+    ("text", "fixes"),
+    [
+        ("    if g.n < 0:\n        s.set_aborted(r)\n    s.set_succeeded(r)\n", ["below line 3, write `return`"]),
+        ("    while n:\n        if s.is_preempt_requested():\n            s.set_preempted()\n        n -= 1\n",
+         ["below line 4, write `return`"]),
+        ("    if g.n < 0:\n        s.set_aborted(r)\n        return\n    s.set_succeeded(r)\n", []),
+        ("    if g.n < 0:\n        s.set_aborted(r)\n    else:\n        s.set_succeeded(r)\n", []),
+        ("    if ok:\n        s.set_succeeded(r)\n    print('done')\n", []),
+        ("    if stop:\n        s.set_preempted()\n        ok = False\n    if ok:\n        s.set_succeeded(r)\n", []),
+    ],
+)  # fmt: skip
+def test_callbacks_that_go_on_after_their_goal(text: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"def do(g):\n{text}", encoding="utf-8")
+    assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "goes-on"] == fixes

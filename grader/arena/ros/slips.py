@@ -96,7 +96,7 @@ def slips(tree):
         queue_sizes, graph_names, object_slips, said_texts, deaf_loops, clock_values, counter_slips,
         counter_starts, without_effect, assigned_late, hidden_names, subscribed_again, imports, taken_off,
         unstarted_servers, wrong_values, unprinted_messages, values_left_out, published_unchanged,
-        unused_publishers, loops_of_numbers,
+        unused_publishers, loops_of_numbers, finished_goals,
     )  # fmt: skip
     for find in finders:
         found += find(tree)
@@ -226,6 +226,30 @@ def unfilled_answer(function):
     uses = [n for n in own if isinstance(n, ast.Name) and n.id == variable]
     is_alone = returned == {variable} and len(uses) == 1 + sum(isinstance(n, ast.Return) for n in own)
     return (variable, called_name(made[0].value)) if variable and is_alone else None
+
+
+FINISHING = ("set_succeeded", "set_aborted", "set_preempted", "set_rejected")
+
+
+def finished_goals(tree):
+    """Where an `if` of an action's callback ends the goal last of all, and the callback goes on below it."""
+    parents = parents_of(tree)
+    for node in walk(tree):
+        if not isinstance(node, ast.If) or node.orelse or not is_call_alone(node.body[-1]):
+            continue
+        call, around = node.body[-1].value, parents.get(node)
+        block = getattr(around, "body", [])
+        below = block[block.index(node) + 1 :] if isinstance(block, list) and node in block else []
+        more = any(calls_in(one, *FINISHING) or is_loop(one) for one in below)
+        if called_name(call) in FINISHING and (more or is_loop(around)):
+            what = "loop" if is_loop(around) else "callback"
+            message = "the goal is over with `%s(…)`, and the %s goes on" % (called_name(call), what)
+            fix = "below line %d, write `return`" % node.body[-1].end_lineno
+            yield slip(call.lineno, "goes-on", message, fix=fix, name=called_name(call))
+
+
+def is_loop(node):
+    return isinstance(node, (ast.While, ast.For))
 
 
 def is_nan(node):

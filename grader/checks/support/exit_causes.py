@@ -42,11 +42,13 @@ from grader.checks.support.rospy_calls import (
     wrong_class,
 )
 from grader.checks.support.scripts import (
+    BUILD_FIRST_HINT,
     OF_INTERFACES,
     SYNTAX,
     copies_of,
     move_hint,
     path_in_package,
+    programs,
     without_git,
 )
 from grader.checks.support.text import LOOP, RATE_SLOT, SPIN, VALUE_SLOT, near_names, shown
@@ -186,7 +188,7 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
         said = (known for line in printed for text, known in OF_ROSCPP.items() if text in line)
         return Ending(*next(said, (f"{signal_name(life.end.signal)} ended it", RUN_IT)))
     if code == 0:
-        return _not_run(life, run, package) or _ran_to_the_end(printed)
+        return _not_run(life, run, package) or _ran_to_the_end(printed, package)
     exceptions = [line for line in printed if line.startswith("RLException: ")]
     last = next(iter(exceptions or printed[::-1]), "")
     words = f"; its last output: {shown(last)}" if last else ""
@@ -205,11 +207,14 @@ MAKES_NODES = {
 """Calls, and the kind of slip that there is where the script has one of them that is not in a comment."""
 
 
-def _ran_to_the_end(printed: Sequence[str]) -> Ending:
+def _ran_to_the_end(printed: Sequence[str], package: PackageFacts) -> Ending:
     """Explain it by what was printed last, where an `except` may have printed it."""
     last = printed[-1] if printed else ""
     if found := next(filter(None, map(NO_PROGRAM.search, printed)), None):
         cause = f"roslaunch finds no program {shown(found[2])} in the package {shown(found[1])}"
+        if found[1] == package.name and any(one.is_called(found[2]) for one in programs(package)):
+            cause = f"the build did not make the program {shown(found[2])}"
+            return Ending(cause, BUILD_FIRST_HINT, unbuilt=True)
         near = near_names(found[2], PROGRAMS_OF.get(found[1], ()))
         return Ending(cause, f'write type="{near[0]}"' if near else programs_hint(found[1]))
     if found := next(filter(None, map(UNKNOWN_PACKAGE.search, printed)), None):

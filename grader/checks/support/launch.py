@@ -264,11 +264,13 @@ def _unset_args(text: str, package: PackageFacts) -> Absence | None:
     return Absence(why, hint, citations=tuple(dict.fromkeys(cited)))
 
 
-def unset_arg_fixes(file: LaunchFile, told: str) -> Iterator[str]:
-    """Yield what to write for each argument of the file that has no value, and that is not told yet."""
+def unset_arg_fixes(file: LaunchFile, told: str, given: Iterable[str] = ()) -> Iterator[str]:
+    """Yield what to write for each argument of the file that has no value, that is not `given` on the command line
+    (`a:=5`), and that is not told yet."""
+    names = {word.partition(":=")[0] for word in given}
     for arg in file.unset_args:
         written = f'<arg name="{arg.name}" default="…"/>'
-        if written not in told:
+        if written not in told and arg.name not in names:
             yield (
                 f"on line {arg.line} of {arg.file} write {written}"
                 if arg.declared

@@ -281,7 +281,8 @@ def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | 
 
 
 def _module_of_others(name: str, package: PackageFacts) -> tuple[str, str] | None:
-    """Return the cause and the hint for a module of ROS 2, of Windows, of Python 2, or of a tutorial's package."""
+    """Return the cause and the hint for a module of ROS 2, of Windows, of Python 2, of a tutorial's package, or for a
+    folder."""
     if name in ROS_2:
         return f"{name} is from ROS 2", "this lab is for ROS 1: write the node with rospy"
     if name in WINDOWS:
@@ -291,6 +292,9 @@ def _module_of_others(name: str, package: PackageFacts) -> tuple[str, str] | Non
     if name in TUTORIALS - {package.name}:
         fix = f"write your package's name instead of {name}, or leave the line out"
         return "tutorials use that name for the reader's own package", fix
+    if any(file.path.startswith(f"{name}/") for file in package.files):
+        why = f"{name}/ is a folder of the package, and Python looks for modules in the script's own folder"
+        return why, "put the module's file into the folder of the script, and import it by its own name"
     return None
 
 
@@ -481,7 +485,7 @@ def lacking_module(found: Traceback, package: PackageFacts) -> str:
     match = NO_MODULE.search(found.message) if found.kind == "ModuleNotFoundError" else None
     # roslib.load_manifest, which rosbuild needed, asks for the ROS package itself
     name = found.message if found.kind == "ResourceNotFound" else match[1] if match else ""
-    own = package.own_modules
+    own = {*package.own_modules, *(file.path.partition("/")[0] for file in package.files if "/" in file.path)}
     sure = found.kind == "ResourceNotFound" or (bool(found.frames) and found.frames[-1].in_library)
     known = name in known_packages() or not is_module(name, package)
     lacks = exists_somewhere(name, own) and (known or not sure)
