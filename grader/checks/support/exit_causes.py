@@ -18,7 +18,7 @@ from grader.checks.support.exceptions import (
     explain_number_of_values,
     explain_operand,
 )
-from grader.checks.support.launch_slips import PROGRAMS_OF, programs_hint
+from grader.checks.support.launch_slips import unfound_program
 from grader.checks.support.missing_names import (
     IMPORT_ERRORS,
     broken_import,
@@ -48,10 +48,9 @@ from grader.checks.support.scripts import (
     copies_of,
     move_hint,
     path_in_package,
-    programs,
     without_git,
 )
-from grader.checks.support.text import LOOP, RATE_SLOT, SPIN, VALUE_SLOT, near_names, shown
+from grader.checks.support.text import LOOP, RATE_SLOT, SPIN, VALUE_SLOT, shown
 from grader.evidence.events import STOPPED
 from grader.evidence.run import Run
 from grader.installable import (
@@ -63,7 +62,7 @@ from grader.model.package import Fault, PackageFacts, SourceFile
 from grader.model.python_slip import PythonSlip
 from grader.model.verdict import Citations, FileCitation, Span, Verdict, machine_lacks
 from grader.syntax_fixes import COMMENTED_OUT, corrected, without_brace
-from grader.wording import join_words
+from grader.wording import join_words, plural
 
 OTHER_NAMES_SHOWN = 3
 """Names of the same script that are not defined either."""
@@ -192,11 +191,16 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
     exceptions = [line for line in printed if line.startswith("RLException: ")]
     last = next(iter(exceptions or printed[::-1]), "")
     words = f"; its last output: {shown(last)}" if last else ""
-    return Ending(f"it exited with code {code}{words}", RUN_IT)
+    given = [one for one in life.start.argv[1:] if ":=" not in one]
+    hint = RUN_IT
+    if given and re.search(r"\busage\b", last, re.IGNORECASE):
+        words += f"; it was given {plural(len(given), 'argument')} ({shown(' '.join(given))})"
+        hint = (
+            f"compare argc, or len(sys.argv) in Python, with {len(given) + 1}: the program's name counts too"
+        )
+    return Ending(f"it exited with code {code}{words}", hint)
 
 
-NO_PROGRAM = re.compile(r"cannot launch node of type \[([^/\]]+)/([^\]]+)\]: Cannot locate node")
-UNKNOWN_PACKAGE = re.compile(r"cannot launch node of type \[([^/\]]+)/[^\]]+\]: \1$")
 MAKES_NODES = {
     "init_node": "node-name",
     "Publisher": "publisher",
@@ -210,16 +214,8 @@ MAKES_NODES = {
 def _ran_to_the_end(printed: Sequence[str], package: PackageFacts) -> Ending:
     """Explain it by what was printed last, where an `except` may have printed it."""
     last = printed[-1] if printed else ""
-    if found := next(filter(None, map(NO_PROGRAM.search, printed)), None):
-        cause = f"roslaunch finds no program {shown(found[2])} in the package {shown(found[1])}"
-        if found[1] == package.name and any(one.is_called(found[2]) for one in programs(package)):
-            cause = f"the build did not make the program {shown(found[2])}"
-            return Ending(cause, BUILD_FIRST_HINT, unbuilt=True)
-        near = near_names(found[2], PROGRAMS_OF.get(found[1], ()))
-        return Ending(cause, f'write type="{near[0]}"' if near else programs_hint(found[1]))
-    if found := next(filter(None, map(UNKNOWN_PACKAGE.search, printed)), None):
-        hint = "write the name of the package that has the program as pkg"
-        return Ending(f"roslaunch finds no package {shown(found[1])}", hint)
+    if found := unfound_program(printed, package):
+        return Ending(*found, unbuilt=found[1] == BUILD_FIRST_HINT)
     hint = f"a node has to stay alive: `{SPIN}`, or a loop `{LOOP}`"
     if not PRINTED_ERROR.search(last):
         return Ending("its script ran to the end", hint, by_itself=True)
