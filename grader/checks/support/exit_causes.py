@@ -191,13 +191,10 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
     exceptions = [line for line in printed if line.startswith("RLException: ")]
     last = next(iter(exceptions or printed[::-1]), "")
     words = f"; its last output: {shown(last)}" if last else ""
-    given = [one for one in life.start.argv[1:] if ":=" not in one]
-    hint = RUN_IT
+    hint, given = RUN_IT, [one for one in life.start.argv[1:] if ":=" not in one]
     if given and re.search(r"\busage\b", last, re.IGNORECASE):
         words += f"; it was given {plural(len(given), 'argument')} ({shown(' '.join(given))})"
-        hint = (
-            f"compare argc, or len(sys.argv) in Python, with {len(given) + 1}: the program's name counts too"
-        )
+        hint = f"compare argc, or len(sys.argv), with {len(given) + 1}: the program's name counts too"
     return Ending(f"it exited with code {code}{words}", hint)
 
 

@@ -425,26 +425,18 @@ def explain_by_wrong_value(
     check: Check, package: PackageFacts | None, run: object, verdict: Verdict
 ) -> Verdict:
     """Return a lost mark with the line of a script that runs on which the value goes wrong."""
-    if package is None or not isinstance(run, Run):
+    if package is None or not isinstance(run, Run) or not verdict.status.is_lost:
         return verdict
-    files = _files_that_run(package, run)
-    ended = next((s for s in package.slips if s.kind == "goes-on" and s.file in files), None)
-    twice = ended is not None and any(GOAL_IS_OVER in c.line for _, c in run.console)
-    if ended is not None and twice and check.name == "action-result" and verdict.status.is_lost:
-        why = f"line {ended.line} of {ended.file}: {ended.message}"
-        return verdict.explained(why, ended.fix, (ended.place,))
-    if not is_unexplained(check, verdict):
-        return verdict
-    found = (s for s in package.slips if s.kind == "wrong-value" and s.file in files)
-    slip = next((s for s in found if SEEN_AS[s.name] == verdict.wrong), None)
-    if slip is None:
-        return verdict
-    why = f"line {slip.line} of {slip.file}: {slip.message}"
-    return verdict.explained(why, slip.fix, (slip.place,), cause=slip.message)
+    files, kinds = _files_that_run(package, run), ["wrong-value"] * is_unexplained(check, verdict)
+    if check.name == "action-result" and any("To transition to a" in c.line for _, c in run.console):
+        kinds.append("goes-on")  # actionlib was told to end a goal that is over
+    found = [s for s in package.slips if s.kind in kinds and s.file in files]
+    for slip in (s for s in found if s.kind == "goes-on" or SEEN_AS[s.name] == verdict.wrong):
+        why = f"line {slip.line} of {slip.file}: {slip.message}"
+        return verdict.explained(why, slip.fix, (slip.place,), cause=slip.message)
+    return verdict
 
 
-GOAL_IS_OVER = "To transition to a"
-"""How actionlib begins to say that a goal that is over already is ended again."""
 OF_RESULTS = ("prints", "rostest")
 """Checks of what comes of callbacks in the end."""
 
