@@ -208,15 +208,15 @@ def wrong_values(tree):
                 name="return",
             )
         elif isinstance(node, ast.FunctionDef) and unfilled_answer(node):
-            variable, name = unfilled_answer(node)
+            variable, name, line = unfilled_answer(node)
             message = "no field of the `%s` that is returned is ever set" % name
             fix = "set it above the `return`: `%s.<field> = …`" % variable
-            yield slip(node.lineno, "wrong-value", message, fix=fix, name="empty")
+            yield slip(line, "wrong-value", message, fix=fix, name="empty")
 
 
 def unfilled_answer(function):
-    """Return the variable and the class of an answer that a callback makes without values, sets nothing of and always
-    returns; None where there is none."""
+    """Return the variable, the class and the line of an answer that a callback makes without values, sets nothing of,
+    and always returns; None where there is none."""
     own = list(walk_own(function))
     made = [n for n in own if isinstance(n, ast.Assign) and called_name(n.value).endswith("Response")]
     made = [n for n in made if not n.value.args + n.value.keywords and isinstance(n.targets[0], ast.Name)]
@@ -225,7 +225,7 @@ def unfilled_answer(function):
     # its name stands where it is made and returned, and nowhere else: `answer.sum` would be one more
     uses = [n for n in own if isinstance(n, ast.Name) and n.id == variable]
     is_alone = returned == {variable} and len(uses) == 1 + sum(isinstance(n, ast.Return) for n in own)
-    return (variable, called_name(made[0].value)) if variable and is_alone else None
+    return (variable, called_name(made[0].value), made[0].lineno) if variable and is_alone else None
 
 
 FINISHING = ("set_succeeded", "set_aborted", "set_preempted", "set_rejected")
