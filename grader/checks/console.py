@@ -215,7 +215,8 @@ def _unseen(one: Life, package: PackageFacts, run: Run, params: PrintsParams, ne
     """Return the loss where a launch file brings nothing up, or a node of it prints the text, and roslaunch writes that
     to a file."""
     started = {PurePosixPath(word).name for word in one.start.argv}
-    if "roslaunch" in started and run.graph and not nodes_of(run, one.name):
+    refused = any("cannot launch node of type" in line.line for _, line in run.lines(one.name))
+    if refused and run.graph and not nodes_of(run, one.name):
         return unjudged(
             f"{never}: none of the launch file's nodes came up", hint="read what roslaunch prints"
         )
