@@ -22,6 +22,7 @@ from grader.judging.repeats_and_repairs import (
     is_used_by,
     launched_in,
     needs_build,
+    never_run,
     programs_of_build,
 )
 from grader.model.package import MANIFEST, PackageFacts
@@ -99,6 +100,8 @@ def most_of(helping: Sequence[Repair]) -> list[Repair]:
 def _find_in_all(submission: Submission, facts: PackageFacts, rubric: Rubric) -> list[Repair]:
     """Return the repairs of all of the lab's packages, with paths from the main one."""
     found = list(find_repairs(submission.package.folder, facts, wanted_of(rubric)))
+    never = never_run(facts, rubric)
+    found = [one for one in found if one.file not in never]
     for package, own in zip(submission.also, facts.views()[1:], strict=True):
         way = facts.way_to(own)
         found += [

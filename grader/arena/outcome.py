@@ -39,7 +39,8 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
             return "complete", ""
     elif now_s - live.started_s > until.limit_s:
         return "complete", f"watched for {until.limit_s:g} s"
-    silent = "" if still_starting else _silent(live, until, now_s) or _never(live, until, given, now_s)
+    wanting = still_starting or (bool(until.ended) and has_goal(live))
+    silent = "" if wanting else _silent(live, until, now_s) or _never(live, until, given, now_s)
     silent = silent or _in_namespaces(live, until, now_s)
     if silent:
         return "silent", silent
@@ -261,6 +262,14 @@ def _never(live: RunState, until: Until, given: Until, now_s: float) -> str:
         missing = min(absent, default="")
         return f"the graph has settled, without {missing}" if missing else "the graph has settled"
     return ""
+
+
+def has_goal(live: RunState) -> bool:
+    """Return whether an action's server, which tells its status again and again, has a goal that has no result yet:
+    whoever waits for that neither works nor sends until then."""
+    counts = {topic: seen.count for topic, seen in live.topics.items() if seen.count}
+    servers = [topic.removesuffix("/status") for topic in counts if topic.endswith("/status")]
+    return any(counts.get(f"{name}/goal", 0) > counts.get(f"{name}/result", 0) for name in servers)
 
 
 def _in_namespaces(live: RunState, until: Until, now_s: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple
@@ -9,11 +10,16 @@ from typing import NamedTuple
 from grader.checks.registry import NoParams, check
 from grader.checks.support.build_errors import UNKNOWN_COMMAND, explain_error_of_build
 from grader.checks.support.build_output import FIRST_ERROR_HINT, first_error
+from grader.checks.support.cpp_errors import CPP_SUFFIXES
 from grader.checks.support.exit_causes import RUN_IT, explain_end
 from grader.checks.support.launch import IGNORE
-from grader.checks.support.processes import Life, lives
+from grader.checks.support.processes import NO_SCRIPT_HINT, Life, lives
 from grader.checks.support.scripts import (
+    BUILD_FIRST_HINT,
+    add_hint,
     cmake_calls,
+    copies_of,
+    find_script,
     handed_in_with_git,
     is_elsewhere,
     paths_by_name,
@@ -23,7 +29,7 @@ from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite
 from grader.evidence.events import CATKIN_MAKE, STOPPED
 from grader.evidence.run import Run
-from grader.model.package import Executable, PackageFacts
+from grader.model.package import CMAKE, Executable, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import (
     FileCitation,
@@ -136,8 +142,25 @@ def judge_build(package: PackageFacts, build: Run) -> Verdict:
     return _broken_build(package, build, end.exit_code)
 
 
-def explain_by_build(package: PackageFacts | None, build: Run | None, verdict: Verdict) -> Verdict:
-    """Return a loss of what the build alone makes as `inconclusive` where the machine is why it was not built."""
+def explain_by_build(
+    package: PackageFacts | None,
+    build: Run | None,
+    verdict: Verdict,
+    asked: Sequence[str] = (),
+    beside: Sequence[str] = (),
+) -> Verdict:
+    """Return a loss of what the build alone makes as `inconclusive` where the machine is why it was not built, and one
+    of what is not there, of all that was `asked` for, with its name. So is a loss `beside` which a program did not
+    run."""
+    if verdict.hint == NO_SCRIPT_HINT and package is not None:
+        verdict = _name_missing(package, build, verdict, asked)
+    elif (
+        beside and package is not None and verdict.status.is_lost and not (verdict.unjudged or verdict.cause)
+    ):
+        one = _name_missing(package, build, unjudged("there is no script to run"), beside)
+        if one.unbuilt:
+            message = f"{verdict.message}; {one.message}, which runs beside it"
+            verdict = one.model_copy(update={"message": message}).about(expected=verdict.expected)
     if not (verdict.unbuilt and verdict.status.is_lost) or package is None or build is None:
         return verdict
     built = judge_build(package, build)
@@ -152,6 +175,29 @@ def explain_by_build(package: PackageFacts | None, build: Run | None, verdict: V
         "cause": verdict.cause,
     }
     return said.model_copy(update=update)
+
+
+def _name_missing(
+    package: PackageFacts, build: Run | None, verdict: Verdict, asked: Sequence[str]
+) -> Verdict:
+    """Return the verdict on what was not started with the file that is missing, or the program that was not made."""
+    made = next((name for name in asked if any(one.is_called(name) for one in programs(package))), "")
+    lost = next((name for name in asked if find_script(package, name) is None), "")
+    if made and build is not None and judge_build(package, build).status is not Status.PASS:
+        why, hint = f"the build did not make the program {made}", BUILD_FIRST_HINT
+    elif lost and PurePosixPath(lost).suffix and not made:
+        why, hint = f"there is no {lost} to run", add_hint(package, lost)
+    elif lost and not made and package.cmake is not None:
+        sources = [one for end in CPP_SUFFIXES for one in copies_of(package, f"{lost}{end}")]
+        source = sources[0].path if sources else f"src/{lost}.cpp"
+        why = f"{CMAKE} makes no program {lost}"
+        link = f"target_link_libraries({lost} ${{catkin_LIBRARIES}})"
+        hint = f"write add_executable({lost} {source}), and below it {link}"
+        hint = hint if sources else f"{add_hint(package, source)}; then {hint}"
+    else:
+        return verdict
+    message = re.sub("there (is no script|was nothing) to run", lambda _: why, verdict.message)
+    return verdict.model_copy(update={"message": message, "hint": hint, "unbuilt": hint == BUILD_FIRST_HINT})
 
 
 def _stopped_build(build: Run, took: str) -> Verdict:

@@ -293,10 +293,12 @@ def _judge_refusal(run: Run, service: str) -> Verdict | None:
             )
         if note.detail.startswith(OTHER_TYPE) and run.is_student_node(note.actor):
             theirs, why = note.type or "another type", note.detail.partition(": ")[2]
+            hint = "call it with the handout's type"
             if note.type == note.value:
                 theirs = f"another definition of {note.type}" + (f" ({shown(why)})" if why else "")
+                hint = "give its definition the handout's fields, in their order and with their types, and build again"
             message = f"{note.actor} calls {service} with {theirs}; the server has {note.value}"
-            return unjudged(message, hint="call it with the handout's type")
+            return unjudged(message, hint=hint)
     return None
 
 

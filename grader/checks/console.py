@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from difflib import SequenceMatcher
+from pathlib import PurePosixPath
 from typing import Annotated
 
 from pydantic import Field, model_validator
@@ -28,6 +29,7 @@ from grader.checks.support.exit_causes import (
     process_tracebacks,
 )
 from grader.checks.support.fields import unit_slip
+from grader.checks.support.launch_slips import own_script
 from grader.checks.support.processes import (
     LOGGERS,
     Life,
@@ -141,7 +143,7 @@ def prints(package: PackageFacts, run: Run, params: PrintsParams) -> Verdict:
     return verdict.about(
         expected=expected,
         measured=verdict.measured or plural(len(lines), "line"),
-        citations=(cite(run, "/grader/console", *span),),
+        citations=verdict.citations or (cite(run, "/grader/console", *span),),
     )
 
 
@@ -172,7 +174,8 @@ def _fits(line: Line, params: PrintsParams) -> bool:
 def _not_printed(
     one: Life, lines: Sequence[Line], package: PackageFacts, run: Run, params: PrintsParams
 ) -> Verdict:
-    other = [line for line in lines if any(params.found_in(line))]
+    refused = any(OTHER_DEFINITION in line.text for line in lines)  # no number in that line is an answer
+    other = [line for line in lines if any(params.found_in(line)) and not refused]
     hint = f"print {params.words} where it happens"
     failing = one.ended_early and (one.end is None or one.end.exit_code != 0)
     asked = _asked_services(one, run)
@@ -192,7 +195,11 @@ def _not_printed(
     deaf = unheard(run, package)
     never = f"it never prints {params.words}"
     unheard_of = unjudged(f"{never}: {deaf.message}", hint=deaf.hint) if deaf else None
-    if why := _unserved(asked, lacking, own, run, never) or unheard_of:
+    if (
+        why := _unserved(asked, lacking, own, run, never)
+        or unheard_of
+        or _unseen(one, package, run, params, never)
+    ):
         return why
     if not own:
         nothing = unjudged(
@@ -202,6 +209,27 @@ def _not_printed(
     meant = max(own, key=lambda line: SequenceMatcher(None, params.words, line.text[:LINE_CHARS_MAX]).ratio())
     hint = _of_whole_answer(meant, params) or unfilled(meant.text) or hint
     return _of_client(asked, run)(f"{never}; it prints {shown(meant.text)!r}", hint=hint).if_repeated()
+
+
+def _unseen(one: Life, package: PackageFacts, run: Run, params: PrintsParams, never: str) -> Verdict | None:
+    """Return the loss where a launch file brings nothing up, or a node of it prints the text, and roslaunch writes that
+    to a file."""
+    started = {PurePosixPath(word).name for word in one.start.argv}
+    refused = any("cannot launch node of type" in line.line for _, line in run.lines(one.name))
+    if refused and run.graph and not nodes_of(run, one.name):
+        return unjudged(
+            f"{never}: none of the launch file's nodes came up", hint="read what roslaunch prints"
+        )
+    files = [file for file in package.launch_files if PurePosixPath(file.path).name in started]
+    for node in (node for file in files for node in file.brings if node.output != "screen"):
+        script = own_script(package, node)
+        said = [s for s in package.slips if script and s.file == script.path and s.kind == "prints"]
+        printed = (re.sub(r"\{\w*\}", "0", s.message) for s in said if s.name == "print")
+        if any(any(params.found_in(Line(0, text))) for text in printed):
+            why = f'the <node> {node.name} lacks output="screen", so what it prints goes to a log file'
+            hint = f'on line {node.line} of {node.file}, write output="screen" in the <node>'
+            return failed(f"{never}: {why}", hint=hint)
+    return None
 
 
 def _of_client(asked: Iterable[str], run: Run) -> Callable[..., Verdict]:
@@ -231,7 +259,7 @@ def _asked_services(one: Life, run: Run) -> dict[str, bool]:
     """Return the services for which a process asked, each with whether it was there at once. A program that is no node
     asks by the name that rospy gives to all of these: it counts where there is one such program alone."""
     unnamed = [other.name for other in lives(run) if not run.student_nodes(other.name)]
-    is_no_node = are_noted(run) and unnamed == [one.name]
+    is_no_node = unnamed == [one.name] and (are_noted(run) or not run.student_nodes())
     names = {UNNAMED} if is_no_node else {*nodes_of(run, one.name)}
     looked = [e for _, e in run.actors if e.action == "lookup" and e.actor in names and e.topic]
     return {e.topic or "": not e.detail for e in looked}
@@ -241,6 +269,10 @@ def _unserved(
     asked: Mapping[str, bool], lacking: str, own: Sequence[Line], run: Run, never: str
 ) -> Verdict | None:
     """Of a client: what its service does wrong, or that it asks for another one, or before a node offers it."""
+    if any(OTHER_DEFINITION in line.text for line in own):
+        hint = "give the .srv file the handout's fields, in their order and with their types, and build again"
+        why = "its call failed, as the service has another definition of that type"
+        return unjudged(f"{never}: {why}", hint=hint)
     for said, wrong in WRONG_ANSWERS.items():
         if any(said in line.text for line in own):
             hint = "end the service's callback with `return …Response(…)`"
@@ -338,6 +370,7 @@ def callbacks_clean(package: PackageFacts, run: Run, params: CallbacksCleanParam
 
 
 ALIKE = 0.7
+OTHER_DEFINITION = "md5sums do not match"
 WRONG_ANSWERS = {
     "service handler returned None": "nothing",
     "handler returned wrong number of values": "something that is not a response",

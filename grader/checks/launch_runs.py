@@ -413,7 +413,8 @@ def _misnamed(file: LaunchFile, name: str, pkg: str) -> list[LaunchNode]:
 
 
 def _wrong_names(file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
-    """Return all nodes that only have another name than the lab asks for, or else the first that is lost otherwise."""
+    """Return all nodes that only have another name or package than the lab asks for, or else the first that is lost
+    otherwise."""
     slips = []
     misnamed = ((name, node) for name, pkg in params.nodes.items() for node in _misnamed(file, name, pkg))
     for wanted, node in misnamed:
@@ -421,6 +422,8 @@ def _wrong_names(file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
         if node.namespace == "/":
             fix = f'on line {node.line}, write name="{wanted.lstrip("/")}"'
             slips.append(Slip(node.file, node.line, why, fix).verdict())
+    of_others = (n for n in params.nodes.items() if _nodes_named(file, n[0]))
+    slips += filter(None, (_wrong_name(file, name, pkg) for name, pkg in of_others))
     others = (
         _wrong_name(file, name, pkg) or _find_swap(file, name, params) for name, pkg in params.nodes.items()
     )
@@ -432,8 +435,8 @@ def _wrong_name(file: LaunchFile, name: str, pkg: str) -> Verdict | None:
     if any(n.pkg == pkg or "$(" in (n.pkg or "") for n in found):
         return None
     if found:
-        why = f'{name} is a node of the package "{found[0].pkg}", not of {pkg}'
-        return Slip(found[0].file, found[0].line, why, f'write pkg="{pkg}"').verdict()
+        why, at = f'{name} is a node of the package "{found[0].pkg}", not of {pkg}', found[0].line
+        return Slip(found[0].file, at, why, f'on line {at}, write pkg="{pkg}"').verdict()
     others = [n.full_name for n in file.brings]
     near = near_names(name, others) or tuple(others)
     seen = f"; it has {join_words(near)}" if near else ""

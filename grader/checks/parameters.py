@@ -428,6 +428,15 @@ def _not_there(package: PackageFacts, run: Run, names: Iterable[str], params: Pa
     if near:
         message = f"there is no parameter {params.name}; {there_is(near)}"
         hint = "with ~, or inside <node>, a parameter gets the node's name in front; otherwise it does not"
+        node, _, key = params.name.rpartition("/")
+        outside = [
+            one
+            for file in package.launch_files
+            for one in file.params
+            if absolute_name(one.name) == f"/{key}" and any(n.full_name == node for n in file.brings)
+        ]
+        if outside and f"/{key}" in near:
+            hint = f"move the <param> on line {outside[0].line} of {outside[0].file} into the <node> {node.strip('/')}"
         return failed(message, hint=hint)
     if absent := no_node(package, run, f"there is no parameter {params.name}"):
         return absent

@@ -11,7 +11,14 @@ from grader.checks.registry import Refers, check
 from grader.checks.support.console_output import Traceback
 from grader.checks.support.exit_causes import explain_end, explain_traceback, process_tracebacks
 from grader.checks.support.fields import differences, fields_text, value_text
-from grader.checks.support.processes import LOGGERS, GlobalName, TypeName, life_of, plain_type
+from grader.checks.support.processes import (
+    LOGGERS,
+    GlobalName,
+    TypeName,
+    first_interrupt_ns,
+    life_of,
+    plain_type,
+)
 from grader.checks.support.text import SERVICE, SPIN, imports, near_names, service_call, shown
 from grader.checks.support.topics import cite, no_node, why_unreached
 from grader.evidence.events import MISFIT, NO_ANSWER
@@ -141,10 +148,24 @@ def _judge_service(offer: Offer, package: PackageFacts, run: Run, params: Servic
         end = explain_end(one, run, package)
         message = f"{offer.node} offered {params.service}, but {one.name} ended: {end.cause}"
         return end.verdict(unjudged, message)
+    if back := _taken_back(run, params.service, offer.node):
+        return back
     if not offer.type:
         message = f"{params.service} is offered, but its type could not be determined"
         return inconclusive(message, hint=f"rosservice type {params.service} shows it; grade again")
     return passed(f"{offer.node} offers {params.service} of type {params.type}")
+
+
+def _taken_back(run: Run, service: str, node: str) -> Verdict | None:
+    """Return the loss where the node was there without the service at the end, and never answered."""
+    if any(one.response is not None for one in exchanges(run, service)):
+        return None
+    until_ns = first_interrupt_ns(run) or run.end_ns
+    last = [event for t, event in run.graph if t < until_ns][-1:]
+    if not any(node in event.nodes and node not in event.services.get(service, ()) for event in last):
+        return None
+    hint = "keep what offers it in a variable that lives as long as the node does: in C++, none within inner braces"
+    return unjudged(f"{node} offers {service} for a moment, and takes it back while it runs on", hint=hint)
 
 
 def _fault(
@@ -183,6 +204,8 @@ def _judge_uncalled(
         end = explain_end(one, run, package)
         message = f"{one.name} ended before {params.service} could be called: {end.cause}"
         return end.verdict(unjudged, message)
+    if back := _taken_back(run, params.service, offer.node):
+        return back
     return grade_again(f"{params.service} was called {plural(len(made), 'time')} of {len(params.expect)}")
 
 

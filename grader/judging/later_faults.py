@@ -116,7 +116,8 @@ def add_later_faults(
         elif criterion.check in OF_LAUNCHES and (
             file := find_launch(package, str(criterion.parameters["launch"]))
         ):
-            told += map(Fix, unset_arg_fixes(file, verdict.hint))
+            given = [word for start in rubric.starts_of(criterion) for word in start.args]
+            told += map(Fix, unset_arg_fixes(file, verdict.hint, given))
         elif verdict.unjudged or verdict.of_machine or criterion.check in OF_TOPICS:
             own_later = Later(criterion, verdict, package, facts, moved)
             told += own_later.syntax(handed_in or package)
@@ -589,7 +590,8 @@ def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) 
     refused = refusal(run, package) if isinstance(run, Run) else None
     if refused is not None and refused.refused != NOT_STARTED and not any(refusals(package, file)):
         yield f"{refused.hint}: {refused.why}"
-    yield from unset_arg_fixes(file, refused.hint if refused is not None else "")
+    given = [word for start in facts.rubric.starts_of(criterion) for word in start.args]
+    yield from unset_arg_fixes(file, refused.hint if refused is not None else "", given)
     nodes = [one for one in file.brings if {one.type, f"{one.type}.py"} & names]
     if topic := wanted.get("topic"):
         renaming = find_renaming(package, nodes, str(topic))

@@ -72,7 +72,8 @@ def charge_repairs(
         if repair.kind in OF_BUILDS:  # of a file with several faults, those that speak of this line
             new = _new_words(repair)
             better_by_it = better - {c.id for c in rubric.criteria if c.check == INSTALL}
-            asking = [c for c in asking if c.id in better_by_it or new & words_of(first[c.id].message)]
+            told = {c.id for c in asking if _is_told(repair, first[c.id].hint)}
+            asking = [c for c in asking if c.id in better_by_it | told or new & words_of(first[c.id].message)]
         sought = [c for c in asking if _seeks(first[c.id], repair)]
         asking = sought or [c for c in asking if _names(c, repair)] or asking
         if asking:
@@ -139,7 +140,8 @@ def asks_for(found: Verdict | CriterionResult, repair: Repair) -> bool:
     if is_unmade(found):
         return False  # the build's own criterion asks for it
     is_it = repair.kind == "file-name" and PurePosixPath(absent).name == PurePosixPath(repair.after).name
-    return lost and (is_it or cites_file(found, repair))
+    is_told = repair.kind in OF_BUILDS and _is_told(repair, found.hint)
+    return lost and (is_it or is_told or cites_file(found, repair))
 
 
 def _names(criterion: Criterion, repair: Repair) -> bool:
@@ -184,7 +186,7 @@ def charged_verdict(
         clauses = [clause for clause in clauses if any(_is_told(one, clause) for one in told)]
     hints = clauses + advice_on(one for one in repairs if one not in told)
     said = verdict.message
-    unsaid = [one for one in repairs if PurePosixPath(one.file).name not in said]
+    unsaid = [one for one in repairs if one.kind == "node-name" or PurePosixPath(one.file).name not in said]
     words = [said, *(one for one in messages_of(unsaid) if (_PLACE.sub("", one) or one) not in said)]
     is_new = not copy.hint or not set(copy.hint.split("; ")) <= set(hints)
     if further:
@@ -295,7 +297,7 @@ def is_next_fault(one: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> boo
     found = {(c.file, c.line) for c in one.citations if isinstance(c, FileCitation) and c.file in files}
     again = cited_lines(copy.citations)
     again -= lines_read_now(repairs)
-    in_repaired = found != set() or one.unjudged
+    in_repaired = found != set() or one.unjudged or any(_is_told(repair, one.hint) for repair in repairs)
     shown = not copy.unjudged or (one.unjudged and found != set())
     return in_repaired and shown and not found & again and _is_other_fault(one, copy)
 

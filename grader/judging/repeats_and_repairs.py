@@ -19,7 +19,7 @@ from types import MappingProxyType
 
 from pydantic import ValidationError
 
-from grader.checks.support.scripts import PYTHON, installed, names_script
+from grader.checks.support.scripts import PYTHON, copies_of, find_script, installed, names_script
 from grader.evidence.events import CATKIN_MAKE, PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.judging.repair_charges import (
@@ -111,6 +111,13 @@ def programs_of_build(package: PackageFacts) -> set[str]:
     used."""
     named = [one for one in installed(package) if one.call.name == PYTHON]
     return {file.path for file in package.files if any(names_script(one, file.path) for one in named)}
+
+
+def never_run(package: PackageFacts, rubric: Rubric) -> set[str]:
+    """Return the paths of the scripts beside which another of their name is the one that the rubric starts."""
+    starts = [s.script for scenario in rubric.scenarios.values() for s in scenario.start if s.script]
+    run = {file.path for script in starts if (file := find_script(package, script))}
+    return {file.path for path in run for file in copies_of(package, path)} - run
 
 
 def repairs_of(rubric: Rubric, repaired: Mapping[str, Run]) -> tuple[Repair, ...]:

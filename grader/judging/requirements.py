@@ -79,7 +79,8 @@ class Requirements:
         if not verdict.status.is_lost or is_unmade(verdict):
             return False  # a program that the build did not make is no reason for the build to fail
         named = verdict.unjudged and any(text in found.message for text in _paths(self._criteria[required]))
-        if same_run and found.cause not in {"", verdict.cause} and not named and not same_line:
+        unbuilt = found.unbuilt and verdict.unbuilt
+        if same_run and found.cause not in {"", verdict.cause} and not (named or same_line or unbuilt):
             return False  # its process ended of something else
         if verdict.unjudged:
             return True
@@ -114,11 +115,8 @@ class Requirements:
 
     def _is_compiled(self, criterion: Criterion) -> bool:
         """Return whether it is about a program that only a build makes: a script runs from its source."""
-        scenario = self._rubric.scenarios.get(criterion.scenario or "")
-        starts = scenario.start if scenario is not None else ()
-        process = str(criterion.parameters.get("process")).partition("/")[0]
-        about = [start for start in starts if start.name == process and not start.is_rostest] or starts
-        return any(start.built or (start.script and not PurePath(start.script).suffix) for start in about)
+        starts = self._rubric.starts_of(criterion)
+        return any(start.built or (start.script and not PurePath(start.script).suffix) for start in starts)
 
 
 def _graph_names(criterion: Criterion) -> set[str]:

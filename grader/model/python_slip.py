@@ -18,7 +18,7 @@ SlipKind = Literal[
     "prints", "argument-text", "unused-import", "lacking-import", "unregistered", "not-started", "start-value",
     "hides-class", "float-index",
     "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed", "printed-in-part",
-    "published-in-part", "never-published", "takes-number", "typed-text",
+    "published-in-part", "never-published", "takes-number", "typed-text", "goes-on",
 ]  # fmt: skip
 
 
@@ -73,8 +73,9 @@ class PythonSlip(Placed, Record):
       or counts nothing.
     - `takes-number`: a loop that computes with what a topic's callback keeps of its message, or publishes it as a
       number: a slip only if that message has to be a text.
+    - `goes-on`: an `if` that ends an action's goal by the call `name`, and no `return` behind it.
     - `wrong-value`: a value that is none: a comparison with NaN, the sine of an angle in degrees, a service's answer
-      that is made and not returned (`name`: `nan`, `degrees`, `return`).
+      that is made and not returned, or of which no field is set (`name`: `nan`, `degrees`, `return`, `empty`).
 
     No slips, but what a line says, for checks that compare it with what the lab asks; `message` is a name, a number or
     a text:

@@ -209,6 +209,10 @@ def _line(data: bytes, number: int) -> str:
     )
 
 
+_JOINED = re.compile(r"(node|param|rosparam|arg|remap|include|group)[-_.]?(pkg|type|name|file|from|ns|value)")
+"""A tag's name and its first attribute, without the space between them."""
+
+
 def _explain(message: str, log: list[str], line: str, *, root: str) -> tuple[Reason, int | None]:
     """Return libxml2's message in plain words, with the line of the tag that is not ended where it is that: libxml2
     says where it noticed. `log` holds all its messages, `line` the text of the faulty line."""
@@ -224,6 +228,8 @@ def _explain(message: str, log: list[str], line: str, *, root: str) -> tuple[Rea
     at = int(begun[2]) if begun else None
     if begun and re.search("attribute name|attributes construct", message):
         fix = "it needs a space before each attribute, quotes round each value, and `>` or `/>` at its end"
+        if joined := _JOINED.fullmatch(begun[1]):
+            fix = f"write `<{joined[1]} {joined[2]}`: without that space, `{begun[1]}` is the tag's name"
         return Reason(f"the tag `<{begun[1]}` is not finished properly", fix), at
     for pattern, *words in _CAUSES:
         if found := re.search(pattern, message):

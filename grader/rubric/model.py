@@ -231,11 +231,15 @@ class Rubric(Record):
         """Return the name of the package that a criterion judges, or that a start's files are of."""
         if one.package is not None or isinstance(one, Start) or isinstance(self.package_, str):
             return one.package or self.package
-        scenario = self.scenarios.get(one.scenario or "")
-        starts = [s for s in scenario.start if s.program is None] if scenario is not None else []
-        process = str(one.parameters.get("process")).partition("/")[0]
-        found = {self.package_of(s) for s in [s for s in starts if s.name == process] or starts}
+        found = {self.package_of(start) for start in self.starts_of(one)}
         return found.pop() if len(found) == 1 else self.package
+
+    def starts_of(self, criterion: Criterion) -> list[Start]:
+        """Return what of the student's its run starts: the process that it names, or all."""
+        scenario = self.scenarios.get(criterion.scenario or "")
+        starts = [s for s in scenario.start if s.program is None] if scenario is not None else []
+        process = str(criterion.parameters.get("process")).partition("/")[0]
+        return [s for s in starts if s.name == process] or starts
 
     def share_of(self, kind: RepairKind) -> float:
         """Return the share of its points, 0 to 1, that a criterion earns on a copy with such a repair."""

@@ -88,6 +88,21 @@ def test_what_others_took_before_the_steps_were_over_lengthens_nothing_behind_th
     assert find_outcome(live, until, 101.0) is None
 
 
+def test_a_goal_without_its_result_is_waited_for_up_to_the_limit() -> None:
+    live, until = _live(), Until(ended=("client",), silent_s=6, limit_s=40)
+    live.note_graph(["/count", "/client"], {}, 1.0, picture={})
+    live.note_messages("/count/goal", 1, 1.0)
+    assert find_outcome(live, until, 7.1) == (
+        "silent",
+        "nothing happened for 6 s",
+    )  # a topic that is called so
+    live.note_messages("/count/status", 5, 2.0)
+    assert find_outcome(live, until, 39.9) is None
+    assert find_outcome(live, until, 40.1) == ("timeout", "not complete after 40 s")
+    live.note_messages("/count/result", 1, 30.0)
+    assert find_outcome(live, until, 36.1) == ("silent", "nothing happened for 6 s")
+
+
 def test_what_no_node_subscribed_to_is_waited_for_once() -> None:
     until, live = Until(messages={"/a": 1}, first_message_s=20, limit_s=60), _live()
     live.started_s = 5.0

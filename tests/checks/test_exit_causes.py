@@ -445,7 +445,9 @@ def test_the_message_is_that_of_the_package_that_is_named(tmp_path):
 @pytest.mark.parametrize(
     ("source", "error", "hint"),
     [
-        ("return str(a)", "struct.error: required argument is not an integer", "give it an int: `int(…)`"),
+        ("return str(a)", "struct.error: required argument is not an integer", "give it an int: `int(…)` of a text"),
+        ("s = rospy.Service('add', Add, add)", "rospy.service.ServiceException: service [/add] already registered",
+         "make it once, above any loop"),
         ("return AddResponse(3)", "NameError: name 'AddResponse' is not defined",
          "write `from lab.srv import AddResponse` at the top"),
         ("x = Reading()", "NameError: name 'Reading' is not defined", "write `from lab.msg import Reading` at the top"),

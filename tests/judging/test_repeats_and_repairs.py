@@ -14,7 +14,7 @@ import pytest
 from grader.evidence.run import Run
 from grader.judging import judge
 from grader.judging.judge import judge_all_runs
-from grader.judging.repeats_and_repairs import drop_unrepeated_losses, is_used_by, launched_in
+from grader.judging.repeats_and_repairs import drop_unrepeated_losses, is_used_by, launched_in, never_run
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation, failed
@@ -650,3 +650,72 @@ def test_a_module_concerns_the_scripts_that_name_it(talker: str, module: str, na
     build = cast("Run", SimpleNamespace(file_lines=lambda path: texts[path].splitlines()))
     known = launched_in(package, build)
     assert is_used_by(asked.scenarios["talker"], repair, asked, built=True, launched=known) is uses
+
+
+@pytest.mark.parametrize(
+    ("said", "status", "hint"),
+    [
+        (
+            'CMake Error: Could not find a package configuration file provided by "tf" with any of the following',
+            "inconclusive",
+            "nothing for you to do: tell your instructor",
+        ),
+        ("/w/src/lab1/src/mean.cpp:3:1: error: 'x' was not declared", "fail", "first get the build to pass"),
+    ],
+)
+def test_a_program_that_the_build_did_not_make_is_no_missing_script(
+    said: str, status: str, hint: str
+) -> None:
+    files = [{"path": "src/mean.cpp"}, {"path": "CMakeLists.txt"}]
+    package = {
+        "name": "lab1",
+        "files": files,
+        "manifest": {},
+        "cmake": {"calls": [["add_executable", "mean", "src/mean.cpp"]]},
+    }
+    scenario = {**SCENARIO, "start": [{"name": "talker", "script": "mean"}]}
+    asked = ({"id": "build", "check": "build"}, {**NODE, "requires": []})
+    runs = build_runs({"runs": {"talker": {"outcome": "ended", "graph": []}}, "package": package})
+    runs |= built(package, exit_code=1, said=[said])
+    found = {c.id: c for c in judge(rubric(*asked, scenarios={"talker": scenario}), runs)}
+    assert found["node"].message.startswith("talker was not started: the build did not make the program mean")
+    assert (found["node"].status.value, found["node"].hint.startswith(hint)) == (status, True)
+
+
+def test_a_script_that_is_missing_is_named() -> None:
+    runs = build_runs(
+        {"runs": {"talker": {"outcome": "ended", "graph": []}}, "package": {"name": "lab1", "files": []}}
+    )
+    (node,) = judge(rubric({**NODE, "requires": []}), runs)
+    assert node.message == "talker was not started: there is no src/numeric_talker.py to run"
+    assert node.hint == "write src/numeric_talker.py"
+
+
+def test_a_copy_of_a_script_that_is_not_the_one_that_runs_explains_nothing() -> None:
+    files = ("src/numeric_talker.py", "old/numeric_talker.py", "src/other.py")
+    package = complete_facts({"files": [{"path": path} for path in files]})
+    assert never_run(package, rubric(*ALL)) == {"old/numeric_talker.py"}
+
+
+def test_what_runs_beside_a_program_that_was_not_built_is_left_open() -> None:
+    tf = 'CMake Error: Could not find a package configuration file provided by "tf" with any of the following'
+    package = {
+        "name": "lab1",
+        "files": [SCRIPT, {"path": "src/mean.cpp"}, {"path": "CMakeLists.txt"}],
+        "manifest": {},
+        "cmake": {"calls": [["add_executable", "mean", "src/mean.cpp"]]},
+    }
+    scenario = {**SCENARIO, "start": [*SCENARIO["start"], {"name": "mean", "script": "mean"}]}
+    done = {
+        "id": "done",
+        "check": "prints",
+        "with": {"process": "talker", "text": "done"},
+        "scenario": "talker",
+    }
+    said = [{"process": "talker", "line": "waiting"}]
+    runs = build_runs({"runs": {"talker": {**GOOD_RUN, "console": said}}, "package": package})
+    for exit_code, status in ((1, "inconclusive"), (0, "fail")):
+        runs |= built(package, exit_code=exit_code, said=[tf] if exit_code else [])
+        (found,) = judge(rubric(done, scenarios={"talker": scenario}), runs)
+        assert found.status.value == status
+        assert ("did not make the program mean, which runs beside it" in found.message) == bool(exit_code)

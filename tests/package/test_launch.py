@@ -71,6 +71,7 @@ def test_attributes_that_are_not_there_are_none():
         ("<launch>\n<node/>\n", 1, "`<launch>` on line 1 is never closed"),
         ('<launch\n<node pkg="a"/></launch>', 1, "the tag `<launch` is not finished"),
         ('<launch>\n<node pkg="a"type="b"/>\n</launch>', 2, "a space before each attribute"),
+        ('<launch>\n<node_pkg = "a" type = "b"/>\n</launch>', 2, "write `<node pkg`: without that space"),
         ("<launch>\n<node pkg=a/></launch>", 2, "no quotes around it"),
         ("<launch>\n<node pkg=\u201ca\u201d/></launch>", 2, "typographic quote \u201c"),
         ('<launch>\n<node pkg="a/>\n<node/></launch>', 2, "closing quote is missing"),

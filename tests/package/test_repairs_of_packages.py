@@ -151,6 +151,9 @@ CASES = {
     "no-quotes": Case(swapped(LAUNCHED, ('"talker.py"', "talker.py")), ["launch-syntax"], "has no quotes around it"),
     "tag-open-and-type": Case(swapped(LAUNCHED, ("/>", ">"), ("talker.py", "talker")),
                           ["launch-syntax", "launch-type"], 'type="talker" should be'),
+    "pkg-that-no-one-knows": Case(swapped(LAUNCHED, ('pkg="lab"', 'pkg="my_robot"')), ["package-name"],
+                                  'pkg="my_robot" should be'),
+    "pkg-of-another": Case(swapped(LAUNCHED, ('pkg="lab"', 'pkg="turtlesim"')), []),
     "pkg": Case(swapped(LAUNCHED, ('pkg="lab"', 'pkg="laab"')), ["package-name"], 'pkg="laab" should be'),
     "manifest-name": Case(swapped(XML, (">lab<", ">lab_<")), ["package-name"], "the package is called lab_"),
     "own-name": Case({XML: MANIFEST.replace(">lab<", ">mine<"), CMAKELISTS: CMAKE.replace("lab", "mine")},
@@ -380,6 +383,10 @@ CASES = {
          CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES std_msgs)\ncatkin_p")},
         ["build-line"] * 2, "write geometry_msgs after DEPENDENCIES",
         after={CMAKELISTS: "DEPENDENCIES geometry_msgs std"},
+    ),
+    "own-message-with-a-header-that-another-package-brings": Case(
+        {**OWN, "msg/Level.msg": "Header header\ngeometry_msgs/Point at\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES geometry_msgs)\ncatkin_p")}, [],
     ),
     "messages-of-no-definition": Case(
         {CMAKELISTS: CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES std_msgs)\ncatkin_p")}, ["build-line"],

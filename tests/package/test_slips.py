@@ -27,6 +27,16 @@ pytestmark = pytest.mark.usefixtures("without_processes")
         ("x = math.cos(math.radians(a))\n", None),
         ("def f(req):\n    AddResponse(sum=1)\n", ("return", "write `return AddResponse(…)`")),
         ("def f(req):\n    return AddResponse(sum=1)\n", None),
+        (
+            "def f(req):\n    a = AddResponse()\n    s = req.a\n    return a\n",
+            ("empty", "set it above the `return`: `a.<field> = …`"),
+        ),
+        ("def f(req):\n    a = AddResponse()\n    a.sum = req.a\n    return a\n", None),
+        ("def f(req):\n    a = AddResponse()\n    fill(a)\n    return a\n", None),
+        (
+            "def f(req):\n    a = AddResponse()\n    if req.a:\n        return AddResponse(1)\n    return a\n",
+            None,
+        ),
     ],
 )
 def test_values_that_are_none(text: str, said: tuple[str, str] | None, tmp_path: Path) -> None:
@@ -576,3 +586,20 @@ def test_an_index_that_is_a_float(line: str, fixes: list[str], tmp_path: Path) -
     (tmp_path / "a.py").write_text(f"{line}\n", encoding="utf-8")
     slips = check_syntax(tmp_path, ["a.py"]).slips
     assert [s.fix for s in slips if s.kind == "float-index"] == fixes
+
+
+@pytest.mark.parametrize(
+    ("text", "fixes"),
+    [
+        ("    if g.n < 0:\n        s.set_aborted(r)\n    s.set_succeeded(r)\n", ["below line 3, write `return`"]),
+        ("    while n:\n        if s.is_preempt_requested():\n            s.set_preempted()\n        n -= 1\n",
+         ["below line 4, write `return`"]),
+        ("    if g.n < 0:\n        s.set_aborted(r)\n        return\n    s.set_succeeded(r)\n", []),
+        ("    if g.n < 0:\n        s.set_aborted(r)\n    else:\n        s.set_succeeded(r)\n", []),
+        ("    if ok:\n        s.set_succeeded(r)\n    print('done')\n", []),
+        ("    if stop:\n        s.set_preempted()\n        ok = False\n    if ok:\n        s.set_succeeded(r)\n", []),
+    ],
+)  # fmt: skip
+def test_callbacks_that_go_on_after_their_goal(text: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"def do(g):\n{text}", encoding="utf-8")
+    assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "goes-on"] == fixes

@@ -51,6 +51,7 @@ from script_names import (
     parents_of,
     slip,
     walk,
+    walk_own,
 )  # fmt: skip
 from script_objects import (
     hidden_names,
@@ -96,7 +97,7 @@ def slips(tree):
         queue_sizes, graph_names, object_slips, said_texts, deaf_loops, clock_values, counter_slips,
         counter_starts, without_effect, assigned_late, hidden_names, subscribed_again, imports, taken_off,
         unstarted_servers, wrong_values, unprinted_messages, values_left_out, published_unchanged,
-        unused_publishers, loops_of_numbers,
+        unused_publishers, loops_of_numbers, finished_goals,
     )  # fmt: skip
     for find in finders:
         found += find(tree)
@@ -220,6 +221,49 @@ def wrong_values(tree):
                 fix=fix,
                 name="return",
             )
+        elif isinstance(node, ast.FunctionDef) and unfilled_answer(node):
+            variable, name, line = unfilled_answer(node)
+            message = "no field of the `%s` that is returned is ever set" % name
+            fix = "set it above the `return`: `%s.<field> = …`" % variable
+            yield slip(line, "wrong-value", message, fix=fix, name="empty")
+
+
+def unfilled_answer(function):
+    """Return the variable, the class and the line of an answer that a callback makes without values, sets nothing of,
+    and always returns; None where there is none."""
+    own = list(walk_own(function))
+    made = [n for n in own if isinstance(n, ast.Assign) and called_name(n.value).endswith("Response")]
+    made = [n for n in made if not n.value.args + n.value.keywords and isinstance(n.targets[0], ast.Name)]
+    returned = {dotted(n.value) for n in own if isinstance(n, ast.Return) and n.value is not None}
+    variable = dotted(made[0].targets[0]) if len(made) == 1 else ""
+    # its name stands where it is made and returned, and nowhere else: `answer.sum` would be one more
+    uses = [n for n in own if isinstance(n, ast.Name) and n.id == variable]
+    is_alone = returned == {variable} and len(uses) == 1 + sum(isinstance(n, ast.Return) for n in own)
+    return (variable, called_name(made[0].value), made[0].lineno) if variable and is_alone else None
+
+
+FINISHING = ("set_succeeded", "set_aborted", "set_preempted", "set_rejected")
+
+
+def finished_goals(tree):
+    """Where an `if` of an action's callback ends the goal last of all, and the callback goes on below it."""
+    parents = parents_of(tree)
+    for node in walk(tree):
+        if not isinstance(node, ast.If) or node.orelse or not is_call_alone(node.body[-1]):
+            continue
+        call, around = node.body[-1].value, parents.get(node)
+        block = getattr(around, "body", [])
+        below = block[block.index(node) + 1 :] if isinstance(block, list) and node in block else []
+        more = any(calls_in(one, *FINISHING) or is_loop(one) for one in below)
+        if called_name(call) in FINISHING and (more or is_loop(around)):
+            what = "loop" if is_loop(around) else "callback"
+            message = "the goal is over with `%s(…)`, and the %s goes on" % (called_name(call), what)
+            fix = "below line %d, write `return`" % node.body[-1].end_lineno
+            yield slip(call.lineno, "goes-on", message, fix=fix, name=called_name(call))
+
+
+def is_loop(node):
+    return isinstance(node, (ast.While, ast.For))
 
 
 def is_nan(node):

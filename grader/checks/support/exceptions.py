@@ -79,7 +79,10 @@ SLIPS = {
        "write that name in front of it: `pub.publish(…)`")
        for said, rest in (("name", " is not defined"), ("module 'rospy' has no attribute", ""))},
     "required argument is not an integer": (
-     "a field of whole numbers is given something else, such as a text or 2.0", "give it an int: `int(…)`"),
+     "a field of whole numbers is given something else, such as a text or 2.0",
+     "give it an int: `int(…)` of a text or a number; of a whole message or request, one of its fields"),
+    "] already registered": ("the script offers that service already: each turn of a loop makes another one",
+     "make it once, above any loop"),
     "is a non-ascii string": (
      "rospy names it by mistake, as a text may have such letters: another field has a value of the wrong type",
      "compare the value of each of the message's other fields with its type in the .msg file"),

@@ -18,7 +18,7 @@ from grader.checks.support.exceptions import (
     explain_number_of_values,
     explain_operand,
 )
-from grader.checks.support.launch_slips import PROGRAMS_OF, programs_hint
+from grader.checks.support.launch_slips import unfound_program
 from grader.checks.support.missing_names import (
     IMPORT_ERRORS,
     broken_import,
@@ -42,6 +42,7 @@ from grader.checks.support.rospy_calls import (
     wrong_class,
 )
 from grader.checks.support.scripts import (
+    BUILD_FIRST_HINT,
     OF_INTERFACES,
     SYNTAX,
     copies_of,
@@ -49,7 +50,7 @@ from grader.checks.support.scripts import (
     path_in_package,
     without_git,
 )
-from grader.checks.support.text import LOOP, RATE_SLOT, SPIN, VALUE_SLOT, near_names, shown
+from grader.checks.support.text import LOOP, RATE_SLOT, SPIN, VALUE_SLOT, shown
 from grader.evidence.events import STOPPED
 from grader.evidence.run import Run
 from grader.installable import (
@@ -61,7 +62,7 @@ from grader.model.package import Fault, PackageFacts, SourceFile
 from grader.model.python_slip import PythonSlip
 from grader.model.verdict import Citations, FileCitation, Span, Verdict, machine_lacks
 from grader.syntax_fixes import COMMENTED_OUT, corrected, without_brace
-from grader.wording import join_words
+from grader.wording import join_words, plural
 
 OTHER_NAMES_SHOWN = 3
 """Names of the same script that are not defined either."""
@@ -186,14 +187,17 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
         said = (known for line in printed for text, known in OF_ROSCPP.items() if text in line)
         return Ending(*next(said, (f"{signal_name(life.end.signal)} ended it", RUN_IT)))
     if code == 0:
-        return _not_run(life, run, package) or _ran_to_the_end(printed)
+        return _not_run(life, run, package) or _ran_to_the_end(printed, package)
     exceptions = [line for line in printed if line.startswith("RLException: ")]
     last = next(iter(exceptions or printed[::-1]), "")
     words = f"; its last output: {shown(last)}" if last else ""
-    return Ending(f"it exited with code {code}{words}", RUN_IT)
+    hint, given = RUN_IT, [one for one in life.start.argv[1:] if ":=" not in one]
+    if given and re.search(r"\busage\b", last, re.IGNORECASE):
+        words += f"; it was given {plural(len(given), 'argument')} ({shown(' '.join(given))})"
+        hint = f"compare argc, or len(sys.argv), with {len(given) + 1}: the program's name counts too"
+    return Ending(f"it exited with code {code}{words}", hint)
 
 
-NO_PROGRAM = re.compile(r"cannot launch node of type \[([^/\]]+)/([^\]]+)\]: Cannot locate node")
 MAKES_NODES = {
     "init_node": "node-name",
     "Publisher": "publisher",
@@ -204,13 +208,11 @@ MAKES_NODES = {
 """Calls, and the kind of slip that there is where the script has one of them that is not in a comment."""
 
 
-def _ran_to_the_end(printed: Sequence[str]) -> Ending:
+def _ran_to_the_end(printed: Sequence[str], package: PackageFacts) -> Ending:
     """Explain it by what was printed last, where an `except` may have printed it."""
     last = printed[-1] if printed else ""
-    if found := next(filter(None, map(NO_PROGRAM.search, printed)), None):
-        cause = f"roslaunch finds no program {shown(found[2])} in the package {shown(found[1])}"
-        near = near_names(found[2], PROGRAMS_OF.get(found[1], ()))
-        return Ending(cause, f'write type="{near[0]}"' if near else programs_hint(found[1]))
+    if found := unfound_program(printed, package):
+        return Ending(*found, unbuilt=found[1] == BUILD_FIRST_HINT)
     hint = f"a node has to stay alive: `{SPIN}`, or a loop `{LOOP}`"
     if not PRINTED_ERROR.search(last):
         return Ending("its script ran to the end", hint, by_itself=True)

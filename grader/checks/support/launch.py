@@ -19,7 +19,7 @@ from grader.checks.support.launch_slips import (
 )
 from grader.checks.support.parameters import explain_yaml
 from grader.checks.support.processes import early_end, first_interrupt_ns, lives, observed_until_ns
-from grader.checks.support.scripts import paths_by_name, programs, shebang_obstacles
+from grader.checks.support.scripts import BUILD_FIRST_HINT, paths_by_name, programs, shebang_obstacles
 from grader.checks.support.text import INIT, near_names, shown
 from grader.evidence.run import Run
 from grader.installable import install_hint, known_packages
@@ -264,11 +264,13 @@ def _unset_args(text: str, package: PackageFacts) -> Absence | None:
     return Absence(why, hint, citations=tuple(dict.fromkeys(cited)))
 
 
-def unset_arg_fixes(file: LaunchFile, told: str) -> Iterator[str]:
-    """Yield what to write for each argument of the file that has no value, and that is not told yet."""
+def unset_arg_fixes(file: LaunchFile, told: str, given: Iterable[str] = ()) -> Iterator[str]:
+    """Yield what to write for each argument of the file that has no value, that is not `given` on the command line
+    (`a:=5`), and that is not told yet."""
+    names = {word.partition(":=")[0] for word in given}
     for arg in file.unset_args:
         written = f'<arg name="{arg.name}" default="…"/>'
-        if written not in told:
+        if written not in told and arg.name not in names:
             yield (
                 f"on line {arg.line} of {arg.file} write {written}"
                 if arg.declared
@@ -373,7 +375,7 @@ def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | N
     owner = owner_of(package, node)
     if owner is not None and any(one.is_called(str(node.type)) for one in programs(owner)):
         why = f"CMakeLists.txt makes the program {node.type}, but the build did not make it"
-        return Absence(why, "first get the build to pass: catkin_make", of_script=True, unbuilt=True)
+        return Absence(why, BUILD_FIRST_HINT, of_script=True, unbuilt=True)
     if "Cannot locate" not in line:
         return Absence(
             f"there is no package {node.pkg}", "check the spelling of pkg, and that it is installed"

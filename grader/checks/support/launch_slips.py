@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from grader.checks.support.cpp_errors import CPP_SUFFIXES
 from grader.checks.support.scripts import (
+    BUILD_FIRST_HINT,
     add_hint,
     can_be_moved,
     cmake_calls,
@@ -380,3 +381,21 @@ def own_script(package: PackageFacts, node: LaunchNode) -> SourceFile | None:
 def owner_of(package: PackageFacts, node: LaunchNode) -> PackageFacts | None:
     """Return the lab's package that the node is of; None for one of ROS's."""
     return next((one for one in (package, *package.also) if one.name == node.pkg), None)
+
+
+_NO_PROGRAM = re.compile(r"cannot launch node of type \[([^/\]]+)/([^\]]+)\]: Cannot locate node")
+_NO_PACKAGE = re.compile(r"cannot launch node of type \[([^/\]]+)/[^\]]+\]: \1$")
+
+
+def unfound_program(printed: Sequence[str], package: PackageFacts) -> tuple[str, str] | None:
+    """Return which program or package roslaunch says that it does not find, and what to do about it."""
+    if found := next(filter(None, map(_NO_PROGRAM.search, printed)), None):
+        if found[1] == package.name and any(one.is_called(found[2]) for one in programs(package)):
+            return f"the build did not make the program {shown(found[2])}", BUILD_FIRST_HINT
+        near = near_names(found[2], PROGRAMS_OF.get(found[1], ()))
+        cause = f"roslaunch finds no program {shown(found[2])} in the package {shown(found[1])}"
+        return cause, f'write type="{near[0]}"' if near else programs_hint(found[1])
+    if found := next(filter(None, map(_NO_PACKAGE.search, printed)), None):
+        hint = "write the name of the package that has the program as pkg"
+        return f"roslaunch finds no package {shown(found[1])}", hint
+    return None

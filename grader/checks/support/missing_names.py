@@ -14,7 +14,14 @@ from typing import NamedTuple
 from grader.checks.support.console_output import Traceback
 from grader.checks.support.exceptions import SLIPS
 from grader.checks.support.rospy_calls import fields_of
-from grader.checks.support.scripts import OF_FILES, SYNTAX, cmake_calls, is_product, path_in_package
+from grader.checks.support.scripts import (
+    BUILD_FIRST_HINT,
+    OF_FILES,
+    SYNTAX,
+    cmake_calls,
+    is_product,
+    path_in_package,
+)
 from grader.checks.support.text import near_names, shown
 from grader.installable import (
     MODULE_OF,
@@ -174,7 +181,7 @@ def unmade(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
         hint = f"write the definition in {asked[1]}/, and list it in add_{kind}_files(…)"
         return f"the package has no .{asked[1]} file to build it from", hint
     whose = "the package's own messages" if maker is package else f"the messages of {maker.name}"
-    hint = "first get the build to pass: catkin_make"
+    hint = BUILD_FIRST_HINT
     if maker.file(CMAKE) is None:
         hint = f"first add the {CMAKE} that `catkin_create_pkg` writes. In it, {_listing(maker.interfaces)}"
         hint += ", and call generate_messages(…)"
@@ -275,7 +282,8 @@ def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | 
 
 
 def _module_of_others(name: str, package: PackageFacts) -> tuple[str, str] | None:
-    """Return the cause and the hint for a module of ROS 2, of Windows, of Python 2, or of a tutorial's package."""
+    """Return the cause and the hint for a module of ROS 2, of Windows, of Python 2, of a tutorial's package, or for a
+    folder."""
     if name in ROS_2:
         return f"{name} is from ROS 2", "this lab is for ROS 1: write the node with rospy"
     if name in WINDOWS:
@@ -285,6 +293,9 @@ def _module_of_others(name: str, package: PackageFacts) -> tuple[str, str] | Non
     if name in TUTORIALS - {package.name}:
         fix = f"write your package's name instead of {name}, or leave the line out"
         return "tutorials use that name for the reader's own package", fix
+    if any(file.path.startswith(f"{name}/") for file in package.files):
+        why = f"{name}/ is a folder of the package, and Python looks for modules in the script's own folder"
+        return why, "put the module's file into the folder of the script, and import it by its own name"
     return None
 
 
@@ -476,7 +487,7 @@ def lacking_module(found: Traceback, package: PackageFacts) -> str:
     match = NO_MODULE.search(found.message) if found.kind == "ModuleNotFoundError" else None
     # roslib.load_manifest, which rosbuild needed, asks for the ROS package itself
     name = found.message if found.kind == "ResourceNotFound" else match[1] if match else ""
-    own = package.own_modules
+    own = {*package.own_modules, *(file.path.partition("/")[0] for file in package.files if "/" in file.path)}
     sure = found.kind == "ResourceNotFound" or (bool(found.frames) and found.frames[-1].in_library)
     known = name in known_packages() or not is_module(name, package)
     lacks = exists_somewhere(name, own) and (known or not sure)

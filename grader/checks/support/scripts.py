@@ -12,6 +12,7 @@ from grader.model.package import CMakeCall, Executable, Fault, PackageFacts, Sou
 from grader.wording import has_role_of, is_role
 
 PYTHON = "catkin_install_python"
+BUILD_FIRST_HINT = "first get the build to pass: catkin_make"
 RIGHT_SHEBANG = "#!/usr/bin/env python3"
 NODE_FOLDERS = ("scripts", "src", "nodes", "bin")
 _KINDS = ("PROGRAMS", "FILES", "TARGETS", "DIRECTORY", "SCRIPT", "CODE")

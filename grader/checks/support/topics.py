@@ -417,7 +417,7 @@ def is_unexplained(check: Check, verdict: Verdict) -> bool:
     return check.of_callbacks and verdict.status.is_lost and not verdict.cause
 
 
-SEEN_AS = {"nan": "nan", "degrees": "value", "return": "nothing"}
+SEEN_AS = {"nan": "nan", "degrees": "value", "return": "nothing", "empty": "value"}
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so."""
 
 
@@ -425,15 +425,16 @@ def explain_by_wrong_value(
     check: Check, package: PackageFacts | None, run: object, verdict: Verdict
 ) -> Verdict:
     """Return a lost mark with the line of a script that runs on which the value goes wrong."""
-    if not is_unexplained(check, verdict) or package is None or not isinstance(run, Run):
+    if package is None or not isinstance(run, Run) or not verdict.status.is_lost:
         return verdict
-    files = _files_that_run(package, run)
-    found = (s for s in package.slips if s.kind == "wrong-value" and s.file in files)
-    slip = next((s for s in found if SEEN_AS[s.name] == verdict.wrong), None)
-    if slip is None:
-        return verdict
-    why = f"line {slip.line} of {slip.file}: {slip.message}"
-    return verdict.explained(why, slip.fix, (slip.place,), cause=slip.message)
+    files, kinds = _files_that_run(package, run), ["wrong-value"] * is_unexplained(check, verdict)
+    if check.name == "action-result" and any("To transition to a" in c.line for _, c in run.console):
+        kinds.append("goes-on")  # actionlib was told to end a goal that is over
+    found = [s for s in package.slips if s.kind in kinds and s.file in files]
+    for slip in (s for s in found if s.kind == "goes-on" or SEEN_AS[s.name] == verdict.wrong):
+        why = f"line {slip.line} of {slip.file}: {slip.message}"
+        return verdict.explained(why, slip.fix, (slip.place,), cause=slip.message)
+    return verdict
 
 
 OF_RESULTS = ("prints", "rostest")

@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 
 from cmake_parser.ast import Command
 
-from grader.installable import noetic_messages
+from grader.installable import noetic_definitions, noetic_messages
 from grader.model.message_definitions import (
     DIVIDER,
     DIVIDING,
@@ -319,6 +319,14 @@ def _name_definitions(files: Files, name: str, made: Sequence[str], needed: Coll
             files.change("build-line", CMAKE, changed, message, f"write {file} {place} {stray}")
 
 
+def _bring_std_msgs(names: Iterable[str]) -> bool:
+    """Return whether generate_messages(…) finds std_msgs by one of these packages, whose messages need it."""
+    needing = {
+        full.partition("/")[0] for full, (text, _) in noetic_definitions().items() if "std_msgs/" in text
+    }
+    return not needing.isdisjoint(names)
+
+
 def _generate(files: Files, package: PackageFacts) -> list[str]:
     """Call generate_messages(…) where nothing does, with the packages whose types are used, above catkin_package(…).
     Return those that find_package(catkin …) has to name with it."""
@@ -349,7 +357,9 @@ def _generate(files: Files, package: PackageFacts) -> list[str]:
         fix = f"move {GENERATE}(…), from line {calls[0].line}, above catkin_package(…)"
         files.change("build-line", CMAKE, changed, message, fix)
     call = calls_of(files, GENERATE)[0]
-    missing = sorted(needed - {token.value for token in words_of(call)})
+    named = {token.value for token in words_of(call)}
+    found = {"std_msgs"} if _bring_std_msgs(named) else set[str]()
+    missing = sorted(needed - named - found)
     if missing and not any("$" in token.value for token in words_of(call)):
         text, listed = cmake_text(files), " ".join(missing)
         token = next((t for t in words_of(call) if t.value == "DEPENDENCIES"), None)

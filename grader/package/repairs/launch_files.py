@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from pathlib import PurePosixPath
 
+from grader.installable import known_packages, noetic_messages
 from grader.model.package import MANIFEST, LaunchFile, LaunchNode, PackageFacts
 from grader.model.repair import RepairKind
 from grader.package.launch import parse_launch
@@ -41,9 +42,11 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
     nodes = [(launch, node) for launch in package.launch_files for node in launch.nodes]
     for launch, node in nodes:
         _complete_node(files, launch.path, node, own, scripts)
+    others = {*known_packages(), *noetic_messages(), *(one.name for one in package.also), "", own}
     for launch, node in nodes:
         pkg, kind = node.pkg or "", node.type or ""
-        if pkg != own and (is_near(pkg, own) or (pkg in ours and {kind, f"{kind}.py"} & scripts)):
+        runs_own = bool({kind, f"{kind}.py"} & (scripts if pkg in ours else programs))
+        if pkg != own and (is_near(pkg, own) or ((pkg in ours or pkg not in others) and runs_own)):
             _set_attribute(files, launch.path, node.line, ("pkg", pkg, own), kind="package-name")
     for launch in package.launch_files:
         _repair_find(files, launch.path, own)

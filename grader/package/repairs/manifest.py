@@ -112,7 +112,11 @@ def _spell_dependency(files: Files, name: str) -> None:
     tags = re.compile(r"<(\w*depend)\b[^<>]*>\s*([\w-]+)\s*</\1>")
     given = {found[2] for found in tags.finditer(_blank_comments(text))} if _parses(text) else set[str]()
     near = {
-        one for one in given if is_one_edit(one, name) or one.lower() == name or is_word_of(one, name, given)
+        one
+        for one in given
+        if (is_one_edit(one, name) and not _is_version(one, name))
+        or one.lower() == name
+        or is_word_of(one, name, given)
     }
     slips = near - {name, *known_packages(), *noetic_messages(), *OF_ROS}
     for _ in range(SLIPS_MAX):  # each change reads the file again
@@ -129,6 +133,11 @@ def _spell_dependency(files: Files, name: str) -> None:
             fix = f"delete <{found[1]}>{found[2]}</{found[1]}> on line {line}"
         text = f"{text[:begin]}{new}{text[end:]}"
         files.change("manifest-line", MANIFEST, text, message, fix)
+
+
+def _is_version(one: str, other: str) -> bool:
+    """Return whether only a number tells them apart: `openni2_camera` is another package than `openni_camera`."""
+    return re.sub(r"\d", "", one) == re.sub(r"\d", "", other)
 
 
 def _add_dependency(files: Files, name: str) -> None:
