@@ -41,7 +41,7 @@ from grader.judging.repair_charges import (
     words_of,
 )
 from grader.model.package import PackageFacts
-from grader.model.repair import Repair
+from grader.model.repair import OF_LOGIC, Repair
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import FileCitation, Status, Verdict, cited_lines
 from grader.rubric.model import Criterion, Rubric
@@ -147,6 +147,11 @@ def apply_repaired_copy(
         )
         for c in rubric.criteria
     }
+    if any(one.kind in OF_LOGIC for one in repairs):
+        judged = [c.id for c in rubric.criteria if c.check not in AT_ANY_RATE]
+        if any(on_copy[i].status.is_lost and not first[i].status.is_lost for i in judged):
+            return verdicts, uses  # one fault for another
+        needs = {i: ones if on_copy[i].status is Status.PASS else () for i, ones in needs.items()}
     better = {
         c.id
         for c in rubric.criteria

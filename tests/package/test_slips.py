@@ -129,6 +129,8 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (node(LOOP + "        p.publish(1)\n        rospy.spin()\n") + CALLED,
          [("spin-in-loop", 6, "stops at the spin()")]),
         (node(LOOP + "        p.publish(1)\n        break\n") + CALLED, [("loop-left", 6, "at the break on line 6")]),
+        ("def side():\n    while on:\n        p.publish(1)\n        break\nside()\nside()\n", []),
+        ("def side():\n    while on:\n        p.publish(1)\n        return\nfor i in range(4):\n    side()\n", []),
         ("def heard(msg):\n    rospy.signal_shutdown('x')\nrospy.Subscriber('x', A, heard)\nrospy.spin()\n",
          [("loop-left", 2, "the callback `heard` ends the node on line 2, at the first message")]),
         ("class A:\n    def go(self):\n        def stop(self):\n            pass\nA().stop()\n",
@@ -407,7 +409,7 @@ def test_why_a_node_goes_on_after_ctrl_c(tmp_path, code, told):
 @pytest.mark.parametrize(
     ("condition", "fix"),
     [
-        ("n < 9 and on", "on line 1, write ` and not rospy.is_shutdown()` before the colon"),
+        ("n < 9 and on", "on line 1, write `and not rospy.is_shutdown()` before the colon"),
         ("(n <\n 9)", "on line 2, write"),
         ("n < 9 or on", "check `rospy.is_shutdown()` in it"),
         ("n := look()", "check `rospy.is_shutdown()` in it"),

@@ -158,7 +158,9 @@ def stopped_loops(tree):
             elif isinstance(loop, ast.For) and dotted(loop.target) in used:
                 fix = "put it inside a `while not rospy.is_shutdown():`"
             yield slip(loop.lineno, "loop-left", message, fix=fix)
-        left = next((n for n in loop.body if isinstance(n, (ast.Break, ast.Return))), None)
+        # what is done again and again, or in several places, ends by no loop in it
+        ends = not turned[loop][1] and not is_part
+        left = next((n for n in loop.body if isinstance(n, (ast.Break, ast.Return))), None) if ends else None
         if left is not None:
             word = "break" if isinstance(left, ast.Break) else "return"
             message = "the loop ends the first time around, at the %s on line %d" % (word, left.lineno)
@@ -474,7 +476,7 @@ ENDS = (ast.Break, ast.Return, ast.Raise)
 RAISING = ("wait_for_message", "wait_for_service")
 """Calls that end with an exception on Ctrl-C. `rate.sleep()` is none of them: by the real clock it sleeps on."""
 ASKS = "check `rospy.is_shutdown()` in it: `while not rospy.is_shutdown():`"
-ASKS_TOO = "on line %d, write ` and not rospy.is_shutdown()` before the colon"
+ASKS_TOO = "on line %d, write `and not rospy.is_shutdown()` before the colon"
 
 
 def deaf_loops(tree):
