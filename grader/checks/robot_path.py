@@ -139,6 +139,9 @@ def tell_end(verdict: Verdict, package: PackageFacts, run: Run) -> Verdict:
     if end is None or end.by_itself or end.cause in verdict.message:
         return verdict
     kind = unjudged if verdict.unjudged else failed
+    if "keeps moving" in verdict.message:  # it was there before that
+        verdict = verdict.model_copy(update={"citations": (*verdict.citations, *end.citations)})
+        return verdict.explained(f"the node ended: {end.cause}", f"{verdict.hint}; {end.hint}")
     return end.verdict(kind, f"{verdict.message}; the node ended: {end.cause}", verdict.measured)
 
 

@@ -149,9 +149,12 @@ def apply_repaired_copy(
     }
     if any(one.kind in OF_LOGIC for one in repairs):
         judged = [c.id for c in rubric.criteria if c.check not in AT_ANY_RATE]
-        if any(on_copy[i].status.is_lost and not first[i].status.is_lost for i in judged):
-            return verdicts, uses  # one fault for another
-        needs = {i: ones if on_copy[i].status is Status.PASS else () for i, ones in needs.items()}
+        worse = any(on_copy[i].status.is_lost and not first[i].status.is_lost for i in judged)
+        helped = {i for i, one in on_copy.items() if one.status is Status.PASS and not worse}
+        needs = {
+            i: tuple(one for one in ones if one.kind not in OF_LOGIC or i in helped)
+            for i, ones in needs.items()
+        }
     better = {
         c.id
         for c in rubric.criteria

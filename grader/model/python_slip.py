@@ -71,7 +71,8 @@ class PythonSlip(Placed, Record):
     - `takes-number`: a loop that computes with what a topic's callback keeps of its message, or publishes it as a
       number: a slip only if that message has to be a text.
     - `wrong-value`: a value that is none: a comparison with NaN, the sine of an angle in degrees, a service's answer
-      that is made and not returned (`name`: `nan`, `degrees`, `return`).
+      that is made and not returned, or a condition that all numbers fulfil, or none (`name`: `nan`, `degrees`,
+      `return`, `bounds`).
 
     No slips, but what a line says, for checks that compare it with what the lab asks; `message` is a name, a number or
     a text:

@@ -379,12 +379,12 @@ def _last_block(tree: ast.Module, waits: list[ast.Call]) -> list[ast.stmt]:
 
 def with_sign_turned(text: str, side: str) -> Iterator[Step]:
     """Yield the text with the other sign for the only turn that can be to the wrong `side`: a number of that sign, or
-    else what is calculated."""
+    else what is calculated, which alone counts where no side is known."""
     if syntax_error(text) is not None:
         return
     tree, lines = tree_of(text), text.split("\n")
     turns = _turns(tree)
-    plain = [one for one in turns if (sign := _sign(one)) and (sign > 0) == (side == "left")]
+    plain = [one for one in turns if side and (sign := _sign(one)) and (sign > 0) == (side == "left")]
     worked_out = [one for one in turns if _sign(one) is None]
     found = plain if not worked_out else worked_out if not plain else []
     span = span_of(lines, found[0]) if len(found) == 1 else None

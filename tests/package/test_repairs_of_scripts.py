@@ -525,6 +525,8 @@ def scanned(scan):
         (STEERS.format(near="0", far="K * error - D * change"), "right", "twist.angular.z = -(K * error - D * change)"),
         (STEERS.format(near="-math.pi / 4", far="0"), "right", "twist.angular.z = math.pi / 4"),
         (STEERS.format(near="0.5", far="K * error"), "left", ""),  # either of them
+        (STEERS.format(near="0.5", far="K * error"), "", "twist.angular.z = -K * error"),
+        (STEERS.format(near="0.5", far="0"), "", ""),
         (STEERS.format(near="turn", far="turn"), "left", ""),  # no line of this file sets it
         ("turn = 0\nif near:\n    turn = 0.3\ntwist.angular.z = turn\n", "left", "turn = -0.3"),
         ("p.publish(Twist(angular=Vector3(0, 0, 0.4)))\n", "left", "Vector3(0, 0, -0.4)"),

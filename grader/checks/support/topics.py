@@ -417,23 +417,24 @@ def is_unexplained(check: Check, verdict: Verdict) -> bool:
     return check.of_callbacks and verdict.status.is_lost and not verdict.cause
 
 
-SEEN_AS = {"nan": "nan", "degrees": "value", "return": "nothing"}
+SEEN_AS = {"nan": "nan", "degrees": "value", "return": "nothing", "bounds": ""}
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so."""
 
 
 def explain_by_wrong_value(
     check: Check, package: PackageFacts | None, run: object, verdict: Verdict
 ) -> Verdict:
-    """Return a lost mark with the line of a script that runs on which the value goes wrong."""
+    """Return a lost mark with the line of a script that runs on which the value goes wrong, or with its conditions that
+    are always or never true."""
     if not is_unexplained(check, verdict) or package is None or not isinstance(run, Run):
         return verdict
     files = _files_that_run(package, run)
-    found = (s for s in package.slips if s.kind == "wrong-value" and s.file in files)
-    slip = next((s for s in found if SEEN_AS[s.name] == verdict.wrong), None)
-    if slip is None:
-        return verdict
-    why = f"line {slip.line} of {slip.file}: {slip.message}"
-    return verdict.explained(why, slip.fix, (slip.place,), cause=slip.message)
+    found = [s for s in package.slips if s.kind == "wrong-value" and s.file in files]
+    for slip in [s for s in found if SEEN_AS[s.name] == verdict.wrong][: 1 if verdict.wrong else 4]:
+        why = f"line {slip.line} of {slip.file}: {slip.message}"
+        hint = slip.fix if verdict.wrong else f"{verdict.hint}; {slip.fix}"
+        verdict = verdict.explained(why, hint, (slip.place,), cause=slip.message if verdict.wrong else "")
+    return verdict
 
 
 OF_RESULTS = ("prints", "rostest")

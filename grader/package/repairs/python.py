@@ -217,9 +217,10 @@ def _examine(
         left = left[1:]  # of those that are left, the first one ended the child
 
 
-def turn_sign(folder: Path, file: str, side: str) -> Repair | None:
-    """Return the repair that turns the sign of the only line of a script that can make a robot turn to that side; None
-    where it is not plain which one that is. The robot's way shows whether it is one."""
+def turn_sign(folder: Path, file: str, side: str = "") -> Repair | None:
+    """Return the repair that turns the sign of the only line of a script that can make a robot turn to that side, or
+    without a side, of the only turn that is worked out; None where it is not plain which one that is. The robot's way
+    shows whether it is one."""
     files = Files(folder=folder.resolve())
     text = files.text(file)
     answer = run_limited(TURN, text or "", side, limits=ChildLimits(wall_s=WALL_S, **LIMITS))
