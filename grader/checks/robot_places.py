@@ -11,7 +11,17 @@ from typing import Annotated, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
-from grader.checks.robot_path import DRIVE, metres, never_moves, spot, tell_end, unreadable, why_still
+from grader.checks.robot_path import (
+    DRIVE,
+    TURNS_S,
+    drives_too_little,
+    metres,
+    never_moves,
+    spot,
+    tell_end,
+    unreadable,
+    why_still,
+)
 from grader.checks.support.clocks import LATE_MS, Lateness, excused, no_clock, run_seconds
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.geometry import (
@@ -32,7 +42,6 @@ from grader.checks.support.geometry import (
     length_m,
     out_along,
     relative,
-    rests_along,
     set_off_s,
     share_inside,
     shown_walls,
@@ -54,8 +63,6 @@ STALLED_MS = 1000.0
 """In the time of the run, which may be faster than the wall's."""
 STILL_S = 0.5
 """A robot's speed at the end is that of so long a time."""
-TURNS_S = 3.0
-"""A robot that turns for so long, and does not drive, finds no way."""
 SLOW_M_S = 0.02
 SILENT_S, GAPS = 1.5, 5.0
 """Positions have ended where none came for so long, and for so many of their gaps, before the run's end."""
@@ -68,7 +75,6 @@ STEER = (
 )
 FASTER = "drive faster, or take a shorter way"
 CIRCLES = "make angular.z depend on where the wall is, ahead or beside the robot, and not only on how far away it is"
-DRIVES = 0.95  # of the time it drives, and does not stand or turn on the spot
 TOWARDS = "turn towards the wall where it is too far away: a positive angular.z turns to the left"
 PLACES = 200
 """So many of a robot's poses are enough to see to which side it turns."""
@@ -520,36 +526,12 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
             why = f"it drives in circles there, {around:.1f} times around"
             verdict = verdict.explained(why, CIRCLES)
     elif long_m < params.least_m:
-        verdict = _too_little(path, long_m, region, params)
+        verdict = drives_too_little(path, region, params.least_m)
     else:
         always = f"for {inside:.0%} of the time" if any(out) else "all the time"
         return passed(f"it is {region.words} {always}", measured=figures)
     nearly = inside * NEARLY >= params.share and long_m * NEARLY >= params.least_m
     return _excuse_nearly(verdict.about(measured=figures), run, nearly=nearly)
-
-
-def _too_little(path: Sequence[Pose], long_m: float, region: Region, params: StaysWithinParams) -> Verdict:
-    """Return the loss of a robot that drives too little: it is slow, or turns on the spot in the end."""
-    message = f"its path is {metres(long_m)} long; {significant(params.least_m)} m are asked for"
-    hint = "keep driving while the way is clear"
-    if share_inside(path, rests_along(path)) > DRIVES:
-        mean_m_s = long_m / max(path[-1].time_s - path[0].time_s, STILL_S)
-        message, hint = f"{message}, and it drives all the time, at {mean_m_s:.2f} m/s", "drive faster"
-    recent = [pose for pose in path if pose.time_s >= path[-1].time_s - TURNS_S]
-    if not stands(recent) or turned_rad(recent) <= TURNING_RAD:
-        return failed(message, hint=hint)
-    message += f", and it turns on the spot at {spot(path[-1].point)} in the end"
-    hint = "drive on where the way is clear: look at the ranges in front alone, by their angles in radians"
-    steps = (math.remainder(b.heading - a.heading, math.tau) for a, b in pairwise(recent))
-    if abs(sum(steps)) < turned_rad(recent) / 2:
-        message += ", now to the left and now to the right"
-        hint = "once it turns, let it turn to the same side until the way in front is clear"
-    if isinstance(region, Band) and region.max_m is not None:
-        message += (
-            f", {metres(region.nearest_m(path[-1].point))} from the nearest wall; why is not established"
-        )
-        hint = "print in each branch which one it is, and look at the condition that stays true there"
-    return failed(message, hint=hint)
 
 
 def _turns_wrong(

@@ -131,6 +131,8 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (node(LOOP + "        p.publish(1)\n        break\n") + CALLED, [("loop-left", 6, "at the break on line 6")]),
         (node("    for i in range(4):\n        t.angular.z = i\n        p.publish(t)\n") + CALLED,
          [("loop-left", 4, "call rospy.spin() below line 6")]),
+        ("def drive(x, y):\n    while on:\n        p.publish(x)\n",
+         [("never-called", 1, "call `drive(…)` with values for x, y")]),
         ("def side():\n    while on:\n        p.publish(1)\n        break\nside()\nside()\n", []),
         ("def side():\n    while on:\n        p.publish(1)\n        return\nfor i in range(4):\n    side()\n", []),
         ("if a > 265 or a < 275:\n    f(b)\n", [("wrong-value", 1, "`a > 265 or a < 275` is true for every number")]),

@@ -161,8 +161,11 @@ def never_run(tree):
 
 
 def handed_over(function, tree, owner):
-    """Return who has to be told of a callback, which takes one value; "" of another function."""
+    """Return who has to be told of a callback, which takes one value, or how one that takes several is called; "" of
+    another function."""
     taken = [one.arg for one in function.args.args if one.arg != "self"]
+    if len(taken) > 1 and not function.args.defaults:
+        return "call `%s%s(…)` with values for %s" % (owner, function.name, ", ".join(taken))
     if len(taken) != 1 or function.args.defaults or calls_in(function, "init_node"):
         return ""
     name = (owner and "self.") + function.name

@@ -201,6 +201,35 @@ def off_m(point: Point, start: Point, end: Point) -> float:
     return math.dist(point, (start[0] + share * dx, start[1] + share * dy))
 
 
+STANDS_M, RESTS_M = 0.01, 0.001
+"""How far a robot that turns in place goes for each radian, and one that rests."""
+
+
+def first_turn(path: Sequence[Pose]) -> float:
+    """Return by how much it turns in place, to the left (rad), the first time that it does."""
+    turned = 0.0
+    for a, b in pairwise(path):
+        if math.dist(a.point, b.point) <= RESTS_M:
+            turned += math.remainder(b.heading - a.heading, math.tau)
+        elif abs(turned) > TURNING_RAD:
+            break
+        else:
+            turned = 0.0
+    return turned
+
+
+def arc(path: Sequence[Pose], enough_rad: float) -> tuple[float, float]:
+    """Return by how much it turned while it drove, to the left (rad), and how far (m), until it has turned enough."""
+    turned = arc_m = 0.0
+    for a, b in pairwise(path):
+        step, step_m = math.remainder(b.heading - a.heading, math.tau), math.dist(a.point, b.point)
+        if step and step_m > abs(step) * STANDS_M:
+            turned, arc_m = turned + step, arc_m + step_m
+        if abs(turned) >= enough_rad:
+            break
+    return turned, arc_m
+
+
 class Course(NamedTuple):
     """How a path follows a way of several points.
 
