@@ -226,7 +226,14 @@ def turn_sign(folder: Path, file: str, side: str = "") -> Repair | None:
     answer = run_limited(TURN, text or "", side, limits=ChildLimits(wall_s=WALL_S, **LIMITS))
     for step in map(json.loads, answer.lines.splitlines()[:1]):
         place = f"line {step['line']} of {file}"
-        message = f"{place}: this turn has the wrong sign: a copy of the package with the other sign passes"
+        passes = "a copy of the package with the other sign passes"
+        # where no side is known to be wrong, another line may be what is meant
+        why = (
+            f"this turn has the wrong sign: {passes}"
+            if side
+            else "with the other sign for this turn, a copy of the package passes"
+        )
+        message = f"{place}: {why}"
         files.change("turn-sign", file, step["text"], message)
     return next(iter(files.repairs), None)
 
