@@ -30,6 +30,7 @@ from grader.checks.support.geometry import (
     has_no_numbers,
     length_m,
     off_m,
+    other_axis,
     relative,
     rests_along,
     set_off_s,
@@ -142,6 +143,12 @@ def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
 def tell_end(verdict: Verdict, package: PackageFacts, run: Run) -> Verdict:
     """Return a loss with the reason why the node ended, where it did so early and not by its script's own end."""
     end = explain_early_end(package, run) if verdict.status is Status.FAIL else None
+    for channel in run.student_channels() if verdict.status is Status.FAIL else ():
+        if axis := other_axis(channel):
+            why = f"velocities on {channel.topic} set {axis}, and their angular.z is always 0"
+            verdict = verdict.explained(
+                why, f"set angular.z in place of {axis}: a robot on wheels turns by that alone"
+            )
     if end is None or end.by_itself or end.cause in verdict.message:
         return verdict
     kind = unjudged if verdict.unjudged else failed

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated, NamedTuple
 
@@ -40,6 +41,7 @@ from grader.checks.support.geometry import (
     circles,
     commands_of,
     length_m,
+    nearest_seen,
     out_along,
     relative,
     set_off_s,
@@ -74,6 +76,7 @@ STEER = (
     "-pi and pi: math.remainder(angle, 2 * math.pi); dx and dy are the point minus the robot's place"
 )
 FASTER = "drive faster, or take a shorter way"
+LOOK_AT = "see that the script reads this one: print the index or the angle of what it compares"
 CIRCLES = "make angular.z depend on where the wall is, ahead or beside the robot, and not only on how far away it is"
 TOWARDS = "turn towards the wall where it is too far away: a positive angular.z turns to the left"
 PLACES = 200
@@ -519,9 +522,12 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
         verdict = _outside(path, out, region, inside, params)
         wrong = _turns_wrong(path, out, region, run) if isinstance(region, Band) else None
         if wrong is not None:
-            side, why, hint = wrong
-            verdict = verdict.explained(f"it turns to the {side} there, {why}", hint)
-            verdict = verdict.lost_by("steers-wrong", side)
+            verdict = verdict.explained(f"it turns to the {wrong[0]} there, {wrong[1]}", wrong[2])
+            verdict = verdict.lost_by("steers-wrong", wrong[0])
+        elif isinstance(region, Band) and (seen := _seen_near(path, out, region, run)):
+            verdict = verdict.explained(
+                f"the smallest of its ranges is then {seen}", f"{verdict.hint}; {LOOK_AT}"
+            )
         elif isinstance(region, Band) and (around := circles(path, out)) > 1:
             why = f"it drives in circles there, {around:.1f} times around"
             verdict = verdict.explained(why, CIRCLES)
@@ -532,6 +538,18 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
         return passed(f"it is {region.words} {always}", measured=figures)
     nearly = inside * NEARLY >= params.share and long_m * NEARLY >= params.least_m
     return _excuse_nearly(verdict.about(measured=figures), run, nearly=nearly)
+
+
+def _seen_near(path: Sequence[Pose], out: Sequence[float], band: Band, run: Run) -> str:
+    """Return what its laser sees where it first comes too near to a wall; "" where it has none, or is too far away."""
+    first, to_s = next(pose for pose, far in zip(path, out, strict=True) if far), run_seconds(run)
+    scans = [
+        c for c in run.channels if "LaserScan" in c.type and c.callerid in run.grader_nodes and c.messages
+    ]
+    if not scans or to_s is None or band.nearest_m(first.point) >= (band.min_m or 0.0):
+        return ""
+    before = tuple(one for one in scans[0].messages if to_s(one.log_time_ns) <= first.time_s)[-1:]
+    return nearest_seen(replace(scans[0], messages=before).values[0], scans[0].topic) if before else ""
 
 
 def _turns_wrong(

@@ -360,6 +360,29 @@ def commands_of(channel: Channel) -> list[tuple[int, Command]]:
     return [(t, one) for t, one in commands if one is not None and _finite(one.forward, one.left, one.turn)]
 
 
+def other_axis(channel: Channel) -> str:
+    """Return the other axis (`angular.x`) around which velocities on a topic turn, where angular.z is always 0; ""
+    where they do not."""
+    values = channel.values if "Twist" in channel.type else ()
+    twists = [one.get("twist", one) for one in values if isinstance(one, Mapping)]
+    turns = [one["angular"] for one in twists if isinstance(one.get("angular"), Mapping)]
+    if any(turn["z"] for turn in turns):
+        return ""
+    return next((f"angular.{axis}" for axis in "xy" if any(turn[axis] for turn in turns)), "")
+
+
+def nearest_seen(scan: Mapping[str, Any], topic: str) -> str:
+    """Return the smallest range of a LaserScan, where it is and how far (m); "" where nothing is in reach."""
+    there = [(one, index) for index, one in enumerate(scan["ranges"]) if math.isfinite(one) and one > 0]
+    if not there:
+        return ""
+    far_m, index = min(there)
+    deg = math.degrees(math.remainder(scan["angle_min"] + index * scan["angle_increment"], math.tau))
+    side = f"{abs(deg):.0f}° to the {'left' if deg > 0 else 'right'}"
+    side = "straight ahead" if abs(deg) < AIMED_DEG else "behind it" if abs(deg) > BEHIND_DEG else side
+    return f"ranges[{index}] of {topic}, {side}, with {far_m:.2f} m"
+
+
 def has_no_numbers(channel: Channel) -> bool:
     """Return whether a velocity on a topic is nan or inf."""
     sent = (_command(0.0, one) for one in channel.values) if "Twist" in channel.type else ()
