@@ -56,7 +56,8 @@ def test_a_function_that_reads_messages_and_has_no_subscriber(
     [
         ("def heard(msg):", "pass it to what calls it: `rospy.Subscriber(…, heard)`"),
         ("def on_feedback(msg):", "pass it: `send_goal(…, feedback_cb=on_feedback)`"),
-        ("def heard(msg, pub):", ""),
+        ("def heard(msg, pub):", "call `heard(…)` with values for msg, pub"),
+        ("def heard(msg, pub=None):", ""),
     ],
 )
 def test_a_callback_that_is_handed_to_nobody_is_to_be_handed_over(
@@ -138,6 +139,12 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         ("if a > 265 or a < 275:\n    f(b)\n", [("wrong-value", 1, "`a > 265 or a < 275` is true for every number")]),
         ("if c and 10 > self.a and self.a >= 350:\n    f(b)\n",
          [("wrong-value", 1, "`self.a >= 350 and self.a < 10` is true for no number") ]),
+        ("if key != 'a' or key != 'b':\n    f(b)\n",
+         [("wrong-value", 1, "`key != 'a' or key != 'b'` is true for every value")]),
+        ("if key == 1 and c and key == 2:\n    f(b)\n", [("wrong-value", 1, "write `or` in place of `and`")]),
+        ("if key != 1 or key != 1.0 or key != True:\n    f(b)\n", []),
+        ("if key != 'a' or other != 'b' or key != 'a':\n    f(b)\n", []),
+        ("if key == 'a' or key == 'b' and key != 'c':\n    f(b)\n", []),
         ("if a > 90 or b or a < -90 or a > 100:\n    f(b)\n", []),
         ("if a < -90 or a >= -91.5 or a > 9:\n    f(b)\n", [("wrong-value", 1, "on line 1, write `and`")]),
         ("if a < 10 or a > 350 or b < 400:\n    f(b)\n", []),

@@ -212,7 +212,7 @@ def wrong_values(tree):
 
 
 BELOW = (ast.Lt, ast.LtE)
-NUMBERS_BELOW = 1e9
+NUMBERS_BELOW, TEXT_SHOWN = 1e9, 40
 SIGNS = {ast.Gt: ">", ast.GtE: ">=", ast.Lt: "<", ast.LtE: "<="}
 TURNED = {ast.Gt: ast.Lt, ast.GtE: ast.LtE, ast.Lt: ast.Gt, ast.LtE: ast.GtE}
 
@@ -223,6 +223,7 @@ def decided_conditions(tree):
         if not isinstance(node, ast.BoolOp):
             continue
         any_of, bounds = isinstance(node.op, ast.Or), {}
+        yield from decided_by_values(node, ast.NotEq if any_of else ast.Eq)
         for name, kind, number in filter(None, map(bound_of, node.values)):
             lowest, highest = bounds.setdefault(name, [None, None])
             side = kind in BELOW
@@ -240,6 +241,26 @@ def decided_conditions(tree):
             yield slip(
                 node.lineno, "wrong-value", "`%s` is true for %s" % (pair, holds), fix=fix, name="bounds"
             )
+
+
+def decided_by_values(condition, kind):
+    """`key != 'a' or key != 'b'`, which every value fulfils, and `key == 'a' and key == 'b'`, which none does."""
+    asked = {}
+    for one in condition.values:
+        is_plain = isinstance(one, ast.Compare) and len(one.ops) == 1 and isinstance(one.ops[0], kind)
+        if is_plain and isinstance(one.comparators[0], ast.Constant) and "..." not in dotted(one.left):
+            value = one.comparators[0].value  # 1 and 1.0 are one value
+            asked.setdefault(dotted(one.left), {})[value] = repr(value)[:TEXT_SHOWN]
+    for name, values in asked.items():
+        if len(values) > 1:
+            sign, word, other, holds = (
+                ("!=", "or", "and", "every") if kind is ast.NotEq else ("==", "and", "or", "no")
+            )
+            first, second = list(values.values())[:2]
+            pair = "%s %s %s %s %s %s %s" % (name, sign, first, word, name, sign, second)
+            fix = "on line %d, write `%s` in place of `%s`" % (condition.lineno, other, word)
+            message = "`%s` is true for %s value" % (pair, holds)
+            yield slip(condition.lineno, "wrong-value", message, fix=fix, name="bounds")
 
 
 def bound_of(node):
