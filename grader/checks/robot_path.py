@@ -206,40 +206,37 @@ def never_moves(path: Sequence[Pose], figures: str, run: Run) -> Verdict:
 
 def drives_too_little(path: Sequence[Pose], region: Region, least_m: float) -> Verdict:
     """Return the loss of a robot whose path is too short: it is slow, stands, or turns on the spot in the end."""
-    long_m, stood = length_m(path), 1 - share_inside(path, rests_along(path))
+    long_m, rests = length_m(path), rests_along(path)
     message = f"its path is {metres(long_m)} long; {significant(least_m)} m are asked for"
-    hint, follows = (
-        "keep driving while the way is clear",
-        isinstance(region, Band) and region.max_m is not None,
-    )
+    hint, stood = "keep driving while the way is clear", 1 - share_inside(path, rests)
     recent = [pose for pose in path if pose.time_s >= path[-1].time_s - TURNS_S]
-    near_m = region.nearest_m(path[-1].point) if isinstance(region, Band) else math.inf
-    if stands(recent) and turned_rad(recent) > TURNING_RAD:
+    turns = stands(recent) and turned_rad(recent) > TURNING_RAD
+    if turns:
         message += f", and it turns on the spot at {spot(path[-1].point)} in the end"
-        hint = (
-            "drive on where the way is clear: look at the ranges in front alone, by their angles in radians"
-        )
+        hint = AHEAD
         steps = (math.remainder(b.heading - a.heading, math.tau) for a, b in pairwise(recent))
         if abs(sum(steps)) < turned_rad(recent) / 2:
             message += ", now to the left and now to the right"
             hint = "once it turns, let it turn to the same side until the way in front is clear"
-        if follows:
-            message += f", {metres(near_m)} from the nearest wall; why is not established"
-            hint = "print in each branch which one it is, and look at the condition that stays true there"
     elif stood < RARELY:
         mean_m_s = long_m / max(path[-1].time_s - path[0].time_s, STOPS_S)
         message, hint = f"{message}, and it drives all the time, at {mean_m_s:.2f} m/s", "drive faster"
-    elif stood > MOSTLY:
+    if turns and isinstance(region, Band) and region.max_m is not None:
+        message += (
+            f", {metres(region.nearest_m(path[-1].point))} from the nearest wall; why is not established"
+        )
+        hint = "print in each branch which one it is, and look at the condition that stays true there"
+    elif stood > MOSTLY and (isinstance(region, Band) or not turns):
         message += f", and it stands, or turns on the spot, for {stood:.0%} of the time"
         if isinstance(region, Band):
-            resting = (a for a, rests in zip(path, rests_along(path), strict=True) if rests)
-            message += (
-                f", at least {metres(min(region.nearest_m(one.point) for one in resting))} from any wall"
-            )
-        hint = "look at the condition under which it drives: it does not hold there"
+            free_m = min(region.nearest_m(a.point) for a, still in zip(path, rests, strict=True) if still)
+            message += f", at least {metres(free_m)} from any wall"
+        why = "look at the condition under which it drives: it does not hold there"
+        hint = f"{hint}; {why}" if turns else why
     return failed(message, hint=hint)
 
 
+AHEAD = "drive on where the way is clear: look at the ranges in front alone, by their angles in radians"
 RARELY, MOSTLY = 0.05, 0.5
 """Shares of the time for which it stands."""
 
