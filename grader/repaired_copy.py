@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import posixpath
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -32,9 +32,13 @@ from grader.model.submission import SourcePackage, Submission
 from grader.package.manifest import parse_manifest
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs, wanted_of
 from grader.package.repairs.editing import read_data
+from grader.package.repairs.python import ros_clock, turn_sign
 from grader.rubric.model import Rubric
 
 REPAIRED, REPEATED = "repaired-1", "repeated-1"
+STEERS_WRONG, WARPED = "steers-wrong", "warped"
+OF_WAYS = ("path", "ends-at", "stays-within")
+"""Checks of where a robot drives, which a turn to the wrong side can fail."""
 REPAIRS_MAX = 4
 """So many lines of scripts and launch files are repaired, however many mistakes are on one."""
 
@@ -77,8 +81,11 @@ def choose_repairs(
     ]
     chosen = most_of(helping)
     scenarios = sorted(name for name in lost if any(uses(name, one) for one in chosen))
-    if not scenarios and not any(map(unblocks, chosen)):
-        return (), ()
+    if not scenarios:
+        logic, scenarios = _choose_logic(submission, rubric, criteria, lost)
+        if not logic and not any(map(unblocks, chosen)):
+            return (), ()
+        chosen += logic
     # of a script that the build makes a program of, neither its bit nor its first line is used
     made = {c.mistake.name for c in criteria if c.mistake is not None and is_unmade(c)}
     made |= programs_of_build(facts) & {one.before for one in chosen if one.kind == "file-name"}
@@ -86,6 +93,28 @@ def choose_repairs(
     return (*(one for one in before if not is_first_line_added(one, rubric, chosen)), *chosen), tuple(
         scenarios
     )
+
+
+def _choose_logic(
+    submission: Submission, rubric: Rubric, criteria: Sequence[CriterionResult], lost: Collection[str]
+) -> tuple[list[Repair], list[str]]:
+    """Return the only repair of logic that could be the reason for a lost mark, and all scenarios that run its script:
+    ROS's clock in place of the computer's, or the other sign for a turn to the wrong side."""
+    turning = {c.scenario: c.mistake.name for c in criteria if c.mistake and c.mistake.kind == STEERS_WRONG}
+    led = {c.scenario for c in criteria if c.check in OF_WAYS and c.status.is_lost and not c.blocked_by}
+    for name in sorted(lost) if not submission.also else ():
+        scripts = [start.script for start in rubric.scenarios[name].start if start.script]
+        found, folder = None, submission.package.folder
+        if len(scripts) == 1 and name in turning:
+            found = turn_sign(folder, scripts[0], turning[name])
+        if len(scripts) == 1 and found is None and rubric.scenarios[name].clock == WARPED:
+            found = ros_clock(folder, scripts[0])
+        if len(scripts) == 1 and found is None and name in led:
+            found = turn_sign(folder, scripts[0])
+        if found is not None and rubric.share_of(found.kind) > 0:
+            run = (i for i, one in rubric.scenarios.items() if scripts[0] in {s.script for s in one.start})
+            return [found], sorted(run)
+    return [], []
 
 
 def most_of(helping: Sequence[Repair]) -> list[Repair]:

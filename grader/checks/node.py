@@ -39,7 +39,7 @@ from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
-from grader.wording import join_words, plural, seconds
+from grader.wording import join_words, numbers_text, plural, seconds
 
 IN_A_LOOP = f"loop with `{LOOP}`" + both(" and catch rospy.ROSInterruptException around it", "")
 
@@ -239,6 +239,7 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
     return failed(message, hint=end.hint or IN_A_LOOP, citations=end.citations)
 
 
+LONG_TURN_S = 4.0
 LONG_SLEEP_HZ = 0.5
 """A loop of a lower rate can sleep for as long as Ctrl-C is waited for."""
 
@@ -247,12 +248,15 @@ def _asleep(one: Life, package: PackageFacts) -> Verdict | None:
     """Return that the node slept on after Ctrl-C, where its loop sleeps for long: its rate is judged elsewhere."""
     rates = [s for s in package.slips if s.kind == "rate-number" and s.file == one.start.script]
     slow = min(rates, key=lambda s: float(s.message), default=None)
-    if slow is None or float(slow.message) >= LONG_SLEEP_HZ:
+    pauses = [s for s in rates if s.name.endswith("sleep")]
+    turn_s = sum(1 / float(s.message) for s in pauses)
+    if slow is not None and float(slow.message) < LONG_SLEEP_HZ:
+        who, pause = f"line {slow.line} lets", seconds(round(1e9 / float(slow.message)))
+    elif turn_s >= LONG_TURN_S:  # by the computer's clock, none of them ends sooner
+        who, pause = f"lines {numbers_text(sorted(s.line for s in pauses))} let", seconds(round(turn_s * 1e9))
+    else:
         return None
-    pause = seconds(round(1e9 / float(slow.message)))
-    slept = (
-        f"line {slow.line} lets it sleep for {pause} at a time, also after Ctrl-C, so its end is not counted"
-    )
+    slept = f"{who} it sleep for {pause} at a time, also after Ctrl-C, so its end is not counted"
     return passed(f"{_script(one)} is one node and stayed alive; {slept}")
 
 

@@ -13,20 +13,28 @@ from grader.checks.registry import check
 from grader.checks.support.clocks import excused, lateness, no_clock, run_seconds
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.geometry import (
+    RESTS_M,
     TURNING_RAD,
+    Band,
     Course,
     Point,
     Pose,
+    Region,
     Spot,
     Track,
+    arc,
     commands_of,
     driven,
+    first_turn,
     followed,
     has_no_numbers,
     length_m,
     off_m,
+    other_axis,
     relative,
+    rests_along,
     set_off_s,
+    share_inside,
     stands,
     top_speeds,
     track,
@@ -51,10 +59,9 @@ DEGREES_FROM = 20.0
 
 AWAY = 0.3
 """How far from a corner, as a share of what follows it, the robot is when its direction is looked at."""
-STANDS_M = 0.01
-"""Of a robot that turns in place: how far it goes for each radian."""
-RESTS_M = 0.001
 STOPS_S = 0.3
+TURNS_S = 3.0
+"""A robot that turns for so long, and does not drive, finds no way."""
 STOPS_AFTER_S = 1.0
 """The last velocity of a node that ends holds for so long."""
 SAME_TURN_DEG, OTHER_TURN_DEG, HALF_TURN_DEG = 2.0, 20.0, 170.0
@@ -136,9 +143,18 @@ def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
 def tell_end(verdict: Verdict, package: PackageFacts, run: Run) -> Verdict:
     """Return a loss with the reason why the node ended, where it did so early and not by its script's own end."""
     end = explain_early_end(package, run) if verdict.status is Status.FAIL else None
+    for channel in run.student_channels() if verdict.status is Status.FAIL else ():
+        if axis := other_axis(channel):
+            why = f"velocities on {channel.topic} set {axis}, and their angular.z is always 0"
+            verdict = verdict.explained(
+                why, f"set angular.z in place of {axis}: a robot on wheels turns by that alone"
+            )
     if end is None or end.by_itself or end.cause in verdict.message:
         return verdict
     kind = unjudged if verdict.unjudged else failed
+    if "keeps moving" in verdict.message:  # it was there before that
+        verdict = verdict.model_copy(update={"citations": (*verdict.citations, *end.citations)})
+        return verdict.explained(f"the node ended: {end.cause}", f"{verdict.hint}; {end.hint}")
     return end.verdict(kind, f"{verdict.message}; the node ended: {end.cause}", verdict.measured)
 
 
@@ -186,6 +202,43 @@ def never_moves(path: Sequence[Pose], figures: str, run: Run) -> Verdict:
             hint = "look at the condition under which it drives: it is hardly ever true"
         return unjudged("it turns, and never leaves its place", measured=figures, hint=hint)
     return why_still(unjudged("it never moves", measured=figures, hint=DRIVE), run)
+
+
+def drives_too_little(path: Sequence[Pose], region: Region, least_m: float) -> Verdict:
+    """Return the loss of a robot whose path is too short: it is slow, stands, or turns on the spot in the end."""
+    long_m, rests = length_m(path), rests_along(path)
+    message = f"its path is {metres(long_m)} long; {significant(least_m)} m are asked for"
+    hint, stood = "keep driving while the way is clear", 1 - share_inside(path, rests)
+    recent = [pose for pose in path if pose.time_s >= path[-1].time_s - TURNS_S]
+    turns = stands(recent) and turned_rad(recent) > TURNING_RAD
+    if turns:
+        message += f", and it turns on the spot at {spot(path[-1].point)} in the end"
+        hint = AHEAD
+        steps = (math.remainder(b.heading - a.heading, math.tau) for a, b in pairwise(recent))
+        if abs(sum(steps)) < turned_rad(recent) / 2:
+            message += ", now to the left and now to the right"
+            hint = "once it turns, let it turn to the same side until the way in front is clear"
+    elif stood < RARELY:
+        mean_m_s = long_m / max(path[-1].time_s - path[0].time_s, STOPS_S)
+        message, hint = f"{message}, and it drives all the time, at {mean_m_s:.2f} m/s", "drive faster"
+    if turns and isinstance(region, Band) and region.max_m is not None:
+        message += (
+            f", {metres(region.nearest_m(path[-1].point))} from the nearest wall; why is not established"
+        )
+        hint = "print in each branch which one it is, and look at the condition that stays true there"
+    elif stood > MOSTLY and (isinstance(region, Band) or not turns):
+        message += f", and it stands, or turns on the spot, for {stood:.0%} of the time"
+        if isinstance(region, Band):
+            free_m = min(region.nearest_m(a.point) for a, still in zip(path, rests, strict=True) if still)
+            message += f", at least {metres(free_m)} from any wall"
+        why = "look at the condition under which it drives: it does not hold there"
+        hint = f"{hint}; {why}" if turns else why
+    return failed(message, hint=hint)
+
+
+AHEAD = "drive on where the way is clear: look at the ranges in front alone, by their angles in radians"
+RARELY, MOSTLY = 0.05, 0.5
+"""Shares of the time for which it stands."""
 
 
 def why_still(verdict: Verdict, run: Run) -> Verdict:
@@ -383,7 +436,7 @@ def _turns_alike(path: Sequence[Pose], way: Way, course: Course) -> Words | None
     if len(way.points) < 3:
         return None
     asked = math.remainder(_direction(*way.points[1:3]) - _direction(*way.points[:2]), math.tau)
-    turned = _first_turn(path)
+    turned = first_turn(path)
     if turned * asked <= 0 or not SAME_TURN_DEG <= abs(math.degrees(turned - asked)) <= OTHER_TURN_DEG:
         return None
     right, heading, x, y = [path[0]], 0.0, path[0].x, path[0].y
@@ -402,43 +455,18 @@ def _turns_alike(path: Sequence[Pose], way: Way, course: Course) -> Words | None
     return Words(message, hint)
 
 
-def _first_turn(path: Sequence[Pose]) -> float:
-    """Return by how much it turns in place, to the left (rad), the first time that it does."""
-    turned = 0.0
-    for a, b in pairwise(path):
-        if math.dist(a.point, b.point) <= RESTS_M:
-            turned += math.remainder(b.heading - a.heading, math.tau)
-        elif abs(turned) > TURNING_RAD:
-            break
-        else:
-            turned = 0.0
-    return turned
-
-
 def _turns_while_driving(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
     """Through a corner in an arc, behind a leg that it drove straight along."""
     corner = course.reached - 1
-    if not 0 < corner < len(way.points) - 1 or abs(_arc(path[: course.at], math.inf)[0]) > TURNING_RAD:
+    if not 0 < corner < len(way.points) - 1 or abs(arc(path[: course.at], math.inf)[0]) > TURNING_RAD:
         return None
     before, here, goal = way.points[corner - 1 : corner + 2]
     asked = math.remainder(_direction(here, goal) - _direction(before, here), math.tau)
-    turned, arc_m = _arc(path[course.at :], abs(asked) - math.radians(OTHER_TURN_DEG))
+    turned, arc_m = arc(path[course.at :], abs(asked) - math.radians(OTHER_TURN_DEG))
     if arc_m <= way.tolerance_m or abs(turned - asked) > math.radians(OTHER_TURN_DEG):
         return None
     message = f"at {way.name(corner)} it turns while it drives on, in an arc {metres(arc_m)} long"
     return Words(message, "publish a linear.x of 0 for as long as it turns")
-
-
-def _arc(path: Sequence[Pose], enough_rad: float) -> tuple[float, float]:
-    """Return by how much it turned while it drove, to the left (rad), and how far (m), until it has turned enough."""
-    turned = arc_m = 0.0
-    for a, b in pairwise(path):
-        step, step_m = math.remainder(b.heading - a.heading, math.tau), math.dist(a.point, b.point)
-        if step and step_m > abs(step) * STANDS_M:
-            turned, arc_m = turned + step, arc_m + step_m
-        if abs(turned) >= enough_rad:
-            break
-    return turned, arc_m
 
 
 def _direction(start: Point, end: Point) -> float:

@@ -5,13 +5,24 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated, NamedTuple
 
 from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
-from grader.checks.robot_path import DRIVE, metres, never_moves, spot, tell_end, unreadable, why_still
+from grader.checks.robot_path import (
+    DRIVE,
+    TURNS_S,
+    drives_too_little,
+    metres,
+    never_moves,
+    spot,
+    tell_end,
+    unreadable,
+    why_still,
+)
 from grader.checks.support.clocks import LATE_MS, Lateness, excused, no_clock, run_seconds
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.geometry import (
@@ -26,14 +37,20 @@ from grader.checks.support.geometry import (
     Region,
     Spot,
     Track,
+    aside,
+    circles,
     commands_of,
     length_m,
+    nearest_seen,
+    out_along,
     relative,
     set_off_s,
+    share_inside,
     shown_walls,
     stands,
     track,
     turned_rad,
+    turns_away,
 )
 from grader.checks.support.processes import GlobalName, named_at, observed_until_ns
 from grader.checks.support.text import subscriber
@@ -48,13 +65,10 @@ STALLED_MS = 1000.0
 """In the time of the run, which may be faster than the wall's."""
 STILL_S = 0.5
 """A robot's speed at the end is that of so long a time."""
-TURNS_S = 3.0
-"""A robot that turns for so long, and does not drive, finds no way."""
 SLOW_M_S = 0.02
 SILENT_S, GAPS = 1.5, 5.0
 """Positions have ended where none came for so long, and for so many of their gaps, before the run's end."""
 ROUNDING = 1e-9
-SAME_M = 0.005
 NEARLY = 1.25
 """A loss by no more than this factor is one that a single run's timing could have made."""
 STEER = (
@@ -62,14 +76,17 @@ STEER = (
     "-pi and pi: math.remainder(angle, 2 * math.pi); dx and dy are the point minus the robot's place"
 )
 FASTER = "drive faster, or take a shorter way"
+LOOK_AT = "see that the script reads this one: print the index or the angle of what it compares"
+CIRCLES = "make angular.z depend on where the wall is, ahead or beside the robot, and not only on how far away it is"
+TOWARDS = "turn towards the wall where it is too far away: a positive angular.z turns to the left"
+PLACES = 200
+"""So many of a robot's poses are enough to see to which side it turns."""
 OTHER_SIDE = "turn to the other side where the wall is too near: a positive angular.z turns to the left"
 IN_ITS_WAY = "see on the map what is in its way, and turn away from that before you drive on"
 SEE = "see on the map where it leaves its way, and what it does there"
 """For a robot that knows no position: it steers by what it sees."""
 SELDOM_S = 0.5
 """A node that steers by what it sees gets ten scans in a second, and answers them sooner."""
-AWAY, AWAY_LEAST, AIMED_DEG, BEHIND_DEG = 0.8, 5, 10.0, 170.0
-"""By this share of at least so many velocities it turns away from a goal that is neither ahead of it nor behind."""
 STRAIGHT = 2.0
 """A way that is longer by this factor than it brings the robot nearer is not a slow one, but a wrong one."""
 
@@ -270,16 +287,15 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
         driven = driven if strays else f"it turns around {around:.1f} times on its way"
         steer = _steer(run, params)
         steer += "; where it does not, it is too slow" if steer == SEE and nearer_m >= 0 else ""
-        if (strays or around > 1) and (sides := _turns_away(judged, _told(run, asked), params.goal)):
-            message += f", and it turns to the {sides[0]} where the goal is on its {sides[1]}"
-            steer = f"turn towards the goal: a positive angular.z turns to the left, and {STEER}"
         turn = f"{'it drives away' if nearer_m < 0 else driven}: {steer}"
         strays = strays or around > 1
-        return failed(message, hint=turn if strays else FASTER if moves else IN_ITS_WAY)
+        verdict = failed(message, hint=turn if strays else FASTER if moves else IN_ITS_WAY)
+        return _with_side(verdict, judged, asked, run, params) if strays else verdict
     told = _told(run, asked)
     holds = bool(told) and asked.to_s - told[-1].time_s <= hold_s
     if turned_rad(judged, STILL_S) > TURNING_RAD or (holds and told[-1].turn):
-        return failed(f"{at}, and turns on the spot", hint=_steer(run, params))
+        verdict = failed(f"{at}, and turns on the spot", hint=_steer(run, params))
+        return _with_side(verdict, judged, asked, run, params)
     near = f"the distance is less than {significant(params.tolerance_m)} m"
     hint = f"stop only where {near}"
     if told and not holds and (told[-1].speed or told[-1].turn):
@@ -288,27 +304,16 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
     return failed(at, hint=hint)
 
 
-def _turns_away(path: Sequence[Pose], told: Sequence[Command], goal: Point) -> tuple[str, str] | None:
-    """Return to which side it is told to turn, and on which the goal is, where it is nearly always the other one."""
-    away, index = [], 0
-    for command in told:
-        while index + 1 < len(path) and path[index + 1].time_s <= command.time_s:
-            index += 1
-        pose = path[index]
-        aside = math.remainder(math.atan2(goal[1] - pose.y, goal[0] - pose.x) - pose.heading, math.tau)
-        if (
-            command.time_s >= path[0].time_s
-            and command.turn
-            and AIMED_DEG < abs(math.degrees(aside)) < BEHIND_DEG
-        ):
-            away.append(aside if aside * command.turn < 0 else 0.0)
-    if len(away) < AWAY_LEAST or sum(map(bool, away)) < AWAY * len(away):
-        return None
-    return (
-        ("right", "left")
-        if sum(aside > 0 for aside in away) * 2 >= sum(map(bool, away))
-        else ("left", "right")
-    )
+def _with_side(
+    verdict: Verdict, judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtParams
+) -> Verdict:
+    """Return the loss with the side to which it turns, where the goal is nearly always on the other one."""
+    sides = turns_away([(pose, aside(pose, params.goal)) for pose in judged], _told(run, asked))
+    if sides is None:
+        return verdict
+    why = f"it turns to the {sides[0]} where the goal is on its {sides[1]}"
+    hint = f"turn towards the goal: a positive angular.z turns to the left, and {STEER}"
+    return verdict.explained(why, hint).lost_by("steers-wrong", sides[0])
 
 
 def _steer(run: Run, params: EndsAtParams) -> str:
@@ -335,7 +340,8 @@ def _never_moves(
     """Return the loss of a robot that stays where it is: it turns there, is told to stop, is in front of something, or
     is told nothing."""
     if turned_rad(judged, STILL_S) > TURNING_RAD:
-        return unjudged(f"{message}, and turns on the spot", hint=_steer(run, params))
+        verdict = unjudged(f"{message}, and turns on the spot", hint=_steer(run, params))
+        return _with_side(verdict, judged, asked, run, params)
     sent = _told(run, asked)
     if any(command.forward for command in sent):
         return unjudged(f"{message}, though it is told to drive", hint=IN_ITS_WAY)
@@ -474,7 +480,8 @@ def stays_within(package: PackageFacts, run: Run, params: StaysWithinParams) -> 
     verdict = _unreadable(found, package, run, params) or _no_walls(region)
     if verdict is None and found is not None:
         path = placed(found, params)
-        verdict = tell_end(_stays(path, region, run, params), package, run) if path else _too_short(params)
+        early = f"no position came on {params.topic} after the first {significant(params.from_s)} s"
+        verdict = tell_end(_stays(path, region, run, params), package, run) if path else grade_again(early)
         verdict = _answers_late(verdict, run)
     assert verdict is not None  # noqa: S101 - one of them always is
     share = f" for {params.share:.0%} of the time" if params.share < 1 else ""
@@ -493,26 +500,11 @@ def placed(found: Track, params: StaysWithinParams) -> list[Pose]:
     return [pose for pose in path if pose.time_s >= from_s]
 
 
-def out_along(path: Sequence[Pose], region: Region) -> list[float]:
-    """Return how far outside each pose is (m); half a centimetre is still inside, and is 0."""
-    out: list[float] = []
-    at: Point | None = None
-    for pose in path:
-        if at is None or math.dist(pose.point, at) > SAME_M:
-            at, far_m = pose.point, region.out_m(pose.point)
-        out.append(far_m if far_m > SAME_M else 0.0)
-    return out
-
-
 def _no_walls(region: Region) -> Verdict | None:
     if not isinstance(region, Band) or region.walls:
         return None
     message = "no simulator of this run shows its walls, and the rubric gives none"
     return inconclusive(message, hint="tell your instructor")
-
-
-def _too_short(params: StaysWithinParams) -> Verdict:
-    return grade_again(f"no position came on {params.topic} after the first {significant(params.from_s)} s")
 
 
 def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinParams) -> Verdict:
@@ -528,20 +520,19 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
         return never_moves(path, figures, run)
     if inside < params.share - ROUNDING or (params.share == 1 and any(out)):
         verdict = _outside(path, out, region, inside, params)
-        if side := _turns_to_wall(path, out, region, run):
-            verdict = verdict.explained(f"it turns to the {side} there, where the wall is", OTHER_SIDE)
+        wrong = _turns_wrong(path, out, region, run) if isinstance(region, Band) else None
+        if wrong is not None:
+            verdict = verdict.explained(f"it turns to the {wrong[0]} there, {wrong[1]}", wrong[2])
+            verdict = verdict.lost_by("steers-wrong", wrong[0])
+        elif isinstance(region, Band) and (seen := _seen_near(path, out, region, run)):
+            verdict = verdict.explained(
+                f"the smallest of its ranges is then {seen}", f"{verdict.hint}; {LOOK_AT}"
+            )
+        elif isinstance(region, Band) and (around := circles(path, out)) > 1:
+            why = f"it drives in circles there, {around:.1f} times around"
+            verdict = verdict.explained(why, CIRCLES)
     elif long_m < params.least_m:
-        message = f"its path is {metres(long_m)} long; {significant(params.least_m)} m are asked for"
-        hint = "keep driving while the way is clear"
-        recent = [pose for pose in path if pose.time_s >= path[-1].time_s - TURNS_S]
-        if stands(recent) and turned_rad(recent) > TURNING_RAD:
-            message += f", and it turns on the spot at {spot(path[-1].point)} in the end"
-            hint = "drive on where the way is clear: look at the ranges in front alone, by their angles in radians"
-            steps = (math.remainder(b.heading - a.heading, math.tau) for a, b in pairwise(recent))
-            if abs(sum(steps)) < turned_rad(recent) / 2:
-                message += ", now to the left and now to the right"
-                hint = "once it turns, let it turn to the same side until the way in front is clear"
-        verdict = failed(message, hint=hint)
+        verdict = drives_too_little(path, region, params.least_m)
     else:
         always = f"for {inside:.0%} of the time" if any(out) else "all the time"
         return passed(f"it is {region.words} {always}", measured=figures)
@@ -549,28 +540,37 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
     return _excuse_nearly(verdict.about(measured=figures), run, nearly=nearly)
 
 
-def _turns_to_wall(path: Sequence[Pose], out: Sequence[float], region: Region, run: Run) -> str:
-    """Return to which side it is told to turn before it comes too near to a wall, if the wall is there; "" else."""
-    first = next(pose for pose, far in zip(path, out, strict=True) if far)
-    if not isinstance(region, Band) or not Band(region.walls, region.min_m or 0.0, None).out_m(first.point):
+def _seen_near(path: Sequence[Pose], out: Sequence[float], band: Band, run: Run) -> str:
+    """Return what its laser sees where it first comes too near to a wall; "" where it has none, or is too far away."""
+    first, to_s = next(pose for pose, far in zip(path, out, strict=True) if far), run_seconds(run)
+    scans = [
+        c for c in run.channels if "LaserScan" in c.type and c.callerid in run.grader_nodes and c.messages
+    ]
+    if not scans or to_s is None or band.nearest_m(first.point) >= (band.min_m or 0.0):
         return ""
-    (x, y), off = first.point, SAME_M
-    dx = region.nearest_m((x - off, y)) - region.nearest_m((x + off, y))
-    dy = region.nearest_m((x, y - off)) - region.nearest_m((x, y + off))
-    aside = math.remainder(math.atan2(dy, dx) - first.heading, math.tau)
-    told = [one.turn * aside for one in _told(run, Stretch(first.time_s - TURNS_S, first.time_s)) if one.turn]
-    if not told or min(told) <= 0 or not AIMED_DEG < abs(math.degrees(aside)) < BEHIND_DEG:
-        return ""
-    return "left" if aside > 0 else "right"
+    before = tuple(one for one in scans[0].messages if to_s(one.log_time_ns) <= first.time_s)[-1:]
+    return nearest_seen(replace(scans[0], messages=before).values[0], scans[0].topic) if before else ""
 
 
-def share_inside(path: Sequence[Pose], out: Sequence[float]) -> float:
-    """Return the share of the time in which it was inside."""
-    lasted = [b.time_s - a.time_s for a, b in pairwise(path)]
-    whole_s = sum(lasted)
-    if whole_s <= 0:
-        return sum(not far for far in out) / len(out)
-    return 1.0 if not any(out) else sum(s for s, far in zip(lasted, out, strict=False) if not far) / whole_s
+def _turns_wrong(
+    path: Sequence[Pose], out: Sequence[float], band: Band, run: Run
+) -> tuple[str, str, str] | None:
+    """Return to which side it is told to turn, where the wall is, and what to do: before it comes too near to a wall
+    that is there, or while it is too far from one that is on the other side. None where it is neither."""
+    outside = [pose for pose, far in zip(path, out, strict=True) if far]
+    if band.nearest_m(outside[0].point) < (band.min_m or 0.0):
+        side, until_s = aside(outside[0], band.towards(outside[0])), outside[0].time_s
+        told = [one.turn * side for one in _told(run, Stretch(until_s - TURNS_S, until_s)) if one.turn]
+        to_wall = min(told, default=0.0) > 0
+        return ("left" if side > 0 else "right", "where the wall is", OTHER_SIDE) if to_wall else None
+    too_far = [
+        pose
+        for pose in outside[:: 1 + len(outside) // PLACES]
+        if band.nearest_m(pose.point) > (band.max_m or math.inf)
+    ]
+    away = [(pose, aside(pose, band.towards(pose))) for pose in too_far]
+    sides = turns_away(away, _told(run, Stretch(-math.inf, math.inf)))
+    return (sides[0], f"where the wall is too far away, on its {sides[1]}", TOWARDS) if sides else None
 
 
 def _outside(

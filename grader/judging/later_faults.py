@@ -253,8 +253,7 @@ class Later:
         renamed = {(slip.file, slip.line): slip.fix for slip in self._of("object")}
         for slip in self._of("never-called"):
             if f"write {slip.name}" not in meant:  # else what calls it has its name wrong
-                passed = slip.fix.startswith("pass it")
-                whole = slip.fix if passed else f"call `{slip.name}()`, which nothing in {slip.file} calls"
+                whole = slip.fix or f"call `{slip.name}()`, which nothing in {slip.file} calls"
                 yield Fix(renamed.get((slip.file, slip.line), whole))
         yield from (Fix(f"{slip.fix} ({slip.file})", (slip.fix,)) for slip in self._of("float-index"))
         for slip in self._of("main-guard"):

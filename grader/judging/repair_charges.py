@@ -196,7 +196,8 @@ def charged_verdict(
         untold = [clause for clause in copy.message.split("; ") if clause not in said]
         words += [f"with that repaired, {'; '.join(untold)}"] if untold else []
         hints = _hints_and_next(clauses, [one for one in repairs if one not in told], copy, lines)
-    if verdict.mistake and any(one.kind == "file-name" for one in repairs):
+    of_file = verdict.mistake is not None and verdict.mistake.kind != "steers-wrong"
+    if verdict.mistake and of_file and any(one.kind == "file-name" for one in repairs):
         verdict = verdict.lost_by("file-elsewhere", verdict.mistake.name)
     update: dict[str, object] = {
         "message": "; ".join(words),

@@ -42,7 +42,7 @@ from grader.judging.repair_charges import (
     words_of,
 )
 from grader.model.package import PackageFacts
-from grader.model.repair import Repair
+from grader.model.repair import OF_LOGIC, Repair
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import FileCitation, Status, Verdict, cited_lines
 from grader.rubric.model import Criterion, Rubric
@@ -155,6 +155,14 @@ def apply_repaired_copy(
         )
         for c in rubric.criteria
     }
+    if any(one.kind in OF_LOGIC for one in repairs):
+        judged = [c.id for c in rubric.criteria if c.check not in AT_ANY_RATE]
+        worse = any(on_copy[i].status.is_lost and not first[i].status.is_lost for i in judged)
+        helped = {i for i, one in on_copy.items() if one.status is Status.PASS and not worse}
+        needs = {
+            i: tuple(one for one in ones if one.kind not in OF_LOGIC or i in helped)
+            for i, ones in needs.items()
+        }
     better = {
         c.id
         for c in rubric.criteria

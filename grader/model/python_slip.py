@@ -75,7 +75,8 @@ class PythonSlip(Placed, Record):
       number: a slip only if that message has to be a text.
     - `goes-on`: an `if` that ends an action's goal by the call `name`, and no `return` behind it.
     - `wrong-value`: a value that is none: a comparison with NaN, the sine of an angle in degrees, a service's answer
-      that is made and not returned, or of which no field is set (`name`: `nan`, `degrees`, `return`, `empty`).
+      that is made and not returned, or of which no field is set, or a condition that all numbers fulfil, or none
+      (`name`: `nan`, `degrees`, `return`, `empty`, `bounds`).
 
     No slips, but what a line says, for checks that compare it with what the lab asks; `message` is a name, a number or
     a text:

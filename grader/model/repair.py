@@ -16,7 +16,7 @@ from grader.wording import join_words, plural
 RepairKind = Literal[
     "executable-bit", "encoding", "byte-order-mark", "line-ends", "shebang", "file-name", "python-syntax",
     "manifest-line", "build-line", "launch-syntax", "yaml-syntax", "package-name", "launch-type", "missing-import",
-    "missing-call", "node-name", "topic-name", "service-name", "parameter-name",
+    "missing-call", "node-name", "topic-name", "service-name", "parameter-name", "ros-clock", "turn-sign",
 ]  # fmt: skip
 """In the order in which a student would meet them."""
 
@@ -41,6 +41,8 @@ DEFAULT_SHARES: dict[RepairKind, float] = {
     "topic-name": 1.0,
     "service-name": 1.0,
     "parameter-name": 1.0,
+    "ros-clock": 1.0,
+    "turn-sign": 0.5,
 }
 """Which share of its points a criterion keeps that passes on a copy with a repair of this kind. The criterion that asks
 for what was repaired loses its own points. A rubric's `repairs` can say otherwise."""
@@ -65,12 +67,17 @@ BY_HAND: dict[RepairKind, str] = {
     "topic-name": "a misspelt topic: rostopic list shows how it is called",
     "service-name": "a misspelt service or action: rosservice list and rostopic list show how it is called",
     "parameter-name": "a misspelt parameter: rosparam list shows how it is called",
+    "ros-clock": "time by the computer's clock: a simulator sets ROS's, which rospy.get_time() and rospy.sleep(…) use",
+    "turn-sign": "a turn to the wrong side: a positive angular.z turns to the left",
 }
 """How a mistake of this kind looks, and how it is repaired."""
 
+OF_LOGIC: frozenset[RepairKind] = frozenset({"ros-clock", "turn-sign"})
+"""Kinds that no file shows to be mistakes: they count only where the copy passes, and nothing is made by itself."""
+
 
 class Repair(Record):
-    """One mistake, and how it is repaired. Logic is never repaired."""
+    """One mistake, and how it is repaired. Logic is never repaired, but for one clock and the sign of one turn."""
 
     kind: RepairKind
     """What kind of repair it is, as in the rubric's `repairs`."""

@@ -99,18 +99,21 @@ Citation = FileCitation | EvidenceCitation
 Citations = tuple[Citation, ...]
 
 
-MistakeKind = Literal["file-missing", "file-elsewhere", "not-executable", "cannot-be-run", "not-made"]
+MistakeKind = Literal[
+    "file-missing", "file-elsewhere", "not-executable", "cannot-be-run", "not-made", "steers-wrong"
+]
 
 
 class Mistake(Record):
     """The mistake that lost a mark, for programs, which need not read the sentence. `name` is the file that
-    it is about."""
+    it is about, or the side to which a robot is told to turn."""
 
     kind: MistakeKind
     """A file is not in the package, or only under another path; a script has no executable bit, or its
-    first line keeps the system from running it, or the build that was to install it failed."""
+    first line keeps the system from running it, or the build that was to install it failed; a robot turns to the
+    wrong side."""
     name: str
-    """The file that the lab asks for, or the script, from the package's root."""
+    """The file that the lab asks for, or the script, from the package's root; of a turn, `left` or `right`."""
 
     @property
     def is_absence(self) -> bool:

@@ -14,6 +14,7 @@ import re
 import time
 import tokenize
 from collections.abc import Collection, Iterator, Mapping
+from difflib import get_close_matches
 from itertools import chain
 from typing import NamedTuple
 
@@ -188,9 +189,10 @@ def _misspelt_members(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
         kind = inside.get(id(node), "") if owner == "self" else kinds.get(owner, owner.removesuffix("()"))
         fields = fields_of.get(kind, ()) if kind not in own else ()
         members = OF_TEXTS if of_text else own.get(kind) or MEMBERS.get(kind) or fields or members
-        right = (
-            _near(node.attr, members) if node.attr not in {*members, *(stored if not fields else ())} else ""
-        )
+        known_attr = node.attr in {*members, *(stored if not fields else ())}
+        right = "" if known_attr else _near(node.attr, members)
+        if not known_attr and not right and kind in ("Publisher", "Rate") and kind not in own:
+            right = next(iter(get_close_matches(node.attr, members, 1, 0.85)), "")  # `pub.publisher(…)`
         span = span_of(lines, node)
         if right and span is not None:
             line, _, end = span

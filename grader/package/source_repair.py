@@ -374,6 +374,75 @@ def _last_block(tree: ast.Module, waits: list[ast.Call]) -> list[ast.stmt]:
     return block
 
 
+# ---- turns to the wrong side
+
+
+def with_sign_turned(text: str, side: str) -> Iterator[Step]:
+    """Yield the text with the other sign for the only turn that can be to the wrong `side`: a number of that sign, or
+    else what is calculated, which alone counts where no side is known."""
+    if syntax_error(text) is not None:
+        return
+    tree, lines = tree_of(text), text.split("\n")
+    turns = _turns(tree)
+    plain = [one for one in turns if side and (sign := _sign(one)) and (sign > 0) == (side == "left")]
+    worked_out = [one for one in turns if _sign(one) is None]
+    found = plain if not worked_out else worked_out if not plain else []
+    span = span_of(lines, found[0]) if len(found) == 1 else None
+    if span is not None:
+        line, start, end = span
+        after = edited(text, [(line, start, end, _other_sign(found[0], lines[line][start:end]))])
+        yield from step_to("name", line + 1, text, after)
+
+
+def _turns(tree: ast.Module) -> list[ast.expr]:
+    """Return what `angular.z` is set to; where that is a variable, what it is set to; where only its bounds are kept,
+    nothing."""
+    bounded = {
+        id(inner)
+        for n in nodes_in(tree)
+        if isinstance(n, ast.If) and ".angular.z" in ast.unparse(n.test)
+        for inner in nodes_in(n)
+    }
+    found: list[ast.expr] = []
+    for node in nodes_in(tree):
+        target = node.targets[0] if isinstance(node, ast.Assign) else None
+        if isinstance(node, ast.Assign) and isinstance(target, ast.Attribute) and id(node) not in bounded:
+            found += [node.value] if target.attr == "z" and last_name(target.value) == "angular" else []
+        elif isinstance(node, ast.keyword) and node.arg == "angular" and isinstance(node.value, ast.Call):
+            found += [*node.value.args[2:3], *(k.value for k in node.value.keywords if k.arg == "z")]
+    given = {ast.unparse(one) for one in found if isinstance(one, ast.Name | ast.Attribute)}
+    made = [n for n in nodes_in(tree) if isinstance(n, ast.Assign) and ast.unparse(n.targets[0]) in given]
+    stored = {ast.unparse(n.targets[0]) for n in made}
+    return [*(one for one in found if ast.unparse(one) not in stored), *(n.value for n in made)]
+
+
+def _sign(value: ast.expr) -> float | None:
+    """Return a number whose sign is that of the turn; None where it is worked out."""
+    if isinstance(value, ast.UnaryOp) and isinstance(value.op, ast.USub):
+        sign = _sign(value.operand)
+        return None if sign is None else -sign
+    if isinstance(value, ast.BinOp) and isinstance(value.op, ast.Mult | ast.Div):
+        left, right = _sign(value.left), _sign(value.right)
+        return None if left is None or right is None else left * right
+    if last_name(value) == "pi":
+        return 1.0
+    return (
+        float(value.value)
+        if isinstance(value, ast.Constant) and isinstance(value.value, int | float)
+        else None
+    )
+
+
+def _other_sign(value: ast.expr, text: str) -> str:
+    if isinstance(value, ast.UnaryOp) and isinstance(value.op, ast.USub):
+        return text[1:].lstrip()
+    first = value.left if isinstance(value, ast.BinOp) and isinstance(value.op, ast.Mult | ast.Div) else value
+    if isinstance(first, ast.UnaryOp) and isinstance(first.op, ast.USub) and text.startswith("-"):
+        return text[1:].lstrip()
+    plain = isinstance(first, ast.Constant | ast.Name | ast.Attribute | ast.Call | ast.Subscript)
+    return f"-{text}" if plain else f"-({text})"
+
+
 # ---- names that ROS is told
 
 

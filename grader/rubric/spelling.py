@@ -184,7 +184,7 @@ def _last_word(path: KeyPath, text: str, rubric: dict[str, Any]) -> str:
         and str(_judged(path, rubric).get("field")).endswith("frame_id")
     ):
         return text
-    is_field = FIELDS & {*path[:-1]} and text == path[-1] and not _is_known_field(path, rubric)
+    is_field = FIELDS & {*path[2:-1]} and text == path[-1] and not _is_known_field(path, rubric)
     return text.rpartition(".")[2].partition("[")[0] if is_field or _is_own_field(path, rubric) else ""
 
 

@@ -261,6 +261,30 @@ def test_what_the_machine_keeps_the_copy_from_showing_is_charged_to_no_other_cri
     assert "lacks tf" in found["rate"].message
 
 
+SIGN = Repair(
+    kind="turn-sign",
+    file="src/numeric_talker.py",
+    line=9,
+    before="z = turn",
+    after="z = -turn",
+    message="wrong",
+    fix="z = -turn",
+)
+SLOW = {**GOOD_RUN, "topics": [{"topic": "/chatter", "count": 30}]}
+
+
+def test_logic_is_repaired_only_where_the_copy_passes() -> None:
+    silent = {**GOOD_RUN, "topics": [{"topic": "/other", "count": 61}]}
+    found = judged(silent, SLOW, SIGN)
+    assert (found["chatter"].status.value, found["rate"].status.value) == ("fail", "fail") or found[
+        "rate"
+    ].repaired is None
+    assert found["rate"].repaired is None
+    assert all(one.repaired is None for one in judged(SLOW, silent, SIGN).values()), "one fault for another"
+    whole = judged(silent, GOOD_RUN, SIGN)
+    assert sorted(c.points for c in whole.values() if c.repaired is not None) == [0, 5]
+
+
 def test_a_copy_that_helps_nothing_changes_nothing() -> None:
     runs = build_runs({"runs": {"talker": DIED}, "package": PACKAGE})
     alone = judge(rubric(*ALL), runs)

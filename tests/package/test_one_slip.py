@@ -240,6 +240,7 @@ SLIPS = {
          "        pub.publish(text)\n        text = 'hello world %s' % rospy.get_time()\n",
          "write line 13 above line 12"),
         ("rate.sleep", "rate.Sleep", "`Sleep` is called `sleep`"),
+        ("pub.publish(", "pub.publisher(", "`publisher` is called `publish`"),
         ("if __name__", "f __name__", "Python writes `if`, not `f`"),
         ("if __name__", "if __nam__", "__nam__ is not defined"),
         ("'__main__'", "'__mai__'", "`__name__` is never '__mai__'"),

@@ -513,6 +513,8 @@ def test_a_name_that_one_line_alone_has_is_warned_of(tmp_path: Path) -> None:
     found = {str(path[-1]): why for path, why in names_seen_once(data, tmp_path)}
     assert sorted(found) == ["field", "file", "topic"]
     assert found["topic"] == "nothing else in the rubric names /stet: is it spelt as in the handout?"
+    renamed = {**data, "scenarios": {"goal": run}}  # no map of fields
+    assert {str(path[-1]) for path, _ in names_seen_once(renamed, tmp_path)} == set(found)
 
 
 def test_a_scenario_that_no_criterion_judges_is_refused(tmp_path: Path) -> None:

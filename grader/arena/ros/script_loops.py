@@ -151,6 +151,7 @@ def stopped_loops(tree):
             used = {n.id for one in loop.body for n in ast.walk(one) if isinstance(n, ast.Name)}
             fix = "write `while not rospy.is_shutdown():` on line %d" % loop.lineno
             last = next((one for one in reversed(run_after(loop, tree)) if calls_in(one, "publish")), None)
+            last = last or (loop if is_of_robot(tree) else None)  # which has to stay where it is then
             if last is not None:
                 fix = "call rospy.spin() below line %d%s: it waits there until Ctrl-C"
                 alike = ", with the same spaces or tabs before it as line %d has" % last.lineno
@@ -158,12 +159,19 @@ def stopped_loops(tree):
             elif isinstance(loop, ast.For) and dotted(loop.target) in used:
                 fix = "put it inside a `while not rospy.is_shutdown():`"
             yield slip(loop.lineno, "loop-left", message, fix=fix)
-        left = next((n for n in loop.body if isinstance(n, (ast.Break, ast.Return))), None)
+        # what is done again and again, or in several places, ends by no loop in it
+        ends = not turned[loop][1] and not is_part
+        left = next((n for n in loop.body if isinstance(n, (ast.Break, ast.Return))), None) if ends else None
         if left is not None:
             word = "break" if isinstance(left, ast.Break) else "return"
             message = "the loop ends the first time around, at the %s on line %d" % (word, left.lineno)
             fix = "remove it from line %d, or put it inside an `if`" % left.lineno
             yield slip(left.lineno, "loop-left", message, fix=fix)
+
+
+def is_of_robot(tree):
+    """Whether it sets velocities: `twist.angular.z`, `Twist(angular=…)`."""
+    return any(getattr(n, "attr", getattr(n, "arg", "")) == "angular" for n in walk(tree))
 
 
 def calls_made(tree):

@@ -96,7 +96,7 @@ def slips(tree):
         published_before, sleepless_loops, sleeps_twice, publishes_twice, callbacks, waiting_callbacks,
         queue_sizes, graph_names, object_slips, said_texts, deaf_loops, clock_values, counter_slips,
         counter_starts, without_effect, assigned_late, hidden_names, subscribed_again, imports, taken_off,
-        unstarted_servers, wrong_values, unprinted_messages, values_left_out, published_unchanged,
+        unstarted_servers, wrong_values, decided_conditions, unprinted_messages, values_left_out, published_unchanged,
         unused_publishers, loops_of_numbers, finished_goals,
     )  # fmt: skip
     for find in finders:
@@ -171,8 +171,11 @@ def functions_of(owner):
 
 
 def handed_over(function, tree, owner):
-    """Return who has to be told of a callback, which takes one value; "" of another function."""
+    """Return who has to be told of a callback, which takes one value, or how one that takes several is called; "" of
+    another function."""
     taken = [one.arg for one in function.args.args if one.arg != "self"]
+    if len(taken) > 1 and not function.args.defaults:
+        return "call `%s%s(…)` with values for %s" % (owner, function.name, ", ".join(taken))
     if len(taken) != 1 or function.args.defaults or calls_in(function, "init_node"):
         return ""
     name = (owner and "self.") + function.name
@@ -264,6 +267,77 @@ def finished_goals(tree):
 
 def is_loop(node):
     return isinstance(node, (ast.While, ast.For))
+
+
+BELOW = (ast.Lt, ast.LtE)
+NUMBERS_BELOW, TEXT_SHOWN = 1e9, 40
+SIGNS = {ast.Gt: ">", ast.GtE: ">=", ast.Lt: "<", ast.LtE: "<="}
+TURNED = {ast.Gt: ast.Lt, ast.GtE: ast.LtE, ast.Lt: ast.Gt, ast.LtE: ast.GtE}
+
+
+def decided_conditions(tree):
+    """`x > 265 or x < 275`, which every number fulfils, and `x < 10 and x > 350`, which none does."""
+    for node in walk(tree):
+        if not isinstance(node, ast.BoolOp):
+            continue
+        any_of, bounds = isinstance(node.op, ast.Or), {}
+        yield from decided_by_values(node, ast.NotEq if any_of else ast.Eq)
+        for name, kind, number in filter(None, map(bound_of, node.values)):
+            lowest, highest = bounds.setdefault(name, [None, None])
+            side = kind in BELOW
+            before = (lowest, highest)[side]
+            # of several bounds on one side, the widest one counts for `or`, and the narrowest for `and`
+            if before is None or (number < before[1]) == (any_of != side):
+                bounds[name][side] = (kind, number)
+        for name, (low, high) in bounds.items():
+            if low is None or high is None or not (low[1] < high[1] if any_of else low[1] > high[1]):
+                continue
+            word, other, holds = ("or", "and", "every number") if any_of else ("and", "or", "no number")
+            pair = "%s %s %g %s %s %s %g" % (name, SIGNS[low[0]], low[1], word, name, SIGNS[high[0]], high[1])
+            fix = "on line %d, write `%s` in place of `%s`, or compare with other numbers"
+            fix %= (node.lineno, other, word)
+            yield slip(
+                node.lineno, "wrong-value", "`%s` is true for %s" % (pair, holds), fix=fix, name="bounds"
+            )
+
+
+def decided_by_values(condition, kind):
+    """`key != 'a' or key != 'b'`, which every value fulfils, and `key == 'a' and key == 'b'`, which none does."""
+    asked = {}
+    for one in condition.values:
+        is_plain = isinstance(one, ast.Compare) and len(one.ops) == 1 and isinstance(one.ops[0], kind)
+        if is_plain and isinstance(one.comparators[0], ast.Constant) and "..." not in dotted(one.left):
+            value = one.comparators[0].value  # 1 and 1.0 are one value
+            asked.setdefault(dotted(one.left), {})[value] = repr(value)[:TEXT_SHOWN]
+    for name, values in asked.items():
+        if len(values) > 1:
+            sign, word, other, holds = (
+                ("!=", "or", "and", "every") if kind is ast.NotEq else ("==", "and", "or", "no")
+            )
+            first, second = list(values.values())[:2]
+            pair = "%s %s %s %s %s %s %s" % (name, sign, first, word, name, sign, second)
+            fix = "on line %d, write `%s` in place of `%s`" % (condition.lineno, other, word)
+            message = "`%s` is true for %s value" % (pair, holds)
+            yield slip(condition.lineno, "wrong-value", message, fix=fix, name="bounds")
+
+
+def bound_of(node):
+    """Return the name, the kind and the number of a comparison with a number; None of all else."""
+    if not isinstance(node, ast.Compare) or len(node.ops) != 1 or type(node.ops[0]) not in SIGNS:
+        return None
+    name, kind, number = node.left, type(node.ops[0]), number_of(node.comparators[0])
+    if number is None:
+        name, kind, number = node.comparators[0], TURNED[kind], number_of(node.left)
+    return None if number is None or "..." in dotted(name) else (dotted(name), kind, number)
+
+
+def number_of(node):
+    """Return a number that stands in the script, with its sign; None of all else."""
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        number = number_of(node.operand)
+        return None if number is None else -number
+    is_number = isinstance(node, ast.Constant) and type(node.value) in (int, float)
+    return node.value if is_number and abs(node.value) < NUMBERS_BELOW else None
 
 
 def is_nan(node):

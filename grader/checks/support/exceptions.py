@@ -335,7 +335,11 @@ def _call(message: str, source: str) -> Meaning | None:
         )
     if (lacks := _TOO_FEW.match(message)) and re.search(rf"\b{lacks[1]}\(", source):
         name, values = lacks.groups()
-        hint = f"put {values} into its brackets, or remove the call: ROS calls a callback by itself"
+        hint = f"put {values} into its brackets"
+        if "." not in source.partition(f"{name}(")[0].rpartition(" ")[2].removeprefix(
+            "self."
+        ):  # the student's own
+            hint += ", or remove the call: ROS calls a callback by itself"
         return f"`{name}` is called without {values}", hint
     return None
 

@@ -166,6 +166,32 @@ def top_speeds(path: Sequence[Pose]) -> tuple[float, float]:
     return speed, turn
 
 
+SAME_M, RESTS_M_S, TURNS_RAD_S = 0.005, 0.01, 0.03
+AWAY, AWAY_LEAST, AIMED_DEG, BEHIND_DEG = 0.8, 5, 10.0, 170.0
+"""At this share of at least so many places it turns away from a point that is neither ahead of it nor behind."""
+
+
+def aside(pose: Pose, goal: Point) -> float:
+    """Return where a point is, seen from the robot (rad, to the left); 0 where it is ahead or behind."""
+    angle = math.remainder(math.atan2(goal[1] - pose.y, goal[0] - pose.x) - pose.heading, math.tau)
+    return angle if AIMED_DEG < abs(math.degrees(angle)) < BEHIND_DEG else 0.0
+
+
+def turns_away(places: Sequence[tuple[Pose, float]], told: Sequence[Command]) -> tuple[str, str] | None:
+    """Return to which side it is told to turn, and on which the point is, where it is nearly always the other one.
+    Each of the `places` has where the point is `aside` from there."""
+    away, index = [], 0
+    for pose, side in places if told else ():
+        while index + 1 < len(told) and told[index + 1].time_s <= pose.time_s:
+            index += 1
+        if told[index].turn and side and told[index].time_s <= pose.time_s:
+            away.append(side if side * told[index].turn < 0 else 0.0)
+    if len(away) < AWAY_LEAST or sum(map(bool, away)) < AWAY * len(away):
+        return None
+    to_right = sum(one > 0 for one in away) * 2 >= sum(map(bool, away))
+    return ("right", "left") if to_right else ("left", "right")
+
+
 def off_m(point: Point, start: Point, end: Point) -> float:
     """Return the distance of a point from the line between two others."""
     dx, dy = end[0] - start[0], end[1] - start[1]
@@ -173,6 +199,35 @@ def off_m(point: Point, start: Point, end: Point) -> float:
     share = ((point[0] - start[0]) * dx + (point[1] - start[1]) * dy) / square if square else 0.0
     share = min(1.0, max(0.0, share))
     return math.dist(point, (start[0] + share * dx, start[1] + share * dy))
+
+
+STANDS_M, RESTS_M = 0.01, 0.001
+"""How far a robot that turns in place goes for each radian, and one that rests."""
+
+
+def first_turn(path: Sequence[Pose]) -> float:
+    """Return by how much it turns in place, to the left (rad), the first time that it does."""
+    turned = 0.0
+    for a, b in pairwise(path):
+        if math.dist(a.point, b.point) <= RESTS_M:
+            turned += math.remainder(b.heading - a.heading, math.tau)
+        elif abs(turned) > TURNING_RAD:
+            break
+        else:
+            turned = 0.0
+    return turned
+
+
+def arc(path: Sequence[Pose], enough_rad: float) -> tuple[float, float]:
+    """Return by how much it turned while it drove, to the left (rad), and how far (m), until it has turned enough."""
+    turned = arc_m = 0.0
+    for a, b in pairwise(path):
+        step, step_m = math.remainder(b.heading - a.heading, math.tau), math.dist(a.point, b.point)
+        if step and step_m > abs(step) * STANDS_M:
+            turned, arc_m = turned + step, arc_m + step_m
+        if abs(turned) >= enough_rad:
+            break
+    return turned, arc_m
 
 
 class Course(NamedTuple):
@@ -305,6 +360,29 @@ def commands_of(channel: Channel) -> list[tuple[int, Command]]:
     return [(t, one) for t, one in commands if one is not None and _finite(one.forward, one.left, one.turn)]
 
 
+def other_axis(channel: Channel) -> str:
+    """Return the other axis (`angular.x`) around which velocities on a topic turn, where angular.z is always 0; ""
+    where they do not."""
+    values = channel.values if "Twist" in channel.type else ()
+    twists = [one.get("twist", one) for one in values if isinstance(one, Mapping)]
+    turns = [one["angular"] for one in twists if isinstance(one.get("angular"), Mapping)]
+    if any(turn["z"] for turn in turns):
+        return ""
+    return next((f"angular.{axis}" for axis in "xy" if any(turn[axis] for turn in turns)), "")
+
+
+def nearest_seen(scan: Mapping[str, Any], topic: str) -> str:
+    """Return the smallest range of a LaserScan, where it is and how far (m); "" where nothing is in reach."""
+    there = [(one, index) for index, one in enumerate(scan["ranges"]) if math.isfinite(one) and one > 0]
+    if not there:
+        return ""
+    far_m, index = min(there)
+    deg = math.degrees(math.remainder(scan["angle_min"] + index * scan["angle_increment"], math.tau))
+    side = f"{abs(deg):.0f}° to the {'left' if deg > 0 else 'right'}"
+    side = "straight ahead" if abs(deg) < AIMED_DEG else "behind it" if abs(deg) > BEHIND_DEG else side
+    return f"ranges[{index}] of {topic}, {side}, with {far_m:.2f} m"
+
+
 def has_no_numbers(channel: Channel) -> bool:
     """Return whether a velocity on a topic is nan or inf."""
     sent = (_command(0.0, one) for one in channel.values) if "Twist" in channel.type else ()
@@ -367,9 +445,55 @@ class Band(NamedTuple):
         """Return how far the nearest of the lines and points is (m)."""
         return nearest_m(point, self.walls)
 
+    def towards(self, pose: Pose) -> Point:
+        """Return a point beside the robot, where it is nearer to the nearest of the lines and points."""
+        (x, y), off = pose.point, SAME_M
+        dx = self.nearest_m((x - off, y)) - self.nearest_m((x + off, y))
+        dy = self.nearest_m((x, y - off)) - self.nearest_m((x, y + off))
+        return x + dx, y + dy
+
 
 Region = Area | Band
 """Where a robot may be: `words` say it, `out_m` is how far outside a point is, `outline` is a border to be drawn."""
+
+
+def out_along(path: Sequence[Pose], region: Region) -> list[float]:
+    """Return how far outside each pose is (m); half a centimetre is still inside, and is 0."""
+    out: list[float] = []
+    at: Point | None = None
+    for pose in path:
+        if at is None or math.dist(pose.point, at) > SAME_M:
+            at, far_m = pose.point, region.out_m(pose.point)
+        out.append(far_m if far_m > SAME_M else 0.0)
+    return out
+
+
+def share_inside(path: Sequence[Pose], out: Sequence[float]) -> float:
+    """Return the share of the time in which it was inside."""
+    lasted = [b.time_s - a.time_s for a, b in pairwise(path)]
+    whole_s = sum(lasted)
+    if whole_s <= 0:
+        return sum(not far for far in out) / len(out)
+    return 1.0 if not any(out) else sum(s for s, far in zip(lasted, out, strict=False) if not far) / whole_s
+
+
+def rests_along(path: Sequence[Pose]) -> list[float]:
+    """Return 1 for each pose from which it does not drive on at once, and 0 for the others."""
+    return [
+        float(math.dist(a.point, b.point) <= RESTS_M_S * (b.time_s - a.time_s)) for a, b in pairwise(path)
+    ] + [0.0]
+
+
+def circles(path: Sequence[Pose], out: Sequence[float]) -> float:
+    """Return how often it drove around while it was outside, where it turned to one side nearly all that time."""
+    turns = [
+        (math.remainder(b.heading - a.heading, math.tau), b.time_s - a.time_s)
+        for (a, far), (b, _) in pairwise(zip(path, out, strict=True))
+        if far and math.dist(a.point, b.point) > RESTS_M_S * (b.time_s - a.time_s)
+    ]
+    whole = math.fsum(turn for turn, _ in turns)
+    alike = sum(turn * math.copysign(1.0, whole) > TURNS_RAD_S * time_s for turn, time_s in turns)
+    return abs(whole) / math.tau if alike >= AWAY * len(turns) else 0.0
 
 
 def nearest_m(point: Point, lines: Sequence[Polyline]) -> float:

@@ -417,23 +417,29 @@ def is_unexplained(check: Check, verdict: Verdict) -> bool:
     return check.of_callbacks and verdict.status.is_lost and not verdict.cause
 
 
-SEEN_AS = {"nan": "nan", "degrees": "value", "return": "nothing", "empty": "value"}
+SEEN_AS = {"nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": ""}
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so."""
 
 
 def explain_by_wrong_value(
     check: Check, package: PackageFacts | None, run: object, verdict: Verdict
 ) -> Verdict:
-    """Return a lost mark with the line of a script that runs on which the value goes wrong."""
+    """Return a lost mark with the line of a script that runs on which the value goes wrong, or with its conditions that
+    are always or never true."""
     if package is None or not isinstance(run, Run) or not verdict.status.is_lost:
         return verdict
     files, kinds = _files_that_run(package, run), ["wrong-value"] * is_unexplained(check, verdict)
     if check.name == "action-result" and any("To transition to a" in c.line for _, c in run.console):
         kinds.append("goes-on")  # actionlib was told to end a goal that is over
     found = [s for s in package.slips if s.kind in kinds and s.file in files]
-    for slip in (s for s in found if s.kind == "goes-on" or SEEN_AS[s.name] == verdict.wrong):
+    for slip in (
+        s for s in found if s.kind == "goes-on" or (verdict.wrong and SEEN_AS[s.name] == verdict.wrong)
+    ):
         why = f"line {slip.line} of {slip.file}: {slip.message}"
         return verdict.explained(why, slip.fix, (slip.place,), cause=slip.message)
+    for slip in [s for s in found if s.name == "bounds" and not verdict.wrong][:4]:
+        why = f"line {slip.line} of {slip.file}: {slip.message}"
+        verdict = verdict.explained(why, f"{verdict.hint}; {slip.fix}", (slip.place,), cause="")
     return verdict
 
 

@@ -1,4 +1,4 @@
-"""Mechanical repairs: what keeps a package from being judged, and the line that puts it right. Never logic.
+"""Mechanical repairs: what keeps a package from being judged, and the line that puts it right.
 
 A package's folder, its facts and what the rubric names come in, `model.repair.Repair`s go out; `apply_repair` makes
 one on a copy, or on the student's own files. Nothing of the student's is executed, and no link is followed.

@@ -18,13 +18,14 @@ from grader.installable import exists_somewhere, known_packages, noetic_messages
 from grader.limited_child import ChildLimits, run_limited
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.repair import RepairKind, as_code
+from grader.model.repair import Repair, RepairKind, as_code
 from grader.package.python import reason_of
 from grader.package.repairs.editing import KEEP_ONE, Files, emptied_lines
 from grader.syntax_fixes import COMMENTED_OUT, DELETE_LINE, MERGED, OUT_OF_BLOCK, Reason
 from grader.wording import is_one_edit, join_words, numbers_text, plural
 
 EXAMINE = "grader.package.source_repair:examine"
+TURN = "grader.package.source_repair:with_sign_turned"
 LIMITS = {"memory_bytes": 1 << 30, "cpu_s": 20, "file_bytes": 32 << 20, "answer_bytes": 16 << 20}
 WALL_S = 10.0
 INDENTED_SHOWN = 12
@@ -214,6 +215,62 @@ def _examine(
                 left.remove(entry.file)
                 yield entry
         left = left[1:]  # of those that are left, the first one ended the child
+
+
+def turn_sign(folder: Path, file: str, side: str = "") -> Repair | None:
+    """Return the repair that turns the sign of the only line of a script that can make a robot turn to that side, or
+    without a side, of the only turn that is worked out; None where it is not plain which one that is. The robot's way
+    shows whether it is one."""
+    files = Files(folder=folder.resolve())
+    text = files.text(file)
+    answer = run_limited(TURN, text or "", side, limits=ChildLimits(wall_s=WALL_S, **LIMITS))
+    for step in map(json.loads, answer.lines.splitlines()[:1]):
+        place = f"line {step['line']} of {file}"
+        passes = "a copy of the package with the other sign passes"
+        # where no side is known to be wrong, another line may be what is meant
+        why = (
+            f"this turn has the wrong sign: {passes}"
+            if side
+            else "with the other sign for this turn, a copy of the package passes"
+        )
+        message = f"{place}: {why}"
+        files.change("turn-sign", file, step["text"], message)
+    return next(iter(files.repairs), None)
+
+
+def ros_clock(folder: Path, file: str) -> Repair | None:
+    """Return the repair that measures time and waits by ROS's clock in a script that does so by the computer's; None
+    where it does not."""
+    files = Files(folder=folder.resolve())
+    text = files.text(file) or ""
+    lines = text.split("\n")
+    after = (
+        [re.sub(OWN_CLOCK, lambda found: CLOCKS[found[0]], line) for line in lines]
+        if "import rospy" in text
+        else lines
+    )
+    changed = [number for number, (a, b) in enumerate(zip(lines, after, strict=True), 1) if a != b]
+    where = f"{'lines' if len(changed) > 1 else 'line'} {numbers_text(changed)}"
+    words = {
+        found.rstrip("(").removeprefix("from ") for line in lines for found in re.findall(OWN_CLOCK, line)
+    }
+    keeps = "keep" if len(words) > 1 else "keeps"
+    message = f"line {changed[0]} of {file}: " if changed else ""
+    message += f"{join_words(sorted(words))} {keeps} to the computer's clock, and not to that of ROS"
+    fix = f"on {where}, measure time with `rospy.get_time()` and wait with `rospy.sleep(…)`"
+    files.change("ros-clock", file, "\n".join(after), message, fix)
+    return next(iter(files.repairs), None)
+
+
+CLOCKS = {
+    "time.time()": "rospy.get_time()",
+    "time.sleep(": "rospy.sleep(",
+    "from time import sleep": "from rospy import sleep",
+    "from time import time": "from rospy import get_time as time",
+}
+OWN_CLOCK = re.compile(
+    r"(?<![\w.])time\.time\(\)|(?<![\w.])time\.sleep\(|^from time import (?:sleep|time)(?=\s*$)"
+)
 
 
 def _site() -> str:

@@ -19,7 +19,6 @@ from grader.checks.robot_places import (
     EndsAtParams,
     Place,
     StaysWithinParams,
-    out_along,
     path_to_judge,
     placed,
     stretch_to_judge,
@@ -48,7 +47,7 @@ from grader.checks.support.counters import (
     wrong_steps,
 )
 from grader.checks.support.exit_causes import process_tracebacks
-from grader.checks.support.geometry import Polyline, Pose, followed, relative, shown_walls, track
+from grader.checks.support.geometry import Polyline, Pose, followed, out_along, relative, shown_walls, track
 from grader.checks.support.processes import how_it_ended, life_of
 from grader.checks.support.text import VALUE
 from grader.checks.support.topics import sent_by
