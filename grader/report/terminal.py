@@ -15,18 +15,6 @@ from grader.model.result import AppliedOverride, CriterionResult, GradingResult,
 from grader.model.verdict import Status
 from grader.report import sentences
 from grader.report.losses import Loss, MissingFile, ReportView, arrange, missing_files, write_files_hint
-from grader.report.sentences import (
-    COSTS_NOTHING,
-    MINUS,
-    NOTICED_TITLE,
-    SIGNS,
-    STATES,
-    minus,
-    note_place,
-    note_text,
-    visible_words,
-    without_sandbox,
-)
 from grader.report.text import line, without_ci_commands
 from grader.report.view import (
     file_places,
@@ -65,7 +53,7 @@ PLAIN_MARKS = {
 """In place of `SIGNS` where an encoding has no ✓."""
 
 
-PLAIN_LETTERS = str.maketrans({"…": "...", "→": "->", "±": "+/-", MINUS: "-", "\N{EN DASH}": "-"})
+PLAIN_LETTERS = str.maketrans({"…": "...", "→": "->", "±": "+/-", sentences.MINUS: "-", "\N{EN DASH}": "-"})
 """What stands for the grader's own signs where an encoding lacks them."""
 
 
@@ -137,7 +125,7 @@ class Terminal:
         full: bool,
     ) -> None:
         view = arrange(result, rubric)
-        unwalled = without_sandbox(result.environment.sandbox)
+        unwalled = sentences.without_sandbox(result.environment.sandbox)
         parts = [self._head(result, rubric)]
         warnings = filter(None, (unwalled, sentences.students_rubric(result)))
         parts += [self._words(words, indent=0, style="yellow") for words in warnings]
@@ -153,10 +141,10 @@ class Terminal:
             sentences.decided_title(result),
             [self._decision(o, c) for o, c in sentences.decided_criteria(result)],
         )
-        parts += self._section(NOTICED_TITLE, self._note_lines(result.notes))
+        parts += self._section(sentences.NOTICED_TITLE, self._note_lines(result.notes))
         parts += self._reached_lines(result, unrun, full=full)
         parts += self._section("Advice (costs nothing)", [self._advice(c) for c in view.advice])
-        parts += [Text(f"\n{visible_words(result, hidden)}")] if hidden else []
+        parts += [Text(f"\n{sentences.visible_words(result, hidden)}")] if hidden else []
         parts += remarks
         parts += self.still_open(view.open, unrun)
         parts += self.losses(TO_FIX, view.lost, sentences.judged_repaired(result))
@@ -242,22 +230,22 @@ class Terminal:
         """`-5`; `0/5` where the points are not lost for good."""
         if criterion.status.is_open or not criterion.missing:  # a gate may be a criterion that is not counted
             return points_of(criterion)
-        return self._fit_encoding(minus(criterion.missing))
+        return self._fit_encoding(sentences.minus(criterion.missing))
 
     def _total(self, loss: Loss) -> str:
         """`-5`; `-25 in all` where the mistake costs more than its own criterion's points."""
         cost = self._cost(loss.criterion)
         if loss.criterion.status.is_open or loss.points == loss.criterion.missing:
             return cost
-        return f"{self._fit_encoding(minus(loss.points))} in all"
+        return f"{self._fit_encoding(sentences.minus(loss.points))} in all"
 
     def _advice(self, criterion: CriterionResult) -> RenderableType:
         words = self._words(criterion.message or criterion.title)
         return Group(self._line(criterion), words, *self._rows([("hint", criterion.hint)]))
 
     def _note_lines(self, notes: tuple[Note, ...]) -> list[RenderableType]:
-        said = [self._words(f"{note_place(note)}: {note_text(note)}") for note in notes]
-        return [*said, Text(COSTS_NOTHING, "dim")] if notes else []
+        said = [self._words(f"{sentences.note_place(note)}: {sentences.note_text(note)}") for note in notes]
+        return [*said, Text(sentences.COSTS_NOTHING, "dim")] if notes else []
 
     def _reached_lines(self, result: GradingResult, unrun: str, *, full: bool) -> list[RenderableType]:
         """Return how many criteria are reached; with `full`, each of those that were judged with what was measured."""
@@ -274,7 +262,7 @@ class Terminal:
         return [Text(f"\n{sign} {said}", STYLES[Status.PASS])]
 
     def _measured_line(self, criterion: CriterionResult) -> RenderableType:
-        line = self._line(criterion, STATES[criterion.status], points_of(criterion))
+        line = self._line(criterion, sentences.STATES[criterion.status], points_of(criterion))
         passed, measured = criterion.status is Status.PASS, criterion.measured
         if criterion.status is Status.BLOCKED:
             measured = ""  # what was there instead of what could be measured
@@ -347,7 +335,9 @@ def fit_encoding(text: str, encoding: str) -> str:
 
 def mark(status: Status, encoding: str) -> str:
     """The sign of a status, a plain one where the encoding has no ✓."""
-    return (SIGNS if _can_encode("".join(SIGNS.values()), encoding) else PLAIN_MARKS)[status]
+    return (sentences.SIGNS if _can_encode("".join(sentences.SIGNS.values()), encoding) else PLAIN_MARKS)[
+        status
+    ]
 
 
 def _can_encode(text: str, encoding: str) -> bool:
