@@ -28,7 +28,8 @@ from grader.judging.summary import overall_status, reached_pass_mark, scaled_pas
 from grader.model.result import CriterionResult, EarlyVerdict, GradingResult, Progress, StepState
 from grader.model.verdict import Status
 from grader.report.files import result_text
-from grader.report.terminal import STYLES, mark, open_console, print_report
+from grader.report.sentences import STYLES
+from grader.report.terminal import mark, open_console, print_report
 from grader.report.text import visible
 from grader.results import RESULT
 from grader.rubric.model import Rubric

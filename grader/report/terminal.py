@@ -32,27 +32,6 @@ LIMIT = 500
 TO_FIX, NOT_DECIDED = "To fix", "Not decided yet: no points are lost for good"
 INDENT = 2
 SOURCE_CHARS_MIN = 20
-STYLES = {
-    Status.PASS: "green",
-    Status.PARTIAL: "yellow",
-    Status.FAIL: "red",
-    Status.BLOCKED: "dim",
-    Status.INCONCLUSIVE: "yellow",
-    Status.ERROR: "magenta",
-    Status.MANUAL: "cyan",
-}
-PLAIN_MARKS = {
-    Status.PASS: "+",
-    Status.PARTIAL: "~",
-    Status.FAIL: "x",
-    Status.BLOCKED: "-",
-    Status.INCONCLUSIVE: "?",
-    Status.ERROR: "!",
-    Status.MANUAL: "o",
-}
-"""In place of `SIGNS` where an encoding has no ✓."""
-
-
 PLAIN_LETTERS = str.maketrans({"…": "...", "→": "->", "±": "+/-", sentences.MINUS: "-", "\N{EN DASH}": "-"})
 """What stands for the grader's own signs where an encoding lacks them."""
 
@@ -259,7 +238,7 @@ class Terminal:
         others = "" if len(reached) == len(result.criteria) else "other "
         said = f"{plural(len(reached), f'{others}criterion', f'{others}criteria')} passed; --all shows them"
         sign = mark(Status.PASS, self.console.encoding)
-        return [Text(f"\n{sign} {said}", STYLES[Status.PASS])]
+        return [Text(f"\n{sign} {said}", sentences.STYLES[Status.PASS])]
 
     def _measured_line(self, criterion: CriterionResult) -> RenderableType:
         line = self._line(criterion, sentences.STATES[criterion.status], points_of(criterion))
@@ -272,7 +251,7 @@ class Terminal:
     def _line(self, criterion: CriterionResult, *more: str) -> RenderableType:
         """`✗ chatter-rate  -10  src/talker.py:17`; the last stands below where there is no room for it."""
         name = f"{mark(criterion.status, self.console.encoding)} {self._show(criterion.id)}"
-        style, rest = STYLES[criterion.status], [self._show(one) for one in more if one]
+        style, rest = sentences.STYLES[criterion.status], [self._show(one) for one in more if one]
         below = rest != [] and cell_len("  ".join([name, *rest])) > self.console.width
         beside = "".join(f"  {one}" for one in (rest[:-1] if below else rest))
         text = Text.assemble((name, style), (beside, "bold"), no_wrap=True, overflow="ignore")
@@ -335,9 +314,8 @@ def fit_encoding(text: str, encoding: str) -> str:
 
 def mark(status: Status, encoding: str) -> str:
     """The sign of a status, a plain one where the encoding has no ✓."""
-    return (sentences.SIGNS if _can_encode("".join(sentences.SIGNS.values()), encoding) else PLAIN_MARKS)[
-        status
-    ]
+    look = sentences.LOOKS[status]
+    return look.sign if _can_encode("".join(sentences.SIGNS.values()), encoding) else look.plain
 
 
 def _can_encode(text: str, encoding: str) -> bool:

@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
@@ -22,7 +23,7 @@ from grader.classes.batch.renew_results import figures_in
 from grader.classes.batch.run import hold_folder
 from grader.classes.gradebook import GradebookRow
 from grader.errors import EvidenceError, GraderError, UsageError
-from grader.files import atomic_write, make_folder
+from grader.files import atomic_write, make_folder, read_given
 from grader.intake.names import safe_name
 from grader.model.batch import UNPUBLISHED, Entry, Publication
 from grader.model.result import AppliedOverride, GradingResult
@@ -105,12 +106,7 @@ def read_published(path: Path) -> Published:
 
 def read_rows(path: Path) -> list[bytes]:
     """Return the lines of a file, none if there is no such file. Raises UsageError."""
-    try:
-        return path.read_bytes().splitlines()
-    except FileNotFoundError:
-        return []
-    except OSError as error:
-        raise UsageError(f"{path}: cannot be read: {error.strerror}") from error
+    return (read_given(path) or b"").splitlines() if os.path.lexists(path) else []
 
 
 def check_only(folder: BatchFolder, only: Sequence[str]) -> frozenset[str]:

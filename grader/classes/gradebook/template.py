@@ -22,6 +22,7 @@ from grader.classes.gradebook.platforms import (
 from grader.classes.gradebook.table import harmless, number_text
 from grader.classes.roster.entries import delimiter_of, encoding_of
 from grader.errors import UsageError
+from grader.files import read_given
 from grader.wording import first_few
 
 KEPT = {"EX", "N/A"}
@@ -293,12 +294,7 @@ class Sheet:
 
 def read_sheet(path: Path) -> Sheet:
     """Raises UsageError for what is not a table of text."""
-    try:
-        data = path.read_bytes() if path.stat().st_size <= BYTES_MAX else b""
-    except OSError as error:
-        raise UsageError(
-            f"{path}: cannot be read: {error.strerror}", hint="give the platform's export"
-        ) from error
+    data = read_given(path, BYTES_MAX, hint="give the platform's export")
     if not data or data.startswith(b"PK\x03\x04"):
         raise UsageError(f"{path}: this is not a CSV export", hint=_EXPORT)
     mark, encoding = encoding_of(data)

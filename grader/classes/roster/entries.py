@@ -23,6 +23,7 @@ from typing import NamedTuple
 from urllib.parse import unquote
 
 from grader.errors import GraderError, SubmissionError, UsageError
+from grader.files import read_given
 from grader.intake.names import brief, encodable, folder_key, is_archive_name, is_package_name
 from grader.intake.source import parse_source
 from grader.model.batch import Entry, Roster, RosterFault
@@ -138,12 +139,7 @@ def delimiter_of(header: str) -> str:
 
 
 def _text(path: Path) -> str:
-    try:
-        data = path.read_bytes() if path.stat().st_size <= BYTES_MAX else None
-    except OSError as error:
-        raise UsageError(
-            f"{path}: cannot be read: {error.strerror}", hint="give a CSV file, a folder, or an export"
-        ) from error
+    data = read_given(path, BYTES_MAX, hint="give a CSV file, a folder, or an export")
     if is_archive_name(path.name):
         raise UsageError(f"{path}: an archive is not a roster", hint="unpack it first, and give the folder")
     if data is None:

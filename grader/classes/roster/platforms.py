@@ -32,7 +32,7 @@ from grader.classes.roster.entries import (
     whole_source,
 )
 from grader.errors import HostError, UsageError
-from grader.files import make_folder, temporary_folder, unwritable
+from grader.files import make_folder, read_given, temporary_folder, unwritable
 from grader.intake.names import archive_stem, encodable, is_archive_name, listing, printable
 from grader.model.batch import Entry, Roster
 from grader.untrusted_text import line
@@ -395,9 +395,7 @@ def _as_list(page: object, path: Path) -> object:
 
 
 def _text(path: Path) -> str:
-    try:
-        if path.stat().st_size > BYTES_MAX:
-            raise UsageError(f"{path}: larger than {BYTES_MAX >> 20} MB: this is not a list of projects")
-        return text_of(path.read_bytes(), path).strip(_BLANK)
-    except OSError as error:
-        raise UsageError(f"{path}: cannot be read: {error.strerror}") from error
+    data = read_given(path, BYTES_MAX)
+    if data is None:
+        raise UsageError(f"{path}: larger than {BYTES_MAX >> 20} MB: this is not a list of projects")
+    return text_of(data, path).strip(_BLANK)
