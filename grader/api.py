@@ -95,7 +95,8 @@ def grade(
     """
     from grader import pipeline  # noqa: PLC0415 - loading a rubric needs nothing of it
 
-    _check_sandbox(sandbox)
+    if sandbox not in SANDBOXES:
+        raise UsageError(f"sandbox is {sandbox!r}", hint=f"it is one of {', '.join(SANDBOXES)}")
     given, loaded, folder = _text(source), _load_rubric(rubric), Path(out)
     check_writable(folder)
 
@@ -111,11 +112,6 @@ def grade(
         return pipeline.grade(given, loaded, folder, options, steps)
 
     return _run_stoppable(work, progress)
-
-
-def _check_sandbox(mode: str) -> None:
-    if mode not in SANDBOXES:
-        raise UsageError(f"sandbox is {mode!r}", hint=f"it is one of {', '.join(SANDBOXES)}")
 
 
 def judge(evidence: StrPath | Sequence[StrPath], rubric: StrPath | LoadedRubric) -> GradingResult:

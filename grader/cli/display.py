@@ -282,7 +282,8 @@ def exit_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
     status = overall_status(shown)
     if status == "error":
         return ExitCode.NOT_GRADED
-    if reached_pass_mark(_in_proportion(rubric, shown), shown):
+    mark_of_shown = scaled_pass_mark(rubric, sum(c.max_points for c in shown))
+    if reached_pass_mark(rubric.model_copy(update={"pass_mark": mark_of_shown}), shown):
         return ExitCode.PASSED
     return ExitCode.INCONCLUSIVE if status == "inconclusive" else ExitCode.BELOW_PASS_MARK
 
@@ -303,12 +304,6 @@ def staged_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode
 def judged_criteria(criteria: Iterable[CriterionResult]) -> tuple[CriterionResult, ...]:
     """Return the criteria that could be judged."""
     return tuple(c for c in criteria if not c.status.is_open)
-
-
-def _in_proportion(rubric: Rubric, shown: tuple[CriterionResult, ...]) -> Rubric:
-    """Return the rubric with its pass mark scaled from all points to those that are shown."""
-    points = sum(c.max_points for c in shown)
-    return rubric.model_copy(update={"pass_mark": scaled_pass_mark(rubric, points)})
 
 
 REPORT = "report.html"

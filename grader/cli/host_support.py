@@ -221,6 +221,7 @@ ROS_MODULES = {
 FIND_MODULES = (
     "import importlib.util, sys; print(*[m for m in sys.argv[1:] if not importlib.util.find_spec(m)])"
 )
+ROOT = "root; students' code runs as an unprivileged user in the sandbox"
 GIB = 1 << 30
 MIN_MEMORY_BYTES, MIN_DISK_BYTES = GIB, GIB
 
@@ -234,7 +235,7 @@ def diagnose() -> tuple[DoctorRow, ...]:
         *_programs(),
         *_ros(),
         *sandbox_rows(),
-        _user(),
+        DoctorRow("user", "ok", ROOT if user_id() == 0 else f"uid {user_id()}"),
         _search_paths(),
         *_resources(),
         _hostname(),
@@ -373,11 +374,6 @@ def _search_paths() -> DoctorRow:
     detail = f"{', '.join(odd)}: an entry means the current folder, so programs load files from there"
     fix = "write ${NAME:+$NAME:} before what you add, without an empty entry"
     return DoctorRow("search paths", "limited", detail, fix)
-
-
-def _user() -> DoctorRow:
-    root = "root; students' code runs as an unprivileged user in the sandbox"
-    return DoctorRow("user", "ok", root if user_id() == 0 else f"uid {user_id()}")
 
 
 def _resources() -> Iterator[DoctorRow]:

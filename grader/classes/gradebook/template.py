@@ -205,7 +205,9 @@ def find_column(
             hint="say which one with --column",
         )
     if not found and named:
-        raise UsageError(f"no column {wanted.title} in the template", hint=_others(header, known))
+        others = [name for name in header if name.strip() and name not in known]
+        hint = f"there are: {first_few(others, SHOWN_MAX)}"
+        raise UsageError(f"no column {wanted.title} in the template", hint=hint)
     return found[0] if found else None
 
 
@@ -237,11 +239,6 @@ def _titles(name: str, platform: Platform) -> set[str]:
         return {letters_and_digits(re.sub(r"\s*\[Total Pts:.*$|\s*\|\s*\d+\s*$", "", name))}
     bare = re.sub(r"\s*\([^()]*\)\s*$", "", name)
     return {letters_and_digits(bare), letters_and_digits(bare.partition(":")[2]) or letters_and_digits(bare)}
-
-
-def _others(header: Sequence[str], known: dict[str, ColumnKind]) -> str:
-    names = [name for name in header if name.strip() and name not in known]
-    return f"there are: {first_few(names, SHOWN_MAX)}"
 
 
 BYTES_MAX = 64 << 20

@@ -112,12 +112,13 @@ def _from_download(files: list[tuple[Path, Named]]) -> FoundEntry:
 def _entry(path: Path, named: Named, name: str, others: list[str]) -> Entry:
     source = _single_archive(path) or path
     file = named.file or (source.name if source != path else "")
+    is_anonymous_canvas = named.platform == "Canvas" and named.is_blind
     extra: Mapping[str, str] = {
         "platform": named.platform,
         "file": printable(file),
         "late": "yes" if named.late else "",
         "other files": ", ".join(printable(other) for other in others),
-        _id_column(named): named.id,
+        "Canvas anonymous id" if is_anonymous_canvas else f"{named.platform} id": named.id,
     }
     return Entry(
         id=name,
@@ -127,10 +128,6 @@ def _entry(path: Path, named: Named, name: str, others: list[str]) -> Entry:
         modes_lost=True,
         extra={key: text for key, text in extra.items() if text},
     )
-
-
-def _id_column(named: Named) -> str:
-    return "Canvas anonymous id" if named.platform == "Canvas" and named.is_blind else f"{named.platform} id"
 
 
 def _can_be_graded(path: Path) -> bool:
@@ -301,16 +298,12 @@ def with_roster_columns(table: Table) -> Table:
 
 
 def _row(row: RosterRow) -> RosterRow:
-    fields = _rename_columns(row.fields)
+    who = row.fields.get("github_username") or row.fields.get("roster_identifier", "")
+    fields = {"id": who, **{COLUMNS.get(column, column): field for column, field in row.fields.items()}}
     if row.faults or fields.get("source"):
         return RosterRow(row.line, fields, row.faults, row.shifted)
     who = fields.get("name") or fields["id"] or "?"
     return RosterRow(row.line, fields, (f"{who} has no repository",))
-
-
-def _rename_columns(fields: Mapping[str, str]) -> dict[str, str]:
-    renamed = {COLUMNS.get(column, column): field for column, field in fields.items()}
-    return {"id": fields.get("github_username") or fields.get("roster_identifier", ""), **renamed}
 
 
 BYTES_MAX = 64 << 20

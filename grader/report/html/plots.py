@@ -406,7 +406,8 @@ def _histogram(figure: RateFigure, name: str) -> Markup:
     bound = figure.gap_high_s or 2 / figure.low_hz
     log = max(figure.gaps_s) > TOO_FAR * bound
     longest_ms = 1.1e3 * max(1.2 * bound, *figure.gaps_s)
-    edges = [_part(i / BINS, longest_ms, log=log) for i in range(BINS + 1)]
+    shares = [i / BINS for i in range(BINS + 1)]
+    edges = [svg.from_log(s * svg.to_log(longest_ms)) if log else s * longest_ms for s in shares]
     counts = [0] * BINS
     for gap in figure.gaps_s:
         counts[min(bisect_right(edges, gap * 1000) - 1, BINS - 1)] += 1
@@ -420,10 +421,6 @@ def _histogram(figure: RateFigure, name: str) -> Markup:
     ]
     words = f"{len(figure.gaps_s)} gaps. {rate_words(figure)}"
     return svg.drawing(name, HISTOGRAM, f"Gaps between messages on {figure.topic}", words, *children)
-
-
-def _part(share: float, whole: float, *, log: bool) -> float:
-    return svg.from_log(share * svg.to_log(whole)) if log else share * whole
 
 
 def _gap_bounds(figure: RateFigure, frame: svg.Frame) -> list[Markup]:
