@@ -29,7 +29,7 @@ from grader.model.result import CriterionResult, EarlyVerdict, GradingResult, Pr
 from grader.model.verdict import Status
 from grader.report.files import result_text
 from grader.report.sentences import STYLES
-from grader.report.terminal import mark, open_console, print_report
+from grader.report.terminal import Terminal, mark, open_console
 from grader.report.text import visible
 from grader.results import RESULT
 from grader.rubric.model import Rubric
@@ -332,7 +332,7 @@ def show(
         say_document(lambda ascii_only: result_text(result, ascii_only=ascii_only))
     else:
         console = open_console(sys.stdout)
-        print_report(result, rubric, console, hidden=hidden, unrun=unrun, remarks=remarks, full=full)
+        Terminal(console).report(result, rubric, hidden=hidden, unrun=unrun, remarks=remarks, full=full)
         _paths(folder)
     if result.error is not None:
         report(GraderError(result.error.message, hint=result.error.hint))

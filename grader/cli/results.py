@@ -44,7 +44,7 @@ from grader.report.class_page.page import write_class_page
 from grader.report.class_page.submissions import salt_in
 from grader.report.forms import FORMS, ReportInput
 from grader.report.sentences import missing_hidden
-from grader.report.terminal import emit, open_console, print_report
+from grader.report.terminal import Terminal, emit, open_console
 from grader.report.text import line
 from grader.report.view import without_hidden
 from grader.rubric.find import named_labs
@@ -294,7 +294,7 @@ def write_form(
     shown = without_hidden(result, rubric.rubric) if student or form == "classroom" else result
     if form == "terminal" and out == STDOUT:
         hidden = missing_hidden(shown, rubric.rubric)
-        print_report(shown, rubric.rubric, open_console(sys.stdout), hidden=hidden, full=True)
+        Terminal(open_console(sys.stdout)).report(shown, rubric.rubric, hidden=hidden, full=True)
         return ExitCode.PASSED
     where = _prefix(result, prefix) if FORMS[form].cites_lines else ""
     about = ReportInput(

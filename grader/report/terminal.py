@@ -62,28 +62,10 @@ def emit(console: Console, parts: Iterable[RenderableType]) -> None:
     console.file.write(text.encode(console.encoding, "backslashreplace").decode(console.encoding))
 
 
-def print_report(
-    result: GradingResult,
-    rubric: Rubric,
-    console: Console,
-    *,
-    hidden: int = 0,
-    unrun: str = "",
-    remarks: Sequence[RenderableType] = (),
-    full: bool = False,
-) -> None:
-    """Print the whole report. `hidden` is how many criteria are left out, `remarks` stand before the losses.
-
-    Where `unrun` says why nothing was run, open ones are only counted. With `full`, all criteria are listed with what
-    was measured.
-    """
-    Terminal(console).report(result, rubric, hidden, unrun, remarks, full=full)
-
-
 def render_terminal(result: GradingResult, rubric: Rubric, hidden: int = 0) -> str:
     """Return the report as it is printed where there is no terminal: without colour, 80 columns wide."""
     text = io.StringIO()
-    print_report(result, rubric, open_console(text), hidden=hidden, full=True)
+    Terminal(open_console(text)).report(result, rubric, hidden=hidden, full=True)
     return text.getvalue()
 
 
@@ -97,12 +79,17 @@ class Terminal:
         self,
         result: GradingResult,
         rubric: Rubric,
-        hidden: int,
-        unrun: str,
-        remarks: Sequence[RenderableType],
         *,
-        full: bool,
+        hidden: int = 0,
+        unrun: str = "",
+        remarks: Sequence[RenderableType] = (),
+        full: bool = False,
     ) -> None:
+        """Print the whole report. `hidden` is how many criteria are left out, `remarks` stand before the losses.
+
+        Where `unrun` says why nothing was run, open ones are only counted. With `full`, all criteria are listed with
+        what was measured.
+        """
         view = arrange(result, rubric)
         unwalled = sentences.without_sandbox(result.environment.sandbox)
         parts = [self._head(result, rubric)]

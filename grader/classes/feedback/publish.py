@@ -21,6 +21,7 @@ from grader.classes.batch.folder import BatchFolder
 from grader.classes.batch.regrade import pairs, states_of
 from grader.classes.batch.renew_results import figures_in
 from grader.classes.batch.run import hold_folder
+from grader.classes.feedback.forms import PAGE, TEXT
 from grader.classes.gradebook import GradebookRow
 from grader.errors import EvidenceError, GraderError, UsageError
 from grader.files import atomic_write, make_folder, read_given
@@ -38,7 +39,6 @@ from grader.wording import did_you_mean, join_words, number, plural
 from grader.workers import WorkerEnded, run_each
 
 FILE, FOLDER = "published.jsonl", ".published"
-TEXT, PAGE = "report.md", "report.html"
 NAME_CHARS = 16
 PublishState = Literal["new", "changed", "same", "draft"]
 WORDING = "the words of the report, and no points"
