@@ -36,7 +36,7 @@ from grader.model.result import Automatic, CriterionResult, GradingResult
 from grader.report.files import result_text
 from grader.report.sentences import RUBRIC_FROM
 from grader.report.view import hidden_ids, without_hidden
-from grader.results import EVIDENCE, RESULT, SIGNATURE, SUMS, read_result_file
+from grader.results import EVIDENCE, RESULT, SIGNATURE, SUMS, load_result
 from grader.rubric.load import LoadedRubric
 from grader.wording import number, plural
 
@@ -195,19 +195,6 @@ def result_folders(paths: list[Path]) -> list[Path]:
     return found
 
 
-def read_whole(folder: Path) -> GradingResult:
-    """Read the result in a folder. Raises EvidenceError where it cannot be read."""
-    try:
-        result = read_result_file(folder / RESULT)
-    except OSError as error:
-        raise EvidenceError(f"{folder / RESULT} cannot be read: {error.strerror}") from error
-    if result is None:
-        raise EvidenceError(
-            f"{folder / RESULT} is not a result", hint="it was damaged, or is not the grader's"
-        )
-    return result
-
-
 def verify(
     folder: Path, rubric: LoadedRubric, allowed: Path | None, *, of_class: bool = False
 ) -> list[PartFinding]:
@@ -216,7 +203,7 @@ def verify(
 
     Raises EvidenceError where there is nothing to judge.
     """
-    result = read_whole(folder)
+    result = load_result(folder / RESULT)
     if result.error is not None:
         raise EvidenceError(
             f"{folder}: it was not graded, so there is nothing to judge: {result.error.message}"

@@ -98,11 +98,6 @@ def cache_folder() -> Path | None:
     return None
 
 
-def name_of(address: str) -> str:
-    """The name of the mirror of an address in which there is no password."""
-    return hashlib.sha256(os.fsencode(address)).hexdigest()
-
-
 @contextmanager
 def locked(folder: Path) -> Iterator[MirrorFolder]:
     """The place of a mirror, when no one else uses it. Raises OSError where it cannot be had or locked."""
@@ -407,7 +402,8 @@ def git_in(room: Path) -> Git:
 
 def place_name(source: Source) -> str:
     """Return the name of the mirror for a remote source."""
-    return name_of(split_address(source.url)[0])
+    address = split_address(source.url)[0]  # without the password
+    return hashlib.sha256(os.fsencode(address)).hexdigest()
 
 
 Answer = TypeVar("Answer")

@@ -103,7 +103,8 @@ def _add_column(work: _Work, wanted: PointsColumn) -> int:
     """A new column at the end of every row."""
     place = len(work.sheet.header)
     points = number_text(wanted.max_points)
-    (name,) = harmless([new_header(wanted, work.platform, points)])
+    new = f"{wanted.title} [Total Pts: {points} Score]" if work.platform == "blackboard" else wanted.title
+    (name,) = harmless([new])
     for number, record in enumerate(work.sheet.records):
         if record.is_empty:
             continue
@@ -224,11 +225,6 @@ def maximum_in(header: str) -> float | None:
     """Blackboard says in a column's name how many points it has."""
     found = re.search(r"\[Total Pts: (?:up to )?([\d.]+)", header)
     return float(found[1]) if found and found[1].count(".") < 2 else None
-
-
-def new_header(wanted: PointsColumn, platform: Platform, points: str) -> str:
-    """What a column is called that the platform does not have yet."""
-    return f"{wanted.title} [Total Pts: {points} Score]" if platform == "blackboard" else wanted.title
 
 
 def _titles(name: str, platform: Platform) -> set[str]:

@@ -11,14 +11,13 @@ import re
 import stat
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
 from grader.errors import EvidenceError, SubmissionError, UsageError
 from grader.evidence.reader import load_run
 from grader.files import atomic_write, open_untrusted, temporary_folder
-from grader.installable import install_extra
+from grader.installable import require_extra
 from grader.intake.archive import unpack
 from grader.intake.limits import IntakeLimits
 from grader.model.batch import Lines, NotCompared, Pair, Similarity
@@ -58,7 +57,7 @@ def compare(
 
     Raises UsageError without `copydetect` and for starter code that cannot be read.
     """
-    require_library()
+    require_extra("similarity", "comparing submissions", "copydetect")
     from grader.classes.similarity.matching import compare_class  # noqa: PLC0415 - of the extra `similarity`
 
     with temporary_folder("source") as place:
@@ -70,14 +69,6 @@ def compare(
             jobs=max(1, jobs),
         )
         return compare_class(request)
-
-
-def require_library() -> None:
-    """Raise UsageError if the extra is not installed."""
-    if find_spec("copydetect") is None:
-        raise UsageError(
-            "comparing submissions needs copydetect, which is not installed", hint=install_extra("similarity")
-        )
 
 
 def _unpack(path: Path, into: Path) -> Path:
