@@ -10,10 +10,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from grader.api import grade, judge, load_result, load_rubric
+    from grader.api import grade, judge, load_rubric
     from grader.errors import EvidenceError, GraderError, HostError, RubricError, SubmissionError, UsageError
     from grader.model.result import CriterionResult, GradingResult
     from grader.model.verdict import EvidenceCitation, FileCitation, Status
+    from grader.results import load_result
     from grader.rubric.load import LoadedRubric
     from grader.rubric.model import Criterion, Rubric
     from grader.rubric.scenario import Scenario
@@ -44,7 +45,7 @@ __all__ = [
 ]
 
 _PLACES = {
-    "grader.api": ("grade", "judge", "load_result", "load_rubric"),
+    "grader.api": ("grade", "judge", "load_rubric"),
     "grader.errors": (
         "EvidenceError",
         "GraderError",
@@ -55,6 +56,7 @@ _PLACES = {
     ),
     "grader.model.result": ("CriterionResult", "GradingResult"),
     "grader.model.verdict": ("EvidenceCitation", "FileCitation", "Status"),
+    "grader.results": ("load_result",),
     "grader.rubric.load": ("LoadedRubric",),
     "grader.rubric.model": ("Criterion", "Rubric", "Scenario"),
 }

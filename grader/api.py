@@ -25,14 +25,13 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, TypeAlias, TypeVar, get_args
 
-from grader.errors import EvidenceError, UsageError
+from grader.errors import UsageError
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.files import check_writable
 from grader.model import SandboxMode
 from grader.model.result import NO_TIME, GradingResult, Progress, Silence, StepState, SubmissionInfo
 from grader.portable import on_interrupt, wait_for_children
-from grader.results import RESULT, read_result_file
 from grader.rubric.load import LoadedRubric
 from grader.rubric.load import load_rubric as load_file
 
@@ -95,7 +94,8 @@ def grade(
     """
     from grader import pipeline  # noqa: PLC0415 - loading a rubric needs nothing of it
 
-    _check_sandbox(sandbox)
+    if sandbox not in SANDBOXES:
+        raise UsageError(f"sandbox is {sandbox!r}", hint=f"it is one of {', '.join(SANDBOXES)}")
     given, loaded, folder = _text(source), _load_rubric(rubric), Path(out)
     check_writable(folder)
 
@@ -111,11 +111,6 @@ def grade(
         return pipeline.grade(given, loaded, folder, options, steps)
 
     return _run_stoppable(work, progress)
-
-
-def _check_sandbox(mode: str) -> None:
-    if mode not in SANDBOXES:
-        raise UsageError(f"sandbox is {mode!r}", hint=f"it is one of {', '.join(SANDBOXES)}")
 
 
 def judge(evidence: StrPath | Sequence[StrPath], rubric: StrPath | LoadedRubric) -> GradingResult:
@@ -145,21 +140,6 @@ def judge(evidence: StrPath | Sequence[StrPath], rubric: StrPath | LoadedRubric)
         environment=environment_info(_metadata(runs, "ros"), _metadata(runs, "sandbox")),
         timing=NO_TIME,
     )
-
-
-def load_result(path: StrPath) -> GradingResult:
-    """Read a `result.json`, of any version up to this grader's, or the one in that folder of results.
-
-    Raises EvidenceError where there is none, where it is damaged, and where a newer grader wrote it.
-    """
-    file = Path(path) / RESULT if Path(path).is_dir() else Path(path)
-    try:
-        result = read_result_file(file)
-    except OSError as error:
-        raise EvidenceError(f"{file}: {error.strerror}", hint="give a folder of results") from error
-    if result is None:
-        raise EvidenceError(f"{file}: not what a grader writes", hint="grade the submission again")
-    return result
 
 
 def _run_stoppable(work: Callable[[Stop, Progress], T], on_step: OnStep | None) -> T:

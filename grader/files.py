@@ -19,7 +19,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO, Literal, get_args
 
-from grader.errors import GraderError, HostError, OutputError
+from grader.errors import GraderError, HostError, OutputError, UsageError
 from grader.portable import BINARY, CLOEXEC, DIRECTORY, NOFOLLOW, READ, user_id
 
 if sys.platform != "win32":
@@ -48,48 +48,31 @@ def user_folder(kind: Literal["cache", "config"]) -> Path:
 
 
 def atomic_write(path: Path, data: bytes, *, public: bool = False) -> None:
-    """Write `data` beside `path`, flush it to the disk, and rename it into place.
-
-    The file is private to its owner, whatever the umask, and so are missing folders, which are made; a `public` one is
-    as the umask says. A link stays a link, and what is not a file (`/dev/null`, a pipe) is written to.
-    Raises OutputError, or HostError where the disk fails; then `path` is as it was before, and nothing is left beside
-    it.
-    """
-    path = path.resolve() if path.is_symlink() else path
-    if path.exists() and not path.is_file():
-        _write_into(path, data)
-        return
-    try:
-        make_folder(path.parent, public=public)
-        with _new_beside(path, path.parent, public=public) as (beside, file):
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-            _replace(beside, file, path)
-    except OSError as error:
-        raise unwritable(path, error) from error
+    """Write `data` into a file as `whole_file` does. Raises OutputError, or HostError where the disk fails."""
+    with whole_file(path, public=public) as beside:
+        beside.write_bytes(data)
 
 
 @contextmanager
-def whole_file(target: Path) -> Iterator[Path]:
+def whole_file(target: Path, *, public: bool = False) -> Iterator[Path]:
     """Open a new file beside `target`; it takes the target's place in the end, flushed to the disk.
 
-    It is for its owner alone, whatever the umask. A link stays a link, and what is not a file (`/dev/stdout`, a pipe)
-    gets a copy. Raises OutputError, or HostError where the disk gives out; then `target` is as it was before, and
-    nothing is left beside it.
+    It is for its owner alone, whatever the umask, and so are missing folders, which are made; a `public` one is as the
+    umask says. A link stays a link, and what is not a file (`/dev/stdout`, a pipe) gets a copy. Raises OutputError, or
+    HostError where the disk gives out; then `target` is as it was before, and nothing is left beside it.
     """
     target = target.resolve() if target.is_symlink() else target
     special = target.exists() and not target.is_file()
     folder = Path(tempfile.gettempdir()) if special else target.parent
     try:
-        make_folder(folder)
-        with _new_beside(target, folder) as (beside, file):
+        make_folder(folder, public=public)
+        with _new_beside(target, folder, public=public) as (beside, file):
             yield beside
             if special:
                 with beside.open("rb") as source, target.open("wb") as place:
                     shutil.copyfileobj(source, place)
                 return
-            with beside.open("rb") as written:
+            with beside.open("r+b") as written:  # Windows flushes no file that is open to be read
                 os.fsync(written.fileno())
             _replace(beside, file, target)
     except OSError as error:
@@ -197,12 +180,12 @@ def open_untrusted(path: Path, *below: str) -> BinaryIO:
     return os.fdopen(descriptor, "rb")
 
 
-def _write_into(path: Path, data: bytes) -> None:
+def read_given(path: Path, bytes_max: int = sys.maxsize, *, hint: str = "") -> bytes | None:
+    """Read a file that the user named; None where it is larger than that. Raises UsageError."""
     try:
-        with path.open("wb") as file:
-            file.write(data)
+        return path.read_bytes() if path.stat().st_size <= bytes_max else None
     except OSError as error:
-        raise unwritable(path, error) from error
+        raise UsageError(f"{path}: cannot be read: {error.strerror}", hint=hint) from error
 
 
 def check_writable(folder: Path) -> None:

@@ -11,8 +11,10 @@ import re
 import sys
 from collections.abc import Collection, Iterable
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 
+from grader.errors import UsageError
 from grader.wording import is_one_edit
 
 SLIP_CHARS_MIN = 4
@@ -206,3 +208,13 @@ def install_extra(extra: str) -> str:
     )
     pipx = Path(sys.prefix, "pipx_metadata.json").is_file()
     return f"pipx inject ros-lab-grader {names}" if pipx else f"{sys.executable} -m pip install {names}"
+
+
+def require_extra(extra: str, what_for: str, *modules: str) -> None:
+    """Raise UsageError where modules of an extra of the grader are not installed."""
+    missing = [name for name in modules if find_spec(name) is None]
+    if missing:
+        raise UsageError(
+            f"{what_for} needs packages that are not installed: {', '.join(missing)}",
+            hint=install_extra(extra),
+        )

@@ -112,13 +112,27 @@ def read_result(folder: Path) -> GradingResult | None:
     damaged. Raises EvidenceError if a newer grader wrote it: it must not look as if there were none.
     """
     try:
-        return read_result_file(folder / RESULT)
+        return _read(folder / RESULT)
     except OSError:
         return None
 
 
-def read_result_file(file: Path) -> GradingResult | None:
-    """Read a result from a file of any name, as `read_result`. Raises OSError, too."""
+def load_result(path: str | os.PathLike[str]) -> GradingResult:
+    """Read a `result.json`, of any version up to this grader's, or the one in that folder of results.
+
+    Raises EvidenceError where there is none, where it is damaged, and where a newer grader wrote it.
+    """
+    file = Path(path) / RESULT if Path(path).is_dir() else Path(path)
+    try:
+        result = _read(file)
+    except OSError as error:
+        raise EvidenceError(f"{file}: {error.strerror}", hint="give a folder of results") from error
+    if result is None:
+        raise EvidenceError(f"{file}: not what a grader writes", hint="grade the submission again")
+    return result
+
+
+def _read(file: Path) -> GradingResult | None:
     data = file.read_bytes()
     try:
         return GradingResult.read_json(data)

@@ -20,7 +20,7 @@ import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from grader import __version__
 from grader.errors import EvidenceError, HostError, UsageError
@@ -32,11 +32,11 @@ from grader.intake.names import safe_name
 from grader.judging import judge
 from grader.judging.settle import awarded, settle
 from grader.judging.summary import overall_status, total_fields
-from grader.model.result import Automatic, CriterionResult, GradingResult, Lateness
+from grader.model.result import Automatic, CriterionResult, GradingResult
 from grader.report.files import result_text
 from grader.report.sentences import RUBRIC_FROM
 from grader.report.view import hidden_ids, without_hidden
-from grader.results import EVIDENCE, RESULT, SIGNATURE, SUMS, read_result_file
+from grader.results import EVIDENCE, RESULT, SIGNATURE, SUMS, load_result
 from grader.rubric.load import LoadedRubric
 from grader.wording import number, plural
 
@@ -168,8 +168,7 @@ def _printed_text(done: subprocess.CompletedProcess[bytes]) -> str:
 About = Literal["rubric", "result", "evidence", "signature", "code", "grader"]
 
 
-@dataclass(frozen=True, kw_only=True)
-class PartFinding:
+class PartFinding(NamedTuple):
     """What was found about a part. With `wrong`, the result is not to be trusted for it."""
 
     about: About
@@ -196,19 +195,6 @@ def result_folders(paths: list[Path]) -> list[Path]:
     return found
 
 
-def read_whole(folder: Path) -> GradingResult:
-    """Read the result in a folder. Raises EvidenceError where it cannot be read."""
-    try:
-        result = read_result_file(folder / RESULT)
-    except OSError as error:
-        raise EvidenceError(f"{folder / RESULT} cannot be read: {error.strerror}") from error
-    if result is None:
-        raise EvidenceError(
-            f"{folder / RESULT} is not a result", hint="it was damaged, or is not the grader's"
-        )
-    return result
-
-
 def verify(
     folder: Path, rubric: LoadedRubric, allowed: Path | None, *, of_class: bool = False
 ) -> list[PartFinding]:
@@ -217,7 +203,7 @@ def verify(
 
     Raises EvidenceError where there is nothing to judge.
     """
-    result = read_whole(folder)
+    result = load_result(folder / RESULT)
     if result.error is not None:
         raise EvidenceError(
             f"{folder}: it was not graded, so there is nothing to judge: {result.error.message}"
@@ -227,7 +213,7 @@ def verify(
     try:
         runs = load_evidence([folder / EVIDENCE])
     except EvidenceError as error:
-        return [*found, PartFinding(about="evidence", text=error.message)]
+        return [*found, PartFinding("evidence", error.message)]
     return [*found, *_evidence_findings(result, runs), *_result_findings(result, runs, rubric)]
 
 
@@ -235,43 +221,34 @@ def _owner_findings(folder: Path, result: GradingResult, *, of_class: bool) -> I
     """The whole of another student's folder, signature and all, fits in itself."""
     owner, name = result.submission.id, folder.resolve().name
     if name != safe_name(owner):
-        yield PartFinding(
-            about="result", text=f"it is the result of {owner}, in the folder {name}", wrong=of_class
-        )
+        yield PartFinding("result", f"it is the result of {owner}, in the folder {name}", wrong=of_class)
 
 
 def _rubric_findings(result: GradingResult, rubric: LoadedRubric) -> Iterator[PartFinding]:
     used, lab = result.rubric, rubric.rubric
     if (used.id, used.digest) == (lab.id, rubric.digest):
         words = f"{lab.id}, digest {rubric.digest[:12]}"
-        yield PartFinding(about="rubric", text=f"{words} ({RUBRIC_FROM[rubric.origin]})", wrong=False)
+        yield PartFinding("rubric", f"{words} ({RUBRIC_FROM[rubric.origin]})", wrong=False)
         return
     origin = RUBRIC_FROM[result.rubric_origin]
     words = f"it was judged by {used.id} with digest sha256:{used.digest}{f' ({origin})' if origin else ''}"
     other = (
         f"{lab.id} with digest sha256:{rubric.digest}; give the course's own with --rubric, if it is another"
     )
-    yield PartFinding(about="rubric", text=f"{words}, not by {other}")
+    yield PartFinding("rubric", f"{words}, not by {other}")
 
 
 def _signature_findings(folder: Path, allowed: Path | None) -> Iterator[PartFinding]:
     """Yield what is found about the signature. None, or one without a name, is wrong only where signers are
     asked for."""
     signature = read_signature(folder, allowed)
-    yield PartFinding(
-        about="signature",
-        text=_signature_words(signature, asked=allowed is not None),
-        wrong=signature.state == "bad" or (allowed is not None and signature.state != "good"),
-    )
+    wrong = signature.state == "bad" or (allowed is not None and signature.state != "good")
+    yield PartFinding("signature", _signature_words(signature, asked=allowed is not None), wrong=wrong)
     if signature.state == "unsigned":
         return
     for name, what in sorted(changed_files(folder).items()):
-        text = (
-            f"{name} was {what} since it was signed"
-            if what != "missing"
-            else f"{name} was signed, and is gone"
-        )
-        yield PartFinding(about="result" if name == RESULT else "evidence", text=text)
+        since = "was signed, and is gone" if what == "missing" else f"was {what} since it was signed"
+        yield PartFinding("result" if name == RESULT else "evidence", f"{name} {since}")
 
 
 def _signature_words(signature: Signature, *, asked: bool) -> str:
@@ -295,7 +272,7 @@ def _evidence_findings(result: GradingResult, runs: Mapping[str, Run]) -> Iterat
             text = (
                 f"it is of a submission with the {key} {min(other)[:40] or 'none'}, not {said[:40] or 'none'}"
             )
-            yield PartFinding(about="evidence", text=text)
+            yield PartFinding("evidence", text)
 
 
 def _result_findings(
@@ -311,7 +288,8 @@ def _result_findings(
         if _verdict(said.automatic) != _verdict(now.automatic):
             words = f"{_verdict(said.automatic)}; the evidence gives {_verdict(now.automatic)}"
             differing.append(f"{said.criterion}: before a person decided, result.json says {words}")
-    late = _unknown_terms(result, rubric)
+    # A course's terms for late work are not those of its labs' rubrics.
+    late = None if rubric.rubric.deadline or rubric.rubric.late else result.late
     for key in ("status", "points", "max_points", "gate"):
         told = late.points_before if late and key == "points" else getattr(result, key)
         if told != (now := getattr(again, key)):
@@ -320,18 +298,13 @@ def _result_findings(
         cost = f"{number(late.points_before)} points before, {number(result.points)} after"
         words = f"{late.text} ({cost}), by a deadline that this rubric does not have: course.yaml#LAB has it"
         fits = late.points == result.points <= late.points_before
-        yield PartFinding(about="rubric", text=words, wrong=not fits)
-    yield from (PartFinding(about="result", text=text) for text in differing)
+        yield PartFinding("rubric", words, wrong=not fits)
+    yield from (PartFinding("result", text) for text in differing)
     yield from _remarks(result, again)
     if not differing:
         judged = plural(len(before), "criterion", "criteria")
         text = f"{judged} and {number(result.points)} points, as the evidence gives"
-        yield PartFinding(about="result", text=text, wrong=False)
-
-
-def _unknown_terms(result: GradingResult, rubric: LoadedRubric) -> Lateness | None:
-    """Return what being late cost by a course's terms, which its labs' rubrics do not have."""
-    return None if rubric.rubric.deadline or rubric.rubric.late else result.late
+        yield PartFinding("result", text, wrong=False)
 
 
 def _remarks(result: GradingResult, again: GradingResult) -> Iterator[PartFinding]:
@@ -341,14 +314,14 @@ def _remarks(result: GradingResult, again: GradingResult) -> Iterator[PartFindin
     other = [name for name in said if name in texts and said[name] != texts[name]]
     if other:
         text = f"worded otherwise, by another build of the grader or by hand: {', '.join(other)}"
-        yield PartFinding(about="result", text=text, wrong=False)
+        yield PartFinding("result", text, wrong=False)
     if result.environment.grader != __version__:
         text = f"graded by {result.environment.grader}, judged again by {__version__}"
-        yield PartFinding(about="grader", text=text, wrong=False)
+        yield PartFinding("grader", text, wrong=False)
     if decided := awarded(result.overrides):
         who = ", ".join(sorted({o.author or "someone unnamed" for o in decided.values()}))
         text = f"people decided {plural(len(decided), 'criterion', 'criteria')}: {who}"
-        yield PartFinding(about="result", text=text, wrong=False)
+        yield PartFinding("result", text, wrong=False)
 
 
 def _judge_again(result: GradingResult, runs: Mapping[str, Run], rubric: LoadedRubric) -> GradingResult:
@@ -398,21 +371,15 @@ def _compare_causes(own: GradingResult, official: GradingResult) -> Iterator[Par
     same = own.submission.digest == official.submission.digest
     commits = " and ".join((one.submission.commit or "no commit")[:12] for one in (own, official))
     words = "the same files were graded" if same else f"other files were graded ({commits})"
-    yield PartFinding(about="code", text=words, wrong=not same)
+    yield PartFinding("code", words, wrong=not same)
     if (own.rubric.id, own.rubric.digest) != (official.rubric.id, official.rubric.digest):
         used = [f"{one.rubric.id} {one.rubric.digest[:12]}" for one in (own, official)]
         origin = f" ({RUBRIC_FROM[own.rubric_origin]})" if own.rubric_origin else ""
-        yield PartFinding(about="rubric", text=f"own run by {used[0]}{origin}, official by {used[1]}")
-    for name, one, other in zip(
-        ("grader", "ROS", "sandbox"),
-        (own.environment.grader, own.environment.ros, own.environment.sandbox),
-        (official.environment.grader, official.environment.ros, official.environment.sandbox),
-        strict=True,
-    ):
+        yield PartFinding("rubric", f"own run by {used[0]}{origin}, official by {used[1]}")
+    for name in ("grader", "ROS", "sandbox"):
+        one, other = (getattr(result.environment, name.lower()) for result in (own, official))
         if one != other:
-            yield PartFinding(
-                about="grader", text=f"{name}: {one or 'none'}, official: {other or 'none'}", wrong=False
-            )
+            yield PartFinding("grader", f"{name}: {one or 'none'}, official: {other or 'none'}", wrong=False)
 
 
 def _compare_criteria(own: GradingResult, official: GradingResult) -> Iterator[PartFinding]:
@@ -420,13 +387,11 @@ def _compare_criteria(own: GradingResult, official: GradingResult) -> Iterator[P
     for theirs in official.criteria:
         ours = mine.get(theirs.id)
         if ours is None:
-            yield PartFinding(about="result", text=f"{theirs.id}: only in the official result", wrong=False)
+            yield PartFinding("result", f"{theirs.id}: only in the official result", wrong=False)
         elif (ours.status, ours.points) != (theirs.status, theirs.points):
             old, new = (f"{_verdict(c)} of {number(c.max_points)}" for c in (ours, theirs))
-            yield PartFinding(
-                about="result", text=f"{theirs.id}: own run {old}; official {new}: {theirs.message}"
-            )
+            yield PartFinding("result", f"{theirs.id}: own run {old}; official {new}: {theirs.message}")
     for name in mine.keys() - {criterion.id for criterion in official.criteria}:
-        yield PartFinding(about="result", text=f"{name}: only in the own run", wrong=False)
+        yield PartFinding("result", f"{name}: only in the own run", wrong=False)
     points = [f"{number(one.points)} of {number(one.max_points)}" for one in (own, official)]
-    yield PartFinding(about="result", text=f"own run {points[0]} points, official {points[1]}", wrong=False)
+    yield PartFinding("result", f"own run {points[0]} points, official {points[1]}", wrong=False)

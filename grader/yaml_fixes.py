@@ -48,7 +48,8 @@ def slip_of_yaml(text: str, until: int) -> YamlSlip | None:
         if code.endswith(_GOES_ON):
             return None
         below = next((one for one in lines[number:] if one.strip()), "")
-        if found := _slip_of_line(code, is_above_block=_indent(below) > _indent(code)):
+        is_above_block = _indent(below) > _indent(code)
+        if found := _slip_of_key(code, is_above_block=is_above_block) or _slip_of_value(code):
             return YamlSlip(number, *found)
     return None
 
@@ -57,12 +58,8 @@ def _indent(line: str) -> int:
     return len(line) - len(line.lstrip())
 
 
-def _slip_of_line(code: str, *, is_above_block: bool) -> tuple[str, str] | None:
-    """Return what a line of a map lacks, and the line as it should be."""
-    return _slip_of_key(code, is_above_block=is_above_block) or _slip_of_value(code)
-
-
 def _slip_of_key(code: str, *, is_above_block: bool) -> tuple[str, str] | None:
+    """Return what a line of a map lacks, and the line as it should be."""
     if found := _NO_SPACE.fullmatch(code):
         return "has no space after its `:`", f"{found['key'].strip()}: {found['value']}"
     if is_above_block and (found := _KEY_ALONE.fullmatch(code)):

@@ -327,10 +327,14 @@ def combine(out: Path, batches: Sequence[BatchFolder], rubric: LoadedRubric, cou
     make_folder(out)
     with hold_folder(out):
         run = batches[0].run
-        overrides = read_overrides(out / OVERRIDES, rubric.rubric, ids_of(run))
-        bringing = _Bringing(BatchFolder(out, run), rubric, Settler(rubric.rubric, overrides), counts)
-        known = _by_student(batches)
-        entries = tuple(bringing.bring(entry, known.get(folder_key(entry.id), ())) for entry in run.entries)
+        settler = Settler(rubric.rubric, read_overrides(out / OVERRIDES, rubric.rubric, ids_of(run)))
+        folder, known = BatchFolder(out, run), _by_student(batches)
+        entries = tuple(
+            _bring(folder, known[key], rubric, settler, counts)
+            if (key := folder_key(entry.id)) in known
+            else entry
+            for entry in run.entries
+        )
         now = run.model_copy(update={"entries": entries, "state": batches[-1].run.state})
         write_run(out, now)
         return write_books(BatchFolder(out, now), rubric.rubric, now.state, 0)
@@ -347,29 +351,20 @@ def _by_student(batches: Sequence[BatchFolder]) -> dict[str, list[Attempt]]:
     return found
 
 
-@dataclass(frozen=True)
-class _Bringing:
-    """Brings what counts into the lab's folder."""
-
-    folder: BatchFolder
-    rubric: LoadedRubric
-    settler: Settler
-    counts: Counts
-
-    def bring(self, entry: Entry, attempts: Sequence[Attempt]) -> Entry:
-        """Put the chosen attempt's evidence and the reports of what counts into the student's folder, unless they are
-        there already; return that attempt's row of the roster."""
-        if not attempts:
-            return entry
-        lab = self.rubric.rubric
-        one = counting_attempt(attempts, self.counts, lab)
-        target = self.folder.folder_of(one.entry)
-        earlier = read_result(target)
-        automatic = unsettled(counting_result(attempts, one, self.counts, lab), lab)
-        now = self.settler.settle(automatic, one.entry.id, one.result.handed_in, earlier or automatic)
-        if now != earlier:
-            rewrite(target, now, lab, self.rubric.docs, of=one.folder)
-        return one.entry
+def _bring(
+    folder: BatchFolder, attempts: Sequence[Attempt], rubric: LoadedRubric, settler: Settler, counts: Counts
+) -> Entry:
+    """Put the chosen attempt's evidence and the reports of what counts into the student's folder, unless they are there
+    already; return that attempt's row of the roster."""
+    lab = rubric.rubric
+    one = counting_attempt(attempts, counts, lab)
+    target = folder.folder_of(one.entry)
+    earlier = read_result(target)
+    automatic = unsettled(counting_result(attempts, one, counts, lab), lab)
+    now = settler.settle(automatic, one.entry.id, one.result.handed_in, earlier or automatic)
+    if now != earlier:
+        rewrite(target, now, lab, rubric.docs, of=one.folder)
+    return one.entry
 
 
 def counting_attempt(attempts: Sequence[Attempt], counts: Counts, rubric: Rubric) -> Attempt:

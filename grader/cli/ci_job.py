@@ -31,7 +31,7 @@ from grader.integrations.ci_systems import RUNNERS, JobSettings, read_settings, 
 from grader.judging.summary import overall_status, total_fields
 from grader.model.result import GradingResult
 from grader.report.sentences import rubric_words, without_sandbox
-from grader.report.terminal import open_console, print_report
+from grader.report.terminal import Terminal, open_console
 from grader.report.view import hidden_ids, is_students_fault, without_hidden
 from grader.results import RESULT, read_result
 from grader.rubric.load import LoadedRubric
@@ -88,7 +88,7 @@ def _grade(settings: JobSettings) -> JobResult:
     prefix = _prefix(result, Path(source))
     add_forms(settings.out, result, rubric.rubric, prefix, rubric.docs)
     hidden, unrun = len(hidden_ids(rubric.rubric)), "--static" if settings.static else ""
-    print_report(result, rubric.rubric, open_console(sys.stdout), hidden=hidden, unrun=unrun)
+    Terminal(open_console(sys.stdout)).report(result, rubric.rubric, hidden=hidden, unrun=unrun)
     return _outcome_of(result, rubric, settings, prefix)
 
 

@@ -46,7 +46,7 @@ from grader.cli.output import say, say_beside, say_json
 from grader.errors import ExitCode, GraderError, UsageError
 from grader.files import temporary_folder
 from grader.model import SandboxMode
-from grader.model.batch import BatchRun, NotCompared, Pair, Similarity
+from grader.model.batch import BatchRun, Pair, Similarity
 from grader.portable import cores
 from grader.report.terminal import emit, open_console
 from grader.report.text import line
@@ -476,12 +476,8 @@ def _tail(similarity: Similarity) -> Iterator[str]:
             f"the tutorials and what most share: too few to compare."
         )
     for one in similarity.not_compared[:IDS_SHOWN]:
-        yield f"Not compared: {_not_compared(one)}"
+        place = line(f"{one.id}: {one.file}" if one.file else one.id, TEXT_CHARS)
+        yield f"Not compared: {place}: {line(one.reason, TEXT_CHARS)}"
     if len(similarity.not_compared) > IDS_SHOWN:
         yield f"Not compared: {len(similarity.not_compared) - IDS_SHOWN} more"
     yield from (f"Note: {note}" for note in similarity.notes)
-
-
-def _not_compared(one: NotCompared) -> str:
-    place = line(f"{one.id}: {one.file}" if one.file else one.id, TEXT_CHARS)
-    return f"{place}: {line(one.reason, TEXT_CHARS)}"

@@ -28,7 +28,8 @@ from grader.judging.summary import overall_status, reached_pass_mark, scaled_pas
 from grader.model.result import CriterionResult, EarlyVerdict, GradingResult, Progress, StepState
 from grader.model.verdict import Status
 from grader.report.files import result_text
-from grader.report.terminal import STYLES, mark, open_console, print_report
+from grader.report.sentences import STYLES
+from grader.report.terminal import Terminal, mark, open_console
 from grader.report.text import visible
 from grader.results import RESULT
 from grader.rubric.model import Rubric
@@ -281,7 +282,8 @@ def exit_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
     status = overall_status(shown)
     if status == "error":
         return ExitCode.NOT_GRADED
-    if reached_pass_mark(_in_proportion(rubric, shown), shown):
+    mark_of_shown = scaled_pass_mark(rubric, sum(c.max_points for c in shown))
+    if reached_pass_mark(rubric.model_copy(update={"pass_mark": mark_of_shown}), shown):
         return ExitCode.PASSED
     return ExitCode.INCONCLUSIVE if status == "inconclusive" else ExitCode.BELOW_PASS_MARK
 
@@ -302,12 +304,6 @@ def staged_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode
 def judged_criteria(criteria: Iterable[CriterionResult]) -> tuple[CriterionResult, ...]:
     """Return the criteria that could be judged."""
     return tuple(c for c in criteria if not c.status.is_open)
-
-
-def _in_proportion(rubric: Rubric, shown: tuple[CriterionResult, ...]) -> Rubric:
-    """Return the rubric with its pass mark scaled from all points to those that are shown."""
-    points = sum(c.max_points for c in shown)
-    return rubric.model_copy(update={"pass_mark": scaled_pass_mark(rubric, points)})
 
 
 REPORT = "report.html"
@@ -336,7 +332,7 @@ def show(
         say_document(lambda ascii_only: result_text(result, ascii_only=ascii_only))
     else:
         console = open_console(sys.stdout)
-        print_report(result, rubric, console, hidden=hidden, unrun=unrun, remarks=remarks, full=full)
+        Terminal(console).report(result, rubric, hidden=hidden, unrun=unrun, remarks=remarks, full=full)
         _paths(folder)
     if result.error is not None:
         report(GraderError(result.error.message, hint=result.error.hint))

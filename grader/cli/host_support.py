@@ -16,9 +16,8 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import IO, Literal
+from typing import IO, Literal, NamedTuple
 
-from pydantic import AliasChoices, Field
 from rich.table import Table
 from rich.text import Text
 
@@ -38,7 +37,6 @@ from grader.errors import GraderError, HostError, RosMissing
 from grader.host_programs import LISTS, LOCALHOST, LOCALHOST_HINT, find_host_program, resolves
 from grader.installable import install_command
 from grader.model import SandboxMode
-from grader.model.record import Record
 from grader.portable import cores, system, user_id
 from grader.report.sentences import without_sandbox
 from grader.report.terminal import emit, open_console
@@ -81,18 +79,23 @@ WITHOUT = "check --static, judge, report, explain, labs, rubric validate"
 LACKS = "grade, record, and check beyond the files: ROS 1 nodes run on Linux"
 
 
-class DoctorRow(Record):
+class DoctorRow(NamedTuple):
     """A line of `grader doctor`. `missing`: not everything can be graded; `limited`: it can, but less well."""
 
     name: str
     state: Literal["ok", "limited", "missing"]
     detail: str
-    fix: str = Field(default="", validation_alias=AliasChoices("mend", "fix"), serialization_alias="mend")
+    fix: str = ""
+
+    def for_json(self) -> dict[str, str]:
+        """Return the row as `--json` prints it."""
+        return {"name": self.name, "state": self.state, "detail": self.detail, "mend": self.fix}
 
 
 def sandbox_rows() -> Iterator[DoctorRow]:
     """Return a row for each part, then one for the sandbox that `--sandbox auto` chooses."""
-    yield from map(_program, PROGRAMS)
+    for name, package in PROGRAMS.items():
+        yield program_row(name, find_host_program(name), "limited", f"apt-get install {package}")
     unshare = find_host_program("unshare") or "unshare"
     yield _probe(
         "user namespaces", [*words_to_drop_root(), unshare, "--user", "--pid", "--fork", "/bin/true"]
@@ -104,22 +107,18 @@ def sandbox_rows() -> Iterator[DoctorRow]:
     yield _chosen_sandbox()
 
 
-def _program(name: str) -> DoctorRow:
-    return program_row(name, find_host_program(name), "limited", f"apt-get install {PROGRAMS[name]}")
-
-
 def program_row(name: str, path: str | None, without: Literal["limited", "missing"], fix: str) -> DoctorRow:
     """Return the row of a program: where it is, or what its lack means and how to fix that."""
     if path is None:
-        return DoctorRow(name=name, state=without, detail="not found", fix=fix)
-    return DoctorRow(name=name, state="ok", detail=path)
+        return DoctorRow(name, without, "not found", fix)
+    return DoctorRow(name, "ok", path)
 
 
 def _probe(name: str, command: list[str]) -> DoctorRow:
     """Return whether namespaces of that kind can be made."""
     if reason := last_error_line(command):
-        return DoctorRow(name=name, state="limited", detail=reason, fix=_switch())
-    return DoctorRow(name=name, state="ok", detail="namespaces can be made")
+        return DoctorRow(name, "limited", reason, _switch())
+    return DoctorRow(name, "ok", "namespaces can be made")
 
 
 def _switch() -> str:
@@ -136,36 +135,32 @@ def _inherited_rows() -> Iterator[DoctorRow]:
 
     for limit in (*limits(), *group()):
         detail = f"{limit.what}: {limit.found}; a run needs {limit.needed}"
-        yield DoctorRow(
-            name=limit.name, state="missing" if limit.command else "ok", detail=detail, fix=limit.command
-        )
+        yield DoctorRow(limit.name, "missing" if limit.command else "ok", detail, limit.command)
 
 
 def _limits_of_trees() -> DoctorRow:
     if find_cgroups().memory is not None:
-        return DoctorRow(name="limits", state="ok", detail=describe())
+        return DoctorRow("limits", "ok", describe())
     others = DELEGATE if has_memory() else OLD_GROUPS
-    return DoctorRow(
-        name="limits", state="limited", detail=describe(), fix=ROOTS_GROUPS if user_id() == 0 else others
-    )
+    return DoctorRow("limits", "limited", describe(), ROOTS_GROUPS if user_id() == 0 else others)
 
 
 def _limits_of_processes() -> DoctorRow:
     refused = refused_limits()
     if not refused:
-        return DoctorRow(name="ulimit", state="ok", detail="limits of students' processes can be set")
-    return DoctorRow(name="ulimit", state="missing", detail=refused, fix=ULIMIT_HINT)
+        return DoctorRow("ulimit", "ok", "limits of students' processes can be set")
+    return DoctorRow("ulimit", "missing", refused, ULIMIT_HINT)
 
 
 def _chosen_sandbox() -> DoctorRow:
     try:
         sandbox = choose_sandbox("auto")
     except HostError as error:
-        return DoctorRow(name="sandbox", state="missing", detail=error.message, fix=error.hint)
+        return DoctorRow("sandbox", "missing", error.message, error.hint)
     if sandbox.bubblewrap:
-        return DoctorRow(name="sandbox", state="ok", detail=f"--sandbox auto takes {sandbox.label}")
+        return DoctorRow("sandbox", "ok", f"--sandbox auto takes {sandbox.label}")
     detail = f"{without_sandbox(sandbox.label)} --sandbox require refuses."
-    return DoctorRow(name="sandbox", state="limited", detail=detail, fix="fix the rows above")
+    return DoctorRow("sandbox", "limited", detail, "fix the rows above")
 
 
 def warn_without_sandbox(mode: SandboxMode, rubric: LoadedRubric | None = None) -> None:
@@ -197,9 +192,9 @@ def how_to_run_nodes() -> tuple[str, str]:
 
 def platform_rows() -> Iterator[DoctorRow]:
     """Return what can and cannot be done on a system other than Linux."""
-    yield DoctorRow(name=system(), state="ok", detail=f"can: {WITHOUT}")
+    yield DoctorRow(system(), "ok", f"can: {WITHOUT}")
     way = WAYS.get(system(), WAYS["macOS"])
-    yield DoctorRow(name="ROS 1", state="missing", detail=f"cannot: {LACKS}", fix=f"{way}; see {PAGE}")
+    yield DoctorRow("ROS 1", "missing", f"cannot: {LACKS}", f"{way}; see {PAGE}")
 
 
 def require_room(*, gradings: int) -> None:
@@ -226,6 +221,7 @@ ROS_MODULES = {
 FIND_MODULES = (
     "import importlib.util, sys; print(*[m for m in sys.argv[1:] if not importlib.util.find_spec(m)])"
 )
+ROOT = "root; students' code runs as an unprivileged user in the sandbox"
 GIB = 1 << 30
 MIN_MEMORY_BYTES, MIN_DISK_BYTES = GIB, GIB
 
@@ -239,7 +235,7 @@ def diagnose() -> tuple[DoctorRow, ...]:
         *_programs(),
         *_ros(),
         *sandbox_rows(),
-        _user(),
+        DoctorRow("user", "ok", ROOT if user_id() == 0 else f"uid {user_id()}"),
         _search_paths(),
         *_resources(),
         _hostname(),
@@ -252,16 +248,14 @@ def diagnose_rubric(loaded: LoadedRubric) -> tuple[DoctorRow, ...]:
     packages, own, needs = ros_packages(), loaded.rubric.packages, loaded.rubric.needs
     needed = _needed_by_package(loaded)
     rows = [_package(name, needed[name], packages) for name in sorted(needed) if name not in own]
-    brought = [
-        DoctorRow(name=n, state="ok", detail="beside the rubric; built when the lab is graded") for n in own
-    ]
+    brought = [DoctorRow(n, "ok", "beside the rubric; built when the lab is graded") for n in own]
     return (*rows, *brought, *map(_need, look_for(ros=(), apt=needs.apt, pip=needs.pip)))
 
 
 def _need(need: Need) -> DoctorRow:
     state: Literal["ok", "missing"] = "ok" if need.here else "missing"
     detail = f"the rubric needs it ({need.kind})" + ("" if need.here else ": not installed")
-    return DoctorRow(name=need.name, state=state, detail=detail, fix="" if need.here else need.install)
+    return DoctorRow(need.name, state, detail, "" if need.here else need.install)
 
 
 def _needed_by_package(loaded: LoadedRubric) -> dict[str, list[str]]:
@@ -295,19 +289,14 @@ def _package(name: str, asked: Sequence[str], packages: RosPackages) -> DoctorRo
     wanted = f"for {join_words(asked)}" if asked else "which the rubric needs"
     if folder is None:
         return DoctorRow(
-            name=name,
-            state="missing",
-            detail=f"not installed, {wanted}",
-            fix=install_command(name, _distro(packages.ros)),
+            name, "missing", f"not installed, {wanted}", install_command(name, _distro(packages.ros))
         )
     if folder.is_relative_to(STANDINS):
-        return DoctorRow(name=name, state="ok", detail=f"the grader's stand-in, {wanted}")
+        return DoctorRow(name, "ok", f"the grader's stand-in, {wanted}")
     if packages.ros is not None and not is_shown(folder, packages.ros):
         fix = "install its workspace below /opt (catkin_make install), and name that setup.bash in $GRADER_ROS_SETUP"
-        return DoctorRow(
-            name=name, state="missing", detail=f"{folder} is hidden from the sandbox, {wanted}", fix=fix
-        )
-    return DoctorRow(name=name, state="ok", detail=f"{folder}, {wanted}")
+        return DoctorRow(name, "missing", f"{folder} is hidden from the sandbox, {wanted}", fix)
+    return DoctorRow(name, "ok", f"{folder}, {wanted}")
 
 
 def _distro(ros: RosInstallation | None) -> str:
@@ -316,7 +305,7 @@ def _distro(ros: RosInstallation | None) -> str:
 
 
 def _python() -> DoctorRow:
-    return DoctorRow(name="Python", state="ok", detail=f"{platform.python_version()} ({sys.executable})")
+    return DoctorRow("Python", "ok", f"{platform.python_version()} ({sys.executable})")
 
 
 def _programs() -> Iterator[DoctorRow]:
@@ -332,12 +321,12 @@ def _ros() -> Iterator[DoctorRow]:
     try:
         ros = find_ros()
     except RosMissing as error:
-        yield DoctorRow(name="ROS 1", state="missing", detail=error.message, fix=error.hint)
+        yield DoctorRow("ROS 1", "missing", error.message, error.hint)
         return
     if ros is None:
-        yield DoctorRow(name="ROS 1", state="missing", detail="not found", fix=INSTALL_HINT)
+        yield DoctorRow("ROS 1", "missing", "not found", INSTALL_HINT)
         return
-    yield DoctorRow(name="ROS 1", state="ok", detail=ros.label)
+    yield DoctorRow("ROS 1", "ok", ros.label)
     for program in ROS_PROGRAMS:
         yield program_row(program, ros.program(program), "missing", INSTALL_HINT)
     yield from _modules(ros)
@@ -359,47 +348,40 @@ def _modules(ros: RosInstallation) -> Iterator[DoctorRow]:
             timeout=20,
         )
     except (OSError, subprocess.SubprocessError) as error:
-        yield DoctorRow(
-            name="ROS's Python", state="missing", detail=f"{ros.python}: {error}", fix=INSTALL_HINT
-        )
+        yield DoctorRow("ROS's Python", "missing", f"{ros.python}: {error}", INSTALL_HINT)
         return
     missing = done.stdout.split()
-    yield DoctorRow(name="ROS's Python", state="ok", detail=ros.python)
+    yield DoctorRow("ROS's Python", "ok", ros.python)
     for module, package in ROS_MODULES.items():
         if module in missing:
             fix = f"apt-get install {package}" if ros.kind == "debian" else INSTALL_HINT
-            yield DoctorRow(name=module, state="missing", detail=f"{ros.python} cannot import it", fix=fix)
+            yield DoctorRow(module, "missing", f"{ros.python} cannot import it", fix)
         else:
-            yield DoctorRow(name=module, state="ok", detail="found")
+            yield DoctorRow(module, "ok", "found")
 
 
 def _standins(ros: RosInstallation) -> DoctorRow:
     missing = missing_packages(ros)
     detail = f"for {', '.join(missing)}, which this ROS lacks" if missing else "not needed for any package"
-    return DoctorRow(name="stand-ins", state="ok", detail=detail)
+    return DoctorRow("stand-ins", "ok", detail)
 
 
 def _search_paths() -> DoctorRow:
     """Look for entries that are not absolute paths: they mean the current folder, which may be a student's."""
     odd = [name for name in LISTS if not all(map(os.path.isabs, os.environ.get(name, "/").split(os.pathsep)))]
     if not odd:
-        return DoctorRow(name="search paths", state="ok", detail="every entry is an absolute path")
+        return DoctorRow("search paths", "ok", "every entry is an absolute path")
     detail = f"{', '.join(odd)}: an entry means the current folder, so programs load files from there"
     fix = "write ${NAME:+$NAME:} before what you add, without an empty entry"
-    return DoctorRow(name="search paths", state="limited", detail=detail, fix=fix)
-
-
-def _user() -> DoctorRow:
-    root = "root; students' code runs as an unprivileged user in the sandbox"
-    return DoctorRow(name="user", state="ok", detail=root if user_id() == 0 else f"uid {user_id()}")
+    return DoctorRow("search paths", "limited", detail, fix)
 
 
 def _resources() -> Iterator[DoctorRow]:
     if (number := cores()) >= 2:
-        yield DoctorRow(name="cores", state="ok", detail=str(number))
+        yield DoctorRow("cores", "ok", str(number))
     else:
         detail = "1: runs take turns, and rates may be inconclusive"
-        yield DoctorRow(name="cores", state="limited", detail=detail)
+        yield DoctorRow("cores", "limited", detail)
     if sys.platform != "win32":
         memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
         yield _amount("memory", memory, MIN_MEMORY_BYTES, "GiB")
@@ -411,7 +393,7 @@ def _amount(name: str, size_bytes: int, least_bytes: int, unit: str) -> DoctorRo
     enough = size_bytes >= least_bytes
     detail = f"{size_bytes / GIB:.1f} {unit}"
     detail += "" if enough else f"; {least_bytes / GIB:.0f} GiB is recommended"
-    return DoctorRow(name=name, state="ok" if enough else "limited", detail=detail)
+    return DoctorRow(name, "ok" if enough else "limited", detail)
 
 
 def _hostname() -> DoctorRow:
@@ -419,19 +401,19 @@ def _hostname() -> DoctorRow:
     name = socket.gethostname()
     if not resolves(LOCALHOST):
         detail = "localhost does not resolve: without a sandbox, roslaunch cannot start anything"
-        return DoctorRow(name="host name", state="limited", detail=detail, fix=LOCALHOST_HINT)
+        return DoctorRow("host name", "limited", detail, LOCALHOST_HINT)
     if resolves(name):
-        return DoctorRow(name="host name", state="ok", detail=f"{name} resolves")
+        return DoctorRow("host name", "ok", f"{name} resolves")
     fix = f"echo '127.0.1.1 {name}' >> /etc/hosts"
-    return DoctorRow(name="host name", state="limited", detail=f"{name} does not resolve", fix=fix)
+    return DoctorRow("host name", "limited", f"{name} does not resolve", fix)
 
 
 def _encoding() -> DoctorRow:
     name = locale.getpreferredencoding(do_setlocale=False)
     if name.lower().replace("-", "") == "utf8":
-        return DoctorRow(name="encoding", state="ok", detail=name)
+        return DoctorRow("encoding", "ok", name)
     detail = f"{name}: reports use plain characters"
-    return DoctorRow(name="encoding", state="limited", detail=detail, fix="export LC_ALL=C.UTF-8")
+    return DoctorRow("encoding", "limited", detail, "export LC_ALL=C.UTF-8")
 
 
 def print_rows(rows: Sequence[DoctorRow], stream: IO[str]) -> None:

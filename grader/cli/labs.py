@@ -149,13 +149,10 @@ def _table(test: RubricTest) -> Table:
     for mutant in test.mutants:
         mark, style = MARKS[mutant.state]
         state = Text(f"{mark} {mutant.state}", style)
-        table.add_row(state, Text(visible(mutant.label)), Text(_lost_text(mutant)))
+        lost = ", ".join(f"{c.id} {c.status}" for c in mutant.lost)
+        lost = lost or line(mutant.error, TEXT_CHARS) or "nothing"
+        table.add_row(state, Text(visible(mutant.label)), Text(lost))
     return table
-
-
-def _lost_text(mutant: MutantResult) -> str:
-    """`chatter fail, chatter-rate blocked`."""
-    return ", ".join(f"{c.id} {c.status}" for c in mutant.lost) or line(mutant.error, TEXT_CHARS) or "nothing"
 
 
 def _reference(test: RubricTest) -> Iterator[Text]:

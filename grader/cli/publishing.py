@@ -64,13 +64,10 @@ def publish(
 
 
 def _publish_code(steps: Sequence[PublishStep]) -> ExitCode:
-    if any(step.failed or (step.state == "draft" and not _waits(step)) for step in steps):
+    drafts = [step.result for step in steps if step.state == "draft"]
+    if any(step.failed for step in steps) or any(r is None or r.status != "inconclusive" for r in drafts):
         return ExitCode.NOT_GRADED
-    return ExitCode.INCONCLUSIVE if any(step.state == "draft" for step in steps) else ExitCode.PASSED
-
-
-def _waits(step: PublishStep) -> bool:
-    return step.result is not None and step.result.status == "inconclusive"
+    return ExitCode.INCONCLUSIVE if drafts else ExitCode.PASSED
 
 
 def _step_json(step: PublishStep) -> dict[str, object]:

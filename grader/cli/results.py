@@ -44,12 +44,13 @@ from grader.report.class_page.page import write_class_page
 from grader.report.class_page.submissions import salt_in
 from grader.report.forms import FORMS, ReportInput
 from grader.report.sentences import missing_hidden
-from grader.report.terminal import emit, open_console, print_report
+from grader.report.terminal import Terminal, emit, open_console
 from grader.report.text import line
 from grader.report.view import without_hidden
+from grader.results import RESULT, load_result
 from grader.rubric.find import named_labs
 from grader.rubric.load import LoadedRubric, load_rubric
-from grader.verification import PartFinding, compare, read_whole, result_folders, verify
+from grader.verification import PartFinding, compare, result_folders, verify
 from grader.wording import first_few, number
 
 CHANNELS_MAX = 500
@@ -176,7 +177,7 @@ def verify_results(results: Sequence[Path], rubric: str | None, allowed: Path | 
     codes = list[ExitCode]()
     for folder in folders:
         try:
-            name = rubric or read_whole(folder).rubric.id
+            name = rubric or load_result(folder / RESULT).rubric.id
             if name not in rubrics:
                 rubrics[name] = _rubric_named(name, given=rubric is not None)
             of_class = (folder.resolve().parent / RUN).is_file()
@@ -200,7 +201,7 @@ def _rubric_named(name: str, *, given: bool) -> LoadedRubric:
 def compare_results(own: Path, official: Path) -> ExitCode:
     """Print what differs between a student's own result and the official one."""
     (mine,), (theirs,) = (result_folders([path]) for path in (own, official))
-    return _print_findings(mine, compare(read_whole(mine), read_whole(theirs)))
+    return _print_findings(mine, compare(load_result(mine / RESULT), load_result(theirs / RESULT)))
 
 
 def _print_findings(folder: Path, findings: Sequence[PartFinding]) -> ExitCode:
@@ -265,11 +266,7 @@ def write_reports(folders: Sequence[Path], rubric: LoadedRubric) -> ExitCode:
 def _say_others(names: Sequence[str], rubric: LoadedRubric) -> None:
     if names:
         shown = first_few(names, NAMES_SHOWN)
-        _remark(f"{shown}: judged by another version of {rubric.path}")
-
-
-def _remark(text: str) -> None:
-    say_beside(f"report: {text}")
+        say_beside(f"report: {shown}: judged by another version of {rubric.path}")
 
 
 def write_class_pages(batch: BatchFolder, anonymous: Path | None) -> None:
@@ -294,7 +291,7 @@ def write_form(
     shown = without_hidden(result, rubric.rubric) if student or form == "classroom" else result
     if form == "terminal" and out == STDOUT:
         hidden = missing_hidden(shown, rubric.rubric)
-        print_report(shown, rubric.rubric, open_console(sys.stdout), hidden=hidden, full=True)
+        Terminal(open_console(sys.stdout)).report(shown, rubric.rubric, hidden=hidden, full=True)
         return ExitCode.PASSED
     where = _prefix(result, prefix) if FORMS[form].cites_lines else ""
     about = ReportInput(
@@ -319,7 +316,6 @@ def _prefix(result: GradingResult, given: str | None) -> str:
     cites = any(isinstance(cited, FileCitation) for c in result.criteria for cited in c.citations)
     if found is None and cites:
         package = result.submission.package
-        _remark(
-            f"no package {package} with these files is here, so paths begin in it; give its folder with --prefix"
-        )
+        missing = f"no package {package} with these files is here, so paths begin in it"
+        say_beside(f"report: {missing}; give its folder with --prefix")
     return found or ""

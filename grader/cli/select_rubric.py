@@ -218,7 +218,8 @@ def _none(found: FoundPackages) -> UsageError:
     known = packages_of_labs()
     near = _near(names, known)
     if near is None:
-        hint = f"give the lab with --rubric: {_list_labs(known)}; or --rubric FILE for a lab of your own"
+        labs = ", ".join(f"{rubric} (package {package})" for rubric, package in known.items())
+        hint = f"give the lab with --rubric: {labs}; or --rubric FILE for a lab of your own"
     else:
         hint = (
             f"{near} is for a package named {known[near]}: fix <name> in {MANIFEST}, "
@@ -259,10 +260,6 @@ def _near(names: Iterable[str], known: dict[str, str]) -> str | None:
 
 def _plain(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", name.lower())
-
-
-def _list_labs(known: dict[str, str]) -> str:
-    return ", ".join(f"{rubric} (package {package})" for rubric, package in known.items())
 
 
 def rubric_to_record(

@@ -20,7 +20,7 @@ from grader.intake.source import Source, parse_source
 from grader.integrations.bundle import BundleSettings, ContainerLayout, LostModes, read_settings
 from grader.integrations.platforms import GRADESCOPE, PRAIRIELEARN
 from grader.model.result import GradingResult, Silence
-from grader.report.terminal import open_console, print_report
+from grader.report.terminal import Terminal, open_console
 from grader.report.text import json_text, line
 from grader.results import read_result
 from grader.rubric.load import LoadedRubric, load_rubric
@@ -65,7 +65,7 @@ def grade_upload(platform: ContainerLayout, root: Path) -> bool:
         print(f"NOT GRADED: {line(fault.message, LIMIT)}\n{line(fault.hint, LIMIT)}")
         return False
     _write(results, document)
-    print_report(result, rubric.rubric, open_console(sys.stdout))
+    Terminal(open_console(sys.stdout)).report(result, rubric.rubric)
     return True
 
 

@@ -81,6 +81,7 @@ def _finding(criterion: CriterionResult, result: GradingResult, prefix: str, lim
         for one in ([c for c in cited if c.line] or cited[:1])
         if (path := repository_path(prefix, one.file))
     )
+    told = (result.rubric.id, criterion.id, places[0].path if places else "")
     return Finding(
         criterion=criterion,
         severity=_severity(criterion),
@@ -88,7 +89,7 @@ def _finding(criterion: CriterionResult, result: GradingResult, prefix: str, lim
         message=line(criterion.message or criterion.title, limit),
         hint=line(criterion.hint, limit),
         places=places,
-        fingerprint=_fingerprint(result.rubric.id, criterion.id, places),
+        fingerprint=hashlib.sha256("\0".join(told).encode("utf-8", "backslashreplace")).hexdigest(),
     )
 
 
@@ -114,11 +115,6 @@ def repository_path(prefix: str, file: str) -> str:
         folder, file = folder.parent, file.removeprefix("../")
     parts = [part for part in PurePosixPath(f"{folder}/{file}").parts if part not in {"/", "//", "."}]
     return "" if ".." in parts or not parts else line("/".join(parts), LIMIT)
-
-
-def _fingerprint(rubric_id: str, criterion_id: str, places: tuple[SourceLine, ...]) -> str:
-    told = (rubric_id, criterion_id, places[0].path if places else "")
-    return hashlib.sha256("\0".join(told).encode("utf-8", "backslashreplace")).hexdigest()
 
 
 EACH_MAX = 10

@@ -10,16 +10,8 @@ from lxml import etree
 
 from grader.model.result import AppliedOverride, CriterionResult, ErrorInfo, GradingResult, Note
 from grader.model.verdict import FileCitation, Status
+from grader.report import sentences
 from grader.report.findings import repository_path
-from grader.report.sentences import (
-    COSTS_NOTHING,
-    NOTICED_TITLE,
-    automatic_words,
-    decision,
-    look_again,
-    note_place,
-    note_text,
-)
 from grader.report.text import line, text_limit, visible
 from grader.report.view import places, points_of
 from grader.wording import number
@@ -117,8 +109,11 @@ class _Writer:
         return "\n".join(f"{name}: {self._text(value)}" for name, value in rows.items() if value)
 
     def _notes_text(self, notes: tuple[Note, ...]) -> str:
-        lines = [f"{self._text(note_place(note))}: {self._text(note_text(note))}" for note in notes]
-        return "\n".join([f"{NOTICED_TITLE}. {COSTS_NOTHING}", *lines])
+        lines = [
+            f"{self._text(sentences.note_place(note))}: {self._text(sentences.note_text(note))}"
+            for note in notes
+        ]
+        return "\n".join([f"{sentences.NOTICED_TITLE}. {sentences.COSTS_NOTHING}", *lines])
 
     def _outcome(self, case: etree._Element, tag: str, kind: str, message: str, details: str) -> None:
         if tag == "skipped":
@@ -139,8 +134,11 @@ class _Writer:
 def _decision_words(criterion: CriterionResult, override: AppliedOverride | None) -> dict[str, str]:
     if override is None:
         return {}
-    again = look_again(override, criterion)
-    words = {"decided_by_a_person": decision(override), "check": automatic_words(override, criterion)}
+    again = sentences.look_again(override, criterion)
+    words = {
+        "decided_by_a_person": sentences.decision(override),
+        "check": sentences.automatic_words(override, criterion),
+    }
     return {**words, **({"look_again": again} if again else {})}
 
 

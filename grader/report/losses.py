@@ -68,13 +68,12 @@ def arrange(result: GradingResult, rubric: Rubric | None = None) -> ReportView:
     return ReportView(
         lost=_told_once([loss for loss in losses if not loss.criterion.status.is_open]),
         open=_fold([loss for loss in losses if loss.criterion.status.is_open]),
-        advice=tuple(c for c in result.criteria if c.id not in told and _advises(c)),
+        advice=tuple(  # what costs nothing and could not be judged is none
+            c
+            for c in result.criteria
+            if c.id not in told and not c.status.is_open and (c.hint or c.status is not Status.PASS)
+        ),
     )
-
-
-def _advises(criterion: CriterionResult) -> bool:
-    """What costs nothing and could not be judged is not advice."""
-    return not criterion.status.is_open and bool(criterion.hint or criterion.status is not Status.PASS)
 
 
 def _told_once(losses: list[Loss]) -> tuple[Loss, ...]:

@@ -12,19 +12,6 @@ from grader.model.result import CriterionResult, GradingResult, Note
 from grader.model.verdict import Status
 from grader.report import sentences
 from grader.report.losses import Loss, MissingFile, arrange, missing_file, missing_files, write_files_hint
-from grader.report.sentences import (
-    NOT_SETTLED,
-    STATES,
-    automatic_words,
-    decided_criteria,
-    decided_title,
-    decision,
-    look_again,
-    score_words,
-    verdict_words,
-    visible_words,
-    without_sandbox,
-)
 from grader.report.text import line, markdown, markdown_block, markdown_code
 from grader.report.view import commands_in, not_graded, places, pointed_at, points_of, where_to_type
 from grader.rubric.model import Rubric
@@ -143,17 +130,20 @@ class _Writer:
         submission = result.submission
         graded = f"{number(result.points)} of {number(result.max_points)} points"
         yield from (f"# {'Not graded' if not_graded(result) else graded}", "")
-        unwalled = without_sandbox(result.environment.sandbox)
+        unwalled = sentences.without_sandbox(result.environment.sandbox)
         for warning in filter(None, (unwalled, sentences.students_rubric(result))):
             yield from (f"**{self._text(warning)}**", "")
-        for words in score_words(result):
+        for words in sentences.score_words(result):
             yield from (self._text(words), "")
         if result.error is not None:
             yield from ([] if not_graded(result) else ["It could not be graded automatically:", ""])
             yield from (self._text(result.error.message), "", self._text(result.error.hint), "")
         if result.status == "inconclusive":
-            yield from (f"**Not decided yet:** {NOT_SETTLED}", "")
-        for words in (verdict_words(result, rubric, hidden), visible_words(result, hidden)):
+            yield from (f"**Not decided yet:** {sentences.NOT_SETTLED}", "")
+        for words in (
+            sentences.verdict_words(result, rubric, hidden),
+            sentences.visible_words(result, hidden),
+        ):
             yield from (words, "") if words else ()
         version = self._text(result.rubric.version)
         yield from (f"{self._text(rubric.title)} ({self._code(result.rubric.id)}, version {version})", "")
@@ -169,15 +159,15 @@ class _Writer:
             yield from (*self._more(changes), "")
 
     def _decisions(self, result: GradingResult) -> Iterator[str]:
-        found = decided_criteria(result)
+        found = sentences.decided_criteria(result)
         if not found:
             return
-        yield from (f"## {decided_title(result)}", "")
+        yield from (f"## {sentences.decided_title(result)}", "")
         for override, criterion in self._first(found):
-            yield f"- {self._code(criterion.id)}: {points_of(criterion)} {self._text(decision(override))}"
-            automatic = automatic_words(override, criterion)
+            yield f"- {self._code(criterion.id)}: {points_of(criterion)} {self._text(sentences.decision(override))}"
+            automatic = sentences.automatic_words(override, criterion)
             yield from [f"  - The check says: {self._text(automatic)}"] if automatic else []
-            again = look_again(override, criterion)
+            again = sentences.look_again(override, criterion)
             yield from [f"  - **{self._text(again)}**"] if again else []
         yield from self._more(found)
         yield ""
@@ -192,13 +182,16 @@ class _Writer:
             others = sum(other.missing for other in (*loss.blocked, *loss.alike))
             more = f", and {number(others)} more points with it" if others else ""
             words = markdown(line(_why_lost(loss), min(SHORT_CHARS, self._detail.text)))
-            yield f"- {self._code(c.id)}: {points_of(c)}{more}, {STATES[c.status]}: {words}"
+            yield f"- {self._code(c.id)}: {points_of(c)}{more}, {sentences.STATES[c.status]}: {words}"
         yield from self._more(losses)
         yield ""
 
     def _loss_section(self, loss: Loss) -> Iterator[str]:
         criterion = loss.criterion
-        yield from (f"### {self._code(criterion.id)}: {points_of(criterion)}, {STATES[criterion.status]}", "")
+        yield from (
+            f"### {self._code(criterion.id)}: {points_of(criterion)}, {sentences.STATES[criterion.status]}",
+            "",
+        )
         files = missing_files(loss)
         details = [*(self._files(files) if len(files) > 1 else self._details(criterion))]
         details += self._blocked_lines(loss if len(files) < 2 else replace(loss, alike=()))
@@ -268,7 +261,7 @@ class _Writer:
         for c in self._first(criteria):
             cells = [
                 points_of(c),
-                STATES[c.status],
+                sentences.STATES[c.status],
                 self._code(c.id, cell=True),
                 self._text(c.title, cell=True),
                 self._text(c.measured, cell=True),

@@ -21,16 +21,8 @@ from typing import Any
 from grader.errors import GraderError
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import FileCitation, Status
+from grader.report import sentences
 from grader.report.findings import repository_path
-from grader.report.sentences import (
-    STATES,
-    decided_criteria,
-    decision,
-    look_again,
-    missing_hidden,
-    score_words,
-    visible_words,
-)
 from grader.report.text import json_text, line, text_limit
 from grader.report.view import hidden_ids, is_students_fault, not_graded, of_points, places, points_of
 from grader.rubric.model import Rubric
@@ -92,7 +84,7 @@ def _tests(result: GradingResult, rubric: Rubric, prefix: str, limit: int) -> It
         yield _criterion(criterion, prefix, limit)
     late = round(result.points - reached, rubric.digits)
     if late:
-        words = " ".join(line(text, NAME_CHARS) for text in score_words(result))
+        words = " ".join(line(text, NAME_CHARS) for text in sentences.score_words(result))
         yield _test(words or "what people decided, or being late", status="fail", points=late)
 
 
@@ -179,7 +171,7 @@ class _Writer:
         self._result, self._rubric = result, rubric
         self._hidden = hidden_ids(rubric)
         self._limit = text_limit(len(result.criteria), LIMIT)
-        self._decided = {c.id: override for override, c in decided_criteria(result)}
+        self._decided = {c.id: override for override, c in sentences.decided_criteria(result)}
 
     def document(self) -> dict[str, object]:
         """Formats are said everywhere: Gradescope's own for the page would read HTML."""
@@ -209,12 +201,14 @@ class _Writer:
             points = number(sum(c.missing for c in waiting))
             what = f": {points} points are not decided yet" if waiting else ""
             yield f"{LOOK}{what}; no points are lost for good."
-        hidden = len(result.criteria) - len(shown) + missing_hidden(result, self._rubric)
+        hidden = len(result.criteria) - len(shown) + sentences.missing_hidden(result, self._rubric)
         if hidden:
-            yield self._text(visible_words(result.model_copy(update={"criteria": tuple(shown)}), hidden))
+            yield self._text(
+                sentences.visible_words(result.model_copy(update={"criteria": tuple(shown)}), hidden)
+            )
         else:
             yield f"{number(result.points)} of {number(result.max_points)} points"
-            yield from map(self._text, score_words(result))
+            yield from map(self._text, sentences.score_words(result))
 
     def _test(self, place: str, criterion: CriterionResult) -> dict[str, object]:
         waits = criterion.status.is_open
@@ -232,12 +226,12 @@ class _Writer:
         }
 
     def _details(self, criterion: CriterionResult) -> Iterator[str]:
-        yield f"{STATES[criterion.status]}, {points_of(criterion)} points"
+        yield f"{sentences.STATES[criterion.status]}, {points_of(criterion)} points"
         override = self._decided.get(criterion.id)
         rows = {
             "": criterion.message,
-            "decided ": decision(override) if override else "",
-            "look again: ": look_again(override, criterion) if override else "",
+            "decided ": sentences.decision(override) if override else "",
+            "look again: ": sentences.look_again(override, criterion) if override else "",
             "measured: ": criterion.measured,
             "expected: ": criterion.expected,
             "hint: ": criterion.hint,

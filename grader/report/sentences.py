@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from datetime import datetime
+from typing import NamedTuple
 
 from grader.evidence.events import PACKAGE_RUN
 from grader.judging.summary import passed
@@ -294,25 +295,28 @@ def students_rubric(result: GradingResult) -> str:
     return f"{where}: these points are guidance, not a mark."
 
 
-SIGNS = {
-    Status.PASS: "✓",
-    Status.PARTIAL: "◐",
-    Status.FAIL: "✗",
-    Status.BLOCKED: "⊘",
-    Status.INCONCLUSIVE: "?",
-    Status.ERROR: "!",
-    Status.MANUAL: "•",
+class Look(NamedTuple):
+    """How a status looks wherever people read it: its sign, one of ASCII, a colour of the terminal, and the word
+    that the glossary has."""
+
+    sign: str
+    plain: str
+    style: str
+    word: str
+
+
+LOOKS = {
+    Status.PASS: Look("✓", "+", "green", "passed"),
+    Status.PARTIAL: Look("◐", "~", "yellow", "to fix"),
+    Status.FAIL: Look("✗", "x", "red", "to fix"),
+    Status.BLOCKED: Look("⊘", "-", "dim", "not tested"),
+    Status.INCONCLUSIVE: Look("?", "?", "yellow", "not decided yet"),
+    Status.ERROR: Look("!", "!", "magenta", "not decided yet"),
+    Status.MANUAL: Look("•", "o", "cyan", "not decided yet"),
 }
-STATES = {
-    Status.PASS: "passed",
-    Status.PARTIAL: "to fix",
-    Status.FAIL: "to fix",
-    Status.BLOCKED: "not tested",
-    Status.INCONCLUSIVE: "not decided yet",
-    Status.ERROR: "not decided yet",
-    Status.MANUAL: "not decided yet",
-}
-"""The word for each status in whatever people read: the glossary has the same."""
+SIGNS = {status: look.sign for status, look in LOOKS.items()}
+STATES = {status: look.word for status, look in LOOKS.items()}
+STYLES = {status: look.style for status, look in LOOKS.items()}
 ADVICE = {Status.FAIL: "How to fix it", Status.PARTIAL: "How to fix it", Status.PASS: "Hint"}
 FAULTS = {
     "submission": "The problem is in what was submitted: fix it and submit it again.",

@@ -15,18 +15,6 @@ from grader.model.result import AppliedOverride, CriterionResult, GradingResult,
 from grader.model.verdict import Status
 from grader.report import sentences
 from grader.report.losses import Loss, MissingFile, ReportView, arrange, missing_files, write_files_hint
-from grader.report.sentences import (
-    COSTS_NOTHING,
-    MINUS,
-    NOTICED_TITLE,
-    SIGNS,
-    STATES,
-    minus,
-    note_place,
-    note_text,
-    visible_words,
-    without_sandbox,
-)
 from grader.report.text import line, without_ci_commands
 from grader.report.view import (
     file_places,
@@ -44,28 +32,7 @@ LIMIT = 500
 TO_FIX, NOT_DECIDED = "To fix", "Not decided yet: no points are lost for good"
 INDENT = 2
 SOURCE_CHARS_MIN = 20
-STYLES = {
-    Status.PASS: "green",
-    Status.PARTIAL: "yellow",
-    Status.FAIL: "red",
-    Status.BLOCKED: "dim",
-    Status.INCONCLUSIVE: "yellow",
-    Status.ERROR: "magenta",
-    Status.MANUAL: "cyan",
-}
-PLAIN_MARKS = {
-    Status.PASS: "+",
-    Status.PARTIAL: "~",
-    Status.FAIL: "x",
-    Status.BLOCKED: "-",
-    Status.INCONCLUSIVE: "?",
-    Status.ERROR: "!",
-    Status.MANUAL: "o",
-}
-"""In place of `SIGNS` where an encoding has no ✓."""
-
-
-PLAIN_LETTERS = str.maketrans({"…": "...", "→": "->", "±": "+/-", MINUS: "-", "\N{EN DASH}": "-"})
+PLAIN_LETTERS = str.maketrans({"…": "...", "→": "->", "±": "+/-", sentences.MINUS: "-", "\N{EN DASH}": "-"})
 """What stands for the grader's own signs where an encoding lacks them."""
 
 
@@ -95,28 +62,10 @@ def emit(console: Console, parts: Iterable[RenderableType]) -> None:
     console.file.write(text.encode(console.encoding, "backslashreplace").decode(console.encoding))
 
 
-def print_report(
-    result: GradingResult,
-    rubric: Rubric,
-    console: Console,
-    *,
-    hidden: int = 0,
-    unrun: str = "",
-    remarks: Sequence[RenderableType] = (),
-    full: bool = False,
-) -> None:
-    """Print the whole report. `hidden` is how many criteria are left out, `remarks` stand before the losses.
-
-    Where `unrun` says why nothing was run, open ones are only counted. With `full`, all criteria are listed with what
-    was measured.
-    """
-    Terminal(console).report(result, rubric, hidden, unrun, remarks, full=full)
-
-
 def render_terminal(result: GradingResult, rubric: Rubric, hidden: int = 0) -> str:
     """Return the report as it is printed where there is no terminal: without colour, 80 columns wide."""
     text = io.StringIO()
-    print_report(result, rubric, open_console(text), hidden=hidden, full=True)
+    Terminal(open_console(text)).report(result, rubric, hidden=hidden, full=True)
     return text.getvalue()
 
 
@@ -130,14 +79,19 @@ class Terminal:
         self,
         result: GradingResult,
         rubric: Rubric,
-        hidden: int,
-        unrun: str,
-        remarks: Sequence[RenderableType],
         *,
-        full: bool,
+        hidden: int = 0,
+        unrun: str = "",
+        remarks: Sequence[RenderableType] = (),
+        full: bool = False,
     ) -> None:
+        """Print the whole report. `hidden` is how many criteria are left out, `remarks` stand before the losses.
+
+        Where `unrun` says why nothing was run, open ones are only counted. With `full`, all criteria are listed with
+        what was measured.
+        """
         view = arrange(result, rubric)
-        unwalled = without_sandbox(result.environment.sandbox)
+        unwalled = sentences.without_sandbox(result.environment.sandbox)
         parts = [self._head(result, rubric)]
         warnings = filter(None, (unwalled, sentences.students_rubric(result)))
         parts += [self._words(words, indent=0, style="yellow") for words in warnings]
@@ -153,10 +107,10 @@ class Terminal:
             sentences.decided_title(result),
             [self._decision(o, c) for o, c in sentences.decided_criteria(result)],
         )
-        parts += self._section(NOTICED_TITLE, self._note_lines(result.notes))
+        parts += self._section(sentences.NOTICED_TITLE, self._note_lines(result.notes))
         parts += self._reached_lines(result, unrun, full=full)
         parts += self._section("Advice (costs nothing)", [self._advice(c) for c in view.advice])
-        parts += [Text(f"\n{visible_words(result, hidden)}")] if hidden else []
+        parts += [Text(f"\n{sentences.visible_words(result, hidden)}")] if hidden else []
         parts += remarks
         parts += self.still_open(view.open, unrun)
         parts += self.losses(TO_FIX, view.lost, sentences.judged_repaired(result))
@@ -242,22 +196,22 @@ class Terminal:
         """`-5`; `0/5` where the points are not lost for good."""
         if criterion.status.is_open or not criterion.missing:  # a gate may be a criterion that is not counted
             return points_of(criterion)
-        return self._fit_encoding(minus(criterion.missing))
+        return self._fit_encoding(sentences.minus(criterion.missing))
 
     def _total(self, loss: Loss) -> str:
         """`-5`; `-25 in all` where the mistake costs more than its own criterion's points."""
         cost = self._cost(loss.criterion)
         if loss.criterion.status.is_open or loss.points == loss.criterion.missing:
             return cost
-        return f"{self._fit_encoding(minus(loss.points))} in all"
+        return f"{self._fit_encoding(sentences.minus(loss.points))} in all"
 
     def _advice(self, criterion: CriterionResult) -> RenderableType:
         words = self._words(criterion.message or criterion.title)
         return Group(self._line(criterion), words, *self._rows([("hint", criterion.hint)]))
 
     def _note_lines(self, notes: tuple[Note, ...]) -> list[RenderableType]:
-        said = [self._words(f"{note_place(note)}: {note_text(note)}") for note in notes]
-        return [*said, Text(COSTS_NOTHING, "dim")] if notes else []
+        said = [self._words(f"{sentences.note_place(note)}: {sentences.note_text(note)}") for note in notes]
+        return [*said, Text(sentences.COSTS_NOTHING, "dim")] if notes else []
 
     def _reached_lines(self, result: GradingResult, unrun: str, *, full: bool) -> list[RenderableType]:
         """Return how many criteria are reached; with `full`, each of those that were judged with what was measured."""
@@ -271,10 +225,10 @@ class Terminal:
         others = "" if len(reached) == len(result.criteria) else "other "
         said = f"{plural(len(reached), f'{others}criterion', f'{others}criteria')} passed; --all shows them"
         sign = mark(Status.PASS, self.console.encoding)
-        return [Text(f"\n{sign} {said}", STYLES[Status.PASS])]
+        return [Text(f"\n{sign} {said}", sentences.STYLES[Status.PASS])]
 
     def _measured_line(self, criterion: CriterionResult) -> RenderableType:
-        line = self._line(criterion, STATES[criterion.status], points_of(criterion))
+        line = self._line(criterion, sentences.STATES[criterion.status], points_of(criterion))
         passed, measured = criterion.status is Status.PASS, criterion.measured
         if criterion.status is Status.BLOCKED:
             measured = ""  # what was there instead of what could be measured
@@ -284,7 +238,7 @@ class Terminal:
     def _line(self, criterion: CriterionResult, *more: str) -> RenderableType:
         """`✗ chatter-rate  -10  src/talker.py:17`; the last stands below where there is no room for it."""
         name = f"{mark(criterion.status, self.console.encoding)} {self._show(criterion.id)}"
-        style, rest = STYLES[criterion.status], [self._show(one) for one in more if one]
+        style, rest = sentences.STYLES[criterion.status], [self._show(one) for one in more if one]
         below = rest != [] and cell_len("  ".join([name, *rest])) > self.console.width
         beside = "".join(f"  {one}" for one in (rest[:-1] if below else rest))
         text = Text.assemble((name, style), (beside, "bold"), no_wrap=True, overflow="ignore")
@@ -347,7 +301,8 @@ def fit_encoding(text: str, encoding: str) -> str:
 
 def mark(status: Status, encoding: str) -> str:
     """The sign of a status, a plain one where the encoding has no ✓."""
-    return (SIGNS if _can_encode("".join(SIGNS.values()), encoding) else PLAIN_MARKS)[status]
+    look = sentences.LOOKS[status]
+    return look.sign if _can_encode("".join(sentences.SIGNS.values()), encoding) else look.plain
 
 
 def _can_encode(text: str, encoding: str) -> bool:

@@ -42,7 +42,7 @@ from grader.package.reading import LEFT_OUT
 from grader.report.files import result_text
 from grader.report.losses import arrange
 from grader.report.sentences import points_line
-from grader.report.terminal import TO_FIX, Terminal, emit, fit_encoding, open_console, print_report
+from grader.report.terminal import TO_FIX, Terminal, emit, fit_encoding, open_console
 from grader.report.text import line
 from grader.report.view import points_of, without_hidden
 from grader.rubric.load import LoadedRubric
@@ -437,7 +437,7 @@ class TerminalScreen(Screen):
                 hint = Text(f"hint: {self._show(result.error.hint)}", "dim")
                 self._emit([Padding(hint, (0, 0, 0, INDENT))])
         elif self._last is None:
-            print_report(result, self._rubric, self._console, hidden=self._hidden, unrun=self._unrun)
+            Terminal(self._console).report(result, self._rubric, hidden=self._hidden, unrun=self._unrun)
         else:
             self._emit(self._short(result, self._last))
         self._last = result if result.error is None else self._last

@@ -244,7 +244,7 @@ def test_doctor_tells_by_its_exit_code(state, code, capsys, monkeypatch):
     assert "apt-get install ros" in out
     assert "\x1b" not in out
     assert run(["doctor", "--json"]) == code
-    assert json.loads(capsys.readouterr().out) == [row.model_dump(by_alias=True)]
+    assert json.loads(capsys.readouterr().out) == [row.for_json()]
 
 
 def test_diagnosis_without_ros_names_the_command_that_mends_it(monkeypatch):

@@ -15,11 +15,10 @@ from pathlib import Path
 import pytest
 
 from grader.arena import base_workspace as arena_cache
-from grader.classes.fetching import Rule, prefetch
+from grader.classes.fetching import Rule
 from grader.classes.fetching.mirror import cache_folder, locked, tidy
-from tests.fetching.samples import AT_ONCE, DEADLINE, HOST, commit_at, entry
+from tests.fetching.samples import DEADLINE, HOST, commit_at
 from tests.intake.samples import git, write
-from tests.support.processes import until
 
 
 def fetches(server, monkeypatch) -> Path:
@@ -273,49 +272,3 @@ def test_the_cache_of_the_arena_tidies_its_own_files_only(server):
     assert len([path for path in server.cache.parent.iterdir() if path.is_file()]) == arena_cache.FILES_MAX
     assert arena_cache.read_kept("newest") == b"x"
     assert len(server.mirrors()) == 1
-
-
-@pytest.mark.full
-def test_mirrors_are_fetched_ahead(server, monkeypatch):
-    for name in ("a", "b", "c"):
-        server.new(name)
-    entries = [
-        entry(f"{HOST}/a"),
-        entry(f"{HOST}/nowhere"),
-        entry("/no/such/folder"),
-        entry("https://localhost:1/x"),
-        entry("ftp://x"),
-        entry(str(server.folder / "a")),
-        entry(f"{HOST}/b@main", ref="other"),
-        entry(f"{HOST}/b"),
-        entry(f"{HOST}/c"),
-        entry(f"{HOST}/c", ref="main"),
-    ]
-    since = time.time()
-    log = fetches(server, monkeypatch)
-    with prefetch(iter(entries), threads=3, fetched_since=since, patience=AT_ONCE) as ahead:
-        assert ahead.wait(600)
-        assert log.read_text().split().count("fetch") == 3
-        log.write_text("")
-        for name in ("a", "b", "c"):
-            head = git(server.folder / name, "rev-parse", "HEAD")
-            assert server.obtain(f"{HOST}/{name}", since=since).source.ref == head
-        assert log.read_text() == ""
-
-
-def test_an_end_waits_for_no_server(server, monkeypatch):
-    started = server.base / "started"
-    write(
-        server.base / "bin", {"git": f"#!/bin/sh\ntouch '{started}'\nexec sleep 3600\n"}, executable=("git",)
-    )
-    monkeypatch.setenv("PATH", f"{server.base}/bin:{os.environ['PATH']}")
-    begun = time.monotonic()
-
-    def interrupted() -> None:
-        with prefetch([entry(), entry()], threads=1, patience=AT_ONCE):
-            until(started.exists)
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        interrupted()
-    assert time.monotonic() - begun < 250

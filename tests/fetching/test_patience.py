@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import time
-
 import pytest
 
-from grader.classes.fetching import Patience, prefetch
+from grader.classes.fetching import Patience
 from grader.classes.fetching.mirror import GivenUp, patiently
 from grader.errors import SubmissionError, Unreachable
 from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch
 from grader.intake.repository import explained, may_pass
 from grader.intake.source import parse_source
 from tests.fetching.forge import forge
-from tests.fetching.samples import AT_ONCE, entry
 from tests.intake.samples import git
 
 PASSES = [
@@ -108,21 +105,3 @@ def test_a_clear_answer_is_asked_for_once(status, message, public, server):
             server.obtain(f"http://127.0.0.1:{running.port}/student")
         assert len(running.failures) == 9
     assert "tried" not in caught.value.message
-
-
-def test_those_who_come_after_a_failure_do_not_wait_for_the_server_again(public, server):
-    with forge(public) as running:
-        source = f"http://127.0.0.1:{running.port}/student"
-        running.failures = [502] * 10
-        since = time.time()
-        with prefetch([entry(source)], fetched_since=since, patience=AT_ONCE) as ahead:
-            assert ahead.wait(600)
-        assert len(running.failures) == 7
-        with pytest.raises(Unreachable, match=r"has failed.*\(tried 3 times\)"):
-            server.obtain(source, since=since)
-        assert len(running.failures) == 7
-        [written] = server.cache.glob("*/failure.json")
-        assert "127.0.0.1" not in written.read_text()
-        running.failures = []
-        assert server.obtain(source).source.ref
-        assert not written.exists()

@@ -16,7 +16,7 @@ from grader.report.junit import render_junit
 from grader.report.losses import arrange
 from grader.report.markdown import render_markdown
 from grader.report.platforms import render_classroom, render_gradescope
-from grader.report.terminal import open_console, print_report
+from grader.report.terminal import Terminal, open_console
 from grader.report.view import points_of, without_hidden
 from grader.rubric.model import Rubric
 from tests.judging.rubrics import rubric
@@ -162,7 +162,7 @@ def test_every_report_gives_the_same_total_and_says_why() -> None:
     assert (found.points, found.max_points) == (15, 100)
     assert [points_of(c) for c in found.criteria] == ["0/60", "20/20", "20/20", "not counted", "+5/+5", "-8"]
     text = io.StringIO()
-    print_report(found, lab, open_console(text))
+    Terminal(open_console(text)).report(found, lab)
     why = "37 of 100 points were earned, but without build at most 15 count"
     for report in (text.getvalue(), render_markdown(found, lab)):
         assert why in " ".join(report.split())
@@ -186,7 +186,7 @@ def test_what_closes_a_gate_is_no_advice_where_it_is_not_counted() -> None:
     shown = arrange(found, lab)
     assert ([loss.criterion.id for loss in shown.lost], shown.advice) == (["b"], ())
     text = io.StringIO()
-    print_report(found, lab, open_console(text))
+    Terminal(open_console(text)).report(found, lab)
     assert "b  not counted" in " ".join(text.getvalue().split("To fix")[1].split("\n")).replace("✗ ", "")
 
 

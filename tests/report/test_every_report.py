@@ -34,7 +34,7 @@ from grader.model.verdict import EvidenceCitation, FileCitation, Status
 from grader.report.files import result_bytes, result_text, write_reports
 from grader.report.junit import render_junit
 from grader.report.markdown import render_markdown
-from grader.report.terminal import open_console, print_report
+from grader.report.terminal import Terminal, open_console
 from grader.report.text import line
 from tests.report.hostile import result, rubric
 from tests.report.nasty import STEERING, TEXTS
@@ -101,7 +101,7 @@ def terminal(shown: GradingResult, **how) -> str:
         if how
         else open_console(out)
     )
-    print_report(shown, rubric(), console)
+    Terminal(console).report(shown, rubric())
     return out.getvalue()
 
 

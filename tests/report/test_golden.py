@@ -20,7 +20,7 @@ from grader.model.result import GradingResult
 from grader.model.verdict import Status
 from grader.report.files import result_bytes
 from grader.report.forms import FORMS, ReportInput
-from grader.report.terminal import open_console, print_report
+from grader.report.terminal import Terminal, open_console
 from grader.report.view import without_hidden
 from tests.report import hostile
 from tests.report.hostile import ESCAPES
@@ -39,7 +39,7 @@ def terminal(encoding: str, width: int = 80, *, full: bool = False) -> bytes:
     stream = io.TextIOWrapper(raw, encoding=encoding)
     console = open_console(stream)
     console.width = width
-    print_report(student(), rubric(), console, hidden=3, full=full)
+    Terminal(console).report(student(), rubric(), hidden=3, full=full)
     stream.flush()
     return raw.getvalue()
 
@@ -146,7 +146,7 @@ def test_a_real_terminal_gets_colour_but_none_of_the_students():
         highlight=False,
         color_system="standard",
     )
-    print_report(worst(), rubric(), console)
+    Terminal(console).report(worst(), rubric())
     assert "\x1b[31m✗" in out.getvalue()
     assert "\x1b]0;" not in out.getvalue()
 
@@ -177,7 +177,7 @@ def test_in_an_encoding_without_them_dots_and_arrows_are_spelt_out() -> None:
         update={"criteria": (hostile.result().criteria[0].model_copy(update=update),)}
     )
     out = io.TextIOWrapper(io.BytesIO(), encoding="ascii", write_through=True)
-    print_report(shown, hostile.rubric(), open_console(out))
+    Terminal(open_console(out)).report(shown, hostile.rubric())
     text = out.buffer.getvalue().decode("ascii")
     assert 'name="...", 5 -> 6' in text
     assert "9 +/- 1" in text

@@ -11,7 +11,7 @@ from grader.model.result import Note
 from grader.report.files import result_bytes
 from grader.report.junit import render_junit
 from grader.report.markdown import render_markdown
-from grader.report.terminal import open_console, print_report
+from grader.report.terminal import Terminal, open_console
 from tests.report.hostile import result, rubric
 
 NOTES = (
@@ -45,7 +45,7 @@ def test_markdown_has_a_section():
 
 def test_the_terminal_has_a_section():
     out = io.StringIO()
-    print_report(result(notes=NOTES), rubric(), open_console(out))
+    Terminal(open_console(out)).report(result(notes=NOTES), rubric())
     assert "\nNoticed while it ran\n" in out.getvalue()
     assert "  real, talker.py: asked the master to shut down (refused)\n" in out.getvalue()
     assert COSTS_NOTHING in out.getvalue()

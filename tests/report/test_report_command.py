@@ -89,7 +89,7 @@ def test_what_cannot_be_read_costs_the_others_nothing(lab, capsys):
     assert run(["report", str(lab)]) == 3
     out, err = capsys.readouterr()
     assert "2 of 3 written" in out
-    assert f"grader: error: {lab / 'bob' / 'result.json'}: there is none, or it is not what" in err
+    assert f"grader: error: {lab / 'bob' / 'result.json'}: not what a grader writes" in err
     assert not (lab / "bob" / "report.md").exists()
     assert (lab / "ada" / "report.md").exists()
     assert "mermaid" not in (lab / "cy" / "report.md").read_text()

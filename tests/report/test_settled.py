@@ -15,7 +15,7 @@ from grader.report.files import result_bytes
 from grader.report.junit import render_junit
 from grader.report.markdown import render_markdown
 from grader.report.sentences import late_words
-from grader.report.terminal import open_console, print_report
+from grader.report.terminal import Terminal, open_console
 from tests.report.hostile import result, rubric
 from tests.support.a_class import criterion
 
@@ -61,7 +61,7 @@ def settled(**changes: object) -> GradingResult:
 
 def terminal(shown: GradingResult) -> str:
     out = io.StringIO()
-    print_report(shown, rubric(), open_console(out))
+    Terminal(open_console(out)).report(shown, rubric())
     return out.getvalue()
 
 

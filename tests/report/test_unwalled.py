@@ -18,7 +18,7 @@ from grader.report.class_page.page import write_class_page
 from grader.report.html.page import render_html
 from grader.report.markdown import render_markdown
 from grader.report.sentences import without_sandbox
-from grader.report.terminal import open_console, print_report
+from grader.report.terminal import Terminal, open_console
 from grader.rubric.load import LoadedRubric
 from tests.report.class_page.made_up import made_up_rows, made_up_run
 from tests.report.hostile import ESCAPES, result, rubric
@@ -39,7 +39,7 @@ def graded(sandbox: str) -> GradingResult:
 
 def terminal(of: GradingResult) -> str:
     stream = io.StringIO()
-    print_report(of, rubric(), open_console(stream))
+    Terminal(open_console(stream)).report(of, rubric())
     return " ".join(stream.getvalue().split())
 
 

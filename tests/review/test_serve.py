@@ -155,9 +155,7 @@ def test_ports_that_are_none(out, port, capsys) -> None:
 
 def test_without_the_extra_it_says_what_to_install(out, monkeypatch, capsys) -> None:
     found = importlib.util.find_spec
-    monkeypatch.setattr(
-        "grader.classes.review.find_spec", lambda name: None if name == "flask" else found(name)
-    )
+    monkeypatch.setattr("grader.installable.find_spec", lambda name: None if name == "flask" else found(name))
     assert run(["review", str(out)]) == 2
     errors = capsys.readouterr().err
     assert "-m pip install 'flask>=" in errors

@@ -13,7 +13,7 @@ from grader.errors import HostError, UsageError
 from grader.model.figure import Figures
 from grader.report.html.page import render_html
 from grader.report.markdown import render_markdown
-from grader.report.terminal import open_console, print_report
+from grader.report.terminal import Terminal, open_console
 from grader.rubric.download import BYTES_MAX
 from grader.rubric.find import rubrics_folder
 from grader.rubric.load import LoadedRubric, checkout_around, load_rubric, origin_of
@@ -98,7 +98,7 @@ def test_what_lies_in_the_students_repository_is_the_students(tmp_path: Path) ->
 def test_reports_say_where_the_rubric_came_from(origin: str, words: str) -> None:
     of = result().model_copy(update={"rubric_origin": origin})
     stream = io.StringIO()
-    print_report(of, rubric(), open_console(stream))
+    Terminal(open_console(stream)).report(of, rubric())
     shown = {
         "markdown": render_markdown(of, rubric()).replace("\\", ""),
         "html": render_html(of, rubric(), Figures()).replace("&#39;", "'"),

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.similarity import comparison
 from grader.cli.classes import starter_of
 from grader.cli.main import run as grader
 from grader.model.batch import BatchRun, Entry, Similarity
@@ -133,7 +132,7 @@ def test_starter_code_that_is_not_there_is_refused(class_folder, capsys) -> None
 
 
 def test_without_the_extra_it_says_what_to_install(class_folder, capsys, monkeypatch) -> None:
-    monkeypatch.setattr(comparison, "find_spec", lambda _name: None)
+    monkeypatch.setattr("grader.installable.find_spec", lambda _name: None)
     assert grader(["similar", str(class_folder)]) == 2
     assert "-m pip install 'copydetect>=" in capsys.readouterr().err
     assert not (class_folder / "similarity.json").exists()

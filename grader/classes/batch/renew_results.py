@@ -26,7 +26,7 @@ from grader.report.figures import figures_of
 from grader.report.files import render_files, write_reports
 from grader.report.forms import ReportInput
 from grader.report.sentences import missing_hidden
-from grader.results import EVIDENCE, RESULT, Results, read_result
+from grader.results import EVIDENCE, RESULT, Results, load_result
 from grader.rubric.load import LoadedRubric
 from grader.rubric.made_up import with_recorded_values
 from grader.rubric.model import Rubric
@@ -192,10 +192,7 @@ def has_result(folder: Path) -> bool:
 
 def result_in(folder: Path, rubric: LoadedRubric | None = None) -> GradingResult:
     """Return a submission's result. Raises EvidenceError, and UsageError if it is of another lab than `rubric`."""
-    result = read_result(folder)
-    if result is None:
-        message = f"{folder / RESULT}: there is none, or it is not what this grader writes"
-        raise EvidenceError(message, hint="grade it again")
+    result = load_result(folder / RESULT)
     if rubric is not None and result.rubric.id != rubric.rubric.id:
         message = f"{folder}: a result of {result.rubric.id}, not of {rubric.rubric.id}"
         raise UsageError(message, hint="give the rubric that it was graded by with --rubric")

@@ -17,7 +17,6 @@ from grader import __version__
 from grader.classes.batch.folder import RUN, BatchFolder, open_batch, write_run
 from grader.classes.batch.job import Executor, GradingJob, SubmissionOutcome
 from grader.classes.batch.renew_results import Settler, rewrite
-from grader.classes.fetching import prefetch
 from grader.classes.gradebook import write_gradebook
 from grader.classes.overrides import COMMENTS_FILE as BANK
 from grader.classes.overrides import FILE as OVERRIDES
@@ -166,13 +165,11 @@ def _grade_all(batch: _Batch, executor: Executor, watcher: Watcher) -> Iterator[
         prepare(GradeOptions(sandbox=options.sandbox, static_only=options.static_only))
     since = time.time()
     entries = {entry.id: entry for entry, _ in todo}
-    ahead = [entry for entry, _ in todo] if not options.cluster else []
-    with prefetch(ahead, fetched_since=since):
-        jobs = (_job(batch, entry, again=again, since=since) for entry, again in todo)
-        for outcome in executor.run(jobs, begun=watcher.begun):
-            entry = entries[outcome.id]
-            decided = outcome.status == "error" and batch.settler.of(entry.id)
-            yield _settle_again(batch, entry, outcome) if outcome.kept or decided else outcome
+    jobs = (_job(batch, entry, again=again, since=since) for entry, again in todo)
+    for outcome in executor.run(jobs, begun=watcher.begun):
+        entry = entries[outcome.id]
+        decided = outcome.status == "error" and batch.settler.of(entry.id)
+        yield _settle_again(batch, entry, outcome) if outcome.kept or decided else outcome
 
 
 def _job(batch: _Batch, entry: Entry, *, again: bool, since: float) -> GradingJob:

@@ -66,7 +66,8 @@ def connect(address: str) -> Iterator[Any]:
     from distributed.versions import VersionMismatchWarning  # noqa: PLC0415 - as above
 
     warnings.filterwarnings("ignore", category=VersionMismatchWarning)  # each worker is asked what matters
-    _silence()
+    for name in LOGGERS:  # what Dask logs about lost connections, the grader says where it matters
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     if address != LOCAL:
         _check_address_answers(address)
         with _client(Client, address) as client:
@@ -151,12 +152,6 @@ def _check_scheduler(client: Any, address: str) -> None:  # noqa: ANN401 - Dask 
                 f"the scheduler at {address} has {name} {there[name]}, here it is {here[name]}",
                 hint="use the same environment for the client, the scheduler and the workers",
             )
-
-
-def _silence() -> None:
-    """What Dask logs about lost connections, the grader says where it matters."""
-    for name in LOGGERS:
-        logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 def is_encrypted(address: str) -> bool:

@@ -12,12 +12,12 @@ import json
 import os
 import re
 import time
-from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from http.client import HTTPException
 from itertools import chain
+from types import MappingProxyType
 from typing import Any
 from urllib.error import HTTPError, URLError
 from urllib.parse import quote, unquote, urljoin, urlsplit
@@ -254,6 +254,11 @@ class Comments(Sender):
     unsure = "look"
     name = server = token = ""
     api: Api
+    commits, notes = "commits", "comments"
+    comment_text = issue_text = "body"
+    all_issues = "state=all"
+    issue_fields: Mapping[str, object] = MappingProxyType({})
+    """What else is said of a new issue."""
 
     def place(self, feedback: Feedback) -> str:
         """Return the commit, or the repository whose issue it will be. Raises NotSent."""
@@ -362,33 +367,69 @@ class Comments(Sender):
             hint=hints.get(error.status, ""),
         )
 
-    @abstractmethod
     def is_public(self, path: str) -> bool:
         """Return whether everybody can read the repository, or everybody with an account."""
+        raise NotImplementedError
 
-    @abstractmethod
+    def repository(self, path: str) -> str:
+        """Return the place of a repository below the API's address."""
+        raise NotImplementedError
+
+    def address(self, one: dict[str, Any], path: str, below: str) -> str:
+        """Return where people read a record of the API, which `below` names in a repository's pages."""
+        raise NotImplementedError
+
     def comment(self, path: str, commit: str, body: str) -> str:
         """Comment on a commit; return the comment's address."""
+        made = self.api.post(self._comments_place(path, commit), {self.comment_text: body})
+        return self.address(made, path, f"commit/{commit}")
 
-    @abstractmethod
     def comments(self, path: str, commit: str) -> Iterator[Post]:
         """Yield each comment on a commit."""
+        for one in self.api.pages(self._comments_place(path, commit)):
+            yield _post(one, self.address(one, path, f"commit/{commit}"), self.comment_text)
 
-    @abstractmethod
     def open_issue(self, path: str, title: str, body: str) -> str:
         """Open an issue; return its address."""
+        data = {"title": title, self.issue_text: body, **self.issue_fields}
+        return self.address(self.api.post(f"{self.repository(path)}/issues", data), path, "issues")
 
-    @abstractmethod
     def reply(self, path: str, issue: int, body: str) -> str:
         """Comment on an issue; return the comment's address."""
+        made = self.api.post(self._replies_place(path, issue), {"body": body})
+        return self.address(made, path, f"issues/{issue}#note_{made.get('id', '')}")
 
-    @abstractmethod
     def issues(self, path: str) -> Iterator[Post]:
-        """Yield each issue."""
+        """Yield each issue; a pull request is none."""
+        for one in self.api.pages(f"{self.repository(path)}/issues?{self.all_issues}"):
+            if "pull_request" not in one:
+                yield _post(one, self.address(one, path, "issues"), self.issue_text)
 
-    @abstractmethod
     def replies(self, path: str, issue: int) -> Iterator[Post]:
-        """Yield each comment on an issue."""
+        """Yield each comment on an issue; what GitLab itself notes there is none."""
+        for one in self.api.pages(self._replies_place(path, issue)):
+            if one.get("system") is not True:
+                yield _post(one, self.address(one, path, f"issues/{issue}#note_{one.get('id', '')}"))
+
+    def _comments_place(self, path: str, commit: str) -> str:
+        return f"{self.repository(path)}/{self.commits}/{commit}/comments"
+
+    def _replies_place(self, path: str, issue: int) -> str:
+        return f"{self.repository(path)}/issues/{issue}/{self.notes}"
+
+
+def _post(one: dict[str, Any], address: str, text: str = "body") -> Post:
+    """Return a record of the API; `text` is the key of what it says."""
+    labels = (label.get("name") if isinstance(label, dict) else label for label in one.get("labels") or ())
+    return Post(
+        address=address,
+        text=str(one.get(text) or ""),
+        when=str(one.get("created_at") or ""),
+        title=str(one.get("title") or ""),
+        number=int(one.get("number") or one.get("iid") or 0),
+        is_open=one.get("state", "open") in {"open", "opened"},
+        labels=tuple(map(str, labels)),
+    )
 
 
 def mark(feedback: Feedback) -> str:
@@ -416,50 +457,23 @@ class GitHubComments(Comments):
 
     def is_public(self, path: str) -> bool:
         """Return whether the repository is not private."""
-        return self.api.get(_repo_path(path)).get("private") is not True
+        return self.api.get(self.repository(path)).get("private") is not True
 
-    def comment(self, path: str, commit: str, body: str) -> str:
-        return str(self.api.post(f"{_repo_path(path)}/commits/{commit}/comments", {"body": body})["html_url"])
+    def repository(self, path: str) -> str:
+        return f"/repos/{quote(path)}"
 
-    def comments(self, path: str, commit: str) -> Iterator[Post]:
-        return _github_posts(self.api.pages(f"{_repo_path(path)}/commits/{commit}/comments"))
-
-    def open_issue(self, path: str, title: str, body: str) -> str:
-        return str(self.api.post(f"{_repo_path(path)}/issues", {"title": title, "body": body})["html_url"])
-
-    def reply(self, path: str, issue: int, body: str) -> str:
-        return str(self.api.post(f"{_repo_path(path)}/issues/{issue}/comments", {"body": body})["html_url"])
-
-    def issues(self, path: str) -> Iterator[Post]:
-        """Yield the issues; a pull request is none."""
-        found = self.api.pages(f"{_repo_path(path)}/issues?state=all")
-        return _github_posts(one for one in found if "pull_request" not in one)
-
-    def replies(self, path: str, issue: int) -> Iterator[Post]:
-        return _github_posts(self.api.pages(f"{_repo_path(path)}/issues/{issue}/comments"))
-
-
-def _repo_path(path: str) -> str:
-    return f"/repos/{quote(path)}"
-
-
-def _github_posts(found: Iterator[dict[str, Any]]) -> Iterator[Post]:
-    for one in found:
-        yield Post(
-            address=str(one.get("html_url", "")),
-            text=str(one.get("body") or ""),
-            when=str(one.get("created_at") or ""),
-            title=str(one.get("title") or ""),
-            number=int(one.get("number") or 0),
-            is_open=one.get("state", "open") == "open",
-            labels=tuple(str(label["name"]) for label in one.get("labels") or () if isinstance(label, dict)),
-        )
+    def address(self, one: dict[str, Any], path: str, below: str) -> str:
+        """Return what GitHub says."""
+        del path, below
+        return str(one.get("html_url", ""))
 
 
 class GitLabComments(Comments):
     """One comment or issue for each student."""
 
     name, token = "GitLab", "GITLAB_TOKEN"
+    commits, notes = "repository/commits", "notes"
+    comment_text, issue_text, all_issues = "note", "description", "scope=all"
 
     def __init__(self, settings: SendSettings) -> None:
         super().__init__(settings)
@@ -471,56 +485,15 @@ class GitLabComments(Comments):
         self.server = urlsplit(server).netloc.lower()
         base = os.environ.get("CI_API_V4_URL") or f"{self._address}/api/v4"
         self.api = Api(base, {"Authorization": f"Bearer {token}"}, settings.told)
+        # in a project that others can read, only members see an issue
+        self.issue_fields = {"confidential": settings.public}
 
     def is_public(self, path: str) -> bool:
-        return str(self.api.get(_project_path(path)).get("visibility")) != "private"
+        return str(self.api.get(self.repository(path)).get("visibility")) != "private"
 
-    def comment(self, path: str, commit: str, body: str) -> str:
-        """Comment on a commit; GitLab tells no address of the comment, so it is the commit's."""
-        self.api.post(f"{_project_path(path)}/repository/commits/{commit}/comments", {"note": body})
-        return self._commit(path, commit)
+    def repository(self, path: str) -> str:
+        return f"/projects/{quote(path, safe='')}"
 
-    def comments(self, path: str, commit: str) -> Iterator[Post]:
-        for one in self.api.pages(f"{_project_path(path)}/repository/commits/{commit}/comments"):
-            yield _gitlab_post(one, self._commit(path, commit), "note")
-
-    def open_issue(self, path: str, title: str, body: str) -> str:
-        """Open an issue; in a project that others can read, one that only members see."""
-        data = {"title": title, "description": body, "confidential": self.settings.public}
-        return str(self.api.post(f"{_project_path(path)}/issues", data)["web_url"])
-
-    def reply(self, path: str, issue: int, body: str) -> str:
-        made = self.api.post(f"{_project_path(path)}/issues/{issue}/notes", {"body": body})
-        return self._note(path, issue, made)
-
-    def issues(self, path: str) -> Iterator[Post]:
-        for one in self.api.pages(f"{_project_path(path)}/issues?scope=all"):
-            yield _gitlab_post(one, str(one.get("web_url", "")), "description")
-
-    def replies(self, path: str, issue: int) -> Iterator[Post]:
-        """Yield the comments on an issue; what GitLab itself notes there is none."""
-        for note in self.api.pages(f"{_project_path(path)}/issues/{issue}/notes"):
-            if note.get("system") is not True:
-                yield _gitlab_post(note, self._note(path, issue, note), "body")
-
-    def _commit(self, path: str, commit: str) -> str:
-        return f"{self._address}/{path}/-/commit/{commit}"
-
-    def _note(self, path: str, issue: int, note: dict[str, Any]) -> str:
-        return f"{self._address}/{path}/-/issues/{issue}#note_{note.get('id', '')}"
-
-
-def _project_path(path: str) -> str:
-    return f"/projects/{quote(path, safe='')}"
-
-
-def _gitlab_post(one: dict[str, Any], address: str, body: str) -> Post:
-    return Post(
-        address=address,
-        text=str(one.get(body) or ""),
-        when=str(one.get("created_at") or ""),
-        title=str(one.get("title") or ""),
-        number=int(one.get("iid") or 0),
-        is_open=one.get("state", "opened") == "opened",
-        labels=tuple(map(str, one.get("labels") or ())),
-    )
+    def address(self, one: dict[str, Any], path: str, below: str) -> str:
+        """Return the place in the project's pages: only of issues GitLab says it."""
+        return str(one.get("web_url") or f"{self._address}/{path}/-/{below}")

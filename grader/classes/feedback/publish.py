@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
@@ -20,9 +21,10 @@ from grader.classes.batch.folder import BatchFolder
 from grader.classes.batch.regrade import pairs, states_of
 from grader.classes.batch.renew_results import figures_in
 from grader.classes.batch.run import hold_folder
+from grader.classes.feedback.forms import PAGE, TEXT
 from grader.classes.gradebook import GradebookRow
 from grader.errors import EvidenceError, GraderError, UsageError
-from grader.files import atomic_write, make_folder
+from grader.files import atomic_write, make_folder, read_given
 from grader.intake.names import safe_name
 from grader.model.batch import UNPUBLISHED, Entry, Publication
 from grader.model.result import AppliedOverride, GradingResult
@@ -37,7 +39,6 @@ from grader.wording import did_you_mean, join_words, number, plural
 from grader.workers import WorkerEnded, run_each
 
 FILE, FOLDER = "published.jsonl", ".published"
-TEXT, PAGE = "report.md", "report.html"
 NAME_CHARS = 16
 PublishState = Literal["new", "changed", "same", "draft"]
 WORDING = "the words of the report, and no points"
@@ -105,12 +106,7 @@ def read_published(path: Path) -> Published:
 
 def read_rows(path: Path) -> list[bytes]:
     """Return the lines of a file, none if there is no such file. Raises UsageError."""
-    try:
-        return path.read_bytes().splitlines()
-    except FileNotFoundError:
-        return []
-    except OSError as error:
-        raise UsageError(f"{path}: cannot be read: {error.strerror}") from error
+    return (read_given(path) or b"").splitlines() if os.path.lexists(path) else []
 
 
 def check_only(folder: BatchFolder, only: Sequence[str]) -> frozenset[str]:

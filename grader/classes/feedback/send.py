@@ -9,7 +9,7 @@ before it says that sending was begun, and not how it ended.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
@@ -38,7 +38,7 @@ from grader.errors import NotSent, UsageError
 from grader.files import FILE as PRIVATE
 from grader.files import temporary_folder, unwritable
 from grader.intake.names import safe_name
-from grader.model.batch import Entry, Publication, Sent, SentState
+from grader.model.batch import Publication, Sent, SentState
 from grader.model.version import SENT, UPDATE
 from grader.portable import BINARY, CLOEXEC, NOFOLLOW
 from grader.report.view import hidden_ids
@@ -132,15 +132,15 @@ class Recipients:
     drafts: LoadedRubric | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(kw_only=True)
 class Selection:
     """`todo` is to be sent. `before` were sent already, `unpublished` are drafts; `older` were published earlier than
     asked for."""
 
-    todo: tuple[Feedback, ...]
-    before: tuple[str, ...] = ()
-    older: tuple[str, ...] = ()
-    unpublished: tuple[str, ...] = ()
+    todo: list[Feedback] = field(default_factory=list)
+    before: list[str] = field(default_factory=list)
+    older: list[str] = field(default_factory=list)
+    unpublished: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,17 +160,6 @@ class Delivery:
     failures: list[SendFailure] = field(default_factory=list)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Class:
-    """What every part of a run knows. `jobs` is how many reports are written side by side."""
-
-    folder: BatchFolder
-    published: Published
-    log: SentLog
-    wanted: Recipients
-    jobs: int
-
-
 @contextmanager
 def open_selection(
     folder: BatchFolder, form: FeedbackForm, wanted: Recipients, *, jobs: int
@@ -187,75 +176,77 @@ def open_selection(
         )
     check_only(folder, wanted.only)
     place = folder.path / FOLDER if published.history else folder.path
-    with (
-        hold_folder(place, "other feedback is being sent, or a class published,"),
-        temporary_folder("run") as room,
-    ):
-        log = SentLog(folder.path, form.name)
-        about = _Class(
-            folder=folder, published=read_published(folder.path), log=log, wanted=wanted, jobs=jobs
-        )
-        yield _select(about, room), log
-
-
-def _select(about: _Class, room: Path) -> Selection:
-    names = check_only(about.folder, about.wanted.only)
-    entries = [entry for entry in about.folder.run.entries if safe_name(entry.id) in names]
-    published = about.published
-    if about.wanted.drafts is None:
-        made = {e.id: (p[-1], published.folder(p[-1])) for e in entries if (p := published.of(e))}
-    else:
-        made = _drafts(about, about.wanted.drafts, room)
-    todo, before, older, unpublished = list[Feedback](), list[str](), list[str](), list[str]()
-    since = about.wanted.changed_since
-    for entry in entries:
-        if entry.id not in made:
-            unpublished.append(entry.id)
-            continue
-        publication, place = made[entry.id]
-        if since is not None and publication.at <= since:
-            older.append(entry.id)
-        elif about.log.state(publication) == "sent" and not about.wanted.again:
-            before.append(entry.id)
+    who = "other feedback is being sent, or a class published,"
+    with hold_folder(place, who), temporary_folder("run") as room:
+        log, published = SentLog(folder.path, form.name), read_published(folder.path)
+        if wanted.drafts is None:
+            last = {name: history[-1] for name, history in published.history.items()}
+            made = {name: (one, published.folder(one)) for name, one in last.items()}
         else:
-            todo.append(_feedback(about, entry, publication, place))
-    return Selection(
-        todo=tuple(todo), before=tuple(before), older=tuple(older), unpublished=tuple(unpublished)
-    )
+            made = _drafts(folder, published, wanted.drafts, wanted.only, room, jobs=jobs)
+        yield _select(folder, wanted, made, log), log
 
 
-def _feedback(about: _Class, entry: Entry, publication: Publication, place: Path) -> Feedback:
-    result = read_result(place)
-    return Feedback(
-        entry=entry,
-        publication=publication,
-        name=safe_name(entry.id),
-        title=about.folder.run.title,
-        folder=place,
-        commit=(result.submission.commit if result else None) or "",
-        last_place=about.log.last_place(entry.id),
-    )
+def _select(
+    folder: BatchFolder, wanted: Recipients, made: Mapping[str, tuple[Publication, Path]], log: SentLog
+) -> Selection:
+    """`made` has by the names of folders what can be sent, and where its reports are."""
+    names, selection = check_only(folder, wanted.only), Selection()
+    for entry in folder.run.entries:
+        name = safe_name(entry.id)
+        if name not in names:
+            continue
+        if name not in made:
+            selection.unpublished.append(entry.id)
+            continue
+        publication, place = made[name]
+        if wanted.changed_since is not None and publication.at <= wanted.changed_since:
+            selection.older.append(entry.id)
+        elif log.state(publication) == "sent" and not wanted.again:
+            selection.before.append(entry.id)
+        else:
+            result = read_result(place)
+            feedback = Feedback(
+                entry=entry,
+                publication=publication,
+                name=name,
+                title=folder.run.title,
+                folder=place,
+                commit=(result.submission.commit if result else None) or "",
+                last_place=log.last_place(entry.id),
+            )
+            selection.todo.append(feedback)
+    return selection
 
 
-def _drafts(about: _Class, rubric: LoadedRubric, room: Path) -> dict[str, tuple[Publication, Path]]:
-    """Return the reports of results as they are now, written into `room`, by the student's id."""
-    refuse_other_rubric(about.folder, rubric)
-    wanted = [
-        Freezing(
+def _drafts(
+    folder: BatchFolder,
+    published: Published,
+    rubric: LoadedRubric,
+    only: Sequence[str],
+    room: Path,
+    *,
+    jobs: int,
+) -> dict[str, tuple[Publication, Path]]:
+    """Return the reports of results as they are now, written into `room`."""
+    refuse_other_rubric(folder, rubric)
+    wanted = {
+        safe_name(step.entry.id): Freezing(
             publication=publication_of(step.entry, step.result),
             result=step.result,
-            evidence=about.folder.folder_of(step.entry),
+            evidence=folder.folder_of(step.entry),
             into=room / safe_name(step.entry.id),
-            changes=history_words(about.published.of(step.entry)),
+            changes=history_words(published.of(step.entry)),
             hidden=hidden_ids(rubric.rubric),
         )
-        for step in plan(about.folder, about.published, about.wanted.only)
+        for step in plan(folder, published, only)
         if step.result is not None and step.state != "draft"
-    ]
-    jobs = min(about.jobs, len(wanted))
-    for failed in filter(None, run_each(partial(_freeze_draft, rubric), wanted, jobs, ended=_freezing_ended)):
+    }
+    write = partial(_freeze_draft, rubric)
+    done = run_each(write, wanted.values(), min(jobs, len(wanted)), ended=_freezing_ended)
+    for failed in filter(None, done):
         raise NotSent(failed)
-    return {one.publication.id: (one.publication, one.into) for one in wanted}
+    return {name: (one.publication, one.into) for name, one in wanted.items()}
 
 
 def _freeze_draft(rubric: LoadedRubric, job: Freezing) -> str:

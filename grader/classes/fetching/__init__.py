@@ -4,6 +4,6 @@ from __future__ import annotations
 
 from grader.classes.fetching.history import NothingInTime, Rule
 from grader.classes.fetching.mirror import Patience
-from grader.classes.fetching.obtain import Obtained, Prefetch, obtain, prefetch
+from grader.classes.fetching.obtain import Obtained, obtain
 
-__all__ = ["NothingInTime", "Obtained", "Patience", "Prefetch", "Rule", "obtain", "prefetch"]
+__all__ = ["NothingInTime", "Obtained", "Patience", "Rule", "obtain"]

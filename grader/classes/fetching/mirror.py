@@ -4,8 +4,7 @@
 
 Mirrors are in a folder of the grader's user that no one else can enter, each used by one at a time:
 `<cache>/grader/repositories/<sum of the address>/` holds `lock`, `mirror.git` and `state.json`. The state is written
-when the mirror is complete, and its time of change says when the mirror was used last. `failure.json` is there where
-the network has failed since.
+when the mirror is complete, and its time of change says when the mirror was used last.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ import stat
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -28,7 +27,7 @@ from grader.classes.fetching.history import Commit, read_commit
 from grader.errors import SubmissionError
 from grader.files import lock, open_lock, user_folder, wait_for_lock
 from grader.intake.credentials import split_address
-from grader.intake.git import Git, GitFailed, GitTimeout, Repository
+from grader.intake.git import Git, GitFailed, Repository
 from grader.intake.repository import WantedRevision, ask, explained, may_pass, parse_refs
 from grader.intake.source import Source
 from grader.portable import CLOEXEC, DIRECTORY, NOFOLLOW, user_id
@@ -45,16 +44,6 @@ class MirrorState:
 
     fetched_at: float
     listing: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class NetworkFailure:
-    """That the network failed: what git said (without the address), how often it was tried, and until when."""
-
-    at: float
-    said: str
-    tries: int
-    timeout: bool
 
 
 @dataclass(frozen=True)
@@ -84,25 +73,6 @@ class MirrorFolder:
         beside = self.folder / "state.json.new"
         beside.write_text(json.dumps(data), encoding="utf-8")
         beside.replace(self.folder / "state.json")
-        (self.folder / "failure.json").unlink(missing_ok=True)
-
-    def failure(self) -> NetworkFailure | None:
-        """Return the last failure, if nothing went well since."""
-        try:
-            data = json.loads((self.folder / "failure.json").read_bytes())
-            return NetworkFailure(
-                at=float(data["at"]),
-                said=str(data["said"]),
-                tries=int(data["tries"]),
-                timeout=bool(data["timeout"]),
-            )
-        except (OSError, ValueError, TypeError, KeyError, RecursionError):
-            return None
-
-    def failed(self, failure: NetworkFailure) -> None:
-        """Tell the next process, so that not all of them wait for a server that does not answer."""
-        with suppress(OSError):
-            (self.folder / "failure.json").write_text(json.dumps(asdict(failure)), encoding="utf-8")
 
     def used(self) -> None:
         with suppress(OSError):
@@ -126,11 +96,6 @@ def cache_folder() -> Path | None:
         if _is_own(own) and _is_own(own / "repositories"):
             return own / "repositories"
     return None
-
-
-def name_of(address: str) -> str:
-    """The name of the mirror of an address in which there is no password."""
-    return hashlib.sha256(os.fsencode(address)).hexdigest()
 
 
 @contextmanager
@@ -389,56 +354,35 @@ GIT_TIMEOUT_S = 120.0
 """For everything that git does in one try."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class FetchRequest:
-    """What to bring here. What was fetched after `since` (seconds since 1970) need not be fetched again."""
-
-    source: Source
-    since: float
-    patience: Patience
-
-
-def bring_up_to_date(place: MirrorFolder, request: FetchRequest, room: Path) -> tuple[Mirror, Listing]:
-    """The mirror in `place`, as the server has it now, or had it after `request.since`.
+def bring_up_to_date(
+    place: MirrorFolder, source: Source, room: Path, *, since: float, patience: Patience
+) -> tuple[Mirror, Listing]:
+    """The mirror in `place`, as the server has it now, or had it after `since` (seconds since 1970).
 
     Raises GivenUp, or GitFailed where the mirror may be damaged as well.
     """
     state = place.state()
-    mirror = Mirror(source=request.source, path=place.mirror, room=room, git=git_in(room))
-    if state is not None and request.since <= state.fetched_at <= time.time() + 1:
+    mirror = Mirror(source=source, path=place.mirror, room=room, git=git_in(room))
+    if state is not None and since <= state.fetched_at <= time.time() + 1:
         place.used()
         return mirror, Listing(state.listing)
-    if (failure := place.failure()) and request.since <= failure.at <= time.time() + 1:
-        kind = GitTimeout if failure.timeout else GitFailed
-        raise GivenUp(kind(failure.said), failure.tries)
     if state is None:
         place.clear()
 
-    def ask() -> tuple[Mirror, Listing, float]:
+    def ask() -> tuple[Mirror, MirrorState]:
         fresh = replace(mirror, git=git_in(room))
         asked_at = time.time()
         listing = _listing(fresh)
         if listing.refs and (state is None or listing.text != state.listing):
             place.incomplete()
             fresh.fetch(listing)
-        return fresh, listing, asked_at
+        return fresh, MirrorState(fetched_at=asked_at, listing=listing.text)
 
-    try:
-        asked, listing, asked_at = patiently(ask, request.patience)
-    except GivenUp as problem:
-        if may_pass(problem.failure):
-            place.failed(_without_address(problem, request.source))
-        raise
+    mirror, state = patiently(ask, patience)
+    listing = Listing(state.listing)
     if listing.refs:
-        place.complete(MirrorState(fetched_at=asked_at, listing=listing.text))
-    return asked, listing
-
-
-def _without_address(problem: GivenUp, source: Source) -> NetworkFailure:
-    """For the cache, in which no address is written down."""
-    said = problem.failure.stderr.replace(split_address(source.url)[0], "…") if source.remote else ""
-    timeout = isinstance(problem.failure, GitTimeout)
-    return NetworkFailure(at=time.time(), said=said, tries=problem.tries, timeout=timeout)
+        place.complete(state)
+    return mirror, listing
 
 
 def _listing(mirror: Mirror) -> Listing:
@@ -458,7 +402,8 @@ def git_in(room: Path) -> Git:
 
 def place_name(source: Source) -> str:
     """Return the name of the mirror for a remote source."""
-    return name_of(split_address(source.url)[0])
+    address = split_address(source.url)[0]  # without the password
+    return hashlib.sha256(os.fsencode(address)).hexdigest()
 
 
 Answer = TypeVar("Answer")

@@ -1,21 +1,16 @@
-"""One entry of a roster: its source brought here, and the commit of it that counts.
-
-`prefetch` brings mirrors up to date ahead of that, in the roster's order.
-"""
+"""One entry of a roster: its source brought here, and the commit of it that counts."""
 
 from __future__ import annotations
 
 import shutil
-import threading
 import time
-from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.classes.fetching.history import Commit, NothingInTime, Rule, choose_commit, not_chosen
 from grader.classes.fetching.mirror import (
-    FetchRequest,
     GivenUp,
     Listing,
     Mirror,
@@ -31,7 +26,6 @@ from grader.classes.fetching.mirror import (
     tidy_now_and_then,
 )
 from grader.errors import SubmissionError
-from grader.files import temporary_folder
 from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch
 from grader.intake.names import brief, printable
 from grader.intake.open import new_folder, unreadable
@@ -57,20 +51,15 @@ class Obtained:
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """A repository to bring here. With `uncommitted`, it is a folder in which more may lie than what counts."""
+    """A repository to bring here. What was fetched after `since` (seconds since 1970) need not be fetched again. With
+    `uncommitted`, it is a folder in which more may lie than what counts."""
 
-    request: FetchRequest
+    source: Source
+    since: float
+    patience: Patience
     entry: Entry
     rule: Rule
     uncommitted: bool = False
-
-    @property
-    def source(self) -> Source:
-        return self.request.source
-
-    @property
-    def patience(self) -> Patience:
-        return self.request.patience
 
 
 def obtain(
@@ -97,14 +86,16 @@ def obtain(
     uncommitted = is_clone and rule.is_any
     if source.kind != "repository" and not uncommitted:
         return Obtained(source=source, handed_in=not_chosen(rule, entry))
-    request = FetchRequest(
+    task = Task(
         source=as_repository(source) if uncommitted else source,
         since=fetched_since or time.time(),
         patience=patience or Patience(),
+        entry=entry,
+        rule=rule,
+        uncommitted=uncommitted,
     )
     try:
         with _room(workdir) as room:
-            task = Task(request=request, entry=entry, rule=rule, uncommitted=uncommitted)
             return _from_repository(task, room)
     except _Unreadable as unread:
         note = f"its history cannot be read, so all of the folder counts ({unread})"
@@ -140,7 +131,7 @@ def _from_repository(task: Task, room: Path) -> Obtained:
     """Raises _Unreadable for a folder with a `.git` that is not to be read."""
     try:
         here = _serve_local(task, room)
-        return _through_mirror(replace(task, request=replace(task.request, source=here)), room)
+        return _through_mirror(replace(task, source=here), room)
     except GitTooMuch as failure:
         if task.rule.is_any:
             raise error_of(failure, task.source) from None
@@ -188,7 +179,7 @@ def _mirror_folder(source: Source, room: Path, stack: ExitStack) -> MirrorFolder
 
 
 def _commit_of(place: MirrorFolder, task: Task, room: Path) -> Obtained:
-    mirror, listing = bring_up_to_date(place, task.request, room)
+    mirror, listing = bring_up_to_date(place, task.source, room, since=task.since, patience=task.patience)
     wanted = choose_ref(listing.refs, task.source.ref, given=task.source.given)
     tip = patiently(lambda: mirror.commit(listing, wanted), task.patience)
     if tip is None:
@@ -275,86 +266,3 @@ def _obtain_commit(
         hints=(wanted.hint,) if wanted.hint else (),
     )
     return Obtained(source=source, handed_in=handed_in)
-
-
-STOP_S = 0.5
-
-
-class Prefetch:
-    """Threads that bring mirrors up to date; those who grade say why one could not be."""
-
-    def __init__(self, entries: Iterable[Entry], since: float, patience: Patience) -> None:
-        self._entries = iter(entries)
-        self._since = since
-        self._patience = replace(patience, sleep=self._sleep)
-        self._sleeping = patience.sleep
-        self._lock = threading.Lock()
-        self._stopped = threading.Event()
-        self._threads: list[threading.Thread] = []
-
-    def start(self, threads: int, room: Path) -> None:
-        for number in range(max(1, threads)):
-            own = room / str(number)
-            own.mkdir()
-            # After Ctrl-C no server is waited for: git ends with the thread that started it.
-            thread = threading.Thread(target=self._work, args=(own,), name="prefetch", daemon=True)
-            thread.start()
-            self._threads.append(thread)
-
-    def wait(self, timeout_s: float | None = None) -> bool:
-        """Return whether all entries were looked at within that time."""
-        deadline = None if timeout_s is None else time.monotonic() + timeout_s
-        for thread in self._threads:
-            thread.join(None if deadline is None else max(0.0, deadline - time.monotonic()))
-        return not any(thread.is_alive() for thread in self._threads)
-
-    def stop(self) -> None:
-        """Begin nothing more, and wait a moment for what has begun."""
-        self._stopped.set()
-        self.wait(STOP_S)
-
-    def _sleep(self, seconds: float) -> None:
-        self._sleeping(seconds)
-        if self._stopped.is_set():
-            raise InterruptedError
-
-    def _work(self, room: Path) -> None:
-        while not self._stopped.is_set():
-            with self._lock:
-                entry = next(self._entries, None)
-            if entry is None:
-                return
-            with suppress(Exception):  # whatever it is, those who grade meet it again and say so
-                self._fetch(entry, room)
-
-    def _fetch(self, entry: Entry, room: Path) -> None:
-        source = source_of(entry)
-        folder = cache_folder() if source.remote else None
-        if folder is None:  # what is on this machine needs no mirror, and without a cache none can be kept
-            return
-        tidy_now_and_then(folder)
-        request = FetchRequest(source=source, since=self._since, patience=self._patience)
-        with locked(folder / place_name(source)) as place:
-            bring_up_to_date(place, request, room)
-
-
-@contextmanager
-def prefetch(
-    entries: Iterable[Entry],
-    *,
-    threads: int = 8,
-    fetched_since: float = 0.0,
-    patience: Patience | None = None,
-) -> Iterator[Prefetch]:
-    """While the block runs, the mirrors of the remote repositories among `entries` are fetched, in their order.
-
-    What was fetched after `fetched_since` (seconds since 1970; 0 is now) is not fetched again. It never raises for
-    what it could not fetch, and nothing of it holds up the end of the block.
-    """
-    work = Prefetch(entries, fetched_since or time.time(), patience or Patience())
-    with temporary_folder("source") as room:
-        work.start(threads, room)
-        try:
-            yield work
-        finally:
-            work.stop()

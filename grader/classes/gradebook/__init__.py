@@ -143,7 +143,10 @@ def write_workbook(book: Book, rows: Iterable[GradebookRow], target: Path) -> No
 
 def _gradebook(sheet: Worksheet, book: Book, rows: Iterable[GradebookRow], bold: Format) -> None:
     names = header(book)
-    _widths(sheet, names)
+    wide = {"id", "name", "late", "comment", "error"}
+    for column, name in enumerate(names):
+        width = WIDTH_TEXT if name in wide else min(max(len(name) + 3, WIDTH_MIN), WIDTH_MAX)
+        sheet.set_column(column, column, width)
     _write(sheet, 0, names, bold)
     last = 0
     for last, row in enumerate(rows, start=1):
@@ -160,13 +163,6 @@ def _criteria(sheet: Worksheet, book: Book, bold: Format) -> None:
     for number, criterion in enumerate(book.criteria, start=1):
         _write(sheet, number, criterion[: len(names)])
     sheet.freeze_panes(1, 0)
-
-
-def _widths(sheet: Worksheet, names: Sequence[str]) -> None:
-    wide = {"id", "name", "late", "comment", "error"}
-    for column, name in enumerate(names):
-        width = WIDTH_TEXT if name in wide else min(max(len(name) + 3, WIDTH_MIN), WIDTH_MAX)
-        sheet.set_column(column, column, width)
 
 
 def _write(sheet: Worksheet, number: int, row: Sequence[Cell], form: Format | None = None) -> None:

@@ -22,6 +22,7 @@ from grader.classes.gradebook.platforms import (
 from grader.classes.gradebook.table import harmless, number_text
 from grader.classes.roster.entries import delimiter_of, encoding_of
 from grader.errors import UsageError
+from grader.files import read_given
 from grader.wording import first_few
 
 KEPT = {"EX", "N/A"}
@@ -102,7 +103,8 @@ def _add_column(work: _Work, wanted: PointsColumn) -> int:
     """A new column at the end of every row."""
     place = len(work.sheet.header)
     points = number_text(wanted.max_points)
-    (name,) = harmless([new_header(wanted, work.platform, points)])
+    new = f"{wanted.title} [Total Pts: {points} Score]" if work.platform == "blackboard" else wanted.title
+    (name,) = harmless([new])
     for number, record in enumerate(work.sheet.records):
         if record.is_empty:
             continue
@@ -204,7 +206,9 @@ def find_column(
             hint="say which one with --column",
         )
     if not found and named:
-        raise UsageError(f"no column {wanted.title} in the template", hint=_others(header, known))
+        others = [name for name in header if name.strip() and name not in known]
+        hint = f"there are: {first_few(others, SHOWN_MAX)}"
+        raise UsageError(f"no column {wanted.title} in the template", hint=hint)
     return found[0] if found else None
 
 
@@ -223,11 +227,6 @@ def maximum_in(header: str) -> float | None:
     return float(found[1]) if found and found[1].count(".") < 2 else None
 
 
-def new_header(wanted: PointsColumn, platform: Platform, points: str) -> str:
-    """What a column is called that the platform does not have yet."""
-    return f"{wanted.title} [Total Pts: {points} Score]" if platform == "blackboard" else wanted.title
-
-
 def _titles(name: str, platform: Platform) -> set[str]:
     """What the column may be called without what the platform adds."""
     if platform == "canvas":
@@ -236,11 +235,6 @@ def _titles(name: str, platform: Platform) -> set[str]:
         return {letters_and_digits(re.sub(r"\s*\[Total Pts:.*$|\s*\|\s*\d+\s*$", "", name))}
     bare = re.sub(r"\s*\([^()]*\)\s*$", "", name)
     return {letters_and_digits(bare), letters_and_digits(bare.partition(":")[2]) or letters_and_digits(bare)}
-
-
-def _others(header: Sequence[str], known: dict[str, ColumnKind]) -> str:
-    names = [name for name in header if name.strip() and name not in known]
-    return f"there are: {first_few(names, SHOWN_MAX)}"
 
 
 BYTES_MAX = 64 << 20
@@ -293,12 +287,7 @@ class Sheet:
 
 def read_sheet(path: Path) -> Sheet:
     """Raises UsageError for what is not a table of text."""
-    try:
-        data = path.read_bytes() if path.stat().st_size <= BYTES_MAX else b""
-    except OSError as error:
-        raise UsageError(
-            f"{path}: cannot be read: {error.strerror}", hint="give the platform's export"
-        ) from error
+    data = read_given(path, BYTES_MAX, hint="give the platform's export")
     if not data or data.startswith(b"PK\x03\x04"):
         raise UsageError(f"{path}: this is not a CSV export", hint=_EXPORT)
     mark, encoding = encoding_of(data)

@@ -114,7 +114,8 @@ class _Reading:
                 continue
             name = self._ids.get(folder_key(key))
             if name is None:
-                self.faults.append(((key,), f'there is no submission "{key}"{self._near(key)}'))
+                near = did_you_mean(key, self._ids.values()) or did_you_mean(folder_key(key), self._ids)
+                self.faults.append(((key,), f'there is no submission "{key}"{near}'))
             elif first.setdefault(name, key) != key:
                 line = self._source.line((first[name],))
                 self.faults.append(((key,), f"is the submission on line {line} already, {first[name]}"))
@@ -123,9 +124,6 @@ class _Reading:
     def _schema(self, value: object) -> None:
         if value != SCHEMA:
             self.faults.append(((SCHEMA_KEY,), f'must be "{SCHEMA}", not {shown(value)}'))
-
-    def _near(self, key: str) -> str:
-        return did_you_mean(key, self._ids.values()) or did_you_mean(folder_key(key), self._ids)
 
     def _submission(self, key: str, value: object, name: str | None) -> None:
         if value is not None and not isinstance(value, dict):

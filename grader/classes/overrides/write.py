@@ -21,7 +21,7 @@ import yaml
 
 from grader.classes.overrides import SCHEMA_KEY, parse
 from grader.errors import Busy, RubricError, UsageError
-from grader.files import atomic_write, lock, open_lock, unwritable
+from grader.files import atomic_write, lock, open_lock, read_given, unwritable
 from grader.intake.names import folder_key
 from grader.model.result import BankComment, Override, WrittenOverride
 from grader.model.version import COMMENTS, OVERRIDES
@@ -51,7 +51,7 @@ def write_overrides(path: Path, changes: Iterable[OverrideChange]) -> None:
     path = path.resolve()
     # The lock is a file beside it, which stays: another writer may be waiting for it.
     with hold_lock(path.with_name(f".{path.name}.lock"), path, wait_s=WAIT_S):
-        raw = _read(path)
+        raw = (read_given(path) if os.path.lexists(path) else None) or b""
         mode = path.stat().st_mode & 0o777 if path.exists() else None
         wanted = {(name, criterion): given for name, criterion, given in changes}  # of two for one, the last
         data = _changed_text(path, raw, [(*of, _fields(given)) for of, given in wanted.items()]).encode()
@@ -83,15 +83,6 @@ def _wait(descriptor: int, path: Path, wait_s: float) -> None:
         if time.monotonic() > until:
             raise Busy(f"another program is writing {path}", hint="wait until it has ended, then try again")
         time.sleep(LOOK_S)
-
-
-def _read(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        return b""
-    except OSError as error:
-        raise UsageError(f"{path}: cannot be read: {error.strerror}") from error
 
 
 def _fields(entry: Entry | None) -> Fields | None:

@@ -187,8 +187,7 @@ def card(
 
 def _waits(card: Card, *, whole: bool) -> bool:
     """Of what could not be graded at all, only what people decide anyway waits for one."""
-    status = card.criterion.status
-    return card.criterion.counts and ((status.is_open and whole) or (card.manual and status.is_open))
+    return card.criterion.counts and card.criterion.status.is_open and (whole or card.manual)
 
 
 def verdict(status: Status, points: float, most: float) -> str:

@@ -86,7 +86,9 @@ def browser(address: str, *, wanted: bool) -> Iterator[bool]:
     The browser is given a file of this user's alone: all users of a machine may read the arguments of a program.
     """
     with ExitStack() as stack:
-        tried = wanted and _has_screen()
+        screens = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
+        has_screen = sys.platform == "darwin" or any(os.environ.get(name) for name in screens)
+        tried = wanted and has_screen
         if tried:
             try:
                 page = stack.enter_context(temporary_folder("run")) / "review.html"
@@ -109,8 +111,3 @@ def _write_page(page: Path, address: str) -> None:
 def _open(page: Path) -> None:
     with suppress(webbrowser.Error, OSError):
         webbrowser.open(page.as_uri())
-
-
-def _has_screen() -> bool:
-    screens = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
-    return sys.platform == "darwin" or any(os.environ.get(name) for name in screens)

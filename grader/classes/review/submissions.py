@@ -383,7 +383,9 @@ def place_of(items: Sequence[ListedSubmission], asked: Mapping[str, str], *, at:
     ahead = {item.key for item in items[:here]} if here > 0 else set()
     left = [item.address for item in shown if item.key in ahead]
     right = [item.address for item in shown if item.key not in ahead and item.key != at]
-    page = len(left) // PAGE + 1 if here >= 0 else _page_asked(asked.get("page", ""))
+    asked_page = asked.get("page", "")
+    page = int(asked_page) if re.fullmatch(r"[0-9]{1,6}", asked_page) else 1
+    page = len(left) // PAGE + 1 if here >= 0 else max(1, page)
     return Navigation(
         kind=kind,
         q=q,
@@ -400,10 +402,6 @@ def place_of(items: Sequence[ListedSubmission], asked: Mapping[str, str], *, at:
 
 def _pages(shown: Sequence[ListedSubmission]) -> int:
     return max(1, -(-len(shown) // PAGE))
-
-
-def _page_asked(text: str) -> int:
-    return max(1, int(text)) if re.fullmatch(r"[0-9]{1,6}", text) else 1
 
 
 @dataclass(frozen=True, kw_only=True)

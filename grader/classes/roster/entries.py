@@ -16,13 +16,14 @@ import re
 import unicodedata
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import unquote
 
 from grader.errors import GraderError, SubmissionError, UsageError
+from grader.files import read_given
 from grader.intake.names import brief, encodable, folder_key, is_archive_name, is_package_name
 from grader.intake.source import parse_source
 from grader.model.batch import Entry, Roster, RosterFault
@@ -138,12 +139,7 @@ def delimiter_of(header: str) -> str:
 
 
 def _text(path: Path) -> str:
-    try:
-        data = path.read_bytes() if path.stat().st_size <= BYTES_MAX else None
-    except OSError as error:
-        raise UsageError(
-            f"{path}: cannot be read: {error.strerror}", hint="give a CSV file, a folder, or an export"
-        ) from error
+    data = read_given(path, BYTES_MAX, hint="give a CSV file, a folder, or an export")
     if is_archive_name(path.name):
         raise UsageError(f"{path}: an archive is not a roster", hint="unpack it first, and give the folder")
     if data is None:
@@ -316,8 +312,8 @@ def _is_there(source: str, base: Path) -> bool:
 def entries_of(table: Table, path: Path, local: Local) -> Roster:
     """Raises UsageError where a column is missing, or is there twice."""
     names = known_columns(table, path)
-    header = f"{path.name}:{table.line}"
-    found = [FoundEntry(where=header, faults=(meant,)) for _, meant in near_misses(table.columns)]
+    header = Entry(id="", source="", where=f"{path.name}:{table.line}")
+    found = [FoundEntry(header, (meant,)) for _, meant in near_misses(table.columns)]
     found += [_read_row(row, names, table, path, local) for row in table.rows]
     further = tuple(column for column in table.columns if column and column not in names)
     return gather(path, found, columns=further)
@@ -328,14 +324,25 @@ def _read_row(row: RosterRow, names: dict[str, str], table: Table, path: Path, l
     fields = {names[column]: field for column, field in row.fields.items() if column in names}
     if row.faults:  # what stands in which column is not sure
         sure = not row.shifted or names.get(table.columns[0]) == "id"
-        return FoundEntry(where=where, id=fields.get("id", "") if sure else "", faults=row.faults)
+        return FoundEntry(Entry(id=fields.get("id", "") if sure else "", source="", where=where), row.faults)
     faults = tuple(_faults(fields, base, local))
-    extra = {column: field for column, field in row.fields.items() if column not in names}
-    entry = None if faults else _entry(fields, extra, where, base)
-    name, group = fields.get("name", ""), fields.get("group", "")
-    return FoundEntry(
-        where=where, id=fields.get("id", ""), entry=entry, faults=faults, name=name, group=group, extra=extra
+    known = Entry(
+        id=fields.get("id", ""),
+        source="" if faults else whole_source(fields["source"], base),
+        name=fields.get("name", ""),
+        group=fields.get("group", ""),
+        where=where,
+        extra={column: field for column, field in row.fields.items() if column not in names},
     )
+    if faults:
+        return FoundEntry(known, faults)
+    more = {
+        "ref": fields.get("ref") or None,
+        "package": fields.get("package", ""),
+        "submitted_at": parse_time(fields.get("submitted_at", "")),
+        "extension_days": parse_days(fields.get("extension_days", "")) or 0.0,
+    }
+    return FoundEntry(known.model_copy(update=more))
 
 
 def _faults(fields: dict[str, str], base: Path, local: Local) -> Iterator[str]:
@@ -357,60 +364,36 @@ def _faults(fields: dict[str, str], base: Path, local: Local) -> Iterator[str]:
         yield f"extension_days: {brief(extension)} is not a number of days"
 
 
-def _entry(fields: dict[str, str], extra: dict[str, str], where: str, base: Path) -> Entry:
-    return Entry(
-        id=fields["id"],
-        source=whole_source(fields["source"], base),
-        ref=fields.get("ref") or None,
-        package=fields.get("package", ""),
-        name=fields.get("name", ""),
-        group=fields.get("group", ""),
-        submitted_at=parse_time(fields.get("submitted_at", "")),
-        extension_days=parse_days(fields.get("extension_days", "")) or 0.0,
-        where=where,
-        extra=extra,
-    )
-
-
 ID_BYTES_MAX = 255
 
 
-@dataclass(frozen=True, kw_only=True)
-class FoundEntry:
-    """One submission, or what was meant for one. `id` is empty where it has none, `entry` None where it has faults;
-    `name`, `group` and `extra` are what is known of the student even then."""
+class FoundEntry(NamedTuple):
+    """One submission, or what was meant for one. With `faults` it is none: the entry has what is known of the student,
+    an empty id where there is none."""
 
-    where: str
-    id: str = ""
-    entry: Entry | None = None
+    entry: Entry
     faults: tuple[str, ...] = ()
-    name: str = ""
-    group: str = ""
-    extra: Mapping[str, str] = field(default_factory=dict)
 
 
 def gather(file: Path, found: Sequence[FoundEntry], *, columns: tuple[str, ...] = ()) -> Roster:
     """The first of those that share an id stays; each later one is a fault that says where the first is."""
-    keys = [folder_key(one.id) if one.id else "" for one in found]
+    keys = [folder_key(entry.id) if entry.id else "" for entry, _ in found]
     times = Counter(keys)
     first: dict[str, str] = {}
     entries: list[Entry] = []
     again: list[Entry] = []
     faults: list[RosterFault] = []
-    for key, one in zip(keys, found, strict=True):
-        wrong = [*one.faults, *id_faults(one.id)]
-        sound = not wrong
+    for key, (entry, own_faults) in zip(keys, found, strict=True):
+        wrong = [*own_faults, *id_faults(entry.id)]
         is_again = bool(key) and key in first
+        if not wrong:
+            (again if is_again else entries).append(entry)
         if is_again:
-            wrong.append(f"id: {brief(one.id)} is there already, in {first[key]}")
-        first.setdefault(key, one.where)
-        own = one.id if key and times[key] == 1 and not any(id_faults(one.id)) else None
-        faults += [
-            RosterFault(where=one.where, id=own, text=text, name=one.name, group=one.group, extra=one.extra)
-            for text in wrong
-        ]
-        if sound and one.entry is not None:
-            (again if is_again else entries).append(one.entry)
+            wrong.append(f"id: {brief(entry.id)} is there already, in {first[key]}")
+        first.setdefault(key, entry.where)
+        own = entry.id if key and times[key] == 1 and not any(id_faults(entry.id)) else None
+        about = {"name": entry.name, "group": entry.group, "extra": entry.extra}
+        faults += [RosterFault(where=entry.where, id=own, text=text, **about) for text in wrong]
     return Roster(
         file=str(file), entries=tuple(entries), columns=columns, faults=tuple(faults), again=tuple(again)
     )
@@ -430,9 +413,9 @@ def id_faults(submission_id: str) -> Iterator[str]:
         yield f"id: {brief(submission_id)} is longer than a file's name may be ({ID_BYTES_MAX} bytes)"
 
 
-def columns_of(entries: Iterable[Entry | None]) -> tuple[str, ...]:
+def columns_of(found: Iterable[FoundEntry]) -> tuple[str, ...]:
     """Return the names of all further columns, in the order in which they turn up."""
-    return tuple(dict.fromkeys(name for entry in entries if entry for name in entry.extra))
+    return tuple(dict.fromkeys(name for entry, faults in found if not faults for name in entry.extra))
 
 
 REQUIRED = ("id", "source")

@@ -32,7 +32,7 @@ from grader.classes.roster.entries import (
     whole_source,
 )
 from grader.errors import HostError, UsageError
-from grader.files import make_folder, temporary_folder, unwritable
+from grader.files import make_folder, read_given, temporary_folder, unwritable
 from grader.intake.names import archive_stem, encodable, is_archive_name, listing, printable
 from grader.model.batch import Entry, Roster
 from grader.untrusted_text import line
@@ -63,7 +63,7 @@ def from_folder(folder: Path, local: Local) -> Roster:
         key = (named.platform, named.id) if named else ("", path.name)
         students.setdefault(key, []).append((path, named))
     found = [_check_links(_student(files), folder, local) for files in students.values()]
-    return gather(folder, found, columns=columns_of(one.entry for one in found))
+    return gather(folder, found, columns=columns_of(found))
 
 
 def _inside(folder: Path) -> list[Path]:
@@ -77,28 +77,21 @@ def _inside(folder: Path) -> list[Path]:
 
 def _check_links(found: FoundEntry, folder: Path, local: Local) -> FoundEntry:
     """A link may lead out of the folder."""
-    fault = local_fault(found.entry.source, folder, local) if found.entry else ""
-    return _faulty(found.entry, fault) if fault and found.entry else found
-
-
-def _faulty(entry: Entry, fault: str) -> FoundEntry:
-    """What is wrong with a submission, with what is known of its student."""
-    return FoundEntry(
-        where=entry.where, id=entry.id, faults=(fault,), name=entry.name, group=entry.group, extra=entry.extra
-    )
+    fault = "" if found.faults else local_fault(found.entry.source, folder, local)
+    return FoundEntry(found.entry, (fault,)) if fault else found
 
 
 def _student(files: list[tuple[Path, Named | None]]) -> FoundEntry:
     path, named = files[0]
     if named is not None:
         return _from_download([(path, named) for path, named in files if named])
-    where = printable(path.name)
+    unknown = Entry(id="", source="", where=printable(path.name))
     if not encodable(path.name):
-        return FoundEntry(where=where, faults=("its name is not UTF-8: rename it",))
+        return FoundEntry(unknown, ("its name is not UTF-8: rename it",))
     if not _can_be_graded(path):
-        return FoundEntry(where=where, faults=("neither a folder nor an archive",))
+        return FoundEntry(unknown, ("neither a folder nor an archive",))
     name = path.name if path.is_dir() else archive_stem(path.name)
-    return FoundEntry(where=where, id=name, entry=Entry(id=name, source=str(path.absolute()), where=where))
+    return FoundEntry(Entry(id=name, source=str(path.absolute()), where=unknown.where))
 
 
 def _from_download(files: list[tuple[Path, Named]]) -> FoundEntry:
@@ -109,22 +102,23 @@ def _from_download(files: list[tuple[Path, Named]]) -> FoundEntry:
     entry = _entry(path, named, name, [one.name for one, _ in files if one != path])
     if not taken:
         fault = "only text or a link was submitted" if named.is_text else "neither a folder nor an archive"
-        return _faulty(entry, fault)
+        return FoundEntry(entry, (fault,))
     if len(taken) > 1:
         more = listing([other.name for other, _ in taken[1:]])
-        return _faulty(entry, f"not the only one of this student, there is {more}: leave one there")
-    return FoundEntry(where=entry.where, id=name, entry=entry)
+        return FoundEntry(entry, (f"not the only one of this student, there is {more}: leave one there",))
+    return FoundEntry(entry)
 
 
 def _entry(path: Path, named: Named, name: str, others: list[str]) -> Entry:
     source = _single_archive(path) or path
     file = named.file or (source.name if source != path else "")
+    is_anonymous_canvas = named.platform == "Canvas" and named.is_blind
     extra: Mapping[str, str] = {
         "platform": named.platform,
         "file": printable(file),
         "late": "yes" if named.late else "",
         "other files": ", ".join(printable(other) for other in others),
-        _id_column(named): named.id,
+        "Canvas anonymous id" if is_anonymous_canvas else f"{named.platform} id": named.id,
     }
     return Entry(
         id=name,
@@ -134,10 +128,6 @@ def _entry(path: Path, named: Named, name: str, others: list[str]) -> Entry:
         modes_lost=True,
         extra={key: text for key, text in extra.items() if text},
     )
-
-
-def _id_column(named: Named) -> str:
-    return "Canvas anonymous id" if named.platform == "Canvas" and named.is_blind else f"{named.platform} id"
 
 
 def _can_be_graded(path: Path) -> bool:
@@ -308,16 +298,12 @@ def with_roster_columns(table: Table) -> Table:
 
 
 def _row(row: RosterRow) -> RosterRow:
-    fields = _rename_columns(row.fields)
+    who = row.fields.get("github_username") or row.fields.get("roster_identifier", "")
+    fields = {"id": who, **{COLUMNS.get(column, column): field for column, field in row.fields.items()}}
     if row.faults or fields.get("source"):
         return RosterRow(row.line, fields, row.faults, row.shifted)
     who = fields.get("name") or fields["id"] or "?"
     return RosterRow(row.line, fields, (f"{who} has no repository",))
-
-
-def _rename_columns(fields: Mapping[str, str]) -> dict[str, str]:
-    renamed = {COLUMNS.get(column, column): field for column, field in fields.items()}
-    return {"id": fields.get("github_username") or fields.get("roster_identifier", ""), **renamed}
 
 
 BYTES_MAX = 64 << 20
@@ -337,47 +323,46 @@ def from_gitlab(path: Path, local: Local) -> Roster:
         for number, project in enumerate(_projects(path), start=1)
     ]
     found = _told_apart(found)
-    return gather(path, found, columns=columns_of(one.entry for one in found))
+    return gather(path, found, columns=columns_of(found))
 
 
 def _read_project(project: object, where: str, base: Path, local: Local) -> FoundEntry:
     if not isinstance(project, dict):
-        return FoundEntry(where=where, faults=("no project",))
+        return FoundEntry(Entry(id="", source="", where=where), ("no project",))
     texts = {key: text for key, text in project.items() if isinstance(text, str) and encodable(text)}
     source = next((texts[key] for key in ADDRESSES if texts.get(key)), None)
     name = texts.get("path") or texts.get("name", "")
+    unknown = Entry(id=name, source="", where=where)
     if source is None or not name:
-        return FoundEntry(where=where, id=name, faults=("no http_url_to_repo, or no path",))
+        return FoundEntry(unknown, ("no http_url_to_repo, or no path",))
     if fault := source_fault(source, base, local):
-        return FoundEntry(where=where, id=name, faults=(f"source: {fault}",))
+        return FoundEntry(unknown, (f"source: {fault}",))
     namespace = project.get("namespace")
     group = namespace.get("full_path") if isinstance(namespace, dict) else None
-    entry = Entry(
-        id=name,
-        source=whole_source(source, base),
-        name=texts.get("name", ""),
-        group=group if isinstance(group, str) and encodable(group) else "",
-        where=where,
-        extra={"path_with_namespace": texts["path_with_namespace"]} if "path_with_namespace" in texts else {},
-    )
-    return FoundEntry(where=where, id=name, entry=entry)
+    about = {
+        "source": whole_source(source, base),
+        "name": texts.get("name", ""),
+        "group": group if isinstance(group, str) and encodable(group) else "",
+        "extra": {"path_with_namespace": path} if (path := texts.get("path_with_namespace")) else {},
+    }
+    return FoundEntry(unknown.model_copy(update=about))
 
 
 def _told_apart(found: list[FoundEntry]) -> list[FoundEntry]:
     """Projects of one name in several subgroups (`lab/ada/ros`, `lab/bob/ros`) are named by the subgroup too."""
-    sources = {(one.id, one.entry.source) for one in found if one.entry}
+    sources = {(entry.id, entry.source) for entry, faults in found if not faults}
     shared = {name for name, times in Counter(name for name, _ in sources).items() if times > 1}
-    paths = [path for one in found if one.entry and (path := one.entry.extra.get("path_with_namespace"))]
+    paths = [path for entry, _ in found if (path := entry.extra.get("path_with_namespace"))]
     common = os.path.commonpath(paths) if paths and not any(path.startswith("/") for path in paths) else ""
-    return [_by_path(one, common) if one.id in shared else one for one in found]
+    return [_by_path(one, common) if one.entry.id in shared else one for one in found]
 
 
 def _by_path(one: FoundEntry, common: str) -> FoundEntry:
-    path = one.entry.extra.get("path_with_namespace") if one.entry else None
-    if one.entry is None or path is None:
+    path = one.entry.extra.get("path_with_namespace")
+    if path is None:
         return one
-    name = path.removeprefix(common).strip("/").replace("/", "-") or one.id
-    return FoundEntry(where=one.where, id=name, entry=one.entry.model_copy(update={"id": name}))
+    name = path.removeprefix(common).strip("/").replace("/", "-") or one.entry.id
+    return FoundEntry(one.entry.model_copy(update={"id": name}))
 
 
 def _projects(path: Path) -> list[object]:
@@ -403,9 +388,7 @@ def _as_list(page: object, path: Path) -> object:
 
 
 def _text(path: Path) -> str:
-    try:
-        if path.stat().st_size > BYTES_MAX:
-            raise UsageError(f"{path}: larger than {BYTES_MAX >> 20} MB: this is not a list of projects")
-        return text_of(path.read_bytes(), path).strip(_BLANK)
-    except OSError as error:
-        raise UsageError(f"{path}: cannot be read: {error.strerror}") from error
+    data = read_given(path, BYTES_MAX)
+    if data is None:
+        raise UsageError(f"{path}: larger than {BYTES_MAX >> 20} MB: this is not a list of projects")
+    return text_of(data, path).strip(_BLANK)

@@ -1,4 +1,4 @@
-"""`compare` finds near-identical submissions in a process of its own; `write_similarity` writes them down.
+"""`compare` finds near-identical submissions; `write_similarity` writes them down.
 
 Compared are the programs in Python and C++ of a submission's evidence, without what catkin generates or everybody has
 alike: no link is followed, and sizes are bounded.
@@ -11,35 +11,32 @@ import re
 import stat
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
-from grader.errors import EvidenceError, HostError, SubmissionError, UsageError
+from grader.errors import EvidenceError, SubmissionError, UsageError
 from grader.evidence.reader import load_run
 from grader.files import atomic_write, open_untrusted, temporary_folder
-from grader.installable import install_extra
+from grader.installable import require_extra
 from grader.intake.archive import unpack
 from grader.intake.limits import IntakeLimits
 from grader.model.batch import Lines, NotCompared, Pair, Similarity
-from grader.model.record import Record
 from grader.report.text import csv_text, json_text
-from grader.workers import Worker, WorkerEnded, WorkerLimits
 
 THRESHOLD = 0.8
-LIMITS = WorkerLimits(memory_bytes=6 << 30, cpu_s=1800, wall_s=1800)
-REASON_CHARS = 200
 HEAD = (
     "a", "name_a", "b", "name_b", "similarity_a_percent", "similarity_b_percent", "lines_a", "lines_b", "files"
 )  # fmt: skip
 
 
-class ComparisonRequest(Record):
-    """What the process is asked: `folders` of results by id, starter code as folders and files, a share from 0 to 1."""
+@dataclass(frozen=True, kw_only=True)
+class ComparisonRequest:
+    """`folders` of results by id, starter code as folders and files, groups by id, a share from 0 to 1, and how many
+    are read side by side."""
 
-    folders: dict[str, Path]
-    starter: tuple[Path, ...]
-    groups: dict[str, str]
+    folders: Mapping[str, Path]
+    starter: Sequence[Path]
+    groups: Mapping[str, str]
     threshold: float
     jobs: int
 
@@ -58,26 +55,20 @@ def compare(
     named. `threshold` is the share (0 to 1) of the one's own code that is in the other, `jobs` how many are read side
     by side.
 
-    Raises UsageError without `copydetect` and for starter code that cannot be read, HostError if the process ends.
+    Raises UsageError without `copydetect` and for starter code that cannot be read.
     """
-    require_library()
+    require_extra("similarity", "comparing submissions", "copydetect")
+    from grader.classes.similarity.matching import compare_class  # noqa: PLC0415 - of the extra `similarity`
+
     with temporary_folder("source") as place:
         request = ComparisonRequest(
             folders={name: folder.absolute() for name, folder in folders.items()},
             starter=tuple(_unpack(path, place / str(number)) for number, path in enumerate(starter)),
-            groups=dict(groups or {}),
+            groups=groups or {},
             threshold=threshold,
             jobs=max(1, jobs),
         )
-        return _compare_apart(request)
-
-
-def require_library() -> None:
-    """Raise UsageError if the extra is not installed."""
-    if find_spec("copydetect") is None:
-        raise UsageError(
-            "comparing submissions needs copydetect, which is not installed", hint=install_extra("similarity")
-        )
+        return compare_class(request)
 
 
 def _unpack(path: Path, into: Path) -> Path:
@@ -93,29 +84,6 @@ def _unpack(path: Path, into: Path) -> Path:
     except OSError as error:
         raise UsageError(f"--starter {path}: cannot be read: {error.strerror}") from error
     return into
-
-
-def _compare_apart(request: ComparisonRequest) -> Similarity:
-    """Compare in a worker, which has limits and can be ended with all that it started."""
-    worker = Worker(LIMITS)
-    hint = "give it more memory, or compare fewer submissions"
-    try:
-        return worker.run(_compare_class, request)
-    except WorkerEnded as error:
-        raise HostError(
-            f"the submissions could not be compared: the process {error.reason}", hint=hint
-        ) from error
-    except Exception as error:
-        reason = f"{type(error).__name__}: {error}"[:REASON_CHARS]
-        raise HostError(f"the submissions could not be compared: {reason}", hint=hint) from error
-    finally:
-        worker.close()
-
-
-def _compare_class(request: ComparisonRequest) -> Similarity:
-    from grader.classes.similarity.matching import compare_class  # noqa: PLC0415 - of the extra `similarity`
-
-    return compare_class(request)
 
 
 def write_similarity(

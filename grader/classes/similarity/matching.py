@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 import signal
 from base64 import b64decode, b64encode
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from importlib import metadata
@@ -349,9 +349,11 @@ def _pairs(works: Sequence[Work], request: ComparisonRequest) -> tuple[list[Pair
     found, same_group = [], 0
     for first, second in near:
         one = pair(works[first], works[second])
-        if not _alike(one, request.threshold):
+        share = max(one.similarity_a, one.similarity_b)
+        if share < request.threshold or min(one.lines_a, one.lines_b) < MIN_LINES:
             continue
-        if _same_group(one, request.groups):
+        group = request.groups.get(one.a, "")
+        if group and group == request.groups.get(one.b):
             same_group += 1
         else:
             found.append(one)
@@ -359,16 +361,6 @@ def _pairs(works: Sequence[Work], request: ComparisonRequest) -> tuple[list[Pair
         key=lambda one: (-max(one.similarity_a, one.similarity_b), -one.lines_a - one.lines_b, one.a, one.b)
     )
     return found, same_group, cut
-
-
-def _alike(one: Pair, threshold: float) -> bool:
-    share = max(one.similarity_a, one.similarity_b)
-    return share >= threshold and min(one.lines_a, one.lines_b) >= MIN_LINES
-
-
-def _same_group(one: Pair, groups: Mapping[str, str]) -> bool:
-    group = groups.get(one.a, "")
-    return bool(group) and group == groups.get(one.b)
 
 
 def _notes(request: ComparisonRequest, count: int, found: Sequence[Sequence[str]], *, cut: bool) -> list[str]:

@@ -39,6 +39,7 @@ from grader.cli.declare import (
     port,
 )
 from grader.errors import ExitCode, UsageError
+from grader.installable import require_extra
 from grader.report.forms import FORMS as REPORT_FORMS
 
 DEFAULT_OUT = Path("grader-results")
@@ -178,9 +179,7 @@ def review(
 
     The page is served to this machine alone until Ctrl-C.
     """
-    with loading():
-        from grader.classes.review import require_library
-    require_library()
+    require_extra("review", "reviewing a class", "flask", "waitress")
     with loading():
         from grader.classes.review.markers import share_of
         from grader.classes.review.session import open_session
@@ -318,9 +317,7 @@ def similar(
     as_json: JsonFlag = False,
 ) -> ExitCode:
     """Find nearly identical submissions, for a person to look at; marks do not change."""
-    with loading():
-        from grader.classes.similarity.comparison import require_library
-    require_library()
+    require_extra("similarity", "comparing submissions", "copydetect")
     with loading():
         from grader.classes.similarity import compare, write_similarity
         from grader.cli.classes import print_similarity, starter_of, submissions_in

@@ -190,10 +190,11 @@ def sign(
     """Sign results and their evidence with an SSH key."""
     with loading():
         from grader.cli.output import say
-        from grader.verification import read_whole, result_folders
+        from grader.results import RESULT, load_result
+        from grader.verification import result_folders
         from grader.verification import sign as sign_folder
     for folder in result_folders(list(results)):
-        read_whole(folder)
+        load_result(folder / RESULT)
         sign_folder(folder, key)
         say(f"{folder}: signed")
     return ExitCode.PASSED

@@ -110,7 +110,7 @@ def doctor(*, rubric: Annotated[str | None, RUBRIC] = None, as_json: JsonFlag = 
     loaded = load_rubric(rubric) if rubric is not None else None
     rows = (*machine.diagnose(), *(machine.diagnose_rubric(loaded) if loaded is not None else ()))
     if as_json:
-        say_json([row.model_dump(by_alias=True) for row in rows])
+        say_json([row.for_json() for row in rows])
     else:
         machine.print_rows(rows, sys.stdout)
     return ExitCode.NOT_GRADED if any(row.state == "missing" for row in rows) else ExitCode.PASSED

@@ -124,7 +124,7 @@ def line_of(entry: Entry, result: GradingResult, criteria: Sequence[CriterionInf
         id=line(entry.id, CHARS),
         name=line(entry.name, CHARS),
         group=line(entry.group, CHARS),
-        folder=result.submission.id if _has_reports(result) else "",
+        folder="" if result.error and result.error.kind in {MISSING, ROSTER} else result.submission.id,
         state=state_of(result),
         points=result.points,
         letters=letters_of(result, criteria),
@@ -152,10 +152,6 @@ def _points_lost(result: GradingResult, criteria: Sequence[CriterionInfo]) -> di
 def link_to(one: SubmissionRow) -> str:
     """Return the submission's report; empty where it has none."""
     return f"{quote(one.folder, safe='', errors='replace')}/{REPORT}" if one.folder else ""
-
-
-def _has_reports(result: GradingResult) -> bool:
-    return result.error is None or result.error.kind not in {MISSING, ROSTER}
 
 
 def state_of(result: GradingResult) -> SubmissionState:

@@ -58,7 +58,8 @@ def figures_of(rubric: Rubric, runs: Mapping[str, Run], criteria: Sequence[Crite
     scenario without nodes and one in which nothing was printed are not in it.
     """
     rubric = with_recorded_values(rubric, runs)
-    facts, on_copy = (_try_make(try_facts, rubric, found) for found in _first_and_copy(runs))
+    first, _, repaired = split_runs(runs)  # the runs of a repaired copy stand in the place of the first ones
+    facts, on_copy = (_try_make(try_facts, rubric, found) for found in (first, {**first, **repaired}))
     known = facts.runs if facts else runs
     shown = {
         name: run for name, run in islice(known.items(), RUNS_MAX) if name in {*rubric.scenarios, PACKAGE_RUN}
@@ -69,12 +70,6 @@ def figures_of(rubric: Rubric, runs: Mapping[str, Run], criteria: Sequence[Crite
         graphs=_each(graph_of, {name: run for name, run in shown.items() if name != PACKAGE_RUN}),
         consoles=_each(console_of, shown),
     )
-
-
-def _first_and_copy(runs: Mapping[str, Run]) -> tuple[dict[str, Run], dict[str, Run]]:
-    """Return the first runs, and the same with those of a repaired copy in their place."""
-    first, _, repaired = split_runs(runs)
-    return first, {**first, **repaired}
 
 
 def _by_criterion(

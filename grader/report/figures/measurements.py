@@ -328,19 +328,16 @@ def _lines_of(
 
 def _row(run: Run, topic: str, probe: Probe, right: Line | None, other: Line | None) -> Heard:
     line = right or other
+    # without what stands between the node's name, which is cut off already, and its words
+    words = short(" ".join(line.text.split()).removeprefix(": "), TEXT_LETTERS) if line else None
     return Heard(
         topic=short_name(topic),
         sent=short(probe.value, TEXT_LETTERS),
         at_s=second(run, probe.at_ns),
-        heard=None if line is None else _message_words(line),
+        heard=words,
         after_s=None if line is None else max(0.0, round((line.at_ns - probe.at_ns) / 1e9, 6)),
         other_words=right is None and line is not None,
     )
-
-
-def _message_words(line: Line) -> str:
-    """Without what stands between the node's name, which is cut off already, and its words."""
-    return short(" ".join(line.text.split()).removeprefix(": "), TEXT_LETTERS)
 
 
 def _shown_probes(found: Sequence[Line | None]) -> list[int]:

@@ -17,19 +17,10 @@ from grader.evidence.events import PACKAGE_RUN
 from grader.model.figure import Figure, Figures
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import FileCitation, Status
-from grader.report import sentences
+from grader.report import losses, sentences
 from grader.report.html.figures import Drawer, Drawn, code_places
 from grader.report.html.shell import environment, policy, prose, script, style
-from grader.report.losses import (
-    Loss,
-    MissingFile,
-    ReportView,
-    arrange,
-    missing_file,
-    missing_files,
-    write_files_hint,
-)
-from grader.report.sentences import is_own_fault, lost_words
+from grader.report.losses import Loss
 from grader.report.text import line
 from grader.report.view import (
     blame,
@@ -64,7 +55,7 @@ def render_html(
 
     `docs` has the sections of the checks' docstrings, `changes` what has changed since it was first published.
     """
-    view = arrange(result, rubric)
+    view = losses.arrange(result, rubric)
     head = {
         **_head(result, rubric, hidden, len(view.lost)),
         "view": view,
@@ -207,7 +198,7 @@ class Card:
     blocked: Sequence[Card] = ()
     alike: Sequence[Card] = ()
     repaired: Sequence[Card] = ()
-    files: Sequence[MissingFile] = ()
+    files: Sequence[losses.MissingFile] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -255,7 +246,7 @@ class Maker:
         self._anchors = {c.id: f"criterion-{i}" for i, c in enumerate(result.criteria, start=1)}
         self._room = detail.cards
 
-    def page(self, view: ReportView) -> Page:
+    def page(self, view: losses.ReportView) -> Page:
         whole = not not_graded(self._result)
         lost = [self._loss(loss) for loss in self._first(view.lost if whole else ())]
         still = [self._loss(loss) for loss in self._first(view.open if whole else ())]
@@ -284,10 +275,10 @@ class Maker:
     def _loss(self, loss: Loss) -> Card:
         told = {c.id for c in loss.alike}
         repaired = [self._by_id[i] for i in self._repaired.get(loss.criterion.id, ()) if i not in told]
-        files = missing_files(loss)
+        files = losses.missing_files(loss)
         card = replace(
             self._card(loss.criterion, self._with_graph(loss.criterion)),
-            lost=lost_words(loss),
+            lost=sentences.lost_words(loss),
             blocked=[self._short(c) for c in loss.blocked],
             alike=[] if files else [self._short(c) for c in loss.alike],
             repaired=[self._short(c) for c in repaired],
@@ -300,7 +291,7 @@ class Maker:
             card,
             message=f"{len({file.path for file in files})} files are not in the package",
             rest="",
-            hint=[self._prose(sentence(write_files_hint(files)))],
+            hint=[self._prose(sentence(losses.write_files_hint(files)))],
             of=f"{number(sum(c.points for c in together))} of {number(sum(c.max_points for c in together))}",
         )
 
@@ -325,7 +316,7 @@ class Maker:
             rest=sentence(rest),
             why=self._prose(docs.get(MATTERS, "")),
             how=self._prose(docs.get(MEASURED, "")),
-            fix=self._prose(docs.get(FIX, "")) if is_own_fault(criterion) else NOTHING,
+            fix=self._prose(docs.get(FIX, "")) if sentences.is_own_fault(criterion) else NOTHING,
             hint=[
                 self._prose(sentence(step)) for step in steps(hint_beside(criterion, place)) if criterion.hint
             ],
@@ -348,7 +339,7 @@ class Maker:
 
     def _seen(self, criterion: CriterionResult) -> tuple[tuple[str, bool], ...]:
         """Return how to see it, and where; nothing of a missing file, of which a command only says the same."""
-        if missing_file(criterion):
+        if losses.missing_file(criterion):
             return ()
         where = where_to_type(criterion.reproduce)
         return (*([(where, False)] if where else []), *commands_in(criterion.reproduce))

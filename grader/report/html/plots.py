@@ -8,21 +8,7 @@ from collections.abc import Iterator, Sequence
 from markupsafe import Markup
 
 from grader.model.figure import CounterFigure, PathFigure, PlaceFigure, RateFigure
-from grader.report.html.svg import (
-    BOTTOM,
-    LEFT,
-    RIGHT,
-    TOP,
-    Frame,
-    Point,
-    dots,
-    drawing,
-    element,
-    from_log,
-    path,
-    text,
-    to_log,
-)
+from grader.report.html import svg
 from grader.wording import hertz, number, plural
 
 WHOLE = (760.0, 240.0)
@@ -88,7 +74,7 @@ def _step(figure: CounterFigure, i: int) -> str:
     return f"{number(figure.values[i - 1])} → {value}" if i else f"{value} comes first"
 
 
-def _plot(figure: CounterFigure, name: str, shown: range, size: Point, title: str) -> Markup:
+def _plot(figure: CounterFigure, name: str, shown: range, size: svg.Point, title: str) -> Markup:
     values = [float(max(-FAR, min(FAR, figure.values[i]))) for i in shown]
     times = [figure.times_s[i] for i in shown]
     low, high = min(values), max(values)
@@ -96,7 +82,7 @@ def _plot(figure: CounterFigure, name: str, shown: range, size: Point, title: st
         low, high = min(low, 0.0), max(high, 1.0)
     pad = (high - low) * 0.14 or 1.0
     died = _visible_ends(figure.died, times[0], times[-1])
-    frame = Frame(
+    frame = svg.Frame(
         size=size,
         xs=(times[0], max(times[-1], *(at for at, _ in died), times[0] + TINY_S)),
         ys=(low - (pad if low != 0 else 0), high + pad),
@@ -110,16 +96,16 @@ def _plot(figure: CounterFigure, name: str, shown: range, size: Point, title: st
     children = frame.axes(fast if figure.faster != 1 else "seconds since the run began", "value")
     children += _wraps(figure, frame, at)
     children += _deaths(died, frame)
-    children.append(element("path", d="".join(map(path, _whole(figure, at))), class_="line"))
+    children.append(svg.element("path", d="".join(map(svg.path, _whole(figure, at))), class_="line"))
     if named:
         children += [
-            text(x, y - 9, number(figure.values[i]), text_anchor="middle")
+            svg.text(x, y - 9, number(figure.values[i]), text_anchor="middle")
             for i, (x, y) in at.items()
             if i not in figure.wrong
         ]
-    children.append(element("path", d=dots(points), class_="dots" if few else "dots small"))
+    children.append(svg.element("path", d=svg.dots(points), class_="dots" if few else "dots small"))
     children += _wrong(figure, frame, at)
-    return drawing(name, size, title, counter_words(figure), *children)
+    return svg.drawing(name, size, title, counter_words(figure), *children)
 
 
 def _has_dwarfed(values: Sequence[float]) -> bool:
@@ -134,25 +120,25 @@ def _visible_ends(died: Sequence[tuple[float, str]], from_s: float, to_s: float)
     return [(at, words) for at, words in died if from_s <= at <= beyond][:1]
 
 
-def _deaths(died: Sequence[tuple[float, str]], frame: Frame) -> Iterator[Markup]:
+def _deaths(died: Sequence[tuple[float, str]], frame: svg.Frame) -> Iterator[Markup]:
     """Where a process ended by itself: nothing comes after that."""
     for at, words in died:
         x = frame.x(at)
-        yield element("line", x1=x, x2=x, y1=TOP, y2=frame.bottom, class_="died")
-        yield _beside(x, frame.bottom - 8, words, 6, most=(LEFT + frame.right) / 2, class_="alarm")
+        yield svg.element("line", x1=x, x2=x, y1=svg.TOP, y2=frame.bottom, class_="died")
+        yield _beside(x, frame.bottom - 8, words, 6, most=(svg.LEFT + frame.right) / 2, class_="alarm")
 
 
 def _beside(x: float, y: float, words: str, gap: float, *, most: float, class_: str = "label") -> Markup:
     """Return words beside a place: to its right, or to its left where it lies right of `most`."""
     if x > most:
-        return text(x - gap, y, words, class_, text_anchor="end")
-    return text(x + gap, y, words, class_, text_anchor="start")
+        return svg.text(x - gap, y, words, class_, text_anchor="end")
+    return svg.text(x + gap, y, words, class_, text_anchor="start")
 
 
-def _whole(figure: CounterFigure, at: dict[int, Point]) -> Iterator[list[Point]]:
+def _whole(figure: CounterFigure, at: dict[int, svg.Point]) -> Iterator[list[svg.Point]]:
     """The points in pieces, broken where values between them are left out."""
     numbers = figure.numbers or range(len(figure.values))
-    piece: list[Point] = []
+    piece: list[svg.Point] = []
     for i, point in at.items():
         if piece and numbers[i] != numbers[i - 1] + 1:
             yield piece
@@ -161,26 +147,26 @@ def _whole(figure: CounterFigure, at: dict[int, Point]) -> Iterator[list[Point]]
     yield piece
 
 
-def _wraps(figure: CounterFigure, frame: Frame, at: dict[int, Point]) -> Iterator[Markup]:
+def _wraps(figure: CounterFigure, frame: svg.Frame, at: dict[int, svg.Point]) -> Iterator[Markup]:
     for i in figure.wraps:
         if i not in at:
             continue
         x, y = at[i]
-        yield element("line", x1=x, x2=x, y1=TOP, y2=frame.bottom, class_="wrap")
-        yield element("path", d=f"M{x:.1f} {y - 6:.1f}l5 6l-5 6l-5 -6z", class_="wrap-mark")
+        yield svg.element("line", x1=x, x2=x, y1=svg.TOP, y2=frame.bottom, class_="wrap")
+        yield svg.element("path", d=f"M{x:.1f} {y - 6:.1f}l5 6l-5 6l-5 -6z", class_="wrap-mark")
         if len(figure.wraps) <= LABELS_MAX // 2 and i not in figure.wrong:
-            yield _beside(x, TOP - 7, f"wrap {_step(figure, i)}", 5, most=frame.right - 90)
+            yield _beside(x, svg.TOP - 7, f"wrap {_step(figure, i)}", 5, most=frame.right - 90)
 
 
-def _wrong(figure: CounterFigure, frame: Frame, at: dict[int, Point]) -> Iterator[Markup]:
+def _wrong(figure: CounterFigure, frame: svg.Frame, at: dict[int, svg.Point]) -> Iterator[Markup]:
     for index, i in enumerate(figure.wrong[:LABELS_MAX], start=1):
         if i not in at:
             continue
         x, y = at[i]
-        yield element("circle", cx=x, cy=y, r=10, class_="wrong")
+        yield svg.element("circle", cx=x, cy=y, r=10, class_="wrong")
         turns = i == 0 or abs(figure.values[i] - figure.values[i - 1]) != 1
         words = f"#{index}: {_step(figure, i)}" if turns and len(figure.wrong) <= TEXTS_MAX else f"#{index}"
-        above = y - 24 if y - 24 > TOP else y + 28
+        above = y - 24 if y - 24 > svg.TOP else y + 28
         yield _beside(x, above, words, 8, most=frame.right - 110, class_="alarm")
 
 
@@ -198,13 +184,13 @@ def path_plot(figure: PathFigure, name: str) -> Markup | None:
     children = frame.axes("metres", "metres")
     if len(corners) > 1:
         room = max(2 * figure.tolerance_m * scale, 2.0)
-        children.append(element("path", d=path(corners), class_="room", stroke_width=room))
-        children.append(element("path", d=path(corners), class_="way"))
+        children.append(svg.element("path", d=svg.path(corners), class_="room", stroke_width=room))
+        children.append(svg.element("path", d=svg.path(corners), class_="way"))
     taken = frame.at(figure.points)
-    children.append(element("path", d=path(taken), class_="line strong-line"))
+    children.append(svg.element("path", d=svg.path(taken), class_="line strong-line"))
     children += _corners(figure, corners)
     children += _mark_point(figure.strayed, taken, "leaves it here")
-    return drawing(
+    return svg.drawing(
         name, frame.size, f"The path of {figure.topic}, seen from above", path_words(figure), *children
     )
 
@@ -227,50 +213,57 @@ def place_plot(figure: PlaceFigure, name: str) -> Markup:
     taken = frame.at(figure.points)
     children = frame.axes("metres", "metres")
     if figure.area:
-        children.append(element("path", d=path(frame.at((*figure.area, figure.area[0]))), class_="way"))
+        children.append(
+            svg.element("path", d=svg.path(frame.at((*figure.area, figure.area[0]))), class_="way")
+        )
     for x, y in frame.at(goal):
-        children.append(element("circle", cx=x, cy=y, r=max(figure.tolerance_m * scale, 4), class_="goal"))
-    lines = "".join((path if len(line) > 1 else dots)(frame.at(line)) for line in figure.walls)
+        children.append(
+            svg.element("circle", cx=x, cy=y, r=max(figure.tolerance_m * scale, 4), class_="goal")
+        )
+    lines = "".join((svg.path if len(line) > 1 else svg.dots)(frame.at(line)) for line in figure.walls)
     if lines:
-        children.append(element("path", d=lines, class_="wall"))
-    children.append(element("path", d=path(taken), class_="line strong-line"))
-    children.append(element("circle", cx=taken[0][0], cy=taken[0][1], r=4, class_="corner"))
+        children.append(svg.element("path", d=lines, class_="wall"))
+    children.append(svg.element("path", d=svg.path(taken), class_="line strong-line"))
+    children.append(svg.element("circle", cx=taken[0][0], cy=taken[0][1], r=4, class_="corner"))
     children += _mark_point(figure.wrong, taken, "here")
     title = f"Where the robot was, seen from above: {figure.topic}"
-    return drawing(name, frame.size, title, figure.says, *children)
+    return svg.drawing(name, frame.size, title, figure.says, *children)
 
 
-def _frame(spots: Sequence[Point], room: float) -> tuple[Frame, float]:
+def _frame(spots: Sequence[svg.Point], room: float) -> tuple[svg.Frame, float]:
     """The frame, and how many pixels a metre has in it."""
     x_low, x_high = _edges([x for x, _ in spots], room)
     y_low, y_high = _edges([y for _, y in spots], room)
     wide, high = x_high - x_low, y_high - y_low
     scale = SIDE / max(high, wide / WIDEST)
     # A path along a wall is nearly a line: its plot is still half as wide, and a quarter as high, as a square one.
-    size = (LEFT + RIGHT + max(wide * scale, SIDE / 2), TOP + BOTTOM + max(high * scale, SIDE / 4))
+    size = (
+        svg.LEFT + svg.RIGHT + max(wide * scale, SIDE / 2),
+        svg.TOP + svg.BOTTOM + max(high * scale, SIDE / 4),
+    )
     xs, ys = (x_low, x_low + max(wide, SIDE / 2 / scale)), (y_low, y_low + max(high, SIDE / 4 / scale))
-    return Frame(size=size, xs=xs, ys=ys), scale
+    return svg.Frame(size=size, xs=xs, ys=ys), scale
 
 
-def _edges(values: list[float], room: float) -> Point:
+def _edges(values: list[float], room: float) -> svg.Point:
     low, high = min(values), max(values)
     pad = max(room, 0.08 * (high - low), 0.05)
     return low - pad, high + pad
 
 
-def _corners(figure: PathFigure, corners: list[Point]) -> Iterator[Markup]:
+def _corners(figure: PathFigure, corners: list[svg.Point]) -> Iterator[Markup]:
     for i, (x, y) in enumerate(corners):
         passed = i < figure.reached
-        yield element("circle", cx=x, cy=y, r=5, class_="corner passed" if passed else "corner")
+        yield svg.element("circle", cx=x, cy=y, r=5, class_="corner passed" if passed else "corner")
         if i < CORNER_LABELS_MAX and (x, y) not in corners[:i]:
-            yield text(x + 8, y - 8, "start" if i == 0 and not figure.first else f"{i + figure.first}")
+            yield svg.text(x + 8, y - 8, "start" if i == 0 and not figure.first else f"{i + figure.first}")
 
 
-def _mark_point(index: int | None, taken: list[Point], words: str) -> Iterator[Markup]:
+def _mark_point(index: int | None, taken: list[svg.Point], words: str) -> Iterator[Markup]:
     if index is None:
         return
     x, y = taken[index]
-    yield element("circle", cx=x, cy=y, r=10, class_="wrong")
+    yield svg.element("circle", cx=x, cy=y, r=10, class_="wrong")
     yield _beside(x, y + 4, words, 13, most=max(spot[0] for spot in taken) - 90, class_="alarm")
 
 
@@ -341,7 +334,7 @@ def _over_time(figure: RateFigure, name: str) -> Markup:
     log = max(rates) > TOO_FAR * highest
     end = max(last, *(at for at, _ in died), last)
     top = (1.5 if log else 1.2) * max(highest, *rates)
-    frame = Frame(size=OVER_TIME, xs=(begin, end), ys=(0, top), log_y=log)
+    frame = svg.Frame(size=OVER_TIME, xs=(begin, end), ys=(0, top), log_y=log)
     children = [_hatching(name), frame.box(frame.xs, (figure.low_hz, figure.high_hz), class_="band")]
     children += [
         frame.box(stretch, frame.ys, fill=f"url(#{name}-late)", class_="late")
@@ -350,13 +343,13 @@ def _over_time(figure: RateFigure, name: str) -> Markup:
     ]
     children += frame.axes("seconds since the run began", "Hz")
     points = frame.at(zip(figure.times_s, rates, strict=True))
-    children.append(element("path", d=dots(points), class_="dots"))
+    children.append(svg.element("path", d=svg.dots(points), class_="dots"))
     children.append(
-        text(LEFT + 5, frame.y(figure.high_hz) - 5, f"{_allowed_text(figure)} passes", class_="good")
+        svg.text(svg.LEFT + 5, frame.y(figure.high_hz) - 5, f"{_allowed_text(figure)} passes", class_="good")
     )
     children += _mean(frame, figure.mean_hz)
     children += _deaths(died, frame)
-    return drawing(name, OVER_TIME, f"Rate of {figure.topic} over time", rate_words(figure), *children)
+    return svg.drawing(name, OVER_TIME, f"Rate of {figure.topic} over time", rate_words(figure), *children)
 
 
 def _flood(figure: RateFigure, name: str) -> Markup:
@@ -364,7 +357,7 @@ def _flood(figure: RateFigure, name: str) -> Markup:
     hz = [count / figure.slice_s for count in figure.counts]
     begin = max(0.0, figure.times_s[0] - figure.gaps_s[0])
     end = begin + figure.slice_s * len(hz)
-    frame = Frame(size=OVER_TIME, xs=(begin, end), ys=(0, 4 * max(hz)), log_y=True)
+    frame = svg.Frame(size=OVER_TIME, xs=(begin, end), ys=(0, 4 * max(hz)), log_y=True)
     children = frame.axes("seconds since the run began", "messages a second")
     children += [
         frame.box(
@@ -375,24 +368,25 @@ def _flood(figure: RateFigure, name: str) -> Markup:
     ]
     y = (frame.y(figure.low_hz) + frame.y(figure.high_hz)) / 2
     children += [
-        element("line", x1=LEFT, x2=frame.right, y1=y, y2=y, class_=look) for look in ("halo", "passes")
+        svg.element("line", x1=svg.LEFT, x2=frame.right, y1=y, y2=y, class_=look)
+        for look in ("halo", "passes")
     ]
     above = frame.y(max(hz)) - 8
-    children.append(text(LEFT + 5, above, f"green: {_allowed_text(figure)} passes", class_="good"))
+    children.append(svg.text(svg.LEFT + 5, above, f"green: {_allowed_text(figure)} passes", class_="good"))
     mean = f"mean {figure.mean_hz:,.0f} Hz" if figure.mean_hz else ""
-    children.append(text(frame.right - 4, above, mean, class_="strong", text_anchor="end"))
-    return drawing(name, OVER_TIME, f"Rate of {figure.topic} over time", rate_words(figure), *children)
+    children.append(svg.text(frame.right - 4, above, mean, class_="strong", text_anchor="end"))
+    return svg.drawing(name, OVER_TIME, f"Rate of {figure.topic} over time", rate_words(figure), *children)
 
 
-def _mean(frame: Frame, mean_hz: float | None) -> list[Markup]:
+def _mean(frame: svg.Frame, mean_hz: float | None) -> list[Markup]:
     if mean_hz is None:
         return []
     y = frame.y(mean_hz)
     return [
-        element("line", x1=LEFT, x2=frame.right, y1=y, y2=y, class_="mean"),
-        text(
+        svg.element("line", x1=svg.LEFT, x2=frame.right, y1=y, y2=y, class_="mean"),
+        svg.text(
             frame.right - 4,
-            y - 7 if y > 2 * TOP else y + 17,
+            y - 7 if y > 2 * svg.TOP else y + 17,
             f"mean {hertz(mean_hz)}",
             class_="strong",
             text_anchor="end",
@@ -401,9 +395,10 @@ def _mean(frame: Frame, mean_hz: float | None) -> list[Markup]:
 
 
 def _hatching(name: str) -> Markup:
-    line = element("path", d="M0 8L8 0", class_="hatch")
-    return element(
-        "defs", element("pattern", line, id=f"{name}-late", width=8, height=8, patternUnits="userSpaceOnUse")
+    line = svg.element("path", d="M0 8L8 0", class_="hatch")
+    return svg.element(
+        "defs",
+        svg.element("pattern", line, id=f"{name}-late", width=8, height=8, patternUnits="userSpaceOnUse"),
     )
 
 
@@ -411,11 +406,12 @@ def _histogram(figure: RateFigure, name: str) -> Markup:
     bound = figure.gap_high_s or 2 / figure.low_hz
     log = max(figure.gaps_s) > TOO_FAR * bound
     longest_ms = 1.1e3 * max(1.2 * bound, *figure.gaps_s)
-    edges = [_part(i / BINS, longest_ms, log=log) for i in range(BINS + 1)]
+    shares = [i / BINS for i in range(BINS + 1)]
+    edges = [svg.from_log(s * svg.to_log(longest_ms)) if log else s * longest_ms for s in shares]
     counts = [0] * BINS
     for gap in figure.gaps_s:
         counts[min(bisect_right(edges, gap * 1000) - 1, BINS - 1)] += 1
-    frame = Frame(size=HISTOGRAM, xs=(0, longest_ms), ys=(0, 1.15 * max(counts)), log_x=log)
+    frame = svg.Frame(size=HISTOGRAM, xs=(0, longest_ms), ys=(0, 1.15 * max(counts)), log_x=log)
     children = _gap_bounds(figure, frame)
     children += frame.axes("milliseconds from message to message", "messages")
     children += [
@@ -424,19 +420,15 @@ def _histogram(figure: RateFigure, name: str) -> Markup:
         if count
     ]
     words = f"{len(figure.gaps_s)} gaps. {rate_words(figure)}"
-    return drawing(name, HISTOGRAM, f"Gaps between messages on {figure.topic}", words, *children)
+    return svg.drawing(name, HISTOGRAM, f"Gaps between messages on {figure.topic}", words, *children)
 
 
-def _part(share: float, whole: float, *, log: bool) -> float:
-    return from_log(share * to_log(whole)) if log else share * whole
-
-
-def _gap_bounds(figure: RateFigure, frame: Frame) -> list[Markup]:
+def _gap_bounds(figure: RateFigure, frame: svg.Frame) -> list[Markup]:
     if figure.gap_low_s is None or figure.gap_high_s is None:
         return []
     low, high = figure.gap_low_s * 1000, figure.gap_high_s * 1000
     edges = (frame.x(low), frame.x(high))
     return [
         frame.box((low, high), frame.ys, class_="band"),
-        *(element("line", x1=x, x2=x, y1=TOP, y2=frame.bottom, class_="bound") for x in edges),
+        *(svg.element("line", x1=x, x2=x, y1=svg.TOP, y2=frame.bottom, class_="bound") for x in edges),
     ]
