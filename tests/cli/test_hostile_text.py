@@ -35,8 +35,8 @@ MAY_PRINT = {
     "cli/class_display.py",
     "cli/main.py",  # the list of commands, which is its own
     "limited_child.py",  # JSON for the process that started it
-    "integrations/ci_systems.py",  # annotations; tests/ci
-    "integrations/autograde.py",  # a report as in a terminal; tests/deliver
+    "integrations/ci_systems.py",  # annotations; tests/integrations
+    "integrations/autograde.py",  # a report as in a terminal; tests/integrations
 }
 NASTY = "\x1b[2J\u202e\n::error::owned\n##[error]x\x9b31m\ud800" + "y" * 10**6
 SOME = settings(max_examples=40)

@@ -62,7 +62,7 @@ exec chroot . /usr/bin/env -i PATH=/usr/bin:/usr/sbin:/bin:/sbin HOME=/root LANG
   PYTHONPATH=/repo PYTHONDONTWRITEBYTECODE=1 /usr/bin/env -C /repo "$@"
 """
 TESTS = (
-    "tests/admission",
+    "tests/arena",
     "tests/arena",
     "tests/evidence",
     "tests/package/test_launch.py",

@@ -8,7 +8,7 @@ import shlex
 import pytest
 
 from grader.cli.main import run
-from tests.batch.a_class import CORRECT, ROOT, RUBRIC, WRONG_NAME, batch, handed_in, roster_of
+from tests.classes.batch.a_class import CORRECT, ROOT, RUBRIC, WRONG_NAME, batch, handed_in, roster_of
 from tests.report.class_page.test_page import data_of
 
 
