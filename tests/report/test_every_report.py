@@ -38,8 +38,8 @@ from grader.report.terminal import open_console, print_report
 from grader.report.text import line
 from tests.report.hostile import result, rubric
 from tests.report.nasty import STEERING, TEXTS
-from tests.report.test_shown import TO_A_CI
 from tests.report.test_text import FOUND_BY_FORGES, HARMLESS, MARKDOWN, QUICK_ACTION, prose
+from tests.report.test_text_visible import TO_A_CI
 from tests.support.a_class import criterion
 
 FIELDS = ("id", "title", "check", "scenario", "message", "expected", "measured", "hint", "reproduce")

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from grader.rubric.own_checks import VisibleText, printing_to_stderr
 from tests.report.nasty import STEERING, TEXTS
-from tests.report.test_shown import TO_A_CI
+from tests.report.test_text_visible import TO_A_CI
 
 
 @given(st.lists(TEXTS, max_size=6))

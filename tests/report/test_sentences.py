@@ -1,4 +1,4 @@
-"""What people decided and what being late cost stands in every report, near the points."""
+"""Late work, overrides and notes stand in every report that people read."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from datetime import date, datetime, timedelta, timezone
 import pytest
 from lxml import etree
 
-from grader.model.result import AppliedOverride, Automatic, ErrorInfo, GradingResult, HandedIn, Lateness
+from grader.model.result import AppliedOverride, Automatic, ErrorInfo, GradingResult, HandedIn, Lateness, Note
 from grader.model.verdict import Status
 from grader.report.files import result_bytes
 from grader.report.junit import render_junit
@@ -167,3 +167,51 @@ def test_of_what_could_not_be_opened_there_is_no_digest() -> None:
     assert "package digest" in render_markdown(one, rubric())
     gone = one.submission.model_copy(update={"digest": "", "package": ""})
     assert "recording digest" not in render_markdown(one.model_copy(update={"submission": gone}), rubric())
+
+
+NOTES = (
+    Note(scenario="real", actor="talker.py", kind="refused", text="asked the master to shut down"),
+    Note(scenario="package", actor="", kind="limit", text="had more than 400 processes"),
+)
+COSTS_NOTHING = "None of this cost any points."
+
+
+def test_result_json_names_them_last_and_only_where_there_are_any():
+    data = json.loads(result_bytes(result(notes=NOTES)))
+    assert list(data)[-2:] == ["timing", "notes"]
+    assert data["notes"][0] == {
+        "scenario": "real",
+        "actor": "talker.py",
+        "kind": "refused",
+        "text": "asked the master to shut down",
+    }
+    assert "notes" not in json.loads(result_bytes(result()))
+
+
+def test_markdown_has_a_section():
+    text = render_markdown(result(notes=NOTES), rubric())
+    assert (
+        f"<summary>Noticed while it ran (2)</summary>\n\n{COSTS_NOTHING}\n\n- `real, talker.py`: asked the master"
+        in text
+    )
+    assert "- `build`: had more than 400 processes (over the limit)" in text
+    assert "Noticed" not in render_markdown(result(), rubric())
+
+
+def test_the_terminal_has_a_section():
+    out = io.StringIO()
+    print_report(result(notes=NOTES), rubric(), open_console(out))
+    assert "\nNoticed while it ran\n" in out.getvalue()
+    assert "  real, talker.py: asked the master to shut down (refused)\n" in out.getvalue()
+    assert COSTS_NOTHING in out.getvalue()
+
+
+def test_junit_has_it_as_output_of_the_suite():
+    suite = etree.fromstring(render_junit(result(notes=NOTES)))[0]
+    assert suite[-1].tag == "system-out"
+    assert suite[-1].text.splitlines() == [
+        f"Noticed while it ran. {COSTS_NOTHING}",
+        "real, talker.py: asked the master to shut down (refused)",
+        "build: had more than 400 processes (over the limit)",
+    ]
+    assert etree.fromstring(render_junit(result())).find("testsuite/system-out") is None

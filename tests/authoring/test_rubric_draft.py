@@ -10,7 +10,7 @@ from grader.authoring.mutation.faulty_packages import mutants_text
 from grader.authoring.rubric_draft import rubric_text
 from grader.model.mutants import LostCriterion, Mutant, MutantResult
 from tests.report.nasty import STEERING, TEXTS
-from tests.report.test_shown import TO_A_CI
+from tests.report.test_text_visible import TO_A_CI
 
 SOME = settings(max_examples=60)
 

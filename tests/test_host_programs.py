@@ -1,4 +1,4 @@
-"""Programs that run outside of every sandbox do not depend on the folder in which somebody grades."""
+"""Programs that run outside of every sandbox: they depend neither on the current folder nor on the environment."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ import pytest
 
 from grader.cli.host_support import _modules
 from grader.host_programs import (
+    HOST_ENV,
+    find_host_program,
     find_user_program,
     module_command,
     with_absolute_paths,
@@ -140,3 +142,29 @@ def test_doctor_asks_the_python_of_ros_from_the_root_folder(tmp_path) -> None:
     ros = RosInstallation(kind="debian", where="", distro="", python=str(python), prefixes=(), env={})
     assert {row.state for row in _modules(ros)} == {"ok"}
     assert (tmp_path / "here").read_text() == "/\n"
+
+
+@pytest.fixture
+def _asked_again():
+    find_host_program.cache_clear()
+    yield
+    find_host_program.cache_clear()
+
+
+@pytest.mark.usefixtures("_asked_again")
+def test_programs_are_not_found_by_the_path_of_the_caller(tmp_path, monkeypatch) -> None:
+    for name in ("sh", "no-such-program-anywhere"):
+        (tmp_path / name).write_text("#!/bin/sh\n")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    found = find_host_program("sh")
+    assert found is not None
+    assert Path(found).parent != tmp_path
+    assert find_host_program("no-such-program-anywhere") is None
+
+
+def test_the_path_that_is_handed_on_has_no_folder_of_a_user() -> None:
+    assert set(HOST_ENV) == {"PATH", "LANG"}
+    folders = [Path(folder) for folder in HOST_ENV["PATH"].split(":")]
+    assert all(folder.is_absolute() for folder in folders)
+    assert not [folder for folder in folders if folder.exists() and folder.stat().st_uid != 0]

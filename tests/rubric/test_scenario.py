@@ -1,4 +1,4 @@
-"""Faults of scenarios: what is started, set, sent and called, and when a run has seen enough."""
+"""Faults of scenarios: what is started, set, sent, called and answered, and when a run has seen enough."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from grader.errors import RubricError
 from grader.rubric.find import rubrics_folder
 from grader.rubric.load import cancels_of, load_rubric
 from tests.rubric.samples import faults, spoiled
@@ -131,3 +132,40 @@ def test_how_long_the_result_of_a_goal_is_waited_for_once_that_is_cancelled(
     path = tmp_path / "lab.yaml"
     path.write_text(text.replace("target: -1}, limit_s: 5", "target: -1}, limit_s: 10"), encoding="utf-8")
     assert cancels_of(load_rubric(str(path)).rubric).get("goals", {}).get("/count") == waited_s
+
+
+CALL = "{service: /reset, type: std_srvs/Empty}"
+CRITERION = """    check: service-answers
+    with: {service: /reset, expect: [{}, {}]}
+"""
+
+
+def with_calls(folder: Path, calls: str) -> Path:
+    """The sound rubric with a criterion for two answers, and these calls in its scenario."""
+    return spoiled(
+        folder,
+        ("    check: rate\n    with: {topic: /chatter, rate_hz: 10}\n", CRITERION),
+        ("    until: {", f"    calls: [{calls}]\n    until: {{"),
+    )
+
+
+@pytest.mark.parametrize("calls", [f"{CALL}, {CALL}", f"{CALL}, {CALL}, {CALL}"])
+def test_enough_calls(tmp_path: Path, calls: str) -> None:
+    assert load_rubric(str(with_calls(tmp_path, calls))).rubric.criteria[0].check == "service-answers"
+
+
+@pytest.mark.parametrize(
+    ("calls", "made"),
+    [
+        (CALL, "1 of them"),
+        ("", "none"),
+        ("{service: /other, type: std_srvs/Empty}", "none"),
+    ],
+)
+def test_too_few_calls_are_a_fault(tmp_path: Path, calls: str, made: str) -> None:
+    with pytest.raises(RubricError) as caught:
+        load_rubric(str(with_calls(tmp_path, calls)))
+    [fault] = caught.value.faults
+    assert fault.endswith(
+        f"lab.yaml:18: criteria[0].with.expect: asks for 2 calls of /reset; real makes {made}"
+    )

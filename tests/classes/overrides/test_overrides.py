@@ -1,7 +1,8 @@
-"""What people write into overrides.yaml, and every fault of it by its line."""
+"""What people write into overrides.yaml, every fault of it by its line, and the examples of the guide."""
 
 from __future__ import annotations
 
+import re
 from datetime import date, datetime, timedelta, timezone
 from pathlib import Path
 
@@ -11,7 +12,10 @@ from grader.classes.overrides import FILE, Overrides, read_overrides
 from grader.errors import RubricError
 from grader.intake.names import safe_name
 from grader.model.result import Override
+from grader.rubric.load import load_rubric
+from grader.rubric.model import Late
 from tests.classes.overrides.samples import IDS, rubric
+from tests.rubric.samples import spoiled
 
 TIME = "must be a time with its zone, such as 2026-11-20T23:59:00+01:00"
 
@@ -163,3 +167,18 @@ def test_a_file_without_an_end_is_not_read_to_it(tmp_path):
     (tmp_path / FILE).symlink_to("/dev/zero")
     with pytest.raises(RubricError, match="larger than 20 MB"):
         read_overrides(tmp_path / FILE, rubric(), IDS)
+
+
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "how-to" / "deadlines.md"
+DEADLINE, OVERRIDES = re.findall(r"```yaml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+
+
+def test_the_deadline_and_the_policy(tmp_path):
+    found = load_rubric(str(spoiled(tmp_path, ("package: lab1\n", f"package: lab1\n{DEADLINE}")))).rubric
+    assert found.late == Late(lost=10, grace_minutes=15, cap=50, cut_off_days=7)
+    assert set(Late.model_fields) == {line.split(":")[0].strip() for line in DEADLINE.splitlines()[2:]}
+
+
+def test_the_overrides(tmp_path):
+    (tmp_path / FILE).write_text(OVERRIDES, encoding="utf-8")
+    assert set(read_overrides(tmp_path / FILE, rubric(), IDS)["alice"]) == {"style", "chatter-rate"}
