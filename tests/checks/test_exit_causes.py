@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from tests.checks.tracebacks import SCRIPT, explained
+from grader.checks.support.console_output import tracebacks
+from grader.checks.support.exit_causes import explain_traceback
+from tests.checks.tracebacks import SCRIPT, explained, package_of
 
 
 @pytest.mark.parametrize(
@@ -306,13 +308,16 @@ def test_what_is_wrong_with_messages_is_told_with_their_fields(tmp_path, source,
 
 
 def test_a_number_in_place_of_a_field_with_fields_is_told_with_its_name(tmp_path):
-    twist = "/usr/lib/python3/dist-packages/geometry_msgs/msg/_Twist.py"
-    frames = (
-        ("node.py", 4, "publisher.publish(command)"),
-        (twist, 75, f"buff.write(_get_struct_6d().pack(_x.linear.x, _x.angular.x))\n{'^' * 11:>48}"),
-    )
-    error = "AttributeError: 'float' object has no attribute 'x'"
-    end = explained(tmp_path, {"node.py": SCRIPT}, *frames, error=error)
+    package = package_of(tmp_path, {"node.py": SCRIPT})
+    own, twist = "/ws/src/lab/node.py", "/usr/lib/python3/dist-packages/geometry_msgs/msg/_Twist.py"
+    lines = [
+        "Traceback (most recent call last):",
+        f'  File "{own}", line 4, in <module>', "    publisher.publish(command)",
+        f'  File "{twist}", line 75, in serialize', "    buff.write(_get_struct_6d().pack(_x.linear.x, _x.angular.x))",
+        "                                     ^^^^^^^^^^^",
+        "AttributeError: 'float' object has no attribute 'x'",
+    ]  # fmt: skip
+    end = explain_traceback(tracebacks(lines)[0], package)
     assert end.hint == "write `.linear.x = …`, not `.linear = …`"
 
 

@@ -44,10 +44,7 @@ def raised(package: PackageFacts, *frames: Frame, error: str) -> Traceback:
     lines = ["Traceback (most recent call last):"]
     for file, line, source in frames:
         path = file if file.startswith(("/", "<")) else f"/home/student/catkin_ws/src/{package.name}/{file}"
-        lines += [
-            f'  File "{path}", line {line}, in <module>',
-            *(f"    {text}" for text in source.splitlines()),
-        ]
+        lines += [f'  File "{path}", line {line}, in <module>', f"    {source}"]
     return tracebacks([*lines, error])[0]
 
 
