@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
+from grader.evidence.run import Run
+from grader.model.repair import Repair
 from grader.rubric.model import Rubric
 
 SCENARIO = {
@@ -27,6 +32,14 @@ def rubric(*criteria: dict[str, Any], **keys: Any) -> Rubric:
         **keys,
     }
     return Rubric.model_validate(data)
+
+
+def on_copy(runs: Mapping[str, Run], *repairs: Repair) -> dict[str, Run]:
+    """The runs as those of a copy with these repairs."""
+    about = {"repairs": json.dumps([repair.model_dump() for repair in repairs])}
+    return {
+        f"repaired-1/{name}": replace(run, metadata={**run.metadata, **about}) for name, run in runs.items()
+    }
 
 
 CMAKE_CHECK = {"id": "cmake", "check": "cmake", "with": {"name": "lab1"}}
