@@ -15,9 +15,9 @@ from grader.model.submission import SourcePackage
 from grader.model.verdict import Status, passed
 from grader.package import read_package
 from tests.fixture_runs import loaded, source_of
-from tests.judging.rubrics import CMAKE_CHECK, EXECUTABLE, NODE, rubric
 from tests.package.trees import CMAKE, MANIFEST, make_package
 from tests.package.trees import NODE as SCRIPT
+from tests.support.rubrics import CMAKE_CHECK, EXECUTABLE, NODE, rubric
 
 SAMPLES = [
     ("leeds-comp3631-lab1", "reference"),

@@ -12,7 +12,7 @@ from grader.judging import judge
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult
 from grader.package.launch import parse_launch_files
-from tests.judging.rubrics import (
+from tests.support.rubrics import (
     ALL,
     EXECUTABLE,
     GOOD_RUN,

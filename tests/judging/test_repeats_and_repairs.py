@@ -19,7 +19,7 @@ from grader.judging.repeats_and_repairs import (
 from grader.model.repair import Repair
 from grader.model.verdict import FileCitation, failed
 from grader.package.launch import parse_launch_files
-from tests.judging.rubrics import ALL, GOOD_RUN, NODE, PACKAGE, SCENARIO, SCRIPT, rubric
+from tests.support.rubrics import ALL, GOOD_RUN, NODE, PACKAGE, SCENARIO, SCRIPT, rubric
 from tests.support.timeline import build_runs
 from tests.support.timeline_facts import complete_facts
 

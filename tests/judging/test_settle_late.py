@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from grader.judging.settle import deadline_of, lateness
 from grader.model.result import HandedIn
 from grader.rubric.model import Rubric
+from tests.support.rubrics import rubric as rubric_of
 
 DEADLINE = datetime(2026, 11, 20, 23, 59, tzinfo=timezone(timedelta(hours=1)))
 POLICY = {"lost": 10, "per": "day", "grace_minutes": 15, "cap": 50, "cut_off_days": 7}
@@ -19,18 +20,7 @@ SECOND = timedelta(seconds=1)
 
 
 def rubric(policy: dict[str, object] | None = None, deadline: datetime | None = DEADLINE) -> Rubric:
-    data = {
-        "schema": "grader.rubric/1",
-        "id": "lab",
-        "title": "A lab",
-        "version": "1",
-        "package": "lab1",
-        "deadline": deadline,
-        "late": policy,
-        "scenarios": {},
-        "criteria": ({"id": "all", "title": "All", "points": 100, "check": "manual"},),
-    }
-    return Rubric.model_validate(data)
+    return rubric_of({"id": "all", "points": 100, "check": "manual"}, deadline=deadline, late=policy)
 
 
 def after(

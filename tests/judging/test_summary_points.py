@@ -19,8 +19,8 @@ from grader.report.platforms import render_classroom, render_gradescope
 from grader.report.terminal import open_console, print_report
 from grader.report.view import points_of, without_hidden
 from grader.rubric.model import Rubric
-from tests.judging.rubrics import rubric
 from tests.report.hostile import result
+from tests.support.rubrics import rubric
 
 NAMES = ("a", "b", "c", "d")
 BEST = {"some": {"criteria": NAMES, "best": 3}}

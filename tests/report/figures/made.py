@@ -9,7 +9,7 @@ from grader.judging import judge
 from grader.model.figure import CodeFigure, Figures
 from grader.model.result import CriterionResult
 from grader.report.figures import figures_of
-from tests.judging.rubrics import rubric
+from tests.support.rubrics import rubric
 from tests.support.timeline import build_runs
 
 Kind = TypeVar("Kind")

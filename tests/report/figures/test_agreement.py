@@ -14,8 +14,8 @@ from grader.model.result import CriterionResult
 from grader.model.verdict import EvidenceCitation, Status
 from grader.report.figures import DRAWN, figures_of
 from tests.checks.examples import Example, examples, runs_of
-from tests.judging.rubrics import SCENARIO, rubric
 from tests.report.figures.made import criterion
+from tests.support.rubrics import SCENARIO, rubric
 
 EXAMPLES = [e for e in examples() if e.check in DRAWN]
 NOTHING = re.compile(r"no message|no number|not started|ended|no subscription|subscribed to|no path|nothing")

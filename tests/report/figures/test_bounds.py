@@ -26,8 +26,8 @@ from grader.model.figure import (
 )
 from grader.report.figures import DRAWN, figures_of
 from tests.checks.examples import runs_of
-from tests.judging.rubrics import rubric
 from tests.report.figures.made import criterion, drawn, only
+from tests.support.rubrics import rubric
 
 TOPIC = "/x"
 START_NS = 1_700_000_000_000_000_000

@@ -1,4 +1,4 @@
-"""Small rubrics for the judge's tests."""
+"""Small rubrics and runs for tests of judging and of reports."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""Whole submissions as evidence, for labs of one talker, one listener and a launch file."""
+"""The rubrics of the labs, and whole submissions as evidence for labs of a talker, a listener and a launch file."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -38,8 +39,7 @@ class Lab:
 
     @cached_property
     def rubric(self) -> Rubric:
-        path = ROOT / "rubrics" / f"{self.id}.yaml"
-        return Rubric.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
+        return rubric_of(self.id)
 
     @property
     def launch_text(self) -> str:
@@ -117,13 +117,23 @@ class Lab:
 
     def lost(self, **changes: Any) -> dict[str, str]:
         """The status of each criterion that is not reached, where the submission has these changes."""
-        results = self.judge(**changes)
-        lost = {r.id: r.status.value for r in results if r.status.value != "pass"}
-        assert bool(lost) == (total_points(self.rubric, results) < 100)
-        for result in results:
-            if result.status.value == "blocked":
-                assert result.message.startswith("blocked by ")
-        return lost
+        return lost_of(self.rubric, self.judge(**changes))
+
+
+def rubric_of(lab: str) -> Rubric:
+    """The rubric of a lab that comes with the grader."""
+    text = (ROOT / "rubrics" / f"{lab}.yaml").read_text(encoding="utf-8")
+    return Rubric.model_validate(yaml.safe_load(text))
+
+
+def lost_of(rubric: Rubric, results: Sequence[CriterionResult]) -> dict[str, str]:
+    """The status of each criterion that is not reached."""
+    lost = {r.id: r.status.value for r in results if r.status.value != "pass"}
+    assert bool(lost) == (total_points(rubric, results) < 100)
+    for result in results:
+        if result.status.value == "blocked":
+            assert result.message.startswith("blocked by ")
+    return lost
 
 
 def assert_sound(rubric: Rubric, points: dict[str, int]) -> None:
