@@ -1,15 +1,19 @@
-"""An instructor's file of checks: it takes part in everything, and its faults are named with file and line."""
+"""An instructor's file of checks: it takes part in everything, prints nothing raw; its faults have file and line."""
 
 from __future__ import annotations
 
+import io
 import json
 import multiprocessing
+import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import jsonschema
 import pytest
 import yaml
+from hypothesis import given
+from hypothesis import strategies as st
 
 from grader.checks import CHECKS
 from grader.cli.main import run as grader
@@ -17,7 +21,10 @@ from grader.errors import RubricError
 from grader.judging import judge
 from grader.model.verdict import Status
 from grader.rubric.load import LoadedRubric, load_rubric
+from grader.rubric.own_checks import VisibleText, printing_to_stderr
 from grader.rubric.schema import rubric_schema
+from tests.report.nasty import STEERING, TEXTS
+from tests.report.test_text_visible import TO_A_CI
 from tests.rubric.own_checks.samples import GREETING, HEAD, OWN, judged, runs, write_rubric
 
 
@@ -248,3 +255,37 @@ def test_it_works_in_a_process_of_its_own(tmp_path):
     loaded = load_rubric(str(write_rubric(tmp_path, OWN, checks=GREETING)))
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
         assert pool.submit(_in_worker, loaded).result(60) == ["pass: polite"]
+
+
+@given(st.lists(TEXTS, max_size=6))
+def test_pieces_that_are_harmless_alone_are_harmless_together(pieces):
+    out = io.StringIO()
+    shown = VisibleText(out)
+    for piece in pieces:
+        assert shown.write(piece) == len(piece)
+    shown.finish()
+    assert STEERING.search(out.getvalue()) is None
+    assert TO_A_CI.search(out.getvalue()) is None
+
+
+def test_a_line_without_an_end_does_not_fill_the_memory():
+    out = io.StringIO()
+    shown = VisibleText(out)
+    for _ in range(300):
+        shown.write("x" * 1000)
+    assert len(out.getvalue()) > 250_000
+
+
+def test_both_streams_go_to_stderr_also_where_the_check_fails(capsys):
+    def check() -> None:
+        with printing_to_stderr():
+            print("loading \x1b[2J")
+            sys.stderr.write(":")
+            sys.stderr.write(":error::x")
+            raise ValueError
+
+    with pytest.raises(ValueError, match=r"^$"):
+        check()
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err == "loading \\x1b[2J\n\\x3a:error::x\n"
