@@ -27,8 +27,7 @@ from grader.evidence.reader import package_facts
 from grader.evidence.run import Run
 from grader.model.mutants import LostCriterion, Mutant, MutantResult
 from grader.rubric.load import load_rubric
-from tests.report.nasty import STEERING, TEXTS
-from tests.report.test_text_visible import TO_A_CI
+from tests.report.nasty import STEERING, TEXTS, TO_A_CI
 from tests.support.timeline import build_runs
 
 NS = 10**9

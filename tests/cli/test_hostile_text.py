@@ -25,8 +25,7 @@ from grader.evidence.inspect import inspect_run
 from grader.evidence.run import Channel, Message, Run
 from grader.model.mutants import LostCriterion, MutantResult, ReferenceResult, RubricTest
 from grader.model.result import RubricInfo
-from tests.report.nasty import STEERING, TEXTS
-from tests.report.test_text_visible import TO_A_CI
+from tests.report.nasty import STEERING, TEXTS, TO_A_CI
 
 GRADER = Path(grader.__file__).parent
 MAY_PRINT = {

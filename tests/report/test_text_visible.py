@@ -28,7 +28,7 @@ from grader.untrusted_text import (
     without_ci_commands,
 )
 from tests.report.hostile import result
-from tests.report.nasty import ANY_TEXT, STEERING, TEXTS
+from tests.report.nasty import ANY_TEXT, STEERING, TEXTS, TO_A_CI
 
 FLOOD = "`/chatter` runs at about 5,500 Hz instead of 10 Hz; the loop does not sleep (src/talker.py, line 14)"
 
@@ -192,9 +192,6 @@ def test_commands_are_told_from_the_sentence_around_them(text, parts) -> None:
 )
 def test_a_command_says_where_it_works(reproduce, where) -> None:
     assert where_to_type(reproduce) == where
-
-
-TO_A_CI = re.compile(r"^\s*::|##[A-Za-z]*\[", re.MULTILINE)
 
 
 @given(ANY_TEXT)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.test_grading import Grader
+from tests.support.grader_process import Grader
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-import shutil
 from collections.abc import Iterator
-from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
@@ -14,57 +12,25 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
-from grader import __version__
-from grader.classes.batch.folder import open_batch, write_run
+from grader.classes.batch.folder import open_batch
 from grader.classes.batch.regrade import Regraded
-from grader.classes.batch.run import describe_rubric
 from grader.cli.main import run
-from grader.evidence.reader import load_evidence
-from grader.judging import judge
-from grader.model.batch import BatchRun, Entry
-from grader.report.files import write_reports
-from grader.rubric.load import LoadedRubric, load_rubric
+from grader.rubric.load import load_rubric
 from grader.workers import run_each
 from tests.classes.batch.a_class import (
     CORRECT,
+    LAB,
     RUBRIC,
     WRONG_NAME,
     batch,
     handed_in,
+    kinds,
     lines_of,
+    recorded,
     roster_of,
     run_of,
 )
 from tests.classes.batch.repositories import commit, repository
-from tests.support.a_class import judged_result
-
-RECORDINGS = Path(__file__).parent.parent.parent / "data" / "recordings"
-LAB = Path(__file__).parent.parent.parent.parent / "rubrics" / "leeds-comp3631-lab1.yaml"
-
-
-def recorded(out: Path, kinds: dict[str, str]) -> Path:
-    """A batch's folder as the lab's rubric left it, from recordings that are kept."""
-    rubric = load_rubric(str(LAB))
-    entries = tuple(Entry(id=name, source=f"/gone/{name}", name=name.title()) for name in kinds)
-    for name, kind in kinds.items():
-        shutil.copytree(RECORDINGS / kind, out / name / "evidence")
-        write_result(out / name, name, rubric)
-    about = BatchRun(
-        state="complete",
-        grader=__version__,
-        **describe_rubric(rubric, str(LAB)),
-        roster="roster.csv",
-        started_at=datetime(2026, 11, 1, tzinfo=timezone.utc),
-        entries=entries,
-    )
-    write_run(out, about)
-    return out
-
-
-def write_result(folder: Path, name: str, rubric: LoadedRubric) -> None:
-    criteria = judge(rubric.rubric, load_evidence([folder / "evidence"]), rubric.checks)
-    result = judged_result(name, rubric, criteria)
-    write_reports(result, folder, console="kept", rubric=rubric.rubric)
 
 
 def changed(path: Path, *changes: tuple[str, str]) -> Path:
@@ -80,10 +46,6 @@ def changed(path: Path, *changes: tuple[str, str]) -> Path:
 def rows_of(path: Path) -> list[dict[str, str]]:
     with path.open(encoding="utf-8-sig", newline="") as file:
         return list(csv.DictReader(file))
-
-
-def kinds() -> dict[str, str]:
-    return {"ada": "correct", "bob": "correct"}
 
 
 @pytest.mark.full

@@ -18,6 +18,7 @@ from grader.rubric.course import load_course
 from grader.rubric.load import load_rubric
 from grader.rubric.model import Late
 from tests.classes.batch.a_class import CORRECT, RUBRIC, WRONG_NAME, lines_of
+from tests.classes.course.samples import write_roster
 
 pytestmark = pytest.mark.usefixtures("without_processes")
 
@@ -50,10 +51,6 @@ def course(tmp_path: Path, monkeypatch) -> Path:
     write_roster(tmp_path / "lab2.csv", "ada,right,2026-11-08T11:00:00Z", "cem,wrong,2026-11-06T12:00:00Z")
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-def write_roster(path: Path, *rows: str, columns: str = "id,source,submitted_at") -> None:
-    path.write_text("\n".join([columns, *rows, ""]))
 
 
 def grade(lab: str, *options: str) -> int:

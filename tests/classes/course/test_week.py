@@ -12,7 +12,7 @@ import pytest
 from grader.classes.roster.entries import read_table
 from grader.cli.main import run
 from tests.classes.batch.a_class import CORRECT, RUBRIC, WRONG_NAME, lines_of
-from tests.classes.course.test_course import write_roster
+from tests.classes.course.samples import write_roster
 from tests.classes.review.running import Server, Tab
 
 STUDENTS = [f"s{number:02}" for number in range(60)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -127,3 +128,12 @@ def sent(out: Path) -> list[tuple[str, str, str]]:
 
 
 __all__ = ["COMMIT", "Student", "award", "feedback", "made", "publish", "regrade", "sent", "settle"]
+
+
+def use(out: Path, sources: dict[str, str]) -> None:
+    """Let the roster name these sources."""
+    run_ = out / "run.json"
+    data = json.loads(run_.read_text())
+    for entry in data["entries"]:
+        entry["source"] = sources.get(entry["id"], entry["source"])
+    run_.write_text(json.dumps(data))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 from base64 import b64decode
@@ -13,7 +12,7 @@ from threading import Thread
 
 import pytest
 
-from tests.classes.feedback.a_class import award, feedback, publish, sent
+from tests.classes.feedback.a_class import award, feedback, publish, sent, use
 
 
 def git(folder: Path, *args: str) -> str:
@@ -40,15 +39,6 @@ def repository(folder: Path) -> Path:
     git(work, "commit", "--quiet", "-m", "my work")
     git(work, "push", "--quiet", str(folder), "HEAD:refs/heads/main")
     return folder
-
-
-def use(out: Path, sources: dict[str, str]) -> None:
-    """Let the roster name these sources."""
-    run_ = out / "run.json"
-    data = json.loads(run_.read_text())
-    for entry in data["entries"]:
-        entry["source"] = sources.get(entry["id"], entry["source"])
-    run_.write_text(json.dumps(data))
 
 
 @pytest.fixture

@@ -11,9 +11,8 @@ import pytest
 
 from grader.classes.feedback import forges
 from grader.cli.main import run
-from tests.classes.feedback.a_class import COMMIT, award, feedback, publish, sent
+from tests.classes.feedback.a_class import COMMIT, award, feedback, publish, sent, use
 from tests.classes.feedback.forges import TOKEN, Failure, Forge, Repo, forge, github, gitlab
-from tests.classes.feedback.test_branch import use
 
 pytestmark = pytest.mark.usefixtures("without_processes")
 

@@ -72,3 +72,7 @@ class Tab:
 
     def send(self, key: str, criterion: str, form: dict[str, str], **fields: str) -> int:
         return self.ask("POST", f"/s/{key}/c/{criterion}", {**form, **fields})[0].status
+
+
+def rows(text: str) -> list[str]:
+    return re.findall(r'class="row" href="/s/([^/]+)/', text)

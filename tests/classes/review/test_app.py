@@ -16,12 +16,9 @@ from grader.model.batch import RosterFault
 from grader.model.result import Override
 from tests.classes.review.a_class import INCONCLUSIVE, Who, a_class, overrides_of, result_of
 from tests.classes.review.conftest import PORT, QUICK, TOKEN, Page
+from tests.classes.review.running import rows
 
 HOSTILE = "</td><script>alert(1)</script>\" onload='x' \u202e\u200bevil\x1b[2J"
-
-
-def rows(text: str) -> list[str]:
-    return re.findall(r'class="row" href="/s/([^/]+)/', text)
 
 
 @pytest.mark.full

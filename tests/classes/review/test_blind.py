@@ -16,7 +16,7 @@ from grader.classes.review.submissions import Mask
 from grader.rubric.load import load_rubric
 from tests.classes.review.a_class import INCONCLUSIVE, Who, a_class, overrides_of
 from tests.classes.review.conftest import PORT, QUICK, TOKEN, Page
-from tests.classes.review.test_app import rows
+from tests.classes.review.running import rows
 
 TELLING = "in /home/qwilliam/lab1: see https://github.com/qwilliam/lab1, mail quentin.williams@example.org"
 WHOS = (

@@ -19,7 +19,7 @@ from grader.model.result import BankComment, Override, WrittenOverride
 from grader.rubric.load import load_rubric
 from tests.classes.review.a_class import overrides_of
 from tests.classes.review.conftest import QUICK
-from tests.classes.review.test_app import rows
+from tests.classes.review.running import rows
 
 ENTRIES = [Entry(id=f"s{i}", source="", group="AB"[i % 2]) for i in range(200)]
 

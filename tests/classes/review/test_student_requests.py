@@ -10,7 +10,7 @@ from grader.model.batch import Entry
 from grader.model.verdict import Status
 from grader.rubric.load import load_rubric
 from tests.classes.review.a_class import overrides_of, points_of, result_of
-from tests.classes.review.test_app import rows
+from tests.classes.review.running import rows
 
 ASKED = """\
 when,student,criterion,text,mail

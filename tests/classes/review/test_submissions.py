@@ -8,7 +8,7 @@ import pytest
 
 from grader.classes.review.submissions import across
 from tests.classes.review.a_class import overrides_of
-from tests.classes.review.test_app import rows
+from tests.classes.review.running import rows
 
 
 def test_criteria_with_most_open_ones_first(page, review) -> None:

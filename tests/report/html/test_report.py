@@ -24,10 +24,10 @@ from grader.report.html.shell import policy, script
 from grader.report.sentences import FAULTS, MINUS
 from grader.report.text import line, visible
 from grader.report.view import blame
+from tests.report.anything import FIELDS, HUGE, SOME, decided, of, results, spoiled
 from tests.report.hostile import CRITERIA, result, rubric
 from tests.report.html.made import SCRIPT, code, console, figures, graph, hostile_figures
 from tests.report.nasty import STEERING
-from tests.report.test_every_report import FIELDS, HUGE, SOME, decided, of, results, spoiled
 from tests.support.a_class import criterion
 
 DOCS = {"some-check": {**CHECKS["rate"].sections}}

@@ -23,8 +23,7 @@ from grader.model.verdict import Status
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.rubric.own_checks import VisibleText, printing_to_stderr
 from grader.rubric.schema import rubric_schema
-from tests.report.nasty import STEERING, TEXTS
-from tests.report.test_text_visible import TO_A_CI
+from tests.report.nasty import STEERING, TEXTS, TO_A_CI
 from tests.rubric.own_checks.samples import GREETING, HEAD, OWN, judged, runs, write_rubric
 
 
