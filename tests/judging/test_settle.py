@@ -166,10 +166,13 @@ def test_lateness_comes_last():
     assert unsettled(found, lab) == automatic(CRITERIA)
 
 
-def test_a_mark_in_points_is_compared_with_what_lateness_leaves():
-    lab = rubric(CRITERIA, deadline=DEADLINE, late={"lost": 10}, pass_mark=70)
-    assert passed(lab, settled(lab=lab, style=MILLER))
-    assert not passed(lab, settled(lab=lab, handed_in=TWO_DAYS, style=MILLER))
+@pytest.mark.parametrize(
+    ("mark", "in_time", "late"), [(69.6, True, True), (69.7, True, False), (87.1, False, False)]
+)
+def test_a_mark_in_points_is_compared_with_what_lateness_leaves(mark, in_time, late):
+    lab = rubric(CRITERIA, deadline=DEADLINE, late={"lost": 10}, pass_mark=mark)
+    assert passed(lab, settled(lab=lab, style=MILLER)) is in_time
+    assert passed(lab, settled(lab=lab, handed_in=TWO_DAYS, style=MILLER)) is late
 
 
 ERROR = ErrorInfo(kind="submission", message="no package", hint="hand in a package")

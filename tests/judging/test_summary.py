@@ -58,12 +58,6 @@ def test_round_half_up(value: float, digits: int, expected: float) -> None:
     assert round_half_up(value, digits) == expected
 
 
-def test_pass_mark_in_points() -> None:
-    one = rubric({"id": "a", "check": "rate"}, pass_mark=5)
-    assert reached_pass_mark(one, [result("a", "partial", 5)])
-    assert not reached_pass_mark(one, [result("a", "partial", 4.9)])
-
-
 def test_without_a_pass_mark_every_visible_criterion_has_to_pass() -> None:
     criteria = rubric(
         {"id": "a", "check": "rate"},
