@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import dask.config
@@ -13,23 +12,11 @@ from grader.classes.cluster import ClusterExecutor
 from grader.classes.cluster.executor import EXCHANGE
 from grader.errors import HostError
 from tests.classes.cluster.clusters import Cluster, cluster, kill
-from tests.classes.cluster.jobs import ids, jobs_for, verdicts
+from tests.classes.cluster.jobs import ids, ignore, jobs_for, verdicts
 from tests.classes.cluster.shelf import on_shelf, register
 
 COUNT = 30
 NAMES = [f"s{number:03}" for number in range(COUNT)]
-
-
-@pytest.fixture
-def place(tmp_path: Path) -> Iterator[Cluster]:
-    folder = tmp_path / "cluster"
-    folder.mkdir()
-    with cluster(folder) as made:
-        yield made
-
-
-def _none(_: str) -> None:
-    pass
 
 
 @pytest.mark.full
@@ -49,7 +36,7 @@ def test_a_worker_killed_in_the_middle_costs_nobody_a_result(place: Cluster, tmp
     assert not (out / EXCHANGE).exists()
 
     alone = tmp_path / "alone"
-    assert ids(LocalExecutor(2).run(jobs_for(alone, COUNT), begun=_none)) == NAMES
+    assert ids(LocalExecutor(2).run(jobs_for(alone, COUNT), begun=ignore)) == NAMES
     assert verdicts(out) == verdicts(alone)
     assert sorted(verdicts(out)) == NAMES
 
@@ -64,7 +51,7 @@ def test_results_come_through_a_url_that_is_no_path(place: Cluster, tmp_path: Pa
     place.worker(preload="shelf", threads=2)
     out = tmp_path / "out"
     executor = ClusterExecutor(place.address, out, "shelf://results", insecure=True)
-    assert ids(executor.run(jobs_for(out, 4), begun=_none)) == NAMES[:4]
+    assert ids(executor.run(jobs_for(out, 4), begun=ignore)) == NAMES[:4]
     assert sorted(verdicts(out)) == NAMES[:4]
     assert on_shelf(shelf) == []
 
@@ -77,7 +64,7 @@ def test_a_cluster_with_certificates_needs_no_flag(tmp_path: Path) -> None:
         names = {"ca-file": "ca-file", "client.cert": "cert", "client.key": "key"}
         files = {f"distributed.comm.tls.{key}": str(made.certificates[name]) for key, name in names.items()}
         with dask.config.set(files):
-            assert ids(ClusterExecutor(made.address, out).run(jobs_for(out, 2), begun=_none)) == NAMES[:2]
+            assert ids(ClusterExecutor(made.address, out).run(jobs_for(out, 2), begun=ignore)) == NAMES[:2]
     assert made.address.startswith("tls://")
     assert sorted(verdicts(out)) == NAMES[:2]
 
@@ -89,7 +76,7 @@ def test_workers_that_differ_are_named_and_left_out(place: Cluster, tmp_path: Pa
     out, said = tmp_path / "out", []
     executor = ClusterExecutor(place.address, out, insecure=True, say=said.append, patience_s=5.0)
     with pytest.raises(HostError, match="no worker that can grade") as caught:
-        list(executor.run(jobs_for(out, 1), begun=_none))
+        list(executor.run(jobs_for(out, 1), begun=ignore))
     assert f"dask worker {place.address}" in caught.value.hint
     assert any("it has grader 0.0.9, here it is" in line for line in said)
     assert any("no grader like this one is installed there" in line for line in said)
@@ -102,7 +89,7 @@ def test_workers_that_differ_are_named_and_left_out(place: Cluster, tmp_path: Pa
 def test_a_scheduler_that_differs_is_named(preload: str, why: str, tmp_path: Path) -> None:
     out = tmp_path / "out"
     with cluster(tmp_path, preload=preload) as made, pytest.raises(HostError, match=why) as caught:
-        list(ClusterExecutor(made.address, out, insecure=True).run(jobs_for(out, 1), begun=_none))
+        list(ClusterExecutor(made.address, out, insecure=True).run(jobs_for(out, 1), begun=ignore))
     assert f"the scheduler at {made.address}" in caught.value.message
     assert caught.value.hint
     assert not out.exists()
@@ -126,6 +113,6 @@ def test_real_gradings_get_the_same_verdicts_with_a_worker_killed(place: Cluster
     assert {outcome.status for outcome in outcomes} == {"graded"}
 
     alone = tmp_path / "alone"
-    list(LocalExecutor(2).run(jobs_for(alone, 3, static_only=False, names=names), begun=_none))
+    list(LocalExecutor(2).run(jobs_for(alone, 3, static_only=False, names=names), begun=ignore))
     once = verdicts(alone)
     assert verdicts(out) == {name: once[f"s{number % 3:03}"] for number, name in enumerate(NAMES[:count])}

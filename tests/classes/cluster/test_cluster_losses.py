@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,23 +13,11 @@ import pytest
 from grader.classes.cluster import ClusterExecutor
 from grader.classes.cluster.executor import EXCHANGE
 from grader.errors import HostError
-from tests.classes.cluster.clusters import ROOT, Cluster, cluster, kill
-from tests.classes.cluster.jobs import ids, jobs_for, named_job, verdicts
+from tests.classes.cluster.clusters import ROOT, Cluster, kill
+from tests.classes.cluster.jobs import ids, ignore, jobs_for, named_job, verdicts
 from tests.support.processes import children_of, lives, until
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture
-def place(tmp_path: Path) -> Iterator[Cluster]:
-    folder = tmp_path / "cluster"
-    folder.mkdir()
-    with cluster(folder) as made:
-        yield made
-
-
-def _none(_: str) -> None:
-    pass
 
 
 @pytest.mark.full
@@ -43,7 +30,7 @@ def test_a_submission_that_ends_its_workers_is_given_up_and_the_others_are_grade
     jobs = [named_job(out, "poison"), *jobs_for(out, 4)]
     outcomes = {
         outcome.id: outcome
-        for outcome in ClusterExecutor(place.address, out, insecure=True).run(jobs, begun=_none)
+        for outcome in ClusterExecutor(place.address, out, insecure=True).run(jobs, begun=ignore)
     }
     poison = outcomes.pop("poison")
     assert (poison.status, poison.kind) == ("error", "worker-lost")
@@ -57,7 +44,7 @@ def test_a_submission_that_ends_its_workers_is_given_up_and_the_others_are_grade
 def test_workers_that_come_later_take_over_from_those_that_are_gone(place: Cluster, tmp_path: Path) -> None:
     first = place.worker()
     out, outcomes = tmp_path / "out", []
-    for outcome in ClusterExecutor(place.address, out, insecure=True).run(jobs_for(out, 8), begun=_none):
+    for outcome in ClusterExecutor(place.address, out, insecure=True).run(jobs_for(out, 8), begun=ignore):
         outcomes.append(outcome)
         if len(outcomes) == 2:
             kill(first.pid)
@@ -71,7 +58,7 @@ def test_workers_that_come_later_take_over_from_those_that_are_gone(place: Clust
 def test_a_caller_that_stops_leaves_nothing_running(place: Cluster, tmp_path: Path) -> None:
     worker = place.worker(threads=2)
     out = tmp_path / "out"
-    outcomes = ClusterExecutor(place.address, out, insecure=True).run(jobs_for(out, 50), begun=_none)
+    outcomes = ClusterExecutor(place.address, out, insecure=True).run(jobs_for(out, 50), begun=ignore)
     next(outcomes)
     assert children_of(worker.pid)
     outcomes.close()
@@ -99,7 +86,7 @@ def test_a_killed_client_leaves_its_workers_free_and_the_next_one_goes_on(
     (out / EXCHANGE).mkdir(exist_ok=True)
     (out / EXCHANGE / "s000.0123456789abcdef.tar.gz").write_bytes(b"of the one that was killed")
     assert (
-        len(ids(ClusterExecutor(place.address, out, insecure=True).run(jobs_for(out, 4), begun=_none))) == 4
+        len(ids(ClusterExecutor(place.address, out, insecure=True).run(jobs_for(out, 4), begun=ignore))) == 4
     )
     assert not (out / EXCHANGE).exists()
 
@@ -108,7 +95,7 @@ def test_a_killed_client_leaves_its_workers_free_and_the_next_one_goes_on(
 def test_without_its_scheduler_the_batch_ends_with_one_line(place: Cluster, tmp_path: Path) -> None:
     place.worker()
     out = tmp_path / "out"
-    outcomes = ClusterExecutor(place.address, out, insecure=True).run(jobs_for(out, 50), begun=_none)
+    outcomes = ClusterExecutor(place.address, out, insecure=True).run(jobs_for(out, 50), begun=ignore)
     next(outcomes)
     kill(place.scheduler.pid)
     with pytest.raises(HostError, match=r"the connection to the scheduler at .* is lost") as caught:
@@ -120,7 +107,7 @@ def test_without_its_scheduler_the_batch_ends_with_one_line(place: Cluster, tmp_
 @pytest.mark.full
 def test_a_cluster_of_this_machine_is_started_and_ended(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    assert len(ids(ClusterExecutor("local", out).run(jobs_for(out, 3), begun=_none))) == 3
+    assert len(ids(ClusterExecutor("local", out).run(jobs_for(out, 3), begun=ignore))) == 3
     assert len(verdicts(out)) == 3
     until(lambda: not any(_works_for_dask(pid) for pid in children_of(os.getpid())))
 

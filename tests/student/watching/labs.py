@@ -8,6 +8,7 @@ from pathlib import Path
 from grader.rubric.load import LoadedRubric, load_rubric
 
 ROOT = Path(__file__).resolve().parents[3]
+LEEDS = "leeds-comp3631-lab1"
 
 
 def copy_of(lab: str, folder: Path) -> Path:

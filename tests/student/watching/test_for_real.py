@@ -16,9 +16,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.student.watching.labs import copy_of, write
+from tests.student.watching.labs import LEEDS, write
 
-LEEDS = "leeds-comp3631-lab1"
 LONG_S = 900.0
 GIT = shutil.which("git") or "git"
 
@@ -83,11 +82,6 @@ def watching(folder: Path, *options: str) -> Iterator[Command]:
 
 def points(result: dict, name: str) -> float:
     return next(c["points"] for c in result["criteria"] if c["id"] == name)
-
-
-@pytest.fixture
-def package(tmp_path: Path) -> Path:
-    return copy_of(LEEDS, tmp_path)
 
 
 def test_files_alone_are_judged_within_a_moment_of_a_save(package) -> None:

@@ -10,16 +10,10 @@ import pytest
 from grader.errors import ExitCode, SubmissionError
 from grader.model.result import ErrorInfo
 from grader.model.verdict import Status
-from tests.student.watching.labs import append, copy_of, rubric, write
+from tests.student.watching.labs import LEEDS, append, rubric, write
 from tests.student.watching.made_up import Course, Step
 
-LEEDS = "leeds-comp3631-lab1"
 TALKER, LISTENER, LAUNCH = "src/numeric_talker.py", "src/numeric_listener.py", "launch/lab1.launch"
-
-
-@pytest.fixture
-def package(tmp_path: Path) -> Path:
-    return copy_of(LEEDS, tmp_path)
 
 
 @pytest.fixture

@@ -13,16 +13,10 @@ import pytest
 
 from grader.arena.interruption import Stop
 from grader.student.watching import Saves, changed_files, is_ignored, take_snapshot
-from tests.student.watching.labs import append, copy_of, write
+from tests.student.watching.labs import LEEDS, append, copy_of, write
 from tests.support.processes import until
 
-LEEDS = "leeds-comp3631-lab1"
 LONG_S = 600.0
-
-
-@pytest.fixture
-def package(tmp_path: Path) -> Path:
-    return copy_of(LEEDS, tmp_path)
 
 
 @pytest.fixture
