@@ -26,7 +26,7 @@ from grader.classes.batch.run import describe_rubric
 from grader.model.batch import BatchRun, Entry
 from grader.model.verdict import Status
 from grader.rubric.load import load_rubric
-from tests.cluster.clusters import cluster
+from tests.classes.cluster.clusters import cluster
 
 COUNT = 10_000
 REAL, RECORDED, FILES = "graded", "judged again", "files alone"

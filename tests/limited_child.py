@@ -1,4 +1,4 @@
-"""What `tests/test_limited.py` has run in a child with limits; it needs nothing but the standard library."""
+"""What `tests/test_limited_child.py` has run in a child with limits; it needs nothing but the standard library."""
 
 from __future__ import annotations
 

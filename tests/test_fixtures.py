@@ -19,6 +19,7 @@ from grader.model.result import GradingResult
 from grader.model.verdict import FileCitation
 from grader.package import read_packages
 from grader.pipeline import wanted_package
+from tests.classes.gradebook.made import criterion
 from tests.fixture_runs import (
     GIT,
     REFERENCE,
@@ -39,7 +40,6 @@ from tests.fixture_runs import (
     surprises,
     workers,
 )
-from tests.gradebook.made import criterion
 from tests.support.advice import faulty_advice
 
 LABS = labs()

@@ -23,6 +23,8 @@ EXAMPLES = {
     *("../b/scripts/talker.py", "evidence/repaired-1/", "evidence/repeated-1/"),
 }
 """What a submission, or a folder of results, may have in it."""
+OF_NO_MODULE = {"browser", "docs", "fresh", "fuzz", "hostile", "packaging"}
+"""Folders of tests that test no single folder or module of the grader."""
 NO_MODULES = {"copydetect", "params", "run", "sarif"}
 """Names in the docstrings of rooms that are a library, a check's parameters and a form."""
 
@@ -194,6 +196,16 @@ def test_modules_that_the_docstring_of_a_room_names_are_there() -> None:
         and not _defines(path.parent, name)
     ]
     assert wrong == []
+
+
+def test_folders_of_tests_are_those_of_what_they_test() -> None:
+    folders = {path.parent.relative_to(ROOT / "tests") for path in (ROOT / "tests").rglob("test_*.py")}
+    named = {folder for folder in folders if not set(folder.parts) & OF_NO_MODULE}
+    assert {
+        str(folder)
+        for folder in named
+        if not ((GRADER / folder).is_dir() or (GRADER / folder).with_suffix(".py").is_file())
+    } == set()
 
 
 def _defines(folder: Path, name: str) -> bool:

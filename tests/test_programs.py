@@ -37,7 +37,7 @@ STARTS = {
     "arena/ros/launching.py:launch": Start(
         "HOST_ENV",
         "stage.folder if gate is not None else NOWHERE",
-        "nothing: tests/arena/test_environment.py",
+        "nothing: tests/arena/test_process_environment.py",
     ),
     "ros_env.py:_from_setup": Start("base", "'/'", "nothing: ROS's own setup.bash"),
     "arena/arena_process.py:__init__": Start("dict(env)", "'/'", "nothing: ROS's own variables"),
@@ -60,7 +60,7 @@ STARTS = {
         "nothing: the address of the course's own server",
     ),
     "limited_child.py:_run": Start(
-        "env",  # the variables that loading takes: tests/test_limited.py
+        "env",  # the variables that loading takes: tests/test_limited_child.py
         "'/'",
         "its archive, and its source files, which are parsed and not run",
     ),

@@ -5,7 +5,7 @@ A new form takes
 2. an entry in `_FORMS`, from which `grader report --form`, its help and the files of a submission have it;
 3. its row in the table of `docs/how-to/reports.md`, in the order of `_FORMS` and in the words of its `purpose`;
 4. a golden file in `tests/report/golden/`: `GRADER_REGENERATE=1 pytest tests/report/test_golden.py` writes it;
-5. with `in_results`, the name of its file in `results.RESULT_FILES`, `cli.outcome.REPORTS` and
+5. with `in_results`, the name of its file in `results.RESULT_FILES`, `cli.display.REPORTS` and
    `classes.review.guard.REPORTS`.
 """
 

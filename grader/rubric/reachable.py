@@ -16,7 +16,7 @@ from grader.checks.support.fields import Reading, is_number
 from grader.evidence.message_values import ANGLES, FORMS
 from grader.rubric.definitions import PATH_PARTS
 from grader.rubric.durations import late_faults, longest_s, often_faults, stretch_faults, within_faults
-from grader.rubric.room import pair, room_faults, start_faults
+from grader.rubric.robot_walls import pair, room_faults, start_faults
 from grader.rubric.scenario import Scenario, Until
 from grader.rubric.simulators import FIELD_M, PROGRAMS, TRUE_POSE, robot_of
 from grader.rubric.started import starts_of

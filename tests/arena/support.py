@@ -12,6 +12,7 @@ import pytest
 
 from grader.arena.limits import RunLimits
 from grader.arena.process_environment import ProcessEnvironment
+from grader.arena.run_state import RunState
 from grader.arena.sandbox import choose_sandbox, why_no_sandbox
 from grader.arena.sandbox_files import prepare
 from grader.arena.scenario import run_scenario
@@ -143,3 +144,12 @@ def exit_of(run: Run, name: str = "node") -> object:
 
 def printed(run: Run, name: str = "node") -> list[str]:
     return [line.line for _, line in run.lines(name)]
+
+
+def state_of(**topics: tuple[int, float, float]) -> RunState:
+    """Topics as count, first, last; the run started at 0, its process runs and is a node."""
+    live = RunState(running={"node"}, registered={"node"})
+    for name, (count, first_s, last_s) in topics.items():
+        seen = live.topics["/" + name]
+        seen.count, seen.first_s, seen.last_s = count, first_s, last_s
+    return live

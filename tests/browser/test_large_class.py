@@ -9,8 +9,8 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.browser.timing import Timing
-from tests.review.a_class import INCONCLUSIVE, Who, a_class, overrides_of
-from tests.review.running import Server
+from tests.classes.review.a_class import INCONCLUSIVE, Who, a_class, overrides_of
+from tests.classes.review.running import Server
 
 COUNT = 300
 GENEROUS_MS = 30_000

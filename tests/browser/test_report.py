@@ -15,10 +15,10 @@ from grader.checks import CHECKS
 from grader.report.html.page import render_html
 from tests.browser.conftest import DESKTOP, PHONE
 from tests.browser.test_class_page import LOOKS
+from tests.report.anything import of, spoiled
 from tests.report.hostile import ESCAPES, result, rubric
 from tests.report.html.made import SCRIPT, code, counter, figures, graph, heard, hostile_figures, rate
 from tests.report.nasty import STEERING
-from tests.report.test_every_report import of, spoiled
 
 ROOT = Path(__file__).resolve().parents[2]
 LAB = "leeds-comp3631-lab1"

@@ -12,8 +12,8 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.conftest import DESKTOP, PHONE
-from tests.review.a_class import CLASS, INCONCLUSIVE, Who, a_class, overrides_of
-from tests.review.running import Server
+from tests.classes.review.a_class import CLASS, INCONCLUSIVE, Who, a_class, overrides_of
+from tests.classes.review.running import Server
 
 HOSTILE = (
     "<img src=x onerror=\"document.title='caught'\">\u202e</textarea><script>document.title='caught'</script>"

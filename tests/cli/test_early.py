@@ -17,8 +17,7 @@ from grader.model.result import EarlyVerdict, Silence
 from grader.pipeline import GradeOptions, grade
 from grader.rubric.load import load_rubric
 from tests.fixture_runs import ROOT
-from tests.report.nasty import STEERING, TEXTS
-from tests.report.test_shown import TO_A_CI
+from tests.report.nasty import STEERING, TEXTS, TO_A_CI
 from tests.rubric.samples import spoiled
 from tests.support.a_class import criterion
 

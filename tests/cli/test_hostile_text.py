@@ -25,8 +25,7 @@ from grader.evidence.inspect import inspect_run
 from grader.evidence.run import Channel, Message, Run
 from grader.model.mutants import LostCriterion, MutantResult, ReferenceResult, RubricTest
 from grader.model.result import RubricInfo
-from tests.report.nasty import STEERING, TEXTS
-from tests.report.test_shown import TO_A_CI
+from tests.report.nasty import STEERING, TEXTS, TO_A_CI
 
 GRADER = Path(grader.__file__).parent
 MAY_PRINT = {
@@ -35,8 +34,8 @@ MAY_PRINT = {
     "cli/class_display.py",
     "cli/main.py",  # the list of commands, which is its own
     "limited_child.py",  # JSON for the process that started it
-    "integrations/ci_systems.py",  # annotations; tests/ci
-    "integrations/autograde.py",  # a report as in a terminal; tests/deliver
+    "integrations/ci_systems.py",  # annotations; tests/integrations
+    "integrations/autograde.py",  # a report as in a terminal; tests/integrations
 }
 NASTY = "\x1b[2J\u202e\n::error::owned\n##[error]x\x9b31m\ud800" + "y" * 10**6
 SOME = settings(max_examples=40)

@@ -20,7 +20,7 @@ AT_ITS_END = ", at its end"
 GIT = shutil.which("git") or "git"
 STYLE = (("check", "--no-cache"), ("format", "--no-cache", "--check"))
 LIKE, LIKE_PACKAGE = "york-ele00118m-lab7", "lab_exercises"
-LAB, PACKAGE = "our-lab1", "our_first_node"
+LAB, PACKAGE = "a-lab1", "our_first_node"
 INHERITED = re.compile(
     r"(PATH|HOME|PIP_\w+|UV_\w+|SSL_\w+|REQUESTS_\w+|https?_proxy|no_proxy)$", re.IGNORECASE
 )

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.ci.gitlab import JOB, variables_of
-from tests.ci.runner import ACTION, outputs_in
 from tests.fresh.room import Rooms, Root
+from tests.integrations.gitlab import JOB, variables_of
+from tests.integrations.runner import ACTION, outputs_in
 
 pytestmark = [pytest.mark.ros, pytest.mark.full, pytest.mark.slow, pytest.mark.timeout(900)]
 

@@ -50,7 +50,7 @@ from grader.rubric.load import load_rubric
 from grader.rubric.model import Rubric
 from grader.rubric.scenario import Param
 from grader.rubric.yaml_lines import read_source
-from tests.gradebook.made import BOOK, row
+from tests.classes.gradebook.made import BOOK, row
 from tests.support.timeline import build_runs
 
 Read = Callable[[bytes], None]

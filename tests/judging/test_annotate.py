@@ -21,10 +21,11 @@ from grader.model.result import CriterionResult
 from grader.model.verdict import Status, failed
 from grader.package import read_package
 from grader.rubric.load import load_rubric, read_beside_rubric
-from tests.judging.rubrics import ALL, CHATTER, CMAKE_CHECK, EXECUTABLE, GOOD_RUN, RATE, SCRIPT, rubric
-from tests.judging.rubrics import NODE as LIVES
 from tests.package.trees import CMAKE, MANIFEST, NODE, make_package
 from tests.rubric.samples import faults, spoiled
+from tests.support.a_class import criterion as criterion_of
+from tests.support.rubrics import ALL, CHATTER, CMAKE_CHECK, EXECUTABLE, GOOD_RUN, RATE, SCRIPT, rubric
+from tests.support.rubrics import NODE as LIVES
 from tests.support.timeline import build_runs
 
 OUT = "roslaunch leaves a <node> out: launch/x.launch, line 2:"
@@ -50,21 +51,7 @@ def test_commands_have_the_name_that_the_package_has_as_handed_in(tmp_path: Path
 def criterion(
     hint: str = "", *, status: Status = Status.PASS, scenario: str | None = None
 ) -> CriterionResult:
-    return CriterionResult(
-        id="cmake",
-        title="",
-        check="cmake",
-        scenario=scenario,
-        status=status,
-        points=0,
-        max_points=1,
-        message="",
-        expected="",
-        measured="",
-        hint=hint,
-        reproduce="",
-        citations=(),
-    )
+    return criterion_of("cmake", status, 0, 1, check="cmake", hint=hint, scenario=scenario)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from grader.judging.facts import try_facts
 from grader.model.package import PackageFacts
 from grader.model.verdict import FileCitation, SoughtKind, failed, partial, passed
 from grader.package.launch import parse_launch_files
-from tests.judging.rubrics import CMAKE_CHECK, RATE, SCRIPT, rubric
+from tests.support.rubrics import CMAKE_CHECK, RATE, SCRIPT, rubric
 from tests.support.timeline import build_runs
 
 

@@ -6,12 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from grader.judging import judge
 from grader.package.launch import parse_launch_files
-from grader.rubric.model import Rubric
-from tests.judging.two_nodes import SHEBANG, STOPPED, assert_sound
+from tests.judging.labs import SHEBANG, STOPPED, assert_sound, lost_of, rubric_of
 from tests.support.timeline import build_runs
 
 POINTS = {
@@ -31,17 +29,12 @@ POINTS = {
     "web-launch": 5,
 }
 ROOT = Path(__file__).parents[2]
-FILE = ROOT / "rubrics" / "eyantra-ros-basics.yaml"
+RUBRIC = rubric_of("eyantra-ros-basics")
 PACKAGE = ROOT / "reference_solutions" / "eyantra-ros-basics" / "pkg_ros_basics"
 NAMES = ("name/first", "name/last", "contact/address", "contact/phone")
 DETAILS = dict(zip(NAMES, ("PwkbXwuuI", "QmvRtaalE", "HhdOtsbcU", 50378), strict=True))
 DEPENDS = ("roscpp", "rospy", "std_msgs")
 LAUNCHED = {"processes": [{"name": "roslaunch", "exit_s": 9, **STOPPED}]}
-
-
-@pytest.fixture(scope="module")
-def rubric() -> Rubric:
-    return Rubric.model_validate(yaml.safe_load(FILE.read_text(encoding="utf-8")))
 
 
 def submission(
@@ -155,13 +148,12 @@ def _turtlesim(text: str) -> dict[str, Any]:
     }
 
 
-def lost(rubric: Rubric, **changes: Any) -> dict[str, str]:
-    results = judge(rubric, build_runs(submission(**changes)))
-    return {r.id: r.status.value for r in results if r.status.value != "pass"}
+def lost(**changes: Any) -> dict[str, str]:
+    return lost_of(RUBRIC, judge(RUBRIC, build_runs(submission(**changes))))
 
 
-def test_ids_and_points(rubric: Rubric) -> None:
-    assert_sound(rubric, POINTS)
+def test_ids_and_points() -> None:
+    assert_sound(RUBRIC, POINTS)
 
 
 @pytest.mark.parametrize(
@@ -176,8 +168,8 @@ def test_ids_and_points(rubric: Rubric) -> None:
         {"launch": {"web_node.launch": ('name="webpage_launch"', 'name="webpage-launch"')}},
     ],
 )
-def test_full_marks(rubric: Rubric, changes: dict[str, Any]) -> None:
-    assert lost(rubric, **changes) == {}
+def test_full_marks(changes: dict[str, Any]) -> None:
+    assert lost(**changes) == {}
 
 
 @pytest.mark.parametrize(
@@ -198,10 +190,8 @@ def test_full_marks(rubric: Rubric, changes: dict[str, Any]) -> None:
         ({"url": "https://www.ros.org/"}, {"web-launch": 2.5}),
     ],
 )
-def test_what_is_right_earns_its_share(
-    rubric: Rubric, changes: dict[str, Any], points: dict[str, float]
-) -> None:
-    results = judge(rubric, build_runs(submission(**changes)))
+def test_what_is_right_earns_its_share(changes: dict[str, Any], points: dict[str, float]) -> None:
+    results = judge(RUBRIC, build_runs(submission(**changes)))
     assert {r.id: r.points for r in results if r.status.value != "pass"} == points
     for one in results:
         assert ("of the points for what is right: " in one.message) == (0 < one.points < one.max_points)
@@ -239,7 +229,5 @@ def test_what_is_right_earns_its_share(
         ),
     ],
 )
-def test_one_fault_costs_its_own_criterion(
-    rubric: Rubric, changes: dict[str, Any], wanted: dict[str, str]
-) -> None:
-    assert lost(rubric, **changes) == wanted
+def test_one_fault_costs_its_own_criterion(changes: dict[str, Any], wanted: dict[str, str]) -> None:
+    assert lost(**changes) == wanted

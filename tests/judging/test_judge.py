@@ -11,7 +11,7 @@ from grader.judging import judge
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status, Verdict, partial
 from grader.rubric.message_fields import said_types
-from tests.judging.rubrics import (
+from tests.support.rubrics import (
     ALL,
     CHATTER,
     EXECUTABLE,

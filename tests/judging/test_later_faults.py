@@ -13,7 +13,7 @@ from grader.judging.facts import try_facts
 from grader.judging.judge import Judgement, judge_all_runs
 from grader.model.verdict import FileCitation, partial
 from grader.package.launch import parse_launch_files
-from tests.judging.rubrics import CHATTER, NODE, PACKAGE, RATE, SCENARIO, SCRIPT, rubric
+from tests.support.rubrics import CHATTER, NODE, PACKAGE, RATE, SCENARIO, SCRIPT, rubric
 from tests.support.timeline import build_runs
 
 FILE = SCRIPT["path"]

@@ -1,294 +1,28 @@
-"""What repaired copies and repeated runs change: who is charged, what the others earn, and what was seen only once."""
+"""What repeated runs and copies show: losses seen once, the runs that a repair concerns, lines as handed in."""
 
 from __future__ import annotations
 
-import json
-import re
-from collections.abc import Sequence
-from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import pytest
 
 from grader.evidence.run import Run
 from grader.judging import judge
 from grader.judging.judge import judge_all_runs
-from grader.judging.repeats_and_repairs import drop_unrepeated_losses, is_used_by, launched_in, never_run
+from grader.judging.repeats_and_repairs import (
+    drop_unrepeated_losses,
+    is_used_by,
+    launched_in,
+    never_run,
+    with_lines_as_handed_in,
+)
 from grader.model.repair import Repair
-from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation, failed
 from grader.package.launch import parse_launch_files
-from tests.judging.rubrics import ALL, EXECUTABLE, GOOD_RUN, NODE, PACKAGE, RATE, SCENARIO, SCRIPT, rubric
+from tests.support.rubrics import ALL, GOOD_RUN, NODE, PACKAGE, SCENARIO, SCRIPT, rubric
 from tests.support.timeline import build_runs
 from tests.support.timeline_facts import complete_facts
-
-DIED = {"processes": [{"name": "talker", "exit_s": 0.3, "exit_code": 1}], "outcome": "ended"}
-TABS = Repair(
-    kind="python-syntax",
-    file="src/numeric_talker.py",
-    line=7,
-    before="\tx = 1",
-    after="        x = 1",
-    message="tabs and spaces are mixed in its indentation",
-    fix="indent every line with four spaces",
-)
-TOPIC = Repair(
-    kind="topic-name",
-    file="src/numeric_talker.py",
-    line=9,
-    before="pub = rospy.Publisher('/chater', String, queue_size=10)",
-    after="pub = rospy.Publisher('/chatter', String, queue_size=10)",
-    message="the topic is /chatter, not /chater",
-    fix="'/chatter'",
-)
-
-
-def judged(
-    first: dict[str, Any], copy: dict[str, Any], *repairs: Repair, **keys: Any
-) -> dict[str, CriterionResult]:
-    runs = build_runs({"runs": {"talker": first}, "package": PACKAGE})
-    about = {"repairs": json.dumps([one.model_dump() for one in repairs])}
-    for name, run in build_runs({"runs": {"talker": copy}, "package": PACKAGE}).items():
-        runs[f"repaired-1/{name}"] = replace(run, metadata={**run.metadata, **about})
-    return {c.id: c for c in judge(rubric(*ALL, **keys), runs)}
-
-
-def test_one_fault_is_charged_once_and_the_rest_earns_its_share() -> None:
-    found = judged(DIED, GOOD_RUN, TABS)
-    assert {name: (c.status.value, c.points) for name, c in found.items()} == {
-        "rate": ("partial", 5),
-        "chatter": ("partial", 5),
-        "node": ("fail", 0),
-        "executable": ("pass", 10),
-    }
-    assert found["node"].hint == "src/numeric_talker.py line 7: indent every line with four spaces"
-    assert found["node"].repaired is not None
-    assert found["node"].repaired.charged
-    assert found["rate"].message.startswith(
-        "judged on a copy with src/numeric_talker.py line 7 repaired: half of the points; "
-    )
-    assert found["executable"].repaired is None
-
-
-@pytest.mark.parametrize("repair", [TABS, TOPIC])
-def test_one_fault_is_charged_once_where_no_criterion_requires_another(repair: Repair) -> None:
-    first = DIED if repair is TABS else {**GOOD_RUN, "topics": [{"topic": "/chater", "count": 61}]}
-    runs = build_runs({"runs": {"talker": first}, "package": PACKAGE})
-    about = {"repairs": json.dumps([repair.model_dump()])}
-    for name, run in build_runs({"runs": {"talker": GOOD_RUN}, "package": PACKAGE}).items():
-        runs[f"repaired-1/{name}"] = replace(run, metadata={**run.metadata, **about})
-    lost = {
-        free: [
-            one.id
-            for one in judge(
-                rubric(*({**c, "requires": [] if free else c.get("requires", [])} for c in ALL)), runs
-            )
-            if one.points == 0
-        ]
-        for free in (False, True)
-    }
-    assert len(lost[False]) == len(lost[True]) == 1
-
-
-def test_a_sleep_without_brackets_is_charged_to_the_rate() -> None:
-    line = "        rate.sleep"
-    sleep = TABS.model_copy(update={"kind": "missing-call", "line": 12, "before": line, "after": f"{line}()"})
-    found = judged(DIED, GOOD_RUN, TABS, sleep)
-    assert {name: (c.status.value, c.points) for name, c in found.items()} == {
-        "rate": ("fail", 0),
-        "chatter": ("partial", 5),
-        "node": ("fail", 0),
-        "executable": ("pass", 10),
-    }
-    assert found["node"].repaired is not None
-    assert found["node"].repaired.repairs == (TABS,)
-
-
-def test_a_name_is_charged_where_the_rubric_asks_for_it() -> None:
-    misspelt = {**GOOD_RUN, "topics": [{"topic": "/chater", "count": 61}]}
-    found = judged(misspelt, GOOD_RUN, TOPIC)
-    assert {name: (c.status.value, c.points) for name, c in found.items()} == {
-        "rate": ("pass", 10),
-        "chatter": ("fail", 0),
-        "node": ("pass", 10),
-        "executable": ("pass", 10),
-    }
-    assert "/chatter" in found["chatter"].hint
-
-
-def test_a_name_that_a_launch_file_refuses_is_charged_there_alone() -> None:
-    text = '<launch>\n<node pkg="lab1" type="numeric_talker.py" name="/talker"/>\n</launch>'
-    wrong, right = (
-        {
-            **PACKAGE,
-            "name": "lab1",
-            "launch_files": [
-                f.model_dump() for f in parse_launch_files({"launch/x.launch": one.encode()}, ["lab1"])
-            ],
-        }
-        for one in (text, text.replace("/talker", "talker"))
-    )
-    slash = Repair(
-        kind="node-name",
-        file="launch/x.launch",
-        line=2,
-        before='name="/talker"',
-        after='name="talker"',
-        message="m",
-        fix="f",
-    )
-    with_launch = {"launch": "x.launch", "scripts": ["src/numeric_talker.py"]}
-    lab = rubric(
-        {"id": "launch-xml", "check": "launch-xml", "with": with_launch},
-        RATE | {"requires": []},
-        scenarios={"talker": {**SCENARIO, "start": [{"name": "roslaunch", "launch": "x.launch"}]}},
-    )
-    runs = build_runs({"runs": {"talker": {"outcome": "ended"}}, "package": wrong})
-    for name, run in build_runs({"runs": {"talker": GOOD_RUN}, "package": right}).items():
-        about = {"repairs": json.dumps([slash.model_dump()])}
-        runs[f"repaired-1/{name}"] = replace(run, metadata={**run.metadata, **about})
-    found = {c.id: c for c in judge(lab, runs)}
-    assert {name: (c.status.value, c.points) for name, c in found.items()} == {
-        "launch-xml": ("fail", 0),
-        "rate": ("pass", 10),
-    }
-
-
-def test_what_a_blocked_criterion_is_lost_by_next_is_named_with_its_line() -> None:
-    name = NODE | {"id": "name", "check": "node-name", "with": {"process": "talker", "names": ["talker"]}}
-    fault = {"file": SCRIPT["path"], "line": 7, "kind": "TabError", "message": "inconsistent use of tabs"}
-    broken = {"files": [{**SCRIPT, "python": True, "python_fault": fault}]}
-    lines = [f'  File "/ws/src/lab1/{SCRIPT["path"]}", line 7', "TabError: inconsistent use of tabs"]
-    died = {**DIED, "console": [{"process": "talker", "stream": "stderr", "every_s": 0.001, "lines": lines}]}
-    runs = build_runs({"runs": {"talker": died}, "package": broken})
-    value = TABS.model_copy(
-        update={
-            "kind": "missing-call",
-            "line": 8,
-            "before": "r = rospy.Rate = 1",
-            "after": "r = rospy.Rate(1)",
-            "message": "a value",
-            "fix": "r = rospy.Rate(1)",
-        }
-    )
-    slips = [{"file": SCRIPT["path"], "line": 4, "kind": "node-name", "message": "listener"}]
-    listener = {
-        **GOOD_RUN,
-        "processes": [{**GOOD_RUN["processes"][0], "script": SCRIPT["path"], "nodes": ["/listener"]}],
-    }
-    about = {"repairs": json.dumps([TABS.model_dump(), value.model_dump()])}
-    copy = build_runs({"runs": {"talker": listener}, "package": {**PACKAGE, "slips": slips}})
-    for key, run in copy.items():
-        runs[f"repaired-1/{key}"] = replace(run, metadata={**run.metadata, **about})
-    found = {c.id: c for c in judge(rubric(EXECUTABLE, name), runs)}["name"]
-    assert found.message == "a value; with that repaired, the node is named /listener, not /talker"
-    assert found.hint == (
-        "src/numeric_talker.py line 8: write `r = rospy.Rate(1)`; "
-        "then on line 4 of src/numeric_talker.py, write rospy.init_node('talker')"
-    )
-
-
-def test_what_is_wrong_besides_in_the_same_file_is_said_once() -> None:
-    check = {"id": "manifest", "check": "manifest", "with": {"name": "lab1", "dependencies": ["std_msgs"]}}
-    renamed = TABS.model_copy(
-        update={
-            "kind": "package-name",
-            "file": "package.xml",
-            "line": 3,
-            "before": "  <name>lab_1</name>",
-            "after": "  <name>lab1</name>",
-            "message": "line 3 of package.xml: the package is called lab_1, not lab1",
-            "fix": "write lab1 instead of lab_1 in package.xml, in project(…) and in every pkg=",
-        }
-    )
-    runs = build_runs({"runs": {"talker": GOOD_RUN}, "package": {**PACKAGE, "manifest": {"name": "lab_1"}}})
-    about = {"repairs": json.dumps([renamed.model_dump()])}
-    copy = build_runs({"runs": {"talker": GOOD_RUN}, "package": {**PACKAGE, "manifest": {"name": "lab1"}}})
-    for key, run in copy.items():
-        runs[f"repaired-1/{key}"] = replace(run, metadata={**run.metadata, **about})
-    found = {c.id: c for c in judge(rubric(check), runs)}["manifest"]
-    assert found.repaired is not None
-    assert found.message.count("std_msgs") == found.hint.count("<exec_depend>std_msgs</exec_depend>") == 1
-
-
-def test_two_faults_are_two_losses() -> None:
-    found = judged(DIED, GOOD_RUN, TABS, TOPIC)
-    assert (found["node"].points, found["chatter"].points, found["rate"].points) == (0, 0, 5)
-    assert found["chatter"].message == TOPIC.message
-
-
-def test_the_rubric_has_its_own_shares_and_may_switch_a_repair_off() -> None:
-    assert judged(DIED, GOOD_RUN, TABS, repairs={"python-syntax": 0.3})["rate"].points == 3
-    off = judged(DIED, GOOD_RUN, TABS, repairs={"python-syntax": 0})
-    assert (off["rate"].status.value, off["rate"].points) == ("blocked", 0)
-    assert off["rate"].repaired is None
-
-
-def test_what_fails_on_the_copy_too_says_why() -> None:
-    slow = {**GOOD_RUN, "topics": [{"topic": "/chatter", "count": 31, "rate_hz": 5}]}
-    found = judged(DIED, slow, TABS)
-    assert (found["rate"].status.value, found["rate"].points) == ("fail", 0)
-    assert "repaired" in found["rate"].message
-    assert "5" in found["rate"].measured
-
-
-def died(error: str, line: int) -> dict[str, Any]:
-    """A run in which the talker dies of an error on this line."""
-    where = f'  File "/ws/src/lab1/src/numeric_talker.py", line {line}, in main'
-    console = [{"process": "talker", "stream": "stderr", "at_s": 0.2, "lines": [where, error]}]
-    if not error.startswith("SyntaxError"):
-        console[0]["lines"] = ["Traceback (most recent call last):", where, error]
-    return {**DIED, "console": console}
-
-
-def test_the_fault_behind_a_repaired_one_is_named() -> None:
-    first, then = died("SyntaxError: invalid syntax", 7), died("KeyError: 'first'", 21)
-    node = judged(first, then, TABS)["node"]
-    assert (node.status.value, node.points) == ("fail", 0)
-    assert "SyntaxError" in node.message
-    assert "with that repaired" in node.message
-    assert "KeyError: 'first'" in node.message
-    assert node.hint.startswith("src/numeric_talker.py line 7: indent every line with four spaces; then ")
-
-
-def test_what_the_machine_keeps_the_copy_from_showing_is_charged_to_no_other_criterion() -> None:
-    found = judged(
-        died("SyntaxError: invalid syntax", 7), died("ModuleNotFoundError: No module named 'tf'", 3), TABS
-    )
-    status = {name: one.status.value for name, one in found.items() if name != "executable"}
-    assert status == {"node": "fail", "rate": "inconclusive", "chatter": "inconclusive"}
-    assert "lacks tf" in found["rate"].message
-
-
-SIGN = Repair(
-    kind="turn-sign",
-    file="src/numeric_talker.py",
-    line=9,
-    before="z = turn",
-    after="z = -turn",
-    message="wrong",
-    fix="z = -turn",
-)
-SLOW = {**GOOD_RUN, "topics": [{"topic": "/chatter", "count": 30}]}
-
-
-def test_logic_is_repaired_only_where_the_copy_passes() -> None:
-    silent = {**GOOD_RUN, "topics": [{"topic": "/other", "count": 61}]}
-    found = judged(silent, SLOW, SIGN)
-    assert (found["chatter"].status.value, found["rate"].status.value) == ("fail", "fail") or found[
-        "rate"
-    ].repaired is None
-    assert found["rate"].repaired is None
-    assert all(one.repaired is None for one in judged(SLOW, silent, SIGN).values()), "one fault for another"
-    whole = judged(silent, GOOD_RUN, SIGN)
-    assert sorted(c.points for c in whole.values() if c.repaired is not None) == [0, 5]
-
-
-def test_a_copy_that_helps_nothing_changes_nothing() -> None:
-    runs = build_runs({"runs": {"talker": DIED}, "package": PACKAGE})
-    alone = judge(rubric(*ALL), runs)
-    assert judged(DIED, DIED, TABS) == {c.id: c for c in alone}
 
 
 def test_what_was_seen_once_costs_nothing() -> None:
@@ -337,222 +71,6 @@ def test_what_a_sure_loss_explains_is_not_run_again() -> None:
     found = judge_all_runs(rubric(asks, {**sums, "requires": ["asks"]}), runs)
     assert [c.status.value for c in found.criteria] == ["fail", "blocked"]
     assert found.doubtful == frozenset()
-
-
-def test_a_missing_call_is_charged_where_no_name_is_wrong() -> None:
-    flooded = {**GOOD_RUN, "topics": [{"topic": "/chater", "count": 500, "rate_hz": 500}]}
-    call = TABS.model_copy(update={"kind": "missing-call", "message": "rate.sleep is named but not called"})
-    found = judged(flooded, GOOD_RUN, call, TOPIC)
-    assert found["chatter"].hint == f"src/numeric_talker.py line 9: {TOPIC.fix}"
-    assert (found["rate"].status.value, found["rate"].message) == ("fail", call.message)
-
-
-def test_two_faults_of_one_criterion_are_both_its_hint() -> None:
-    quote = TABS.model_copy(update={"line": 12, "fix": "print('x')"})
-    found = judged(DIED, GOOD_RUN, TABS, quote)
-    assert found["node"].hint == (
-        "src/numeric_talker.py line 7: indent every line with four spaces; "
-        "src/numeric_talker.py line 12: print('x')"
-    )
-
-
-def test_a_private_name_is_charged_where_the_rubric_asks_for_it() -> None:
-    private = TOPIC.model_copy(update={"before": "pub = rospy.Publisher('~chatter', String)"})
-    found = judged(DIED, GOOD_RUN, TABS, private)
-    assert (found["node"].points, found["chatter"].points) == (0, 0)
-
-
-def test_what_the_arena_repairs_before_it_runs_is_charged_to_no_run() -> None:
-    mark = Repair(
-        kind="byte-order-mark", file="src/numeric_talker.py", message="a mark", fix="save it without"
-    )
-    misspelt = {**GOOD_RUN, "topics": [{"topic": "/chater", "count": 61}]}
-    found = judged(misspelt, GOOD_RUN, mark, TOPIC)
-    assert (found["chatter"].points, found["rate"].points) == (0, 10)
-    assert found["chatter"].repaired is not None
-    assert found["chatter"].repaired.repairs == (TOPIC,)
-
-
-def test_a_line_of_the_build_costs_the_build_alone_where_scripts_are_run() -> None:
-    line = Repair(kind="build-line", file="CMakeLists.txt", line=3, message="open", fix="close it")
-    misspelt = {**GOOD_RUN, "topics": [{"topic": "/chater", "count": 61}]}
-    found = judged(misspelt, GOOD_RUN, line, TOPIC)
-    assert (found["chatter"].points, found["rate"].points) == (0, 10)
-
-
-def test_a_line_that_is_missing_is_added_below_its_neighbour() -> None:
-    spin = TABS.model_copy(
-        update={"before": "import rospy", "after": "import rospy\nimport sys", "fix": "import sys"}
-    )
-    assert judged(DIED, GOOD_RUN, spin)["node"].hint == "src/numeric_talker.py: below line 7 add `import sys`"
-
-
-@pytest.mark.parametrize(
-    ("blanks", "words"), [("\t\t", "2 tabs"), (" " * 8, "8 spaces"), ("\t ", "1 tab and 1 space")]
-)
-def test_a_line_that_is_added_begins_as_its_neighbour_does(blanks: str, words: str) -> None:
-    sleep = TABS.model_copy(
-        update={"before": f"{blanks}x", "after": f"{blanks}x\n{blanks}rate.sleep()", "fix": "rate.sleep()"}
-    )
-    told = f"src/numeric_talker.py: below line 7 add `rate.sleep()`, with {words} before it"
-    assert judged(DIED, GOOD_RUN, sleep)["node"].hint == told
-
-
-def test_a_criterion_that_passes_on_the_copy_needs_no_hint() -> None:
-    found = judged(DIED, GOOD_RUN, TABS)
-    assert (found["rate"].status.value, found["rate"].hint) == ("partial", "")
-
-
-def test_a_build_that_the_manifest_blocks_is_judged_on_the_copy() -> None:
-    tag = Repair(
-        kind="manifest-line",
-        file="package.xml",
-        line=5,
-        before="<description>x",
-        after="<description>x</description>",
-        message="<description> is never closed",
-        fix="<description>x</description>",
-    )
-    asked = rubric(
-        {"id": "manifest", "check": "manifest", "with": {"name": "lab1"}},
-        {"id": "build", "check": "build", "requires": ["manifest"]},
-    )
-    fault = {"line": 9, "kind": "XMLSyntaxError", "message": "tag", "cause": "`<description>` is still open"}
-    runs = built({"manifest": None, "manifest_fault": fault}, exit_code=1)
-    assert [c.status.value for c in judge(asked, runs)] == ["fail", "blocked"]
-    copy = built({"manifest": {}}, exit_code=0)["package"]
-    about = {**copy.metadata, "repairs": json.dumps([tag.model_dump()])}
-    manifest, build = judge(asked, {**runs, "repaired-1/package": replace(copy, metadata=about)})
-    assert (manifest.points, manifest.hint) == (0, f"package.xml line 5: write `{tag.fix}`")
-    assert (build.status.value, build.points, build.hint) == ("partial", 5, "")
-
-
-def test_a_dependency_is_told_with_one_tag() -> None:
-    tag = Repair(
-        kind="manifest-line",
-        file="package.xml",
-        line=5,
-        before="<buildtool_depend>catkin</buildtool_depend>",
-        after="<buildtool_depend>catkin</buildtool_depend>\n<depend>rospy</depend>",
-        message="package.xml does not name rospy",
-        fix="<depend>rospy</depend>",
-    )
-    asked = rubric(
-        {"id": "manifest", "check": "manifest", "with": {"name": "lab1", "dependencies": ["rospy"]}},
-        {"id": "build", "check": "build", "requires": ["manifest"]},
-    )
-    depends = [["buildtool_depend", "catkin"]]
-    runs = built({"manifest": {"dependencies": depends}}, exit_code=1)
-    copy = built({"manifest": {"dependencies": [*depends, ["depend", "rospy"]]}}, exit_code=0)["package"]
-    about = {**copy.metadata, "repairs": json.dumps([tag.model_dump()])}
-    manifest, _ = judge(asked, {**runs, "repaired-1/package": replace(copy, metadata=about)})
-    assert re.fullmatch(r"add <exec_depend>rospy</exec_depend> below line \d+", manifest.hint)
-
-
-def test_a_line_of_the_build_is_charged_to_a_build_that_another_fault_blocks() -> None:
-    line = Repair(
-        kind="build-line",
-        file="CMakeLists.txt",
-        line=1,
-        before="vcmake_minimum_required(VERSION 3.0.2)",
-        after="cmake_minimum_required(VERSION 3.0.2)",
-        message="there is no command vcmake_minimum_required",
-        fix="cmake_minimum_required(VERSION 3.0.2)",
-    )
-    script = "src/numeric_talker.py"
-    asked = rubric(
-        {"id": "manifest", "check": "manifest", "with": {"name": "lab1"}},
-        {"id": "talker", "check": "executable", "with": {"path": script}},
-        {"id": "build", "check": "build", "requires": ["manifest"]},
-    )
-    install = ["catkin_install_python", "PROGRAMS", script, "DESTINATION", "lib/other"]
-    package = {
-        "manifest": {"name": "other"},
-        "cmake": {"calls": [install]},
-        "files": [{"path": script, "executable": False, "shebang": "#!/usr/bin/env python3"}],
-    }
-    said = [
-        "CMake Error at lab1/CMakeLists.txt:1 (vcmake_minimum_required):",
-        '  Unknown CMake command "vcmake_minimum_required".',
-    ]
-    runs = built(package, exit_code=1, said=said)
-    assert [c.status.value for c in judge(asked, runs)] == ["fail", "fail", "blocked"]
-    copy = built(package, exit_code=0)["package"]
-    about = {**copy.metadata, "repairs": json.dumps([line.model_dump()])}
-    manifest, talker, build = judge(asked, {**runs, "repaired-1/package": replace(copy, metadata=about)})
-    assert (manifest.repaired, talker.status.value, build.points) == (None, "partial", 0)
-    assert build.hint == f"CMakeLists.txt line 1: write `{line.after}`"
-
-
-def test_a_line_that_only_installs_scripts_costs_no_build_that_worked() -> None:
-    """Another file has another name, and is told to be installed where it lies then."""
-    renamed = Repair(
-        kind="file-name",
-        file="src/numeric_talkr.py",
-        before="src/numeric_talkr.py",
-        after="src/numeric_talker.py",
-        message="src/numeric_talkr.py should be called numeric_talker.py",
-        fix="git mv src/numeric_talkr.py src/numeric_talker.py",
-    )
-    line = Repair(
-        kind="build-line",
-        file="CMakeLists.txt",
-        line=9,
-        before="catkin_package()",
-        after=f"catkin_package()\ncatkin_install_python(PROGRAMS {renamed.after} DESTINATION lib/lab1)",
-        message=f"CMakeLists.txt does not install {renamed.after}",
-        fix="write catkin_install_python(…)",
-    )
-    wanted = "scripts/numeric_talker.py"
-    asked = rubric(
-        {"id": "install", "check": "cmake-install", "with": {"scripts": [wanted]}},
-        {"id": "talker", "check": "executable", "with": {"path": wanted}},
-        {"id": "build", "check": "build", "with": {"scripts": [wanted]}, "requires": ["install", "talker"]},
-    )
-    script = {"path": renamed.before, "executable": True, "shebang": "#!/usr/bin/env python3"}
-    calls = [["find_package", "catkin", "REQUIRED"], ["catkin_package"]]
-    runs = built({"manifest": {}, "cmake": {"calls": calls}, "files": [script]}, exit_code=0)
-    calls.append(["catkin_install_python", "PROGRAMS", renamed.after, "DESTINATION", "lib/lab1"])
-    right = {"manifest": {}, "cmake": {"calls": calls}, "files": [{**script, "path": renamed.after}]}
-    copy = built(right, exit_code=0)["package"]
-    about = {**copy.metadata, "repairs": json.dumps([renamed.model_dump(), line.model_dump()])}
-    found = judge(asked, {**runs, "repaired-1/package": replace(copy, metadata=about)})
-    install, talker, build = found
-    assert (install.points, talker.points, build.points) == (0, 0, build.max_points)
-    assert f"PROGRAMS {renamed.after} DESTINATION" in install.hint
-    assert wanted not in install.hint
-
-
-def built(package: dict[str, Any], *, exit_code: int, said: Sequence[str] = ()) -> dict[str, Run]:
-    made = {"name": "catkin_make", "role": "build", "exit_s": 3, "exit_code": exit_code}
-    console = [{"process": "catkin_make", "stream": "stderr", "lines": [*said]}] if said else []
-    run = {"package": package, "processes": [made], "console": console}
-    return build_runs({"runs": {"package": run}})
-
-
-def test_a_build_that_the_machine_ends_after_the_repair_leaves_what_it_makes_open() -> None:
-    package = {**PACKAGE, "name": "lab1", "manifest": {}, "interfaces": [{"path": "msg/A.msg", "fields": []}]}
-    package["files"] = [*package["files"], {"path": "msg/A.msg"}, {"path": "CMakeLists.txt"}]
-    end = died("ModuleNotFoundError: No module named 'lab1'", 3)
-    folder = (
-        "CMake Error at CMakeLists.txt:4 (catkin_package):\n  catkin_package() include dir 'i' does not exist"
-    )
-    lacks = (
-        'CMake Error: Could not find a package configuration file provided by "tf" with any of the following'
-    )
-    runs: dict[str, Run] = {}
-    line = Repair(
-        kind="build-line", file="CMakeLists.txt", line=4, before="a include", after="a", message="m", fix="f"
-    )
-    for prefix, said in (("", folder), ("repaired-1/", lacks)):
-        runs[f"{prefix}package"] = built(package, exit_code=1, said=said.split("\n"))["package"]
-        about = {**runs[f"{prefix}package"].metadata, "repairs": json.dumps([line.model_dump()])}
-        runs[f"{prefix}package"] = replace(runs[f"{prefix}package"], metadata=about)
-        runs[f"{prefix}talker"] = build_runs({"runs": {"talker": end}, "package": package})["talker"]
-    asked = ({"id": "build", "check": "build"}, {**NODE, "requires": []}, {**RATE, "requires": ["node"]})
-    found = {c.id: c for c in judge(rubric(*asked), runs)}
-    assert found["build"].status.value == "fail"
-    assert {found[name].status.value for name in ("node", "rate")} == {"inconclusive"}
 
 
 @pytest.mark.parametrize(
@@ -629,30 +147,6 @@ def test_what_a_launch_file_starts_is_no_module_of_another_script() -> None:
         assert used == runs
 
 
-def test_what_no_repair_helps_is_told_with_all_of_its_faults() -> None:
-    lacking = [
-        "Traceback (most recent call last):",
-        '  File "/ws/src/lab1/src/numeric_talker.py", line 3, in <module>',
-        "ModuleNotFoundError: No module named 'numpy'",
-    ]
-    console = {"process": "talker", "stream": "stderr", "at_s": 0.2, "every_s": 0.001, "lines": lacking}
-    died = {**DIED, "console": [console]}
-    slip = {
-        "file": TABS.file,
-        "line": 9,
-        "kind": "misspelt",
-        "name": "calback",
-        "message": "did you mean callback?",
-    }
-    slip["fix"] = "write callback instead of calback"
-    runs = build_runs({"runs": {"talker": died}, "package": {**PACKAGE, "slips": [slip]}})
-    about = {"repairs": json.dumps([TOPIC.model_dump()])}
-    for name, run in build_runs({"runs": {"talker": died}, "package": PACKAGE}).items():
-        runs[f"repaired-1/{name}"] = replace(run, metadata={**run.metadata, **about})
-    hints = {c.id: c.hint for c in judge(rubric(*ALL), runs)}
-    assert hints["node"].startswith("on line 9, write callback instead of calback. For the rest, tell")
-
-
 @pytest.mark.parametrize(
     ("talker", "module", "named", "uses"),
     [
@@ -676,43 +170,25 @@ def test_a_module_concerns_the_scripts_that_name_it(talker: str, module: str, na
     assert is_used_by(asked.scenarios["talker"], repair, asked, built=True, launched=known) is uses
 
 
-@pytest.mark.parametrize(
-    ("said", "status", "hint"),
-    [
-        (
-            'CMake Error: Could not find a package configuration file provided by "tf" with any of the following',
-            "inconclusive",
-            "nothing for you to do: tell your instructor",
-        ),
-        ("/w/src/lab1/src/mean.cpp:3:1: error: 'x' was not declared", "fail", "first get the build to pass"),
-    ],
+IMPORT = Repair(
+    kind="missing-import",
+    file="a.py",
+    line=2,
+    before="import rospy",
+    after="import rospy\nfrom std_msgs.msg import Int8",
+    message="",
+    fix="",
 )
-def test_a_program_that_the_build_did_not_make_is_no_missing_script(
-    said: str, status: str, hint: str
-) -> None:
-    files = [{"path": "src/mean.cpp"}, {"path": "CMakeLists.txt"}]
-    package = {
-        "name": "lab1",
-        "files": files,
-        "manifest": {},
-        "cmake": {"calls": [["add_executable", "mean", "src/mean.cpp"]]},
-    }
-    scenario = {**SCENARIO, "start": [{"name": "talker", "script": "mean"}]}
-    asked = ({"id": "build", "check": "build"}, {**NODE, "requires": []})
-    runs = build_runs({"runs": {"talker": {"outcome": "ended", "graph": []}}, "package": package})
-    runs |= built(package, exit_code=1, said=[said])
-    found = {c.id: c for c in judge(rubric(*asked, scenarios={"talker": scenario}), runs)}
-    assert found["node"].message.startswith("talker was not started: the build did not make the program mean")
-    assert (found["node"].status.value, found["node"].hint.startswith(hint)) == (status, True)
-
-
-def test_a_script_that_is_missing_is_named() -> None:
-    runs = build_runs(
-        {"runs": {"talker": {"outcome": "ended", "graph": []}}, "package": {"name": "lab1", "files": []}}
-    )
-    (node,) = judge(rubric({**NODE, "requires": []}), runs)
-    assert node.message == "talker was not started: there is no src/numeric_talker.py to run"
-    assert node.hint == "write src/numeric_talker.py"
+GLOBAL = Repair(
+    kind="python-syntax",
+    file="a.py",
+    line=5,
+    before="    if x:\n        global x\n        x = 1\n        global y",
+    after="    global x, y\n    if x:\n        x = 1",
+    message="",
+    fix="",
+)
+RENAME = Repair(kind="file-name", file="a.py", before="a.py", after="b.py", message="", fix="")
 
 
 def test_a_copy_of_a_script_that_is_not_the_one_that_runs_explains_nothing() -> None:
@@ -721,25 +197,31 @@ def test_a_copy_of_a_script_that_is_not_the_one_that_runs_explains_nothing() -> 
     assert never_run(package, rubric(*ALL)) == {"old/numeric_talker.py"}
 
 
-def test_what_runs_beside_a_program_that_was_not_built_is_left_open() -> None:
-    tf = 'CMake Error: Could not find a package configuration file provided by "tf" with any of the following'
-    package = {
-        "name": "lab1",
-        "files": [SCRIPT, {"path": "src/mean.cpp"}, {"path": "CMakeLists.txt"}],
-        "manifest": {},
-        "cmake": {"calls": [["add_executable", "mean", "src/mean.cpp"]]},
-    }
-    scenario = {**SCENARIO, "start": [*SCENARIO["start"], {"name": "mean", "script": "mean"}]}
-    done = {
-        "id": "done",
-        "check": "prints",
-        "with": {"process": "talker", "text": "done"},
-        "scenario": "talker",
-    }
-    said = [{"process": "talker", "line": "waiting"}]
-    runs = build_runs({"runs": {"talker": {**GOOD_RUN, "console": said}}, "package": package})
-    for exit_code, status in ((1, "inconclusive"), (0, "fail")):
-        runs |= built(package, exit_code=exit_code, said=[tf] if exit_code else [])
-        (found,) = judge(rubric(done, scenarios={"talker": scenario}), runs)
-        assert found.status.value == status
-        assert ("did not make the program mean, which runs beside it" in found.message) == bool(exit_code)
+@pytest.mark.parametrize(
+    ("repairs", "file", "on_copy", "as_handed_in"),
+    [
+        ((IMPORT,), "a.py", 1, 1),
+        ((IMPORT,), "a.py", 2, 2),
+        ((IMPORT,), "a.py", 9, 8),
+        ((IMPORT,), "other.py", 9, 9),
+        ((GLOBAL,), "a.py", 6, 5),
+        ((GLOBAL,), "a.py", 7, 7),
+        ((GLOBAL,), "a.py", 8, 9),
+        ((IMPORT, RENAME), "b.py", 9, 8),
+        ((RENAME,), "b.py", 9, 9),
+    ],
+)
+def test_lines_of_the_copy_are_told_as_they_were_handed_in(repairs, file, on_copy, as_handed_in):
+    place = FileCitation(file=file, line=on_copy)
+    verdict = failed(f"{file}, line {on_copy} asks", hint=f"on line {on_copy}, write it", citations=(place,))
+    told = with_lines_as_handed_in(verdict, repairs)
+    assert told.message == f"{file}, line {as_handed_in} asks"
+    assert told.hint == f"on line {as_handed_in}, write it"
+    assert told.citations == (FileCitation(file=file, line=as_handed_in),)
+
+
+def test_several_lines_and_those_of_other_files_in_one_text():
+    cited = (FileCitation(file="a.py", line=9), FileCitation(file="c.py", line=9))
+    hint = "write it on lines 8, 9 and 12 of a.py, and on line 9 of c.py; line 3"
+    told = with_lines_as_handed_in(failed("", hint=hint, citations=cited), (IMPORT,))
+    assert told.hint == "write it on lines 7, 8 and 11 of a.py, and on line 9 of c.py; line 3"

@@ -18,6 +18,7 @@ from grader.report.view import without_hidden
 from grader.rubric.model import Rubric
 from tests.report.hostile import result as any_result
 from tests.support.a_class import criterion
+from tests.support.rubrics import rubric as rubric_of
 
 DEADLINE = datetime(2026, 11, 20, 23, 59, tzinfo=timezone.utc)
 TWO_DAYS = HandedIn(at=DEADLINE + timedelta(days=1, hours=1), by="commit", deadline=DEADLINE)
@@ -25,25 +26,17 @@ MILLER = Override(points=7, comment="clear names", author="A. Miller", date=date
 
 
 def rubric(criteria: tuple[CriterionResult, ...], *, hidden: str = "", **changes: object) -> Rubric:
-    data = {
-        "schema": "grader.rubric/1",
-        "id": "lab",
-        "title": "A lab",
-        "version": "1",
-        "package": "lab1",
-        "scenarios": {},
-        "criteria": tuple(
-            {
-                "id": c.id,
-                "title": c.title,
-                "points": c.max_points,
-                "check": c.check,
-                "visibility": "hidden" if c.id == hidden else "visible",
-            }
-            for c in criteria
-        ),
-    }
-    return Rubric.model_validate({**data, **changes})
+    asked = (
+        {
+            "id": c.id,
+            "title": c.title,
+            "points": c.max_points,
+            "check": c.check,
+            "visibility": "hidden" if c.id == hidden else "visible",
+        }
+        for c in criteria
+    )
+    return rubric_of(*asked, **changes)
 
 
 def automatic(criteria: tuple[CriterionResult, ...], error: ErrorInfo | None = None) -> GradingResult:
@@ -173,10 +166,13 @@ def test_lateness_comes_last():
     assert unsettled(found, lab) == automatic(CRITERIA)
 
 
-def test_a_mark_in_points_is_compared_with_what_lateness_leaves():
-    lab = rubric(CRITERIA, deadline=DEADLINE, late={"lost": 10}, pass_mark=70)
-    assert passed(lab, settled(lab=lab, style=MILLER))
-    assert not passed(lab, settled(lab=lab, handed_in=TWO_DAYS, style=MILLER))
+@pytest.mark.parametrize(
+    ("mark", "in_time", "late"), [(69.6, True, True), (69.7, True, False), (87.1, False, False)]
+)
+def test_a_mark_in_points_is_compared_with_what_lateness_leaves(mark, in_time, late):
+    lab = rubric(CRITERIA, deadline=DEADLINE, late={"lost": 10}, pass_mark=mark)
+    assert passed(lab, settled(lab=lab, style=MILLER)) is in_time
+    assert passed(lab, settled(lab=lab, handed_in=TWO_DAYS, style=MILLER)) is late
 
 
 ERROR = ErrorInfo(kind="submission", message="no package", hint="hand in a package")

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from tests.judging.two_nodes import Lab, assert_sound
+from tests.judging.labs import Lab, assert_sound
 
 POINTS = {
     "manifest": 5,

@@ -12,28 +12,17 @@ from grader.judging import criteria_bytes, judge, overall_status, reached_pass_m
 from grader.judging.summary import notes_of, round_half_up
 from grader.model.result import CriterionResult, Note
 from grader.model.verdict import FileCitation, Status
-from tests.judging.rubrics import ALL, GOOD_RUN, PACKAGE, rubric
+from tests.support.a_class import criterion
+from tests.support.rubrics import ALL, GOOD_RUN, PACKAGE, rubric
 from tests.support.timeline import build_runs
 
 
 def result(
     name: str = "a", status: str = "pass", points: float = 10.0, max_points: float = 10.0
 ) -> CriterionResult:
-    return CriterionResult(
-        id=name,
-        title="größer",
-        check="rate",
-        scenario=None,
-        status=Status(status),
-        points=points,
-        max_points=max_points,
-        message="m",
-        expected="",
-        measured="",
-        hint="",
-        reproduce="",
-        citations=(FileCitation(file="a.py", line=1),),
-    )
+    about = {"title": "größer", "check": "rate", "message": "m"}
+    cited = (FileCitation(file="a.py", line=1),)
+    return criterion(name, Status(status), points, max_points, citations=cited, **about)
 
 
 @pytest.mark.parametrize(
@@ -67,12 +56,6 @@ def test_total_is_exact() -> None:
 )
 def test_round_half_up(value: float, digits: int, expected: float) -> None:
     assert round_half_up(value, digits) == expected
-
-
-def test_pass_mark_in_points() -> None:
-    one = rubric({"id": "a", "check": "rate"}, pass_mark=5)
-    assert reached_pass_mark(one, [result("a", "partial", 5)])
-    assert not reached_pass_mark(one, [result("a", "partial", 4.9)])
 
 
 def test_without_a_pass_mark_every_visible_criterion_has_to_pass() -> None:

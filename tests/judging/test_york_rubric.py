@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from grader.judging import judge, total_points
-from grader.rubric.model import Rubric
-from tests.judging.two_nodes import SHEBANG, STOPPED, WORDS, assert_sound
+from tests.judging.labs import SHEBANG, STOPPED, WORDS, assert_sound, lost_of, rubric_of
 from tests.support.timeline import build_runs
 
 POINTS = {
@@ -28,14 +25,9 @@ POINTS = {
     "receiver-hears": 10,
     "two-senders": 15,
 }
-FILE = Path(__file__).parents[2] / "rubrics" / "york-ele00118m-lab7.yaml"
+RUBRIC = rubric_of("york-ele00118m-lab7")
 SENDERS = ("/sender_11_1700000000001", "/sender_12_1700000000002")
 NO_SENDER = dict.fromkeys(["data", "data-rate", "message", "two-senders"], "blocked")
-
-
-@pytest.fixture(scope="module")
-def rubric() -> Rubric:
-    return Rubric.model_validate(yaml.safe_load(FILE.read_text(encoding="utf-8")))
 
 
 def submission(
@@ -111,21 +103,20 @@ def _two_senders(copies: tuple[str, ...], heard: str) -> dict[str, Any]:
 CLASH = "[WARN] shutdown request: [/sender] Reason: new node registered with same name"
 
 
-def lost(rubric: Rubric, **changes: Any) -> dict[str, str]:
-    results = judge(rubric, build_runs(submission(**changes)))
-    return {r.id: r.status.value for r in results if r.status.value != "pass"}
+def lost(**changes: Any) -> dict[str, str]:
+    return lost_of(RUBRIC, judge(RUBRIC, build_runs(submission(**changes))))
 
 
-def test_ids_and_points(rubric: Rubric) -> None:
-    assert_sound(rubric, POINTS)
+def test_ids_and_points() -> None:
+    assert_sound(RUBRIC, POINTS)
 
 
 @pytest.mark.parametrize(
     "changes",
     [{}, {"heard": "/receiver: received:  %s"}, {"values": [f"The time is {n}" for n in range(8)]}],
 )
-def test_full_marks(rubric: Rubric, changes: dict[str, Any]) -> None:
-    assert lost(rubric, **changes) == {}
+def test_full_marks(changes: dict[str, Any]) -> None:
+    assert lost(**changes) == {}
 
 
 @pytest.mark.parametrize(
@@ -143,28 +134,26 @@ def test_full_marks(rubric: Rubric, changes: dict[str, Any]) -> None:
         ({"copies": ("/sender", "/sender")}, {"two-senders": "partial"}),
     ],
 )
-def test_one_fault_costs_its_own_criterion(
-    rubric: Rubric, changes: dict[str, Any], wanted: dict[str, str]
-) -> None:
-    assert lost(rubric, **changes) == wanted
+def test_one_fault_costs_its_own_criterion(changes: dict[str, Any], wanted: dict[str, str]) -> None:
+    assert lost(**changes) == wanted
 
 
-def test_a_sender_that_is_not_there_is_one_cause(rubric: Rubric) -> None:
+def test_a_sender_that_is_not_there_is_one_cause() -> None:
     given = submission()
     given["package"]["files"].pop(0)
     given["runs"]["sender"] = {"outcome": "ended"}
     given["runs"]["two-senders"] = {"processes": [{"name": "receiver", "nodes": ["/receiver"], **STOPPED}]}
-    results = judge(rubric, build_runs(given))
+    results = judge(RUBRIC, build_runs(given))
     found = {r.id: r.status.value for r in results if r.status.value != "pass"}
     assert found == {"sender-executable": "fail", "sender-node": "blocked", **NO_SENDER}
     named = {r.message.split(":")[0] for r in results if r.status.value == "blocked"}
     assert named == {"blocked by sender-executable"}
 
 
-def test_a_name_taken_over_earns_a_third(rubric: Rubric) -> None:
-    results = judge(rubric, build_runs(submission(copies=("/sender", "/sender"))))
+def test_a_name_taken_over_earns_a_third() -> None:
+    results = judge(RUBRIC, build_runs(submission(copies=("/sender", "/sender"))))
     assert {r.points for r in results if r.id == "two-senders"} == {5}
-    assert total_points(rubric, results) == 90
+    assert total_points(RUBRIC, results) == 90
 
 
 @pytest.mark.parametrize(
@@ -178,9 +167,7 @@ def test_a_name_taken_over_earns_a_third(rubric: Rubric) -> None:
         ({"values": {"text": "The time is noon"}}, "message", 0),
     ],
 )
-def test_other_words_earn_half(
-    rubric: Rubric, changes: dict[str, Any], criterion: str, points: float
-) -> None:
-    results = judge(rubric, build_runs(submission(**changes)))
+def test_other_words_earn_half(changes: dict[str, Any], criterion: str, points: float) -> None:
+    results = judge(RUBRIC, build_runs(submission(**changes)))
     lost = {r.id: r.points for r in results if r.points < r.max_points}
     assert lost == ({} if points == POINTS[criterion] else {criterion: points})

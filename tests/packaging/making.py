@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -130,3 +131,9 @@ def _run(command: list[str | Path], environment: dict[str, str]) -> None:
         timeout=SECONDS,
     )
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def find(version: str) -> str | None:
+    """That Python, on PATH or among those of pyenv."""
+    places = sorted(Path.home().glob(f".pyenv/versions/{version}.*/bin/python{version}"))
+    return str(places[-1]) if places else shutil.which(f"python{version}")

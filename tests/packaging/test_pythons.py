@@ -4,23 +4,16 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 
 from tests.packaging.conftest import LAB
-from tests.packaging.making import ROOT, Built, Installed, install, once, plain_environment, virtual
+from tests.packaging.making import ROOT, Built, Installed, find, install, once, plain_environment, virtual
 
 RECORDINGS = ROOT / "tests" / "data" / "recordings"
 NAMED = re.findall(r"Python :: (3\.\d+)", (ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-
-
-def find(version: str) -> str | None:
-    """That Python, on PATH or among those of pyenv."""
-    places = sorted(Path.home().glob(f".pyenv/versions/{version}.*/bin/python{version}"))
-    return str(places[-1]) if places else shutil.which(f"python{version}")
 
 
 @pytest.fixture(scope="module", params=NAMED)

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.packaging.making import BIN, ROOT
-from tests.packaging.test_pythons import find
+from tests.packaging.making import BIN, ROOT, find
 
 SIDES = ("grader/arena/ros", "grader/arena/standins")
 NEWER = {

@@ -151,3 +151,4 @@ PIECES = (
     *("a", "Z", "9", " ", "  ", "ü", "ß", "\u00a0", "学", "🤖"),
 )
 TEXTS = ANY_TEXT | st.lists(st.sampled_from(PIECES), min_size=1, max_size=8).map("".join)
+TO_A_CI = re.compile(r"^\s*::|##[A-Za-z]*\[", re.MULTILINE)

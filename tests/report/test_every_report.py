@@ -5,93 +5,31 @@ from __future__ import annotations
 import io
 import json
 import re
-from collections.abc import Iterator
 from xml.parsers import expat
 
 import pytest
 from cmarkgfm import github_flavored_markdown_to_html
 from cmarkgfm.cmark import Options
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import given
 from lxml import etree
 from lxml import html as parser
 from rich.console import Console
 
 from grader.judging import criteria_bytes
 from grader.model.result import (
-    AUTHOR_CHARS,
-    COMMENT_CHARS,
-    AppliedOverride,
-    Automatic,
-    CriterionResult,
-    ErrorInfo,
     GradingResult,
-    Lateness,
-    Note,
-    SubmissionInfo,
 )
-from grader.model.verdict import EvidenceCitation, FileCitation, Status
+from grader.model.verdict import FileCitation, Status
 from grader.report.files import result_bytes, result_text, write_reports
 from grader.report.junit import render_junit
 from grader.report.markdown import render_markdown
 from grader.report.terminal import Terminal, open_console
 from grader.report.text import line
+from tests.report.anything import FIELDS, HUGE, SOME, of, results, spoiled
 from tests.report.hostile import result, rubric
-from tests.report.nasty import STEERING, TEXTS
-from tests.report.test_shown import TO_A_CI
-from tests.report.test_text import FOUND_BY_FORGES, HARMLESS, MARKDOWN, QUICK_ACTION, prose
+from tests.report.markdown_readers import FOUND_BY_FORGES, HARMLESS, MARKDOWN, QUICK_ACTION, prose
+from tests.report.nasty import STEERING, TO_A_CI
 from tests.support.a_class import criterion
-
-FIELDS = ("id", "title", "check", "scenario", "message", "expected", "measured", "hint", "reproduce")
-SOME = settings(suppress_health_check=[HealthCheck.too_slow])
-
-
-def spoiled(texts: Iterator[str], status: str = "fail") -> GradingResult:
-    """A result with the next of these texts in each field that holds one."""
-    citations = (
-        FileCitation(file=next(texts), line=3),
-        EvidenceCitation(evidence=next(texts), topic=next(texts), from_ns=0, to_ns=10**9),
-    )
-    fields = {name: next(texts) for name in FIELDS}
-    one = CriterionResult(**fields, status=Status(status), points=0, max_points=5, citations=citations)
-    return result(
-        submission=SubmissionInfo(
-            id=next(texts), source=next(texts), commit=next(texts), digest=next(texts), package=next(texts)
-        ),
-        criteria=(one, criterion("other", Status.BLOCKED, 0, 5, message=next(texts))),
-        notes=(Note(scenario=next(texts), actor=next(texts), kind="refused", text=next(texts)),),
-        overrides=(decided(one, texts),),
-        late=Lateness(note=next(texts), points_before=5, points=4, text=next(texts)),
-        error=ErrorInfo(kind=next(texts), message=next(texts), hint=next(texts)),
-        status="error",
-    )
-
-
-def decided(of_criterion: CriterionResult, texts: Iterator[str]) -> AppliedOverride:
-    """Its person's texts are as long as they may be, and UTF-8."""
-    comment, author = (next(texts).encode("utf-8", "backslashreplace").decode() for _ in range(2))
-    return AppliedOverride(
-        criterion=of_criterion.id,
-        points=0,
-        comment=comment[:COMMENT_CHARS],
-        author=author[:AUTHOR_CHARS],
-        automatic=Automatic(status=Status.PASS, points=5, message=next(texts)),
-        was=Automatic(status=Status.FAIL, points=0, message=next(texts)),
-        changed=True,
-    )
-
-
-def of(text: str) -> Iterator[str]:
-    while True:
-        yield text
-
-
-@st.composite
-def results(draw) -> GradingResult:
-    """Each field has its own text; the sign at the end keeps a field from being left out for having none."""
-    texts = draw(st.lists(TEXTS, min_size=4, max_size=12))
-    some = (text + "a" for _ in range(100) for text in texts)
-    return spoiled(some, draw(st.sampled_from([s.value for s in Status])))
 
 
 def terminal(shown: GradingResult, **how) -> str:
@@ -199,9 +137,6 @@ def test_a_command_that_wraps_to_a_lines_start_is_none(before):
     shown = terminal(result(criteria=(criterion("c", Status.FAIL, 0, 5, message=text, hint=text),)))
     assert "owned" in shown
     assert TO_A_CI.search(shown) is None
-
-
-HUGE = ("x" * 10**6, "\U000e0001" * 10**6, "&" * 10**6, "*" * 10**6, "/a.b " * 200_000)
 
 
 @pytest.mark.parametrize("text", HUGE, ids=["letters", "hidden", "entities", "stars", "names"])

@@ -27,8 +27,7 @@ from grader.report.junit import render_junit
 from grader.report.markdown import BYTES_MAX, EDGES_MAX, PARTS_MAX, mermaid, render_markdown
 from grader.report.platforms import render_gradescope
 from tests.report import hostile
-from tests.report.nasty import STEERING
-from tests.report.test_shown import TO_A_CI
+from tests.report.nasty import STEERING, TO_A_CI
 from tests.report.worst import DOCS, LONG, MERMAID, MORE, TEXTS, figures, rubric, worst
 from tests.support.a_class import criterion
 

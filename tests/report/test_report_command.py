@@ -17,7 +17,7 @@ from grader.model.verdict import FileCitation, Status
 from grader.report.files import write_reports
 from grader.report.forms import FORMS
 from grader.results import READY
-from tests.batch.test_regrade import LAB, recorded
+from tests.classes.batch.a_class import LAB, recorded
 from tests.report.hostile import result
 from tests.support.a_class import criterion
 

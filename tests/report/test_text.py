@@ -13,20 +13,11 @@ from cmarkgfm.cmark import Options
 from hypothesis import example, given
 from hypothesis import strategies as st
 from lxml import html as parser
-from markdown_it import MarkdownIt
 
 from grader.report.text import csv_text, html, markdown, markdown_code, visible
 from grader.wording import did_you_mean, number
+from tests.report.markdown_readers import FOUND_BY_FORGES, HARMLESS, MARKDOWN, QUICK_ACTION, prose
 from tests.report.nasty import STEERING, TEXTS
-
-MARKDOWN = MarkdownIt("gfm-like", {"linkify": True})
-HARMLESS = {"text", "text_special", "code_inline"}
-# What GitHub and GitLab look for in rendered text, wherever it is not code.
-FOUND_BY_FORGES = re.compile(
-    r"@\w|(?<!\w)(GH-|[#!%&~])\d|\$|:[a-z_]+:|www\.|://|[\[{][+-]|[+-][\]}]|\[\[|\[_*TOC|(?<!\w)[0-9]*[a-f][0-9a-f]{6,39}(?!\w)",
-    re.IGNORECASE,
-)
-QUICK_ACTION = re.compile(r"^\s*/\w", re.MULTILINE)
 
 
 def inline(source: str, kind: str = "inline"):
@@ -37,11 +28,6 @@ def inline(source: str, kind: str = "inline"):
 
 def read(tokens) -> str:
     return "".join(token.content for token in tokens)
-
-
-def prose(tokens) -> str:
-    """What is not code, with a blank in the place of each code span."""
-    return "".join("\0" if token.type == "code_inline" else token.content for token in tokens)
 
 
 def words(text: str) -> list[str]:

@@ -17,7 +17,7 @@ from grader.report.terminal import Terminal, open_console
 from grader.rubric.download import BYTES_MAX
 from grader.rubric.find import rubrics_folder
 from grader.rubric.load import LoadedRubric, checkout_around, load_rubric, origin_of
-from tests.fetching.forge import certificate_in, forge
+from tests.classes.fetching.forge import certificate_in, forge
 from tests.report.hostile import result, rubric
 
 LAB = "leeds-comp3631-lab1"

@@ -35,7 +35,7 @@ A new kind takes
    executable bits on the way;
 2. a line here, before the kinds that would take its paths too;
 3. where it comes packed as one file: `is_download` and `unpack_download` (`platforms.py`);
-4. an example in `tests/roster/`, and its section in `docs/how-to/rosters.md`.
+4. an example in `tests/classes/roster/`, and its section in `docs/how-to/rosters.md`.
 """
 
 

@@ -1,7 +1,7 @@
 """Submissions of a class that are nearly the same are named for a person to look at. No mark depends on it.
 
-The comparison is `copydetect`'s: code without names and layout, fingerprints of all stretches of 25 signs. What the
-starter code, the tutorials and most of the class have is taken out first. Needs the extra `similarity`.
+The library `copydetect` compares fingerprints of every 25 characters of code, without its names and layout. Code of the
+starter, of the tutorials, or of most of the class is taken out first. Needs the extra `similarity`.
 """
 
 from grader.classes.similarity.comparison import compare, write_similarity

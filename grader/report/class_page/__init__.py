@@ -1,4 +1,4 @@
 """A class's results as one page (`index.html`): a table, what cost most, who shares a fault, what to run again.
 
-(Entry, GradingResult), pair by pair → `gather` → counted and drawn (`statistics`) → `page`, with what is left to do
+`submissions.gather` reads the results one by one, `statistics` counts and draws them, `page` makes the HTML.
 """

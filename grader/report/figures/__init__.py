@@ -1,4 +1,4 @@
-"""Pictures of what was measured: numbers and texts out of the evidence, by the measure of the checks themselves.
+"""What plots show: numbers and texts from the evidence, measured with the checks' own functions.
 
 Pure: runs and verdicts come in, records of bounded size go out, and nothing that is wrong with the evidence raises.
 Whatever cannot be shown is left out.

@@ -1,24 +1,28 @@
-"""The file as a whole: its size, its policy, and what an anonymous one does not say."""
+"""The file as a whole: its size, its policy, what an anonymous one does not say, and its links."""
 
 from __future__ import annotations
 
 import base64
 import hashlib
+import html
 import json
 import re
 import resource
+import shlex
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from grader.cli.main import run
 from grader.errors import OutputError
 from grader.model.batch import Entry, RosterFault
 from grader.model.result import AppliedOverride, Automatic, GradingResult
 from grader.model.verdict import Status
 from grader.report.class_page.page import write_class_page
 from grader.report.class_page.submissions import pseudonyms, salt_in
+from tests.classes.batch.a_class import CORRECT, ROOT, RUBRIC, WRONG_NAME, batch, handed_in, roster_of
 from tests.report.class_page.made_up import FAULTS, made_up_rows, made_up_run
 
 
@@ -149,3 +153,36 @@ def test_no_pseudonym_looks_like_an_id() -> None:
     assert pseudonyms(["s001", "x2"]) == ["P001", "P002"]
     assert pseudonyms(["sara", "paul"]) == ["S001", "S002"]
     assert len(set(pseudonyms([str(i) for i in range(1234)]))) == 1234
+
+
+@pytest.mark.full
+def test_a_batch_writes_the_page_beside_the_gradebook(tmp_path, capsys) -> None:
+    handed_in(tmp_path, ["bob"], WRONG_NAME)
+    rows = [f"ada,{CORRECT},Ada", "b b,bob,Bob", f"zoe,{tmp_path}/nowhere/at/all,Zoe"]
+    roster, out = roster_of(tmp_path, rows, "id,source,name"), tmp_path / "out"
+    batch(roster, out, "--allow-local", str(ROOT))
+    data = data_of(out / "index.html")
+    assert [(row[0], row[1], row[4]) for row in data["rows"]] == [
+        ("ada", "Ada", "graded"),
+        ("b b", "Bob", "graded"),
+        ("zoe", "Zoe", "error"),
+    ]
+    links = [f"{row[0]}/report.html" if row[3] == 1 else row[3] for row in data["rows"]]
+    assert links[1] == "b-b/report.html"
+    assert all((out / link).is_file() for link in links[:2])
+    assert str(out / "index.html") in capsys.readouterr().out
+    page = (out / "index.html").read_text(encoding="utf-8")
+    asked = ["--rubric", str(RUBRIC), "--out", str(out), "--allow-local", str(ROOT), "--only", "failed"]
+    command = shlex.join(["grader", "batch", str(roster), *asked])
+    assert html.escape(command) in page
+    assert "This batch" not in page
+
+
+@pytest.mark.full
+def test_a_regrade_writes_it_again(tmp_path) -> None:
+    out = tmp_path / "out"
+    batch(roster_of(tmp_path, [f"ada,{CORRECT}"]), out, "--allow-local", str(ROOT))
+    before = data_of(out / "index.html")
+    (out / "index.html").write_text("old")
+    assert run(["regrade", str(out), "--rubric", str(RUBRIC)]) == 0
+    assert data_of(out / "index.html")["rows"][0][:7] == before["rows"][0][:7]

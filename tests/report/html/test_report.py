@@ -22,12 +22,12 @@ from grader.model.verdict import FileCitation, Mistake, Status
 from grader.report.html.page import BYTES_MAX, render_html
 from grader.report.html.shell import policy, script
 from grader.report.sentences import FAULTS, MINUS
-from grader.report.text import line, visible
+from grader.report.text import code_parts, line, visible
 from grader.report.view import blame
+from tests.report.anything import FIELDS, HUGE, SOME, decided, of, results, spoiled
 from tests.report.hostile import CRITERIA, result, rubric
 from tests.report.html.made import SCRIPT, code, console, figures, graph, hostile_figures
 from tests.report.nasty import STEERING
-from tests.report.test_every_report import FIELDS, HUGE, SOME, decided, of, results, spoiled
 from tests.support.a_class import criterion
 
 DOCS = {"some-check": {**CHECKS["rate"].sections}}
@@ -383,7 +383,8 @@ def test_any_text_of_a_criterion_stands_in_its_card(shown):
     content = words(parsed(page(graded, Figures(), rubric=rubric(), docs={})))
     for field in FIELDS:
         if field not in {"check", "scenario", "hint"}:
-            assert " ".join(line(getattr(shown.criteria[0], field), 1000).split()) in content
+            said = "".join(part for part, _ in code_parts(line(getattr(shown.criteria[0], field), 1000)))
+            assert " ".join(said.split()) in content, "without the backticks around code"
 
 
 @pytest.mark.parametrize(

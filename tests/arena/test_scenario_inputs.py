@@ -1,0 +1,153 @@
+"""What the grader gives to a run: texts and numbers for a listener, and files of the package, within bounds."""
+
+from __future__ import annotations
+
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from grader.arena.process_environment import TEXT_BYTES_MAX, ProcessEnvironment
+from grader.arena.scenario import set_params
+from grader.arena.scenario_inputs import FILE_BYTES_MAX, made_up, make_shots
+from grader.arena.static_recorder import (
+    ATTACHED_BYTES_MAX,
+    ATTACHED_FILES_MAX,
+    attachments,
+    left_out_events,
+)
+from grader.evidence.events import ActorEvent
+from grader.files import read_untrusted
+from grader.package import read_package
+from grader.rubric.scenario import Param, Probe
+from tests.package.trees import CMAKE, MANIFEST, make_package
+
+CHATTER = Probe(topic="/chatter", type="std_msgs/String", text=8)
+
+
+def test_one_text_comes_twice_running_neither_first_nor_last() -> None:
+    for _ in range(50):
+        values = [shot.value for shot in make_shots((CHATTER,))]
+        same = [i for i, (a, b) in enumerate(pairwise(values)) if a == b]
+        assert len(values) == 8
+        assert len(set(values)) == 7
+        assert len(same) == 1
+        assert 0 < same[0] < 6
+
+
+def test_the_first_of_the_two_has_time_to_be_printed() -> None:
+    shots = make_shots((CHATTER,))
+    for shot, following in pairwise(shots):
+        assert shot.pause_s == pytest.approx(0.3 if shot.value == following.value else 0.1)
+
+
+def test_few_texts_and_numbers_come_once() -> None:
+    texts = [shot.value for shot in make_shots((CHATTER.model_copy(update={"text": 3}),))]
+    numbers = Probe(topic="/n", type="std_msgs/Int8", integers=3, among=(-128, 0, 127))
+    values = [shot.value for shot in make_shots((numbers,))]
+    assert len(set(texts)) == len(texts) == 3
+    assert len(set(values)) == len(values) == 6
+
+
+def test_one_of_many_numbers_comes_twice_in_a_row() -> None:
+    numbers = Probe(topic="/n", type="std_msgs/Int8", integers=20, among=(-128, 0, 127))
+    values = [shot.value for shot in make_shots((numbers,))]
+    assert len(values) == 23
+    assert len(set(values)) == 22
+    assert sum(a == b for a, b in pairwise(values)) == 1
+    assert {-128, 0, 127} <= set(values)
+
+
+def test_topics_take_turns() -> None:
+    numbers = Probe(topic="/n", type="std_msgs/Int8", integers=3)
+    shots = make_shots((CHATTER, numbers))
+    assert [shot.topic for shot in shots[:4]] == ["/chatter", "/n", "/chatter", "/n"]
+    assert sorted({shot.topic for shot in shots[6:]}) == ["/chatter"]
+
+
+def test_a_text_that_is_cut_is_noticed() -> None:
+    texts = [str(shot.value) for shot in make_shots((CHATTER,))]
+    for cut in (
+        lambda t: t[:18],
+        lambda t: t.split(",")[0],
+        lambda t: t.split(":")[0],
+        lambda t: t.rstrip("0123456789"),
+    ):
+        assert any(cut(text) != text for text in texts)
+
+
+@pytest.mark.parametrize("like", ["12 Station Road, Mumbai", "Asha", "+91 98-76", "a\nb: c\n", "Al", "", "7"])
+def test_what_is_made_up_has_the_shape_of_the_original(like: str) -> None:
+    found = {made_up(like) for _ in range(20)}
+    assert len(found) >= 18, "two of 20 may be alike by chance"
+    for text in found:
+        rest = "".join("x" if c.isalnum() else c for c in text)
+        assert rest.startswith("".join("x" if c.isalnum() else c for c in like).rstrip())
+        assert [c.isdigit() for c in text][: len(like.rstrip())] == [c.isdigit() for c in like.rstrip()]
+        assert sum(c.isalnum() for c in text) >= 5
+
+
+GOOD = {"package.xml": MANIFEST, "CMakeLists.txt": CMAKE}
+
+
+def test_files_that_the_evidence_does_not_hold_are_named(tmp_path: Path) -> None:
+    files = {f"src/{number:03}.py": "x = 1\n" for number in range(ATTACHED_FILES_MAX)}
+    package = make_package(tmp_path / "lab1", {**GOOD, **files, "a.txt": "y" * (ATTACHED_BYTES_MAX + 1)})
+    facts = read_package(package)
+    held = dict(attachments(package.folder, facts))
+    assert len(held) == ATTACHED_FILES_MAX
+    assert len(held["a.txt"]) == ATTACHED_BYTES_MAX
+    assert [(event.action, event.actor) for event in left_out_events(facts)] == [
+        ("limit", "a.txt"),
+        ("limit", "the package"),
+    ]
+    assert list(left_out_events(read_package(make_package(tmp_path / "lab2", GOOD)))) == []
+
+
+def test_a_readme_is_held_and_takes_no_codes_place(tmp_path: Path) -> None:
+    few = make_package(tmp_path / "lab1", {**GOOD, "README.md": "# Lab 1"})
+    assert dict(attachments(few.folder, read_package(few)))["README.md"] == b"# Lab 1"
+    files = {f"src/{number:03}.py": "x = 1\n" for number in range(ATTACHED_FILES_MAX)}
+    many = make_package(tmp_path / "lab2", {**files, "package.xml": MANIFEST, "README.md": "# Lab 1"})
+    assert "README.md" not in dict(attachments(many.folder, read_package(many)))
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("a: 1\n" * (FILE_BYTES_MAX // 5 + 1), "too large"),
+        ("\n".join(f"a{number}: 1" for number in range(2_000)), "too much in it"),
+        ("a: " + "[" * 50 + "]" * 50, "too much in it"),
+        ("a: &a [1, 1]\n" + "".join(f"b{n}: *a\n" for n in range(30)), "too much in it"),
+    ],
+)
+def test_parameters_that_are_too_much_are_named(text: str, why: str, tmp_path: Path) -> None:
+    file = tmp_path / "p.yaml"
+    file.write_text(text)
+    arena = SimpleNamespace(place=SimpleNamespace(package_file=lambda _: file))
+    noted, arena.send = list[ActorEvent](), lambda **_: None
+    arena.note = noted.append
+    set_params((Param(file="p.yaml", also=("/a",)),), arena)  # type: ignore[arg-type] # as much as it looks at
+    assert [(event.action, event.detail) for event in noted] == [("limit", f"p.yaml: {why}")]
+
+
+def test_a_service_text_that_is_too_large_is_named(tmp_path: Path) -> None:
+    folder = tmp_path / "lab" / "msg"
+    folder.mkdir(parents=True)
+    place = SimpleNamespace(workspace=SimpleNamespace(repaired=tmp_path), share_folders=())
+    (folder / "Odd.msg").write_text("int8 x\n" * (TEXT_BYTES_MAX // 7))
+    find = partial(ProcessEnvironment.type_text, place)  # type: ignore[arg-type] # as much of a place as it looks at
+    assert find("lab/Odd", "msg") is not None
+    (folder / "Odd.msg").write_text("int8 x\n" * (TEXT_BYTES_MAX // 7 + 1))
+    with pytest.raises(ValueError, match=r"Odd\.msg is larger than 64 kB"):
+        find("lab/Odd", "msg")
+
+
+def test_what_is_read_is_a_regular_file_and_no_longer_than_the_limit(tmp_path: Path) -> None:
+    file = tmp_path / "a"
+    with file.open("wb") as stream:
+        stream.truncate(1 << 40)
+    assert read_untrusted(file, 100) == bytes(100)
+    assert read_untrusted(tmp_path, 100) is None
