@@ -330,7 +330,7 @@ def is_settled(live: RunState, now_s: float) -> bool:
     """
     since_s, asked_s = _at_rest_since(live, now_s), max(live.last_sent_s, live.answers_s)
     if not live.talking and not live.running <= _unused(live):
-        asked_s = max(asked_s, live.last_line_s)  # who counts down aloud has something to come
+        asked_s = max(asked_s, live.new_line_s)  # who counts down aloud has something to come
     return (
         since_s is not None
         and now_s > since_s + _longer(live, _patience_s(live))

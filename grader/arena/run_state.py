@@ -13,6 +13,9 @@ from grader.model.message_rate import RateBounds
 
 ROSOUT = "/rosout"
 ARRIVALS_MAX = 2000
+LINES_MAX = 1000
+LOG_TIME = re.compile(r"\[\d{1,12}\.\d{1,9}(?:, \d{1,12}\.\d{1,9})?\]")
+"""The time in a log line of rospy's: `[WARN] [1712.512]: not yet`."""
 FULL, OTHERS_MOST = 0.9, 0.75
 """Shares of the processors' time: a machine is full from the one, and others count up to the other (then all takes four
 times as long)."""
@@ -119,6 +122,9 @@ class RunState:
     """Values that are to be printed and were not, and how each is found in a line."""
     last_heard_s: float = 0.0
     last_line_s: float = 0.0
+    new_line_s: float = 0.0
+    """When a process last printed a line that it had not printed before; `said` are those that it had."""
+    said: set[int] = field(default_factory=set)
     answers_s: float = 0.0
     """Until then, the grader works on what nodes asked its services for."""
 
@@ -275,6 +281,11 @@ class RunState:
 
     def note_line(self, line: str, now_s: float, process: str = "") -> None:
         self.last_line_s = now_s
+        said = hash((process, LOG_TIME.sub("", line)))
+        if said not in self.said:
+            self.new_line_s = now_s
+        if len(self.said) < LINES_MAX:
+            self.said.add(said)
         if BAD_CALLBACK in line:
             self.raised_s[process] = now_s
         self.note_activity(now_s)

@@ -7,7 +7,9 @@ from pathlib import Path, PurePosixPath
 
 from grader import pipeline
 from grader.authoring.rubric_draft import (
+    ANSWERED,
     ANSWERS_S,
+    ASKED,
     INTEGER_PROBES,
     MADE_UP,
     SENT,
@@ -20,6 +22,7 @@ from grader.authoring.rubric_draft import (
     Topic,
     answers_to,
     assign_points,
+    calls_of,
     drop_empty,
     dump_flow,
     find_parts,
@@ -28,9 +31,12 @@ from grader.authoring.rubric_draft import (
     heard_template,
     label_of,
     observe,
+    plain_fields,
+    printed_answer,
     probe_for,
     rubric_text,
     second_look,
+    serves_of,
     step_for,
     wraps_of,
 )
@@ -120,6 +126,10 @@ class Proposal(DraftSheet):
             needs = "" if "No module named" in why else ": does it need parameters or another node?"
             self.notes.append(f"{script} was not observed ({why}){needs}")
             return
+        served = self._runs.get(f"{name}-served")
+        if served:
+            self._client(name, file, served, requires)
+            return
         self._scenario(name, seen)
         node = self._life(name, script, seen, requires)
         for topic in seen.topics:
@@ -130,9 +140,49 @@ class Proposal(DraftSheet):
                 id_, parameters = f"service-{label_of(service)}", {"service": service, "type": kind}
                 title = f"{service} is offered"
                 self.add(id_, title, "service", parameters, scenario=name, requires=[node])
-                call = f"- call: {{service: {service}, type: {kind}, request: {self._request(kind)}}}"
-                self.notes.append(f"what {service} answers is not covered: a step can call it, {call}")
+                self._called(name, service, kind, id_)
         self._hearing(name, script, seen, requires)
+
+    def _called(self, name: str, service: str, kind: str, requires: str) -> None:
+        """What a service was seen to answer."""
+        scenario = f"{name}-asked"
+        run = self._runs.get(scenario)
+        answers = (
+            [e.value for _, e in run.actors if (e.action, e.topic) == ("answer", service)] if run else []
+        )
+        if not answers or None in answers:
+            call = f"- call: {{service: {service}, type: {kind}, request: {self._request(kind)}}}"
+            self.notes.append(f"what {service} answers is not covered: a step can call it, {call}")
+            return
+        calls = calls_of(self._seen[name], self._facts.interfaces)
+        self.scenarios[scenario] = self._alone(name, ASKED, calls=calls, until={"nodes": 1})
+        parameters = {"service": service, "expect": list(map(plain_fields, answers))}
+        if len(answers) > 1 and all(answer == answers[0] for answer in answers):
+            self.notes.append(
+                f"{service} answers all calls alike: give them requests with answers of their own"
+            )
+        title = f"{service} answers as it should"
+        id_ = f"answers-{label_of(service)}"
+        self.add(id_, title, "service-answers", parameters, scenario=scenario, requires=[requires])
+
+    def _client(self, name: str, file: str, run: Run, requires: list[str]) -> None:
+        """What a program asks of a service of the package's, and prints of its answer."""
+        scenario, serves = f"{name}-served", serves_of(name, self._seen, self._facts.interfaces)
+        self.scenarios[scenario] = self._alone(name, ANSWERED, serves=serves, until={"quiet_s": 2})
+        for served in serves:
+            service, answer = served["service"], served["answer"]
+            asked = [e.value["request"] for _, e in run.actors if (e.action, e.topic) == ("serve", service)]
+            if not asked:
+                self.notes.append(f"{file} looked for {service} and did not call it, which is not covered")
+                continue
+            parameters: RubricEntry = {"service": service, "expect": list(map(plain_fields, asked))}
+            title, id_ = f"{file} calls {service}", f"{name}-calls-{label_of(service)}"
+            needs: RubricEntry = {"scenario": scenario, "requires": requires}
+            calls = self.add(id_, title, "calls", parameters, **needs)
+            if printed := printed_answer(run, answer):
+                needs["requires"] = [calls]
+                title = f"{file} prints the answer"
+                self.add(f"{name}-prints", title, "prints", {"process": name, **printed}, **needs)
 
     def _request(self, kind: str) -> str:
         """Return a request of a service of the package's own, as it can be written in a step."""
@@ -335,7 +385,7 @@ def propose_rubric(
             )
         runs = _record_runs(source, first_look(package, parts), folder / "first", options, progress)
         seen = {name: observe(runs[name]) for name in (*parts.nodes, *parts.launches)}
-        again = second_look(package, parts, seen)
+        again = second_look(package, parts, seen, facts.interfaces)
         if again is not None:
             runs |= _record_runs(source, again, folder / "second", options, progress)
         if "package" in runs:  # with what the build said of CMakeLists.txt

@@ -11,6 +11,7 @@ import ast
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
+from math import isfinite
 from pathlib import Path, PurePosixPath
 from statistics import median
 from typing import Any
@@ -23,11 +24,11 @@ from grader.checks.support.processes import lives
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.evidence.inspect import periodic_share, rate_stats
 from grader.evidence.run import Channel, Run
-from grader.model.package import PackageFacts
+from grader.model.package import Interface, PackageFacts
 from grader.model.record import Record
 from grader.rubric.consistency import TOTAL_POINTS
 from grader.rubric.load import LoadedRubric
-from grader.rubric.scenario import Param, Probe, Scenario, Start, Step, Until
+from grader.rubric.scenario import Call, Param, Probe, Scenario, Served, Start, Step, Until
 from grader.untrusted_text import line, visible, without_ci_commands
 
 SYSTEM_SERVICES = ("/get_loggers", "/set_logger_level")
@@ -40,6 +41,7 @@ NICE_HZ = (
     0.1, 0.2, 0.25, 0.5, 1, 2, 2.5, 3, 4, 5, 8, 10, 12, 15, 16, 20, 24, 25, 30, 40, 50, 60, 75, 80, 100
 )  # fmt: skip
 NICE_WITHIN = 0.03
+_NUMBER = re.compile(r"(?<![\w.])-?\d{1,12}(?:\.\d{1,12})?(?![\w.]*\d)")
 _LEADING = re.compile(r"^\W+")
 _TIME = re.compile(r"(?P<words>.*?)(?P<seconds>\d+(?:\.\d+)?)")
 
@@ -69,7 +71,8 @@ class Observed(Record):
 
     `listens` maps topics to types, `services` names to types, `connected` are topics over which two of its nodes are
     connected, `logged` are the lines without numbers that it logs at INFO, `read` the names of the parameters whose
-    made-up values it prints. `ended` tells that the process ended by itself, `failed` why, where that was an error.
+    made-up values it prints, `sought` the services that it looked for and that were not there. `ended` tells that the
+    process ended by itself, `failed` why, where that was an error.
     """
 
     nodes: tuple[str, ...]
@@ -79,6 +82,7 @@ class Observed(Record):
     services: dict[str, str]
     connected: tuple[str, ...]
     ended: bool
+    sought: tuple[str, ...] = ()
     failed: str = ""
     logged: tuple[str, ...] = ()
     read: tuple[str, ...] = ()
@@ -97,6 +101,7 @@ def observe(run: Run) -> Observed:
         services=_services(run),
         connected=_connected_topics(run),
         ended=bool(early),
+        sought=tuple(e.topic for _, e in run.actors if e.action == "lookup" and e.detail and e.topic),
         failed=_last_words(run) if bad else "",
         logged=_logged_texts(run),
         read=_read(run),
@@ -135,6 +140,23 @@ def answers_to(run: Run, topic: str, within_s: float) -> tuple[str, ...]:
         if answered and all(answered) and channel.topic not in SYSTEM_TOPICS:
             found.append(channel.topic)
     return tuple(dict.fromkeys(found))
+
+
+def plain_fields(value: object) -> RubricEntry:
+    """Return the fields of a request or a response that are one number, text, true or false."""
+    fields = value.items() if isinstance(value, dict) else ()
+    return {k: v for k, v in fields if isinstance(v, str) or (isinstance(v, int | float) and isfinite(v))}
+
+
+def printed_answer(run: Run, answer: Mapping[str, object]) -> RubricEntry:
+    """Return the text and numbers of the first line that has a number of a service's answer; empty without one."""
+    wanted = {float(v) for v in answer.values() if isinstance(v, int | float) and not isinstance(v, bool)}
+    for printed in printed_lines(run):
+        numbers = [float(number) for number in _NUMBER.findall(printed.text)]
+        if wanted & {*numbers} and "{" not in printed.text:
+            text = _NUMBER.sub("{number}", printed.text).strip()
+            return {"text": text, "numbers": list(map(format_number, numbers)), "tolerance": 0.01}
+    return {}
 
 
 def _topic(channel: Channel) -> Topic:
@@ -235,6 +257,7 @@ WEIGHTS = {
     "manifest": 1, "cmake": 1, "build": 1, "executable": 1, "node-lives": 1, "node-name": 1, "topic-type": 2, "rate": 3,
     "counter-start": 1, "counter-step": 1, "counter-wrap": 3, "message": 1, "hears": 2, "service": 2, "latched": 1,
     "cmake-install": 2, "launch-xml": 2, "launch-runs": 2, "reacts": 2, "definition": 1,
+    "service-answers": 3, "calls": 2, "prints": 2,
 }  # fmt: skip
 
 RubricEntry = dict[str, Any]
@@ -308,8 +331,9 @@ class _Dumper(yaml.SafeDumper):
 
 
 def _quote_text(dumper: _Dumper, text: str) -> yaml.ScalarNode:
-    """What a CI's log could take for a command stands in double quotes, where `without_ci_commands` writes escapes."""
-    style = '"' if "##" in text or "::" in text else None
+    """What a CI's log could take for a command stands in double quotes, where `without_ci_commands` writes escapes; and
+    so do lines, which are then on one."""
+    style = '"' if "##" in text or "::" in text or "\n" in text else None
     return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
 
 
@@ -373,6 +397,15 @@ TEXT_PROBES = 8
 INTEGER_PROBES = 9
 STRING = "std_msgs/String"
 ANSWERS_S, MESSAGES = 0.5, 3
+ASKED, ANSWERED = ", with calls of the grader's", ", with a service of the grader's"
+SERVICES: Mapping[str, list[tuple[str, str, str]]] = {
+    "std_srvs/SetBool": [
+        ("request", "bool", "data"),
+        ("response", "bool", "success"),
+        ("response", "string", "message"),
+    ],
+    "std_srvs/Trigger": [("response", "bool", "success"), ("response", "string", "message")],
+}
 MADE_UP, SENT = ", with messages made up for this run", ", with messages of the grader's"
 SAMPLES: Mapping[str, tuple[bool | float, ...]] = {
     "std_msgs/Float32": (1.5, -2.25, 3.0),
@@ -420,10 +453,19 @@ def first_look(package: str, parts: Parts) -> LoadedRubric:
     return LoadedRubric.to_record(package, scenarios)
 
 
-def second_look(package: str, parts: Parts, seen: Mapping[str, Observed]) -> LoadedRubric | None:
-    """Messages for the nodes that listen, and a fast clock for those that count; None where there is nothing to see."""
+def second_look(
+    package: str, parts: Parts, seen: Mapping[str, Observed], interfaces: Sequence[Interface] = ()
+) -> LoadedRubric | None:
+    """Messages for the nodes that listen, calls for those that offer a service and answers for those that look for one,
+    and a fast clock for those that count; None where there is nothing to see."""
     scenarios: dict[str, Scenario] = {}
     for name in parts.nodes:
+        if asked := tuple(map(Call.model_validate, calls_of(seen[name], interfaces))):
+            until = Until(nodes=1, messages={})
+            scenarios[f"{name}-asked"] = _alone(parts, name, ASKED, calls=asked, until=until)
+        if answers := tuple(map(Served.model_validate, serves_of(name, seen, interfaces))):
+            until = Until(quiet_s=2, messages={})
+            scenarios[f"{name}-served"] = _alone(parts, name, ANSWERED, serves=answers, until=until)
         listens = seen[name].listens.items()
         if probes := tuple(p for topic, kind in listens if (p := probe_for(topic, kind))):
             until = Until(heard=True, messages={})
@@ -437,6 +479,57 @@ def second_look(package: str, parts: Parts, seen: Mapping[str, Observed]) -> Loa
             fast = _alone(parts, name, " with a fast clock", clock="warped", until=until)
             scenarios[f"{name}-fast"] = fast
     return LoadedRubric.to_record(package, scenarios) if scenarios else None
+
+
+def calls_of(seen: Observed, interfaces: Sequence[Interface]) -> list[RubricEntry]:
+    """Return calls of a node's services: two with values of their own where a request has fields that are known."""
+    found = []
+    for service, kind in seen.services.items():
+        about, fields = _service(service, kind, interfaces)
+        requests = [_filled(fields, "request", turn) for turn in range(2)]
+        found += [{**about, "request": one} for one in (requests if requests[0] else [{}]) if kind]
+    return found
+
+
+def serves_of(name: str, seen: Mapping[str, Observed], interfaces: Sequence[Interface]) -> list[RubricEntry]:
+    """Return the services that a node looks for and another one of the package offers, as the grader can offer them."""
+    types = {service: kind for one in seen.values() for service, kind in one.services.items() if kind}
+    found = [_service(s, types[s], interfaces) for s in dict.fromkeys(seen[name].sought) if s in types]
+    return [{**about, "answer": _filled(fields, "response", 0)} for about, fields in found]
+
+
+def _service(
+    service: str, kind: str, interfaces: Sequence[Interface]
+) -> tuple[RubricEntry, list[tuple[str, str, str]]]:
+    """Return a service's name, type and own definition, and its fields: part, type and name."""
+    path = f"srv/{kind.rpartition('/')[2]}.srv"
+    own = next((one for one in interfaces if one.path == path and one.fault is None), None)
+    if own is None or kind.startswith("std_srvs/"):
+        return {"service": service, "type": kind}, SERVICES.get(kind, [])
+    lines = {
+        part: "".join(
+            f"{f.type} {f.name}{'' if f.value is None else f'={f.value}'}\n"
+            for f in own.fields
+            if f.part == part
+        )
+        for part in ("request", "response")
+    }
+    text = f"{lines['request']}---\n{lines['response']}"
+    fields = [(f.part, f.type, f.name) for f in own.fields if f.value is None]
+    return {"service": service, "type": kind, "definition": text}, fields
+
+
+def _filled(fields: Iterable[tuple[str, str, str]], part: str, turn: int) -> RubricEntry:
+    """Return values for the plain fields of a request or a response, others on each `turn`."""
+    found: RubricEntry = {}
+    for place, (_, kind, name) in enumerate(field for field in fields if field[0] == part):
+        if re.fullmatch(r"float(32|64)", kind):
+            found[name] = 1.5 + 2 * place + 3 * turn
+        elif re.fullmatch(r"u?int(8|16|32|64)", kind):
+            found[name] = 3 + 2 * place + 4 * turn
+        elif kind in {"string", "bool"}:
+            found[name] = turn == 0 if kind == "bool" else ("first", "second")[turn]
+    return found
 
 
 def _alone(parts: Parts, name: str, words: str, **how: Any) -> Scenario:  # noqa: ANN401 - fields of the scenario

@@ -25,6 +25,7 @@ from grader.model.verdict import FileCitation, Verdict, failed, passed
 from grader.wording import closest, join_words, numbers_text, plural
 
 FAULTS_SHOWN = 3
+FILE_PATTERN = r"^(msg/\w+\.msg|srv/\w+\.srv|action/\w+\.action)$"
 FieldType = Annotated[str, Field(pattern=r"^[A-Za-z]\w*(/[A-Za-z]\w*)?(\[\d*\])?$"), Refers("field")]
 
 
@@ -34,7 +35,7 @@ class DefinitionParams(Record):
     In a service or action, a name says its part too: `request.a`, `response.sum`, `goal.order`.
     """
 
-    file: Annotated[str, Field(pattern=r"^(msg/\w+\.msg|srv/\w+\.srv|action/\w+\.action)$")]
+    file: Annotated[str, Field(pattern=FILE_PATTERN)]
     """The file, from the package's root: `msg/Reading.msg`, `srv/AddTwoInts.srv`, `action/Count.action`."""
     fields: dict[str, FieldType] = Field(default_factory=dict)
     """Each field's type by its name; there may be others."""

@@ -11,22 +11,27 @@ from typing import Annotated, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from grader.checks.interfaces import FILE_PATTERN
 from grader.checks.support.frames import FRAME_PATTERN
+from grader.installable import noetic_messages
 from grader.rubric.scenario import NAME_PATTERN, PACKAGE_PATTERN, PROGRAM_PATTERN, TYPE_PATTERN
 from grader.rubric.yaml_lines import Fault, KeyPath
-from grader.wording import did_you_mean, shorten
+from grader.wording import did_you_mean, join_words, shorten
 
+KEYS_LISTED = 6
 UNITS = {"hz": "Hz", "s": "seconds", "m": "metres", "deg": "degrees", "rad": "radians"}
 """By what a parameter's name ends in."""
 PATTERN_RULES = {
     NAME_PATTERN: "must be lower-case letters, digits and hyphens, beginning with a letter",
     TYPE_PATTERN: "must be a type like std_msgs/String",
     FRAME_PATTERN: "must be a frame without blanks or a slash before it, as tf2 has them, like base_link",
+    FILE_PATTERN: "must be a file like srv/Add.srv, with its folder",
     PROGRAM_PATTERN: "must be a program like turtlesim/turtlesim_node",
     PACKAGE_PATTERN: "must be the name of a package, without folders: one of the course lies beside the rubric",
 }
 TIME = "a time with its zone, such as 2026-11-20T23:59:00+01:00"
 DAY = "a day such as 2026-11-02"
+_TYPE_ELSEWHERE = re.compile(r"(\w+)[./](?:msg|srv|action)[./](\w+)")
 _NUMBER_AND_UNIT = re.compile(r"\s*(-?\d+(?:\.\d+)?)\s*([A-Za-z%]*)\s*")
 MUST_BE = {
     "string_type": "text",
@@ -108,7 +113,8 @@ def _unknown(key: str, value: object, keys: Collection[str]) -> str:
     if glued and glued[1] in keys:
         return f": write {glued[1]}, a colon and a blank before its value"
     cut = value is None and " " in key
-    return ": between { and }, text with a comma needs quotes" if cut else did_you_mean(key, keys)
+    there = f": there is {join_words(sorted(keys))}" if len(keys) <= KEYS_LISTED else ""
+    return ": between { and }, text with a comma needs quotes" if cut else did_you_mean(key, keys) or there
 
 
 def _message(model: type[BaseModel], path: KeyPath, detail: ErrorDetails) -> str:
@@ -118,7 +124,9 @@ def _message(model: type[BaseModel], path: KeyPath, detail: ErrorDetails) -> str
         "extra_forbidden": lambda: (
             "is not known here" + _unknown(str(path[-1]), value, _keys(model, path[:-1]))
         ),
-        "string_pattern_mismatch": lambda: f"{_pattern(context['pattern'])}, not {shown(value)}",
+        "string_pattern_mismatch": lambda: (
+            f"{_pattern(context['pattern'])}, not {shown(value)}{_as_named(context['pattern'], value)}"
+        ),
         "literal_error": lambda: _literal(value, context["expected"]),
         "string_too_long": lambda: f"has at most {context['max_length']} characters, not {len(value)}",
         "too_long": lambda: f"has at most {context['max_length']}, not {context['actual_length']}",
@@ -162,6 +170,20 @@ def _other_shape(path: KeyPath, kind: str, value: object) -> str:
 
 def _pattern(pattern: str) -> str:
     return PATTERN_RULES.get(pattern, f"must match {pattern}")
+
+
+def _as_named(pattern: str, text: str) -> str:
+    """Return how a type or a file's name is written that has another form: `std_msgs.msg.String`, `Add.srv`."""
+    if pattern == TYPE_PATTERN and (parts := _TYPE_ELSEWHERE.fullmatch(text)):
+        return f": write {parts[1]}/{parts[2]}"
+    if pattern == TYPE_PATTERN and (
+        known := [f"{p}/{text}" for p, types in noetic_messages().items() if text in types]
+    ):
+        return f" (did you mean {join_words([json.dumps(one) for one in known[:3]], 'or')}?)"
+    ending = text.rpartition(".")[2]
+    if pattern == FILE_PATTERN and ending in {"msg", "srv", "action"}:
+        return f": write {ending}/{text.rpartition('/')[2]}"
+    return ""
 
 
 def _literal(value: object, expected: str) -> str:

@@ -70,6 +70,8 @@ def prose_warnings(rubric: dict[str, Any]) -> Iterator[Fault]:
     handout = str(rubric.get("handout") or "")
     yield from _sent_otherwise(scenarios, handout)
     criteria = criteria_of(rubric)
+    yield from _unsaid_topic(criteria, rubric, handout)
+    yield from _shifted_factors(as_map(rubric.get("made_up")), handout)
     for criterion in criteria:
         at, given, check = criterion.at, criterion.given, criterion.check
         yield from _shifted_numbers(criterion, rubric)
@@ -114,6 +116,36 @@ def _shifted_numbers(criterion: WrittenCriterion, rubric: dict[str, Any]) -> Ite
             if at[-1] != "tolerance" and (known is said or len(known) == 1):
                 fault = f"{number:g} is on no other line, and the rubric's text has {meant:g}"
                 yield (*criterion.at, *at), fault
+
+
+def _shifted_factors(made_up: dict[str, Any], handout: str) -> Iterator[Fault]:
+    """Yield numbers by which a made-up value is computed, and that the handout has ten times as large or as small."""
+    said = {float(number) for number in PLAIN_NUMBER.findall(handout)}
+    for name, key in ((name, key) for name in made_up for key in ("sum", "product", "quotient")):
+        for at, number in numbers_in((key,), as_map(made_up[name]).get(key)):
+            meant = next((number / by for by in SHIFTS[:-1] if round(number / by, 9) in said), None)
+            is_round = re.fullmatch(r"0?\.?0*10*", f"{abs(number):.9g}") is not None
+            if number not in said and meant is not None and not is_round:
+                yield ("made_up", name, *at), f"{number:g} is not what the handout has: {meant:g}"
+
+
+def _unsaid_topic(criteria: list[WrittenCriterion], rubric: dict[str, Any], handout: str) -> Iterator[Fault]:
+    """Yield the first topic or service of a criterion that the handout does not name, where the handout has others in
+    backticks that nothing else in the rubric names."""
+    said = re.findall(r"(?<=`)\w+(?=`)|(?<=/)\w+", handout)
+    named = {text for key, part in rubric.items() if key != "handout" for _, text in texts_in((), part)}
+    used = {word for text in named for word in re.findall(r"(?<![\w.])/[\w/]*\w", text)}
+    used |= {f"/{text}" for text in named}  # a node's
+    others = [name for name in dict.fromkeys(re.findall(r"`(/[\w/]*\w)`", handout)) if name not in used]
+    for criterion in criteria if others else ():
+        for key in ("topic", "service"):
+            name = criterion.given.get(key)
+            if isinstance(name, str) and name.rpartition("/")[2] not in said:
+                fault = (
+                    f"the handout does not name {name}; it has {join_words(others)}, which nothing here does"
+                )
+                yield (*criterion.at, key), fault
+                return
 
 
 def _rates(text: str) -> set[float]:
@@ -298,19 +330,24 @@ def _numbers_of_title(
     that is not the title's, or where that has none, the handout's."""
     given, title = criterion.given, str(criterion.data.get("title"))
     rate_hz, rates = given.get("rate_hz"), _rates(title)
-    known = {one.given.get("rate_hz") for one in criteria if one.given.get("topic") == given.get("topic")}
+    of_topic = [one.given for one in criteria if one.given.get("topic") == given.get("topic")]
+    known = {one.get("rate_hz") for one in of_topic}
     is_told = "cause" not in given and len(known) > 1  # said of the two criteria
     run = criterion.scenario
     is_told = is_told or rate_hz in _numbers_within([run.get("start"), run.get("params")])  # by a parameter
+    sentences = SENTENCE_END.split(str(rubric.get("handout", "")))
+    about = [one for one in sentences if re.search(rf"{re.escape(str(given.get('topic')))}(?!\w)", one)]
+    said_hz = _rates(" ".join(about))
     if not rates and not is_told and "made_up" not in rubric and is_number(rate_hz):
-        sentences = SENTENCE_END.split(str(rubric.get("handout", "")))
-        about = [one for one in sentences if re.search(rf"{re.escape(str(given.get('topic')))}(?!\w)", one)]
-        rates = _rates(" ".join(about))
+        rates = said_hz
+    is_first = given is next((one for one in of_topic if "rate_hz" in one), None)
+    if "made_up" not in rubric and is_first and rate_hz in rates and not said_hz & known:
+        rates = said_hz or rates  # the title agrees
     if any(is_number(rate_hz) and round(rate_hz / by, 9) in rates for by in SHIFTS):
         return  # said elsewhere
     if rates and is_number(rate_hz) and rate_hz not in rates:
         said = join_words([f"{one:g}" for one in sorted(rates)])
-        where = "title" if _rates(title) else "handout"
+        where = "title" if _rates(title) - {rate_hz} else "handout"
         yield (*criterion.at, "rate_hz"), f"{rate_hz:g} is not what the {where} has: {said}"
         return
     numbers = [float(one) for one in PLAIN_NUMBER.findall(title)]
@@ -332,16 +369,22 @@ def _numbers_within(value: object) -> set[float]:
 
 def _other_text(at: KeyPath, given: dict[str, Any], handout: str, keys: tuple[str, ...]) -> Iterator[Fault]:
     """Yield a text to print or to send that the handout has with other blanks or signs, or another case."""
-    for path, text in (one for key in keys for one in texts_in((key,), given.get(key))):
+    asked = [one for key in keys for one in texts_in((key,), given.get(key))]
+    for key in ("cause", "effect"):
+        asked += [one for one in texts_in((key,), given.get(key)) if one[0][-1] == "value"]
+    for path, text in asked:
         if not _letters(text) or text == path[-1]:
             continue
         pattern = r"[-+]?\d+(?:\.\d+)?".join(map(re.escape, text.split("{number}")))
         quoted = [re.sub(r"\s+", " ", one) for one in re.findall(r"`([^`]+)`", handout)]
         alike = [one for one in quoted if _letters(one) == _letters(text) or _is_begun(one, text)]
+        alike += [one for one in quoted if sorted(one.lower().split()) == sorted(text.lower().split())]
         said = re.sub(r"\s+", " ", handout)
         if alike and text not in said and not re.search(pattern, said):
             is_same = alike[0].lower() == text.lower()
-            how = "in another case" if is_same else "with other blanks or signs"
+            is_order = _letters(alike[0]) != _letters(text) and not _is_begun(alike[0], text)
+            how = "in another order" if is_order else "with other blanks or signs"
+            how = "in another case" if is_same else how
             yield (*at, *path), f"the handout has `{alike[0]}`, {how}"
 
 

@@ -15,7 +15,7 @@ from grader.checks.registry import Check, Reference
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.ros_env import TypeKind, ros_packages
 from grader.rubric.definitions import Definitions, services_in
-from grader.rubric.durations import steps_s
+from grader.rubric.durations import longest_s, steps_s
 from grader.rubric.frames import frame_faults
 from grader.rubric.message_fields import field_faults
 from grader.rubric.reachable import reach_faults
@@ -388,16 +388,21 @@ def _too_short(one: Reference, check: Check, scenario: dict[str, Any]) -> Iterat
     done_s = steps_s(scenario)
     is_one_node = until.get("nodes") == 1 and bool(lasting) and not scenario.get("calls")
     waits = any(until.get(key) for key in OTHER_CONDITIONS if not (key == "nodes" and is_one_node))
-    if done_s is None or not isinstance(limit_s, int | float):
+    if not isinstance(limit_s, int | float):
+        return
+    if done_s is None:  # something has to come first: how long that is waited for is known
+        most_s = longest_s(scenario)
+        if most_s is not None and one.value > most_s:
+            yield f"{one.value:g} s is more than the scenario lasts at most, {most_s:g} s"
         return
     if done_s and not lasting and not waits:
-        longest_s, key = done_s, "its steps"
+        lasts_s, key = done_s, "its steps"
     else:
-        longest_s = min(max(lasting), limit_s) if lasting and not waits else limit_s
-        key = "limit_s" if longest_s == limit_s else "window_s" if "window_s" in until else "alive_s"
-        longest_s, key = longest_s + done_s, f"its steps and {key}" if done_s else key
-    if one.value > longest_s:
-        yield f"{one.value:g} s is more than the scenario lasts: {key}, {longest_s:g} s"
+        lasts_s = min(max(lasting), limit_s) if lasting and not waits else limit_s
+        key = "limit_s" if lasts_s == limit_s else "window_s" if "window_s" in until else "alive_s"
+        lasts_s, key = lasts_s + done_s, f"its steps and {key}" if done_s else key
+    if one.value > lasts_s:
+        yield f"{one.value:g} s is more than the scenario lasts: {key}, {lasts_s:g} s"
 
 
 def _unused_faults(
@@ -438,7 +443,10 @@ def _other_goals_and_types(criteria: list[WrittenCriterion]) -> Iterator[Fault]:
         called = {
             str(one.get("type")) for _, _, one in services_in(scenario) if one.get("service") == service
         }
-        if isinstance(kind, str) and called and not closest(kind, called, cutoff=SURE):
+        is_own = not ros_packages().types(
+            str(kind).partition("/")[0], "srv"
+        )  # of others, a slip is said elsewhere
+        if isinstance(kind, str) and called - {kind} and (is_own or not closest(kind, called, cutoff=SURE)):
             yield (*path, "type"), f"{name} has {service} as {join_words(sorted(called))}, not as {kind}"
 
 

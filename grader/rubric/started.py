@@ -196,13 +196,18 @@ def _blanks(text: str) -> str:
 
 
 def _no_colon(text: str, start: dict[str, Any], known: Known) -> str:
-    """Return that `_rate=5` sets no parameter, `gui=false` no argument, and `chatter=talk` remaps nothing."""
-    name, mark, value = text.partition("=")
+    """Return that `_rate=5` and `_rate:5` set no parameter, `gui=false` no argument, and `chatter=talk` remaps
+    nothing."""
+    cut = re.fullmatch(
+        r"(_\w+):(?!=) *=? *([^:=].*)", text
+    )  # of a private parameter only: other texts may have a colon
+    name, mark, value = cut.expand(r"\1 = \2").split(" ", 2) if cut else text.partition("=")
     is_name = re.fullmatch(r"[/A-Za-z][\w/]*", value)
     is_topic = is_name and name in {topic.rpartition("/")[2] for topic in known.topics}
     is_own = start.get("launch") is not None or name.startswith("_") or is_topic
     is_meant = re.fullmatch(r"\w+", name) and is_own
-    return f"ROS reads {name}:={value}, with a colon, and not {text}" if mark and is_meant else ""
+    how = "colon and equals sign" if cut else "a colon"
+    return f"ROS reads {name}:={value}, with {how}, and not {text}" if mark and is_meant else ""
 
 
 def _of_launch(text: str, start: dict[str, Any], known: Known) -> str:

@@ -110,10 +110,17 @@ def _own_types(rubric: dict[str, Any]) -> Iterator[Fault]:
     for scenario, one in as_map(rubric.get("scenarios")).items():
         steps = [(n, key, as_map(step[key])) for n, step in as_maps(as_map(one).get("steps")) for key in step]
         typed += [(("scenarios", scenario, "steps", n, key), given) for n, key, given in steps]
+        for part in ("calls", "serves"):
+            typed += [
+                (("scenarios", scenario, part, n), given) for n, given in as_maps(as_map(one).get(part))
+            ]
     for path, given in typed:
         kind = given.get("type")
         package, _, name = kind.partition("/") if isinstance(kind, str) else ("", "", "")
-        near = closest(name, names, cutoff=SURE) if package in own and name not in names | told else ""
+        is_told = name in told and name.lower() not in {
+            one.lower() for one in names
+        }  # as a word of another case
+        near = "" if package not in own or name in names or is_told else closest(name, names, cutoff=SURE)
         places = {judged for judged, stem in defined if stem == name}
         if package in own and places and package not in places:
             fault = f"a criterion looks for {name} in {join_words(sorted(places))}, and this is {kind}"

@@ -155,6 +155,20 @@ def test_who_naps_or_counts_aloud_is_waited_for_longer() -> None:
     assert is_settled(live, 9.9)
 
 
+def test_who_says_the_same_again_and_again_has_nothing_more_to_register() -> None:
+    live, until = _resting(node=("loops", 1)), Until(messages={"/a": 10})
+    live.published = {"/a": {"/node"}}
+    for second in range(2, 9):
+        live.note_line(f"[WARN] [17.{second}]: no transform yet", float(second), "node")
+    assert live.new_line_s == 2.0
+    assert not is_settled(live, 5.9)
+    assert is_settled(live, 8.1)
+    assert not is_silent(live, ("/a",), until, 13.9)  # what it publishes may yet come
+    assert is_silent(live, ("/a",), until, 14.1)
+    live.note_line("[WARN] [17.9]: 1 of 2 transforms", 9.0, "node")
+    assert not is_settled(live, 12.9)
+
+
 def test_who_works_on_and_on_is_at_rest_once_it_can_do_nothing_else() -> None:
     live = _resting(node=("stuck", 1))
     assert not is_settled(live, 2.4)

@@ -26,6 +26,7 @@ from grader.authoring.rubric_draft import (
 from grader.evidence.reader import package_facts
 from grader.evidence.run import Run
 from grader.model.mutants import LostCriterion, Mutant, MutantResult
+from grader.model.package import Interface, InterfaceField
 from grader.rubric.load import load_rubric
 from tests.report.nasty import STEERING, TEXTS, TO_A_CI
 from tests.support.timeline import build_runs
@@ -169,6 +170,55 @@ def test_a_node_that_answers_what_it_hears_gets_a_step_for_it() -> None:
     assert note.endswith(
         "publish: {topic: /cmd, type: geometry_msgs/Twist, value: {}, count: 3, rate_hz: 2.0}"
     )
+
+
+def test_a_service_of_the_packages_own_is_called_and_its_client_answered() -> None:
+    fields = [
+        ("request", "string", "unit"),
+        ("request", "float64", "value"),
+        ("response", "float64", "result"),
+    ]
+    own = Interface(
+        path="srv/Convert.srv",
+        fields=tuple(InterfaceField(part=p, type=t, name=n, line=1) for p, t, n in fields),
+    )
+    text = "string unit\nfloat64 value\n---\nfloat64 result\n"
+    offers = [{"at_s": 0.5, "nodes": ["/node"], "services": {"/convert": ["/node"]},
+               "processes": {"/node": "node"}, "service_types": {"/convert": "lab1/Convert"}}]  # fmt: skip
+    up = [{"at_s": 0.5, "nodes": ["/client"], "processes": {"/client": "node"}}]
+    looks = [{"action": "lookup", "actor": "/client", "topic": "/convert", "detail": "no such service"}]
+    first = {"node": run_of(graph=offers), "client": run_of(graph=up, actors=looks)}
+    seen = {name: observe(run) for name, run in first.items()}
+    assert seen["client"].sought == ("/convert",)
+    parts = Parts(nodes={"node": "src/node.py", "client": "src/client.py"}, launches={})
+    again = second_look("lab1", parts, seen, [own])
+    assert again is not None
+    calls = again.rubric.scenarios["node-asked"].calls
+    assert [call.request for call in calls] == [
+        {"unit": "first", "value": 3.5},
+        {"unit": "second", "value": 6.5},
+    ]
+    assert {call.definition for call in calls} == {text}
+    (served,) = again.rubric.scenarios["client-served"].serves
+    assert (served.service, served.answer, served.definition) == ("/convert", {"result": 1.5}, text)
+
+    asked = {"unit": "inch", "value": 2}
+    answers = [{"action": "answer", "topic": "/convert", "value": {"result": v}} for v in (8.89, 16.51)]
+    served_it = [{"action": "serve", "actor": "/client", "topic": "/convert",
+                  "value": {"request": asked, "response": {"result": 1.5}}}]  # fmt: skip
+    said = [{"process": "node", "stream": "stdout", "line": "2 inch is 1.50 cm"}]
+    runs = build_runs({"runs": {}, "package": {}}) | first
+    runs |= {"node-asked": run_of(actors=answers), "client-served": run_of(actors=served_it, console=said)}
+    facts = package_facts(runs["package"]).model_copy(update={"interfaces": (own,)})
+    proposal = Proposal(facts, parts, seen, runs)
+    judged = {one["check"]: one.get("with", {}) for one in proposal.criteria}
+    assert judged["service-answers"]["expect"] == [{"result": 8.89}, {"result": 16.51}]
+    assert judged["calls"]["expect"] == [asked]
+    assert judged["prints"]["text"] == "{number} inch is {number} cm"
+    assert judged["prints"]["numbers"] == [2, 1.5]
+    assert proposal.notes == []
+    silent = Proposal(facts, parts, seen, runs | {"node-asked": run_of()})
+    assert silent.notes[0].startswith("what /convert answers is not covered")
 
 
 def test_nodes_are_found_by_reading_alone(tmp_path):

@@ -29,7 +29,7 @@ from tests.rubric.samples import faults, spoiled
         ),
         (
             "{topic: /x, type: Int8, integers: 1}",
-            '.type: must be a type like std_msgs/String, not "Int8"',
+            '.type: must be a type like std_msgs/String, not "Int8" (did you mean "std_msgs/Int8"?)',
         ),
         ("{topic: /x, type: std_msgs/String, text: 1, times: 2}", ".times: is for values"),
         (

@@ -14,7 +14,7 @@ import pyte
 import pytest
 
 from fixtures.make import faulty_package
-from grader.report.terminal import MINUS
+from grader.report.sentences import MINUS
 
 ROOT = Path(__file__).resolve().parents[2]
 COLUMNS, ROWS = 80, 24

@@ -11,7 +11,7 @@ from rich.console import Console
 from grader.errors import ExitCode
 from grader.model.result import ErrorInfo, GradingResult
 from grader.model.verdict import Status
-from grader.report.terminal import MINUS
+from grader.report.sentences import MINUS
 from grader.student.watching import DASH, JsonLines, TerminalScreen, WatchedResult, compare
 from tests.report.hostile import ESCAPES, MARKDOWN, RICH, XML, criterion, result, rubric
 
