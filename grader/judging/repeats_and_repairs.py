@@ -156,24 +156,12 @@ def apply_repaired_copy(
         for c in rubric.criteria
     }
     if any(one.kind in OF_LOGIC for one in repairs):
-        judged = [c.id for c in rubric.criteria if c.check not in AT_ANY_RATE]
-        worse = any(on_copy[i].status.is_lost and not first[i].status.is_lost for i in judged)
-        helped = {i for i, one in on_copy.items() if one.status is Status.PASS and not worse}
+        helped = _helped(rubric, first, on_copy)
         needs = {
             i: tuple(one for one in ones if one.kind not in OF_LOGIC or i in helped)
             for i, ones in needs.items()
         }
-    better = {
-        c.id
-        for c in rubric.criteria
-        if first[c.id].status.is_lost
-        and (
-            not _is_worse(first, on_copy, c)
-            or is_next_fault(first[c.id], on_copy[c.id], needs[c.id])
-            # lost by a repaired line, and behind that line by what the machine lacks
-            or (on_copy[c.id].of_machine and any(fails_in(first[c.id], one) for one in needs[c.id]))
-        )
-    }
+    better = {c.id for c in rubric.criteria if _is_better(first, on_copy, c, needs[c.id])}
     charges = charge_repairs(rubric, first, better, needs)
     for criterion in rubric.criteria:
         charged = tuple(one for one in repairs if criterion.id in charges.get(one, ()))
@@ -192,6 +180,29 @@ def apply_repaired_copy(
         uses[criterion.id] = Repaired(repairs=told, share=share, charged=bool(charged))
     installing = {c.id for c in rubric.criteria if c.check == INSTALL}
     return {i: _at_new_paths(v, repairs) if i in installing else v for i, v in verdicts.items()}, uses
+
+
+def _is_better(
+    first: Mapping[str, Verdict],
+    on_copy: Mapping[str, Verdict],
+    criterion: Criterion,
+    needed: Sequence[Repair],
+) -> bool:
+    """Return whether the copy shows more of a lost criterion: no loss, a next fault, or what the machine lacks behind
+    the line that is repaired."""
+    verdict, copy = first[criterion.id], on_copy[criterion.id]
+    return verdict.status.is_lost and (
+        not _is_worse(first, on_copy, criterion)
+        or is_next_fault(verdict, copy, needed)
+        or (copy.of_machine and any(fails_in(verdict, one) for one in needed))
+    )
+
+
+def _helped(rubric: Rubric, first: Mapping[str, Verdict], on_copy: Mapping[str, Verdict]) -> set[str]:
+    """Return the criteria that pass on a copy whose logic is changed; none where another one is lost by the change."""
+    judged = [c.id for c in rubric.criteria if c.check not in AT_ANY_RATE]
+    worse = any(on_copy[i].status.is_lost and not first[i].status.is_lost for i in judged)
+    return set() if worse else {i for i, one in on_copy.items() if one.status is Status.PASS}
 
 
 def _at_new_paths(verdict: Verdict, repairs: Iterable[Repair]) -> Verdict:

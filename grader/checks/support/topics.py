@@ -432,14 +432,11 @@ def explain_by_wrong_value(
     if check.name == "action-result" and any("To transition to a" in c.line for _, c in run.console):
         kinds.append("goes-on")  # actionlib was told to end a goal that is over
     found = [s for s in package.slips if s.kind in kinds and s.file in files]
-    for slip in (
-        s for s in found if s.kind == "goes-on" or (verdict.wrong and SEEN_AS[s.name] == verdict.wrong)
-    ):
-        why = f"line {slip.line} of {slip.file}: {slip.message}"
-        return verdict.explained(why, slip.fix, (slip.place,), cause=slip.message)
-    for slip in [s for s in found if s.name == "bounds" and not verdict.wrong][:4]:
-        why = f"line {slip.line} of {slip.file}: {slip.message}"
-        verdict = verdict.explained(why, f"{verdict.hint}; {slip.fix}", (slip.place,), cause="")
+    sure = [s for s in found if s.kind == "goes-on" or (verdict.wrong and SEEN_AS[s.name] == verdict.wrong)]
+    for slip in sure[:1] or [s for s in found if s.name == "bounds" and not verdict.wrong][:4]:
+        why, hint = f"line {slip.line} of {slip.file}: {slip.message}", f"{verdict.hint}; {slip.fix}"
+        cause = slip.message if sure else ""
+        verdict = verdict.explained(why, slip.fix if sure else hint, (slip.place,), cause=cause)
     return verdict
 
 
