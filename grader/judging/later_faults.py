@@ -304,8 +304,7 @@ class Later:
         return lines[slip.line - 1] if slip.line <= len(lines) else ""
 
     def _asked(self) -> set[tuple[str, int]]:
-        """Return where the scripts ask for input; nothing where the verdict is about one of these lines, or where the
-        grader types what they ask for."""
+        """Return where scripts ask for input; nothing where the verdict is about it, or the grader types the answer."""
         scenario = self._rubric.scenarios.get(self._criterion.scenario or "")
         if scenario is not None and scenario.typed_to:
             return set()

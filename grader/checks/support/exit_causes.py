@@ -123,12 +123,8 @@ def syntax_hint(fault: Fault) -> str:
         closing = {"(": "`)`", "[": "`]`", "{": "`}`"}.get(fault.unclosed, "the bracket that closes it")
         return f"{where}write {closing} at the end of what is opened there"
     if below := re.search(r"name '(\w+)' is .* global declaration", fault.message):
-        inside = fault.source[:1].isspace()
-        return (
-            f"{where}move `global {below[1]}` up, as the first line of the function"
-            if inside
-            else f"{where}delete this line"
-        )
+        moved = f"move `global {below[1]}` up, as the first line of the function"
+        return where + (moved if fault.source[:1].isspace() else "delete this line")
     if right:
         braces = ", and delete the `}` that closes the block" if without_brace(fault.source) else ""
         begin = fault.message.partition(f"{COMMENTED_OUT}: ")[2]

@@ -569,17 +569,13 @@ def whole_until_ns(run: Run, topic: str, until_ns: int | None = None) -> int | N
 def all_lost(run: Run, topic: str) -> Verdict | None:
     """Return the verdict where nothing was recorded of a topic because the recorder dropped it."""
     lost = losses(run, topic)
-    if lost is None or lost.kept:
-        return None
-    return grade_again(f"nothing was recorded on {topic}", measured="no message")
+    gone = lost is not None and not lost.kept
+    return grade_again(f"nothing was recorded on {topic}", measured="no message") if gone else None
 
 
 def account_for_losses(check: Check, facts: Mapping[str, object], verdict: Verdict) -> Verdict:
-    """Return the verdict with what the recorder lost of its topics.
-
-    A lost mark becomes `inconclusive`, unless the check rests on what came whole (`heeds_losses`): then what was lost
-    only stands with what was measured.
-    """
+    """Return the verdict with what the recorder lost of its topics. A lost mark becomes `inconclusive`, unless the check
+    rests on what came whole (`heeds_losses`): then what was lost only stands with what was measured."""
     run = facts.get("run")
     if not isinstance(run, Run):
         return verdict
@@ -599,5 +595,5 @@ def account_for_losses(check: Check, facts: Mapping[str, object], verdict: Verdi
 
 def _topics(check: Check, params: object) -> Iterable[str]:
     """Whatever of its parameters may be the name of a topic."""
-    named = dict.fromkeys(texts_in(params.model_dump() if isinstance(params, Record) else None))
+    named = texts_in(params.model_dump() if isinstance(params, Record) else None)
     return tuple(dict.fromkeys((*named, *READ_TOO.get(check.name, ()))))
