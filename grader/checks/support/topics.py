@@ -574,8 +574,8 @@ def all_lost(run: Run, topic: str) -> Verdict | None:
 
 
 def account_for_losses(check: Check, facts: Mapping[str, object], verdict: Verdict) -> Verdict:
-    """Return the verdict with what the recorder lost of its topics. A lost mark becomes `inconclusive`, unless the check
-    rests on what came whole (`heeds_losses`): then what was lost only stands with what was measured."""
+    """Return the verdict with what the recorder lost of its topics. A lost mark becomes `inconclusive`, unless the
+    check rests on what came whole (`heeds_losses`): then what was lost only stands with what was measured."""
     run = facts.get("run")
     if not isinstance(run, Run):
         return verdict
