@@ -42,8 +42,6 @@ def frame_faults(rubric: dict[str, Any]) -> Iterator[Fault]:
                 yield from _slash(place, as_map(step.get("transform")).get(key))
         yield from _in_values(("scenarios", name), scenario)
         yield from _two_parents(("scenarios", name), as_map(scenario))
-        others = [one for one in criteria if one.run != name and not any(_swapped_frames(one, criteria))]
-        yield from _swapped_steps(("scenarios", name), as_map(scenario), _asked_frames(others))
         yield from _sent_turns(("scenarios", name), as_map(scenario), rubric)
     for criterion in criteria:
         yield from _in_values(criterion.at, criterion.given)
@@ -198,7 +196,8 @@ def _swapped_frames(criterion: WrittenCriterion, criteria: list[WrittenCriterion
     if given.get("through") is True:
         return
     sent = [(one.get("parent"), one.get("child")) for one in given_steps(scenario, "transform")]
-    sent += _asked_frames(one for one in criteria if one.place < criterion.place)
+    earlier = [one.given for one in criteria if one.check == "transform" and one.place < criterion.place]
+    sent += [(one.get("parent"), one.get("child")) for one in earlier if one.get("through") is not True]
     equal = [one.given for one in criteria if one.check == "field-equals"]
     of_pose = [one for one in equal if one.get("topic") == given.get("pose_of")]
     named = {str(one.get("field")): one.get("value") for one in of_pose}
@@ -208,25 +207,7 @@ def _swapped_frames(criterion: WrittenCriterion, criteria: list[WrittenCriterion
         if publish.get("topic") == given.get("pose_of"):
             sent.append((as_map(value.get("header")).get("frame_id"), value.get("child_frame_id")))
     if parent and child and (child, parent) in sent:
-        yield (*criterion.at, "parent"), _swapped(parent, child)
-
-
-def _asked_frames(criteria: Iterable[WrittenCriterion]) -> list[tuple[object, object]]:
-    """Return the parents and children for which criteria ask, but for those with other frames between them."""
-    asked = [one.given for one in criteria if one.check == "transform"]
-    return [(one.get("parent"), one.get("child")) for one in asked if one.get("through") is not True]
-
-
-def _swapped_steps(
-    path: KeyPath, scenario: dict[str, Any], asked: list[tuple[object, object]]
-) -> Iterator[Fault]:
-    """Yield transforms of the grader's whose parent is the child for criteria of other runs."""
-    for index, step in as_maps(scenario.get("steps")):
-        given = as_map(step.get("transform"))
-        parent, child = given.get("parent"), given.get("child")
-        if (child, parent) in asked and (parent, child) not in asked:
-            yield (*path, "steps", index, "transform", "parent"), _swapped(parent, child)
-
-
-def _swapped(parent: object, child: object) -> str:
-    return f"{child} is the parent elsewhere in the rubric, and {parent} the child: a frame has one parent"
+        fault = (
+            f"{child} is the parent elsewhere in the rubric, and {parent} the child: a frame has one parent"
+        )
+        yield (*criterion.at, "parent"), fault

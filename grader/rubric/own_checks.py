@@ -25,7 +25,7 @@ from grader.checks.registry import collecting
 from grader.model.verdict import Verdict
 from grader.rubric.course_packages import read_packages, read_starter
 from grader.rubric.pytest_check import BAG, PYTHON, FileFault, faults_of_tests, pytest_check, read_beside
-from grader.rubric.step_faults import bag_faults, played_bags, topics_named
+from grader.rubric.step_faults import bag_faults, played_bags
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, criteria_of
 from grader.untrusted_text import visible
 
@@ -75,7 +75,7 @@ def read_instructor(data: object, folder: Path) -> Beside:
             faults.append((path, str(fault)))
             continue
         if path in played:
-            faults += bag_faults(path, file, played[path], topics_named(rubric, path[:-1]), rubric)
+            faults += bag_faults(path, file, played[path], rubric)
         if path == ("checks",):
             own = run_checks_file(file, files[name])
     handed_out = frozenset(hashlib.sha256(content).hexdigest() for content in starter.values() if content)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import PurePosixPath
@@ -12,7 +11,6 @@ from grader.checks.support.fields import is_number
 from grader.model.message_definitions import BUILT_IN
 from grader.rubric.definitions import services_in
 from grader.rubric.message_fields import said_types
-from grader.rubric.simulators import set_in
 from grader.rubric.spelling import is_slip
 from grader.rubric.started import starts_of
 from grader.rubric.unknown_names import topics_in
@@ -75,7 +73,6 @@ def prose_warnings(rubric: dict[str, Any]) -> Iterator[Fault]:
         yield from _shifted_numbers(criterion, rubric)
         yield from _numbers_of_title(criterion, criteria, rubric)
         yield from _other_node(criterion, handout)
-        yield from _other_number(criterion)
         yield from _other_types(at, given, handout)
         yield from _misspelt_keys(at, given, rubric)
         if check in {"node-lives", "node-name", "launch-runs"}:
@@ -213,23 +210,6 @@ def _sent_otherwise(scenarios: Mapping[str, dict[str, Any]], handout: str) -> It
             if said and str(one.get("type")) not in said:
                 fault = f"the handout says that {one['topic']} carries {join_words(sorted(said))}"
                 yield ("scenarios", name, *at), fault
-
-
-def _other_number(criterion: WrittenCriterion) -> Iterator[Fault]:
-    """Yield a value of a field that is named as a parameter of the run, and that the run sets otherwise."""
-    last, value = re.split(r"[.\[]", str(criterion.given.get("field")))[-1], criterion.given.get("value")
-    if criterion.check != "field-equals" or not is_number(value):
-        return
-    for _, one in set_in(criterion.scenario):
-        param = str(one.get("name"))
-        if param.rpartition("/")[2] != last or not is_number(one.get("value")):
-            continue
-        is_float = isinstance(one["value"], float) and isinstance(value, int)
-        if one["value"] != value or is_float:
-            no_int = ", which is no whole number for ROS" if one["value"] == value else ""
-            fault = f"{criterion.run} sets {param} to {json.dumps(one['value'])}{no_int}"
-            yield (*criterion.at, "value"), fault
-            return
 
 
 def _other_types(at: KeyPath, given: dict[str, Any], handout: str) -> Iterator[Fault]:

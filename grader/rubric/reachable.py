@@ -15,10 +15,9 @@ from grader.checks.registry import Check
 from grader.checks.support.fields import Reading, is_number
 from grader.evidence.message_values import ANGLES, FORMS
 from grader.rubric.definitions import PATH_PARTS
-from grader.rubric.durations import late_faults, longest_s, often_faults, stretch_faults, within_faults
-from grader.rubric.room import pair, room_faults, start_faults
+from grader.rubric.durations import late_faults, longest_s, stretch_faults, within_faults
 from grader.rubric.scenario import Scenario, Until
-from grader.rubric.simulators import FIELD_M, PROGRAMS, TRUE_POSE, robot_of
+from grader.rubric.simulators import FIELD_M, PROGRAMS, TRUE_POSE, pair, robot_of, start_faults
 from grader.rubric.started import starts_of
 from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, WrittenCriterion, as_list, as_map, as_maps, criteria_of
@@ -47,10 +46,8 @@ def reach_faults(
         yield from start_faults(("scenarios", name), scenario)
     for about in criteria:
         others = [one for one in criteria if one is not about and one.run == about.run]
-        yield from often_faults(about)
         yield from within_faults(about)
         yield from stretch_faults(about)
-        yield from room_faults(about)
         yield from _never_sent(about, others)
         if about.check in {"ends-at", "path", "stays-within"}:
             yield from _too_far(about, others)
@@ -339,47 +336,6 @@ def _goal_faults(
     away_m = math.dist(start, goal) - 2 * tolerance_m if start else 0
     if away_m > farthest_m:
         yield at, f"it cannot come so far: {limit}"
-    else:
-        yield from _too_soon(about, robot, away_m, f"{away_m:.3g} m from {pair(start or goal)}")
-    for one in others if not given.get("relative") else ():
-        kept = one.given
-        corners = [_spot(corner) for corner in as_list(kept.get("box"))]
-        same = one.check == "stays-within" and kept.get("topic") == given.get("topic")
-        known = len(corners) == 2 and None not in corners and not kept.get("relative")
-        if same and known and not _is_between(goal, corners, tolerance_m):
-            yield at, f"is outside of the box that {one.id} keeps it in"
-
-
-def _too_soon(about: WrittenCriterion, robot: _Robot, away_m: float, way: str) -> Iterator[Fault]:
-    """Yield a goal that the robot cannot come to before the next one is asked for, or within the time."""
-    within_s, fastest, until_s = about.given.get("within_s"), robot.fastest_m_s, _until_next_s(about)
-    if not fastest:
-        return
-    needed = f"{way} at {fastest:g} m/s take longer than"
-    if until_s is not None and away_m > fastest * until_s:
-        after = f"the {until_s:g} s until the next message on {about.given['asked_on']}"
-        yield (*about.at, "goal"), f"{needed} {after} asks for another place"
-    elif is_number(within_s) and away_m > fastest * within_s:
-        yield (*about.at, "within_s"), f"{needed} {within_s:g} s"
-
-
-def _until_next_s(about: WrittenCriterion) -> float | None:
-    """Return how long after the message that a goal is asked with the next one is sent; None where that is not known,
-    or it is the last."""
-    passed_s, number = None, 0
-    for _, step in as_maps(about.scenario.get("steps")):
-        is_goal = "publish" in step and as_map(step["publish"]).get("topic") == about.given.get("asked_on")
-        if is_goal and passed_s is not None:
-            return passed_s
-        seconds = as_map(step.get("wait")).get("seconds")
-        number += is_goal
-        if is_goal and number == about.given.get("number", 1):
-            passed_s = 0.0
-        elif passed_s is not None:
-            if not is_number(seconds):
-                return None
-            passed_s += seconds
-    return None
 
 
 def _not_last(about: WrittenCriterion, others: Sequence[WrittenCriterion], goal: tuple[float, float]) -> str:
@@ -395,13 +351,6 @@ def _not_last(about: WrittenCriterion, others: Sequence[WrittenCriterion], goal:
     topic, spot = next(iter(last.items()))
     asks = f"the last message on {topic} asks for {pair(spot or goal)}"
     return f"without asked_on this is where the run ends, and {asks}: write asked_on: {topic}, with number"
-
-
-def _is_between(spot: tuple[float, float], corners: Sequence[Any], tolerance_m: float) -> bool:
-    return all(
-        min(a, b) - tolerance_m <= one <= max(a, b) + tolerance_m
-        for one, a, b in zip(spot, *corners, strict=True)
-    )
 
 
 def _other_effects(criteria: Sequence[WrittenCriterion]) -> Iterator[Fault]:

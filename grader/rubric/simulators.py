@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 from grader.checks.support.fields import is_number
-from grader.rubric.yaml_lines import KeyPath, as_map, as_maps, as_texts
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts
 from grader.wording import closest
 
+Spot = tuple[float, float]
 LIKELY, SURE = 0.7, 0.85
 WHOLE_TURN = 6.3
 """In radians, rounded up."""
@@ -218,3 +221,68 @@ def _near_topic(topic: str, scenario: dict[str, Any]) -> str:
     robot = str(values.get("robot_world/robot", "turtlebot3"))
     renamed = "robot_world/scan_topic" in values
     return OTHERS_SCAN.get(topic, {}).get(robot, "") if not renamed else ""
+
+
+def start_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
+    """Yield that the robot touches a wall before it has moved, or is in a box."""
+    robot = robot_of(scenario)
+    lines, place, radius_m = _lines(robot), _start(robot), robot.get("radius")
+    if not lines or place is None or not is_number(radius_m):
+        return
+    away_m = min(_distance(place, *ends) for line in lines for ends in pairwise(line))
+    boxes = [line for line in _boxes(robot) if _is_inside(place, line)]
+    given = (at for at, one in set_in(scenario) if str(one.get("name")).endswith("/start"))
+    where = (*path, *next(given, ("start",)))
+    closed = [line for line in _lines(robot) if line[0] == line[-1] and line not in _boxes(robot)]
+    rooms = [line for line in closed if any(_is_inside(box[0], line) for box in _boxes(robot))]
+    if rooms and not any(_is_inside(place, line) for line in rooms):
+        yield where, f"the robot starts at {pair(place)}, outside of the room that the walls make"
+    elif boxes:
+        inside = f"in the box from {pair(boxes[0][0])} to {pair(boxes[0][2])}"
+        yield where, f"the robot starts at {pair(place)}, {inside}"
+    elif away_m < radius_m:
+        touches = f"{away_m:.2g} m from a wall, which it touches before it has moved"
+        yield where, f"the robot starts at {pair(place)}, {touches}"
+
+
+def _start(robot: dict[str, Any]) -> Spot | None:
+    """Return where the robot starts; None where that is not known, or a map has walls too."""
+    start = robot.get("start")
+    is_known = isinstance(start, list) and FORMS["start"][1](start) and "map" not in robot
+    return (start[0], start[1]) if isinstance(start, list) and is_known else None
+
+
+def _lines(robot: dict[str, Any]) -> list[list[Spot]]:
+    """Return the walls and the sides of the boxes; none where one of the two is not as it has to be."""
+    walls = robot.get("walls", [])
+    if not FORMS["walls"][1](walls) or not FORMS["boxes"][1](robot.get("boxes", [])):
+        return []
+    return [[(x, y) for x, y in line] for line in walls if line] + _boxes(robot)
+
+
+def _boxes(robot: dict[str, Any]) -> list[list[Spot]]:
+    return [[(a, b), (c, b), (c, d), (a, d), (a, b)] for a, b, c, d in robot.get("boxes", [])]
+
+
+def _distance(spot: Spot, one: Spot, other: Spot) -> float:
+    """Return how far a spot is from the line between two others."""
+    dx, dy = other[0] - one[0], other[1] - one[1]
+    squared = dx * dx + dy * dy
+    along = ((spot[0] - one[0]) * dx + (spot[1] - one[1]) * dy) / squared if squared else 0.0
+    along = min(max(along, 0.0), 1.0)
+    return math.dist(spot, (one[0] + along * dx, one[1] + along * dy))
+
+
+def _is_inside(spot: Spot, line: Sequence[Spot]) -> bool:
+    """Return whether a closed line goes around a spot."""
+    x, y = spot
+    crossed = 0
+    for (x0, y0), (x1, y1) in pairwise(line):
+        if (y0 > y) != (y1 > y) and x < x0 + (y - y0) * (x1 - x0) / (y1 - y0):
+            crossed += 1
+    return crossed % 2 == 1
+
+
+def pair(spot: Spot) -> str:
+    """Return a place as it is written: `(1, 2.5)`."""
+    return f"({spot[0]:g}, {spot[1]:g})"

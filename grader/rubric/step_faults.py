@@ -6,11 +6,10 @@ What all belongs to a new kind of step is at the beginning of `scenario.py`.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from grader.checks.support.fields import is_number
 from grader.checks.support.processes import odd_name
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.errors import EvidenceError
@@ -19,10 +18,10 @@ from grader.installable import noetic_messages
 from grader.model.message_definitions import NOT_FINITE
 from grader.ros_env import ros_packages
 from grader.rubric.fault_words import model_faults
-from grader.rubric.scenario import STEP_S_MAX, Action, Step, Transform, Until
+from grader.rubric.scenario import STEP_S_MAX, Action, Step, Transform
 from grader.rubric.spelling import is_slip
 from grader.rubric.started import starts_of
-from grader.rubric.yaml_lines import Fault, KeyPath, as_list, as_map, as_maps, as_texts, criteria_of, texts_in
+from grader.rubric.yaml_lines import Fault, KeyPath, as_list, as_map, as_maps, as_texts, texts_in
 from grader.wording import did_you_mean
 
 KINDS = tuple(Step.model_fields)
@@ -37,8 +36,6 @@ NAMED = {
     "set_param": ("name", "a parameter"),
 }
 """The key of a step that is a name of ROS's."""
-ROWS_PER_MESSAGE, ROWS_PER_S = 3, 100
-"""A node that writes more than this into a table is none of a lab's."""
 WAITS = ("seconds", "topic", "node")
 MOMENTS = 20
 """At so many messages of a row a value that changes is looked at, the first and the last among them."""
@@ -59,17 +56,14 @@ def played_bags(rubric: dict[str, Any]) -> dict[KeyPath, dict[str, Any]]:
     }
 
 
-def topics_named(rubric: dict[str, Any], but: KeyPath) -> set[str]:
+def _topics_named(rubric: dict[str, Any], but: KeyPath) -> set[str]:
     """Return the names with a slash in a rubric, but for those in one of its parts."""
     texts = [text for path, text in texts_in((), rubric) if path[: len(but)] != but]
     return {name for text in texts for name in re.findall(r"(?<![\w.])/[A-Za-z][\w/]*\w", text)}
 
 
-def bag_faults(
-    path: KeyPath, file: Path, play: dict[str, Any], named: Collection[str], rubric: dict[str, Any]
-) -> Iterator[Fault]:
-    """Yield what is wrong with a recording that a step plays. `path` is the place of its name; the rest of the rubric
-    names the topics in `named`."""
+def bag_faults(path: KeyPath, file: Path, play: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield what is wrong with a recording that a step plays. `path` is the place of its name."""
     from grader.evidence.reader import load_run  # noqa: PLC0415 - few rubrics play anything
 
     try:
@@ -77,29 +71,14 @@ def bag_faults(
     except EvidenceError as error:
         yield path, f"cannot be played: {error.message}"
         return
-    topics = {channel.topic for channel in channels}
-    times_ns = [time for channel in channels for time in channel.times_ns]
-    yield from _rows_faults(path, file.name, times_ns, rubric)
+    topics, named = {channel.topic for channel in channels}, _topics_named(rubric, path[:-1])
     for number, topic in as_texts(play.get("topics")):
         if topic not in topics:
             yield (*path[:-1], "topics", number), f"{file.name} has no {topic}{did_you_mean(topic, topics)}"
-    for topic in sorted(topics - {*named} - SYSTEM_TOPICS):
-        near = next((one for one in sorted({*named} - topics) if is_slip(topic, one)), "")
+    for topic in sorted(topics - named - SYSTEM_TOPICS):
+        near = next((one for one in sorted(named - topics) if is_slip(topic, one)), "")
         if near:
             yield path, f"{file.name} has {topic}, and the rubric names {near}: give the recording that topic"
-
-
-def _rows_faults(path: KeyPath, name: str, times_ns: list[int], rubric: dict[str, Any]) -> Iterator[Fault]:
-    """Yield tables with more rows than can come of so many messages, or in that time."""
-    lasts_s = (max(times_ns, default=0) - min(times_ns, default=0)) / 1e9
-    for criterion in criteria_of(rubric):
-        until, rows = as_map(criterion.scenario.get("until")), criterion.given.get("rows_at_least")
-        limit_s = until.get("limit_s", Until.model_fields["limit_s"].default)
-        if criterion.run != path[1] or not is_number(rows) or not is_number(limit_s):
-            continue
-        if rows > ROWS_PER_MESSAGE * len(times_ns) + ROWS_PER_S * (lasts_s + limit_s):
-            fault = f"{name} has {len(times_ns)} messages in {lasts_s:.3g} s: so many rows never come"
-            yield (*criterion.at, "rows_at_least"), fault
 
 
 def step_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
