@@ -18,7 +18,12 @@ from grader.evidence.definitions import Field, Types, parse
 from grader.evidence.message_values import ANGLES, CLOCKS, FORMS, NOW, MessageType
 from grader.model.message_definitions import DIVIDER, PARTS
 from grader.ros_env import ros_packages
-from grader.rubric.yaml_lines import KeyPath, as_map, as_maps, criteria_of, packages_in
+from grader.rubric.yaml_lines import (
+    KeyPath,
+    WrittenRubric,
+    as_map,
+    services_in,
+)
 from grader.wording import closest, did_you_mean, is_one_edit, join_words
 
 ALMOST = 0.87
@@ -186,7 +191,7 @@ def limits_of(kind: str) -> tuple[int, int] | None:
 class Definitions:
     """The definitions that are known before a run."""
 
-    def __init__(self, rubric: dict[str, Any], files: Mapping[str, bytes]) -> None:
+    def __init__(self, rubric: WrittenRubric, files: Mapping[str, bytes]) -> None:
         paths = [PurePosixPath(path) for path in files if PurePosixPath(path).suffix in PARTS]
         self.of_course = {f"{path.parts[0]}/{path.stem}" for path in paths}
         self._own: dict[tuple[str, str], OwnText] = {
@@ -243,22 +248,22 @@ class Definitions:
         return own.text if own else None
 
 
-def own_texts(rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str, str, OwnText]]:
+def own_texts(rubric: WrittenRubric) -> Iterator[tuple[KeyPath, str, str, OwnText]]:
     """Yield each definition of a type that the rubric has: where, its type, the ending of its file."""
-    for criterion in criteria_of(rubric):
+    for criterion in rubric.criteria:
         given = criterion.given
         if criterion.check == "topic-type" and isinstance(given.get("definition"), str):
             path: KeyPath = (*criterion.at, "definition")
             yield path, str(given.get("type")), ".msg", OwnText(given["definition"], whole=True)
         if criterion.check == "definition":
             file = PurePosixPath(str(given.get("file")))
-            package = criterion.data.get("package") or next(iter(packages_in(rubric)), "")
+            package = criterion.data.get("package") or next(iter(rubric.packages), "")
             text = given.get("text")
             own = OwnText(text, whole=True) if isinstance(text, str) and text else _of_fields(file, given)
             if file.suffix in PARTS:
                 path = (*criterion.at, "text" if own.whole else "fields")
                 yield path, f"{package}/{file.stem}", file.suffix, own
-    for name, scenario in as_map(rubric.get("scenarios")).items():
+    for name, scenario in rubric.scenarios.items():
         for at, _, one in services_in(as_map(scenario)):
             if isinstance(one.get("definition"), str):
                 path = ("scenarios", name, *at, "definition")
@@ -271,14 +276,3 @@ def _of_fields(file: PurePosixPath, given: dict[str, Any]) -> OwnText:
         part, _, bare = str(name).rpartition(".")
         lines.get(part, []).append(f"{kind} {bare}")
     return OwnText("\n---\n".join("\n".join(part) for part in lines.values()), whole=False)
-
-
-def services_in(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, str, dict[str, Any]]]:
-    """Yield the services that a scenario calls or offers, where it says so, and the key of what it fills in."""
-    for key, part in (("calls", "request"), ("serves", "response")):
-        yield from (
-            ((key, n), part, one) for n, one in as_maps(scenario.get(key)) if one.get("action") is None
-        )
-    for index, step in as_maps(scenario.get("steps")):
-        if "call" in step:
-            yield ("steps", index, "call"), "request", as_map(step["call"])

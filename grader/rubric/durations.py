@@ -12,8 +12,7 @@ from grader.checks.rate import RateParams
 from grader.checks.reacts import Condition
 from grader.checks.support.fields import Reading, is_number
 from grader.rubric.scenario import ROSTEST_ENDING, Action, Probe, Scenario, Step, Until
-from grader.rubric.step_faults import given_steps
-from grader.rubric.yaml_lines import Fault, KeyPath, WrittenCriterion, as_list, as_map, as_maps
+from grader.rubric.yaml_lines import Fault, KeyPath, WrittenCriterion, as_list, as_map, as_maps, given_steps
 from grader.wording import significant
 
 SUBSCRIBE_S, ANSWER_S = 6.0, 10.0

@@ -9,20 +9,19 @@ from typing import Any
 
 from grader.checks.support.fields import is_number
 from grader.model.message_definitions import BUILT_IN
-from grader.rubric.definitions import services_in
 from grader.rubric.message_fields import said_types
 from grader.rubric.spelling import is_slip
-from grader.rubric.started import starts_of
 from grader.rubric.unknown_names import topics_in
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
     WrittenCriterion,
+    WrittenRubric,
     as_map,
     as_maps,
     as_texts,
-    criteria_of,
-    packages_in,
+    services_in,
+    starts_of,
     texts_in,
 )
 from grader.wording import join_words
@@ -62,23 +61,21 @@ FIELD = re.compile(r"^\s*([a-z]+\d*)\s+(\w+)\s*(?:#.*)?$", re.MULTILINE)
 """A field of a primitive type in a definition."""
 
 
-def prose_warnings(rubric: dict[str, Any]) -> Iterator[Fault]:
+def prose_warnings(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield what may be a slip in one of the two."""
-    scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
-    handout = str(rubric.get("handout") or "")
-    yield from _sent_otherwise(scenarios, handout)
-    criteria = criteria_of(rubric)
-    for criterion in criteria:
+    handout = rubric.handout
+    yield from _sent_otherwise(rubric.scenarios, handout)
+    for criterion in rubric.criteria:
         at, given, check = criterion.at, criterion.given, criterion.check
         yield from _shifted_numbers(criterion, rubric)
-        yield from _numbers_of_title(criterion, criteria, rubric)
+        yield from _numbers_of_title(criterion, rubric)
         yield from _other_node(criterion, handout)
         yield from _other_types(at, given, handout)
         yield from _misspelt_keys(at, given, rubric)
         if check in {"node-lives", "node-name", "launch-runs"}:
-            yield from _unsaid_node(at, given, rubric, handout)
+            yield from _unsaid_node(at, given, rubric)
         yield from _other_text(at, given, handout, TEXTS.get(check, VALUES))
-        yield from _of_another_topic(criterion, criteria)
+        yield from _of_another_topic(criterion, rubric)
         if check == "logs":
             yield from _other_level(criterion, handout)
         parent, child = (rf"`?{re.escape(str(given.get(key)))}`?(?!\w)" for key in ("parent", "child"))
@@ -87,14 +84,14 @@ def prose_warnings(rubric: dict[str, Any]) -> Iterator[Fault]:
             yield (*at, "parent"), f"the handout has it from {given.get('child')} to {given.get('parent')}"
 
 
-def _shifted_numbers(criterion: WrittenCriterion, rubric: dict[str, Any]) -> Iterator[Fault]:
+def _shifted_numbers(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield numbers that only this line has, and that the criterion's title or the handout has with another sign, or
     ten times as large or as small."""
     about = [str(criterion.data.get(key, "")) for key in ("title", "hint")]
-    prose = " ".join([*about, str(rubric.get("handout", ""))])
+    prose = " ".join([*about, rubric.handout])
     said = {float(number) for number in PLAIN_NUMBER.findall(prose)}
     said_hz = _rates(prose)
-    there = [number for at, number in numbers_in((), rubric) if not _is_setting(at)]
+    there = [number for at, number in numbers_in((), rubric.data) if not _is_setting(at)]
     own = {number for _, number in numbers_in((), criterion.given)}
     for key in EXPECTED:
         asked = criterion.given.get(key)
@@ -147,34 +144,32 @@ def _other_node(criterion: WrittenCriterion, handout: str) -> Iterator[Fault]:
         yield (*criterion.at, "names", 0), fault
 
 
-def _unsaid_node(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any], handout: str) -> Iterator[Fault]:
+def _unsaid_node(at: KeyPath, given: dict[str, Any], rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield names that the handout gives to the package or to a file alone, and not to a node as it does to others."""
+    handout, starts = rubric.handout, [start for _, start in rubric.starts()]
     nodes = {
         name for said in re.findall(r"\bnodes? `[^.;:(]*", handout) for name in re.findall(r"`/?(\w+)`", said)
     }
-    runs = [as_map(one) for one in as_map(rubric.get("scenarios")).values()]
-    scripts = [str(start.get("script")) for scenario in runs for start in starts_of(scenario)]
-    files = " ".join([*packages_in(rubric), *scripts, *re.findall(r"[\w/]+\.(?:py|cpp)\b", handout)])
+    scripts = [str(start.get("script")) for start in starts]
+    files = " ".join([*rubric.packages, *scripts, *re.findall(r"[\w/]+\.(?:py|cpp)\b", handout)])
     for number, name in as_texts(given.get("names")):
         if nodes and name.strip("/") not in nodes and re.search(rf"\b{re.escape(name.strip('/'))}\b", files):
-            others = nodes - set(packages_in(rubric)) | {*re.findall(r"\bnode `/?(\w+)`", handout)}
+            others = nodes - set(rubric.packages) | {*re.findall(r"\bnode `/?(\w+)`", handout)}
             fault = f"is no node of the handout, which has {join_words(sorted(others))}"
             yield (*at, "names", number), fault
     for name, package in as_map(given.get("nodes")).items():
         last = str(name).rpartition("/")[2]
-        is_started = any(
-            PurePosixPath(str(s.get("program"))).stem == last for one in runs for s in starts_of(one)
-        )
-        if package in packages_in(rubric) and nodes and last not in nodes and not is_started:
+        is_started = any(PurePosixPath(str(start.get("program"))).stem == last for start in starts)
+        if package in rubric.packages and nodes and last not in nodes and not is_started:
             others = {*re.findall(r"\bnode `/?(\w+)`", handout)} or nodes
             yield (*at, "nodes", name), f"is no node of the handout, which has {join_words(sorted(others))}"
 
 
-def _of_another_topic(criterion: WrittenCriterion, criteria: list[WrittenCriterion]) -> Iterator[Fault]:
+def _of_another_topic(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield a topic that the title does not name, where it names another one of the rubric."""
     own = {*topics_in(criterion.given)}
     named = {*re.findall(r"(?<![\w/])/[\w/]*\w", str(criterion.data.get("title")))}
-    others = {topic for one in criteria for topic in topics_in(one.given)}
+    others = {topic for one in rubric.criteria for topic in topics_in(one.given)}
     if isinstance(criterion.given.get("topic"), str) and named and named <= others and not named & own:
         yield (*criterion.at, "topic"), f"is not what the title has: {join_words(sorted(named))}"
 
@@ -250,12 +245,12 @@ def _plain(kind: object) -> str:
     return str(kind).rpartition("/")[2].lower()
 
 
-def _misspelt_keys(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+def _misspelt_keys(at: KeyPath, given: dict[str, Any], rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield constants and nodes of which a part is one letter off from a word of the handout, and that no other line
     has."""
-    handout = str(rubric.get("handout") or "")
+    handout = rubric.handout
     words = set(re.findall(r"\w+", handout))
-    texts = [text for _, text in texts_in((), rubric)]
+    texts = [text for _, text in rubric.texts]
     for name, value in as_map(given.get("constants")).items():
         said = re.search(rf"\b{re.escape(str(name))}\b[^\w,.-]{{0,5}}(-?\d+)\b", handout)
         if said and is_number(value) and float(said[1]) != value:
@@ -271,19 +266,18 @@ def _misspelt_keys(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -
                     yield (*at, key, name), fault
 
 
-def _numbers_of_title(
-    criterion: WrittenCriterion, criteria: list[WrittenCriterion], rubric: dict[str, Any]
-) -> Iterator[Fault]:
+def _numbers_of_title(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield numbers of a criterion's title that neither the criterion nor a run has, where they have others; and a rate
     that is not the title's, or where that has none, the handout's."""
     given, title = criterion.given, str(criterion.data.get("title"))
     rate_hz, rates = given.get("rate_hz"), _rates(title)
-    known = {one.given.get("rate_hz") for one in criteria if one.given.get("topic") == given.get("topic")}
+    rates_of_topic = [one.given for one in rubric.criteria if one.given.get("topic") == given.get("topic")]
+    known = {one.get("rate_hz") for one in rates_of_topic}
     is_told = "cause" not in given and len(known) > 1  # said of the two criteria
     run = criterion.scenario
     is_told = is_told or rate_hz in _numbers_within([run.get("start"), run.get("params")])  # by a parameter
-    if not rates and not is_told and "made_up" not in rubric and is_number(rate_hz):
-        sentences = SENTENCE_END.split(str(rubric.get("handout", "")))
+    if not rates and not is_told and "made_up" not in rubric.data and is_number(rate_hz):
+        sentences = SENTENCE_END.split(rubric.handout)
         about = [one for one in sentences if re.search(rf"{re.escape(str(given.get('topic')))}(?!\w)", one)]
         rates = _rates(" ".join(about))
     if any(is_number(rate_hz) and round(rate_hz / by, 9) in rates for by in SHIFTS):
@@ -294,7 +288,7 @@ def _numbers_of_title(
         yield (*criterion.at, "rate_hz"), f"{rate_hz:g} is not what the {where} has: {said}"
         return
     numbers = [float(one) for one in PLAIN_NUMBER.findall(title)]
-    runs = [as_map(one) for one in as_map(rubric.get("scenarios")).values()]
+    runs = list(rubric.scenarios.values())
     there, texts = _numbers_within([given, runs]), " ".join(text for _, text in texts_in((), [given, runs]))
     is_open = "made_up" in texts or not any(key in given for key in EXPECTED) or "launch" in given
     own = {number for _, number in numbers_in((), given)}

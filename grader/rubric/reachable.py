@@ -18,9 +18,17 @@ from grader.rubric.definitions import PATH_PARTS
 from grader.rubric.durations import late_faults, longest_s, stretch_faults, within_faults
 from grader.rubric.scenario import Scenario, Until
 from grader.rubric.simulators import FIELD_M, PROGRAMS, TRUE_POSE, pair, robot_of, start_faults
-from grader.rubric.started import starts_of
-from grader.rubric.step_faults import given_steps
-from grader.rubric.yaml_lines import Fault, KeyPath, WrittenCriterion, as_list, as_map, as_maps, criteria_of
+from grader.rubric.yaml_lines import (
+    Fault,
+    KeyPath,
+    WrittenCriterion,
+    WrittenRubric,
+    as_list,
+    as_map,
+    as_maps,
+    given_steps,
+    starts_of,
+)
 from grader.wording import plural
 
 WRAPS = {"minimum": 0, "maximum": 127, "wraps": 2}
@@ -33,16 +41,14 @@ POSITIONS = ("", "pose", "position", "point", "pose.position", "pose.pose.positi
 """Where in messages `x` and `y` are."""
 
 
-def reach_faults(
-    rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
-) -> Iterator[Fault]:
+def reach_faults(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator[Fault]:
     """Yield what the runs of a rubric's scenarios cannot show."""
-    criteria = criteria_of(rubric)
-    yield from _too_many(criteria, scenarios, checks)
+    criteria = rubric.criteria
+    yield from _too_many(rubric, checks)
     yield from _too_few(criteria)
-    yield from _too_many_nodes(scenarios)
-    yield from late_faults(scenarios)
-    for name, scenario in scenarios.items():
+    yield from _too_many_nodes(rubric)
+    yield from late_faults(rubric.scenarios)
+    for name, scenario in rubric.scenarios.items():
         yield from start_faults(("scenarios", name), scenario)
     for about in criteria:
         others = [one for one in criteria if one is not about and one.run == about.run]
@@ -56,18 +62,16 @@ def reach_faults(
     yield from _other_ends(criteria)
 
 
-def _too_many(
-    criteria: Sequence[WrittenCriterion], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
-) -> Iterator[Fault]:
+def _too_many(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator[Fault]:
     """Yield counts of messages that cannot come before the run's limit, at the rate that a criterion asks for."""
     rates: dict[str, float] = {}
-    for criterion in criteria:
+    for criterion in rubric.criteria:
         given, check = criterion.given, checks.get(criterion.check)
         topic, rate_hz = given.get("topic"), given.get("rate_hz")
         of_rate = check is not None and hasattr(check.params, "rate_bounds")
         if of_rate and isinstance(rate_hz, int | float) and rate_hz > 0:
             rates[str(topic)] = max(rates.get(str(topic), 0), float(rate_hz))
-    for name, scenario in scenarios.items():
+    for name, scenario in rubric.scenarios.items():
         until = as_map(scenario.get("until"))
         limit_s = until.get("limit_s", Until.model_fields["limit_s"].default)
         warp = scenario.get("warp", Scenario.model_fields["warp"].default)
@@ -81,9 +85,9 @@ def _too_many(
                 yield ("scenarios", name, "until", "messages", topic), fault
 
 
-def _too_many_nodes(scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
+def _too_many_nodes(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield counts of nodes that a run's scripts, each of which is one node, never are."""
-    for name, scenario in scenarios.items():
+    for name, scenario in rubric.scenarios.items():
         nodes, starts = as_map(scenario.get("until")).get("nodes"), starts_of(scenario)
         scripts = [start for start in starts if start.get("script") is not None]
         of_scripts = all(start.get("script") or start.get("program") in PROGRAMS for start in starts)

@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 from grader.checks.support.fields import is_number
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, set_in
 from grader.wording import closest
 
 Spot = tuple[float, float]
@@ -126,14 +126,6 @@ def parameter_faults(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
             yield (*at, "value"), f"{private} is {FORMS[private][0]}"
         elif not node and owner:
             yield (*at, "name"), f"{owner} reads private parameters: write /{owner}/{private}"
-
-
-def set_in(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
-    """Yield the parameters that a scenario sets, and where."""
-    yield from ((("params", n), one) for n, one in as_maps(scenario.get("params")))
-    for index, step in as_maps(scenario.get("steps")):
-        if "set_param" in step:
-            yield ("steps", index, "set_param"), as_map(step["set_param"])
 
 
 def _no_parameter(program: Program, private: str) -> str:

@@ -11,7 +11,7 @@ from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.installable import noetic_messages
 from grader.rubric.message_fields import type_judged, types_of
 from grader.rubric.simulators import TRUE_POSE
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, criteria_of, own_packages, texts_in
+from grader.rubric.yaml_lines import Fault, KeyPath, WrittenRubric
 from grader.wording import is_one_edit
 
 ONE_NAME = re.compile(
@@ -41,95 +41,92 @@ FREE_TEXTS = {*FIELDS, "line", "definition", "answers"}
 """Keys of other texts in which a blank may be meant."""
 
 
-def _blank_ends(data: object) -> Iterator[Fault]:
+def _blank_ends(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield names with a blank before or after them, which no name has and nobody sees."""
-    for path, text in texts_in((), data):
+    for path, text in rubric.texts:
         is_free = {*PROSE, *WORDS, *FREE_TEXTS} & {*path} or path[:1] == ("made_up",)
         if text != text.strip() and text.strip() and not is_free and "\n" not in text:
             yield path, f'has a blank before or after it: write "{text.strip()}"'
 
 
-def names_seen_once(data: object, folder: Path) -> Iterator[Fault]:
+def names_seen_once(rubric: WrittenRubric, folder: Path) -> Iterator[Fault]:
     """Yield the names that one line alone has, and no file in the rubric's folder. Such a name may be right, or a slip
     that no other line shows."""
-    for path, text, near in _named_once(data, folder):
+    for path, text, near in _named_once(rubric, folder):
         if not near:
             yield path, f"nothing else in the rubric names {text}: is it spelt as in the handout?"
-    for path, word, near in _misspelt_words(data, code=False):
+    for path, word, near in _misspelt_words(rubric, code=False):
         yield (
             path,
             f'nothing else in the rubric has the word {word}: did you mean "{near}", as in the handout?',
         )
 
 
-def misspelt_names(data: object, folder: Path) -> Iterator[Fault]:
+def misspelt_names(rubric: WrittenRubric, folder: Path) -> Iterator[Fault]:
     """Yield those of them that are one letter off from a name that other lines have, and words of texts that are one
     letter off from one that the handout has in backticks; and names with a blank at an end."""
-    yield from _blank_ends(data)
-    for path, text, near in (*_named_once(data, folder), *_misspelt_words(data, code=True), *_package(data)):
+    yield from _blank_ends(rubric)
+    for path, text, near in (
+        *_named_once(rubric, folder),
+        *_misspelt_words(rubric, code=True),
+        *_package(rubric),
+    ):
         if near:
             fault = f'nothing else in the rubric names {text} (did you mean "{near}"?): '
             yield path, fault + "if it is right, say it in the handout too"
 
 
-def _package(data: object) -> Iterator[tuple[KeyPath, str, str]]:
+def _package(rubric: WrittenRubric) -> Iterator[tuple[KeyPath, str, str]]:
     """Yield the package's name where it is one letter off from the lab's id, or from a word of the handout or title."""
-    rubric = as_map(data)
-    package, prose = rubric.get("package"), f"{rubric.get('handout') or ''} {rubric.get('title')}"
-    known = dict.fromkeys([str(rubric.get("id")).replace("-", "_"), *re.findall(r"\w+", prose)])
-    typed = any(text.startswith(f"{package}/") for path, text in texts_in((), data) if path[-1] == "type")
+    package, prose = rubric.data.get("package"), f"{rubric.handout} {rubric.data.get('title')}"
+    known = dict.fromkeys([str(rubric.data.get("id")).replace("-", "_"), *re.findall(r"\w+", prose)])
+    typed = any(text.startswith(f"{package}/") for path, text in rubric.texts if path[-1] == "type")
     if isinstance(package, str) and not typed and not re.search(rf"\b{re.escape(package)}\b", prose):
         near = next((one for one in known if is_slip(package, one)), "")
         if near and package not in known:
             yield ("package",), package, near
 
 
-def _misspelt_words(data: object, *, code: bool) -> Iterator[tuple[KeyPath, str, str]]:
+def _misspelt_words(rubric: WrittenRubric, *, code: bool) -> Iterator[tuple[KeyPath, str, str]]:
     """Yield each word of a criterion's texts that no other line has, and the handout's word that is meant by it: one in
     backticks, or with `code=False` any other."""
-    texts, handout = list(texts_in((), data)), str(as_map(data).get("handout") or "")
+    handout = rubric.handout
     quoted = set(re.findall(_WORD, " ".join(re.findall(r"`([^`]+)`", handout))))
     known = quoted if code else set(re.findall(_WORD, handout)) - quoted
-    for path, text in texts:
+    for path, text in rubric.texts:
         if path[0] != "criteria" or _key(path) not in WORDS or text == path[-1]:
             continue
         for word in re.findall(rf"(?<![{{\w]){_WORD}(?![\w}}])", text):
             near = next((one for one in sorted(known) if is_slip(word, one)), "")
-            if near and _count(word, word, texts) == 1:
+            if near and _count(word, word, rubric.texts) == 1:
                 yield path, word, near
 
 
-def _named_once(data: object, folder: Path) -> Iterator[tuple[KeyPath, str, str]]:
+def _named_once(rubric: WrittenRubric, folder: Path) -> Iterator[tuple[KeyPath, str, str]]:
     """Yield each name that one line alone has, and the name that is meant by it, "" where none is known."""
-    rubric, texts = as_map(data), list(texts_in((), data))
+    texts, handout = rubric.texts, rubric.handout
     programs = {text.rpartition("/")[2] for path, text in texts if path[-1] == "program"}
     names = [(path, text, last) for path, text in texts if (last := _last_word(path, text, rubric))]
     names = [one for one in names if not PROSE & {*one[0]}]
     actions = {text for path, text in texts if path[-1] == "action"}
-    handout = str(rubric.get("handout"))
     frames = USUAL_FRAMES & {*re.findall(r"\w+", handout)} or USUAL_FRAMES
     poses = {POSES[program] for program in programs & POSES.keys()}
     known_ones = {*SYSTEM_TOPICS, *frames, *poses}
     words = {word for path, text in texts if not PROSE & {*path} for word in re.findall(r"\w+", text)}
+    topics = sorted(other for _, other, _ in names if other.startswith("/"))
     for path, text, last in names:
         if text.rpartition("/")[0] in actions:  # `/dock/cancel`
             continue
         if text in known_ones or (folder / text).is_file() or not programs.isdisjoint(text.split("/")):
             continue
         if _count(last, text, texts) == 1:
-            known = (
-                [other for _, other, _ in names if other.startswith("/")] if text.startswith("/") else words
-            )
-            word = text if text.startswith("/") else last
-            near = next(
-                (one for one in sorted(known) if is_slip(word, one) and _count(one, one, texts) > 1), ""
-            )
-            quoted = [one for one in re.findall(r"`[/~]?(\w+)`", handout) if is_slip(last, one)]
-            yield path, text, near or next(iter(quoted), "")
+            word, known = (text, topics) if text.startswith("/") else (last, sorted(words))
+            alike = [one for one in known if is_slip(word, one) and _count(one, one, texts) > 1]
+            alike += [one for one in re.findall(r"`[/~]?(\w+)`", handout) if is_slip(last, one)]
+            yield path, text, next(iter(alike), "")
         elif re.search(r"[/.]", text) and _count(text, text, texts) == 1:
-            if (whole := _in_namespace(path, text, names)) and not re.search(
-                rf"(?<![\w~]){text}(?!\w)", handout
-            ):
+            whole = _in_namespace(path, text, names)
+            if whole and not re.search(rf"(?<![\w~]){text}(?!\w)", handout):
                 yield path, text, whole
                 continue
             known = [other for _, other, _ in names if _is_slip_in_path(text, other, texts)]
@@ -174,7 +171,7 @@ def _is_slip_in_path(name: str, other: str, texts: list[tuple[KeyPath, str]]) ->
     return name.rpartition("/")[2] == other.rpartition("/")[2] or _count(other, other, texts) > 1
 
 
-def _last_word(path: KeyPath, text: str, rubric: dict[str, Any]) -> str:
+def _last_word(path: KeyPath, text: str, rubric: WrittenRubric) -> str:
     """Return the part of a name by which others would know it; "" for a text that is not a name of the student's."""
     if ONE_NAME.fullmatch(text) or (_key(path) in PLAIN_NAMES and text != path[-1]):
         return PurePosixPath(text).stem
@@ -193,9 +190,9 @@ def _key(path: KeyPath) -> object:
     return next((part for part in reversed(path) if not isinstance(part, int)), "")
 
 
-def _is_known_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
+def _is_known_field(path: KeyPath, rubric: WrittenRubric) -> bool:
     """Return whether a field is of a type that neither students nor the course write: that is looked up elsewhere."""
-    about: Any = rubric
+    about: Any = rubric.data
     kinds = list[str]()
     for key in path[:-1]:
         about = about[key]
@@ -203,15 +200,15 @@ def _is_known_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
             kinds.append(
                 type_judged(about, rubric) if path[0] == "criteria" else str(about.get("type") or "")
             )
-    return any(kind and kind.partition("/")[0] not in own_packages(rubric) for kind in kinds)
+    return any(kind and kind.partition("/")[0] not in rubric.own_packages for kind in kinds)
 
 
-def _judged(path: KeyPath, rubric: dict[str, Any]) -> dict[str, Any]:
+def _judged(path: KeyPath, rubric: WrittenRubric) -> dict[str, Any]:
     """Return what the criterion at a place asks for."""
-    return next((one.given for one in criteria_of(rubric) if one.place == path[:2]), {})
+    return next((one.given for one in rubric.criteria if one.place == path[:2]), {})
 
 
-def _is_own_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
+def _is_own_field(path: KeyPath, rubric: WrittenRubric) -> bool:
     """Return whether a field of a message type is meant that the student or the course defines, or one that no message
     of ROS's has, on a topic whose type is not said."""
     if len(path) != 4 or path[-2:] != ("with", "field"):
@@ -223,4 +220,4 @@ def _is_own_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
             field for types in noetic_messages().values() for fields in types.values() for field in fields
         }
         return not of_ros.issuperset(re.findall(r"[^\W\d]\w*", str(given.get("field"))))
-    return any(str(kind).partition("/")[0] in own_packages(rubric) for kind in kinds)
+    return any(str(kind).partition("/")[0] in rubric.own_packages for kind in kinds)

@@ -20,8 +20,17 @@ from grader.ros_env import ros_packages
 from grader.rubric.fault_words import model_faults
 from grader.rubric.scenario import STEP_S_MAX, Action, Step, Transform
 from grader.rubric.spelling import is_slip
-from grader.rubric.started import starts_of
-from grader.rubric.yaml_lines import Fault, KeyPath, as_list, as_map, as_maps, as_texts, texts_in
+from grader.rubric.yaml_lines import (
+    Fault,
+    KeyPath,
+    as_list,
+    as_map,
+    as_maps,
+    as_texts,
+    given_steps,
+    starts_of,
+    texts_in,
+)
 from grader.wording import did_you_mean
 
 KINDS = tuple(Step.model_fields)
@@ -39,11 +48,6 @@ NAMED = {
 WAITS = ("seconds", "topic", "node")
 MOMENTS = 20
 """At so many messages of a row a value that changes is looked at, the first and the last among them."""
-
-
-def given_steps(scenario: dict[str, Any], kind: str) -> list[dict[str, Any]]:
-    """Return what the scenario's steps of one kind (`publish`) say."""
-    return [as_map(step[kind]) for _, step in as_maps(scenario.get("steps")) if kind in step]
 
 
 def played_bags(rubric: dict[str, Any]) -> dict[KeyPath, dict[str, Any]]:

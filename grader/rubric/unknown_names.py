@@ -9,17 +9,16 @@ from typing import Any
 
 from grader.checks.registry import Check
 from grader.checks.support.topics import READ_TOO, SYSTEM_TOPICS
-from grader.rubric.simulators import set_in
-from grader.rubric.started import starts_of
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
     WrittenCriterion,
+    WrittenRubric,
     as_map,
     as_maps,
     as_texts,
-    criteria_of,
-    packages_in,
+    set_in,
+    starts_of,
 )
 from grader.wording import closest, join_words
 
@@ -29,30 +28,25 @@ _DIGITS = re.compile(r"\d+")
 _TOPIC = re.compile(r"(?:^|:=)(/[\w/]*\w)")
 
 
-def unknown_names(
-    rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
-) -> Iterator[Fault]:
+def unknown_names(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator[Fault]:
     """Yield a fault for each of them."""
-    yield from _unknown_topics(rubric, scenarios, checks)
+    yield from _unknown_topics(rubric, checks)
     yield from _unknown_causes(rubric, checks)
-    yield from _misspelt_nodes(rubric, scenarios)
+    yield from _misspelt_nodes(rubric)
     yield from _own_types(rubric)
-    yield from _misspelt_scripts(rubric, scenarios)
+    yield from _misspelt_scripts(rubric)
 
 
-def _unknown_topics(
-    rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
-) -> Iterator[Fault]:
+def _unknown_topics(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator[Fault]:
     """Yield topics that a run waits for and that nothing else knows.
 
     Programs, launch files and checks of the instructor's own may know others: then only a near miss is a fault.
     """
-    criteria = criteria_of(rubric)
-    named = {topic for criterion in criteria for topic in topics_in(criterion.given)}
-    named |= {topic for criterion in criteria for topic in READ_TOO.get(criterion.check, ())}
-    found = [checks.get(criterion.check) for criterion in criteria]
+    named = {topic for criterion in rubric.criteria for topic in topics_in(criterion.given)}
+    named |= {topic for criterion in rubric.criteria for topic in READ_TOO.get(criterion.check, ())}
+    found = [checks.get(criterion.check) for criterion in rubric.criteria]
     own = any(check is None or check.source or "evidence" in check.facts for check in found)
-    for name, scenario in scenarios.items():
+    for name, scenario in rubric.scenarios.items():
         until = as_map(scenario.get("until"))
         known = {*named, *SYSTEM_TOPICS}
         known |= {t for key, part in scenario.items() if key != "until" for t in topics_in(part)}
@@ -70,7 +64,7 @@ def _unknown_topics(
                 yield ("scenarios", name, *at), f'no criterion names {topic} (did you mean "{near}"?)'
 
 
-def _unknown_causes(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Iterator[Fault]:
+def _unknown_causes(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator[Fault]:
     """Yield causes on topics that nothing in the scenario sends on, and that no other criterion names."""
     for criterion, others in with_other_topics(rubric):
         check, name, scenario = checks.get(criterion.check), criterion.run, criterion.scenario
@@ -96,20 +90,17 @@ def _of_actions(scenario: dict[str, Any]) -> Iterator[str]:
         yield from (f"{name}/{part}" for part in ("goal", "cancel", "status", "feedback", "result"))
 
 
-def _own_types(rubric: dict[str, Any]) -> Iterator[Fault]:
+def _own_types(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield types of the student's package that are all but one whose file a criterion asks for."""
-    criteria, own = criteria_of(rubric), packages_in(rubric)
-    told = {*re.findall(r"\w+", str(rubric.get("handout")))}
+    own, told = rubric.packages, {*re.findall(r"\w+", rubric.handout)}
     defined = {
         (str(c.data.get("package") or next(iter(own), "")), PurePosixPath(str(c.given.get("file"))).stem)
-        for c in criteria
+        for c in rubric.criteria
         if c.check == "definition"
     }
     names = {stem for _, stem in defined}
-    typed = [(criterion.at, criterion.given) for criterion in criteria]
-    for scenario, one in as_map(rubric.get("scenarios")).items():
-        steps = [(n, key, as_map(step[key])) for n, step in as_maps(as_map(one).get("steps")) for key in step]
-        typed += [(("scenarios", scenario, "steps", n, key), given) for n, key, given in steps]
+    typed = [(criterion.at, criterion.given) for criterion in rubric.criteria]
+    typed += [((*at, key), as_map(step[key])) for at, step in rubric.steps() for key in step]
     for path, given in typed:
         kind = given.get("type")
         package, _, name = kind.partition("/") if isinstance(kind, str) else ("", "", "")
@@ -123,25 +114,25 @@ def _own_types(rubric: dict[str, Any]) -> Iterator[Fault]:
             yield (*path, "type"), f"{fault}: if it is right, say it in the handout too"
 
 
-def _misspelt_scripts(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
+def _misspelt_scripts(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield scripts that nothing starts, and that are all but one that is started and that no criterion names."""
-    paths = {c.at: c.given.get("path") for c in criteria_of(rubric) if c.check == "executable"}
+    paths = {c.at: c.given.get("path") for c in rubric.criteria if c.check == "executable"}
     named = {at: PurePosixPath(path).name for at, path in paths.items() if isinstance(path, str)}
-    starts = [start for scenario in scenarios.values() for start in starts_of(scenario)]
-    started = {PurePosixPath(script).name for script in values_of(starts, "script")}
+    scripts = values_of([start for _, start in rubric.starts()], "script")
+    started = {PurePosixPath(script).name for script in scripts}
     for at, name in named.items():
         near = "" if name in started else _near(name, started - {*named.values()}, cutoff=SURE)
         if near:
             yield (*at, "path"), f'no scenario starts {name} (did you mean "{near}"?)'
 
 
-def _misspelt_nodes(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
+def _misspelt_nodes(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield private parameters of a node whose name is all but one that a criterion asks for."""
     asked: dict[str, set[str]] = {}
-    for criterion in criteria_of(rubric):
+    for criterion in rubric.criteria:
         names = as_texts(criterion.given.get("names"))
         asked.setdefault(criterion.run, set()).update(n.strip("/") for _, n in names)
-    for name, scenario in scenarios.items():
+    for name, scenario in rubric.scenarios.items():
         programs = values_of(starts_of(scenario), "program")
         asked.setdefault(name, set()).update(program.rpartition("/")[2] for program in programs)
         for at, one in set_in(scenario):
@@ -166,11 +157,10 @@ def _waited_for(until: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
     yield from ((("messages", topic), topic) for topic in as_map(until.get("messages")))
 
 
-def with_other_topics(rubric: dict[str, Any]) -> Iterator[tuple[WrittenCriterion, set[str]]]:
+def with_other_topics(rubric: WrittenRubric) -> Iterator[tuple[WrittenCriterion, set[str]]]:
     """Yield each criterion, and the topics that the others name."""
-    criteria = criteria_of(rubric)
-    named = [set(topics_in(criterion.given)) for criterion in criteria]
-    for place, criterion in enumerate(criteria):
+    named = [set(topics_in(criterion.given)) for criterion in rubric.criteria]
+    for place, criterion in enumerate(rubric.criteria):
         yield criterion, set().union(*named[:place], *named[place + 1 :])
 
 

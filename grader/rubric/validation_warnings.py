@@ -7,32 +7,31 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.support.fields import is_number
-from grader.rubric.definitions import services_in
 from grader.rubric.prose_warnings import prose_warnings
-from grader.rubric.simulators import set_in, topics_of_programs
-from grader.rubric.started import argument_warnings, starts_of
-from grader.rubric.step_faults import count_causes, given_steps
+from grader.rubric.simulators import topics_of_programs
+from grader.rubric.started import argument_warnings
+from grader.rubric.step_faults import count_causes
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
     WrittenCriterion,
+    WrittenRubric,
     as_list,
     as_map,
     as_maps,
     as_texts,
-    criteria_of,
-    packages_in,
+    given_steps,
+    services_in,
+    set_in,
+    starts_of,
     texts_in,
 )
 from grader.wording import plural
-
-Criteria = Sequence[WrittenCriterion]
-Scenarios = Mapping[str, dict[str, Any]]
 
 SHORT = {"limit_s": 3.0, "first_message_s": 3.0, "quiet_s": 1.0, "alive_s": 0.5, "window_s": 2.0}
 """Conditions of `until` that a correct package may miss on a busy machine if they are shorter."""
@@ -55,47 +54,43 @@ CLOSE_M = 0.02
 EMPTY = "std_srvs/Empty"
 
 
-def warnings(data: object) -> Iterator[Fault]:
+def warnings(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield what may be a slip."""
-    rubric = as_map(data)
-    handout = str(rubric.get("handout") or "")
-    scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
-    criteria = criteria_of(rubric)
-    yield from _short_times(scenarios)
-    yield from _misnamed_processes(rubric, scenarios)
-    yield from _first_packages(rubric, scenarios)
+    yield from _short_times(rubric)
+    yield from _misnamed_processes(rubric)
+    yield from _first_packages(rubric)
     yield from _lone_quotes(rubric)
-    yield from _same_criteria(criteria)
-    yield from _without_requires(criteria)
-    yield from _patterns(criteria)
-    yield from _of_the_build(criteria)
-    yield from _other_rates(criteria)
-    yield from _not_private(scenarios, handout)
-    yield from _ends_and_lives(criteria, scenarios)
-    yield from _answers_waited_for(scenarios, handout)
-    yield from _more_values(criteria, handout)
-    yield from _numbers_as_text(scenarios)
-    yield from _silent_anyway(criteria)
-    yield from _launched_nodes(criteria, scenarios)
-    for criterion in criteria:
+    yield from _same_criteria(rubric)
+    yield from _without_requires(rubric)
+    yield from _patterns(rubric)
+    yield from _of_the_build(rubric)
+    yield from _other_rates(rubric)
+    yield from _not_private(rubric)
+    yield from _ends_and_lives(rubric)
+    yield from _answers_waited_for(rubric)
+    yield from _more_values(rubric)
+    yield from _numbers_as_text(rubric)
+    yield from _silent_anyway(rubric)
+    yield from _launched_nodes(rubric)
+    for criterion in rubric.criteria:
         yield from _hard(criterion)
         yield from _easy(criterion)
         if criterion.check == "connected":
-            yield from _process_for_node(criterion, criteria)
+            yield from _process_for_node(criterion, rubric)
     yield from prose_warnings(rubric)
     yield from argument_warnings(rubric)
-    for criterion in criteria:
-        yield from _other_process(criterion, scenarios)
+    for criterion in rubric.criteria:
+        yield from _other_process(criterion, rubric)
         if criterion.check == "service-answers":
             yield from _answers(criterion)
         yield from _cancelled_goal(criterion)
         yield from _set_otherwise(criterion)
-        yield from _other_run(criterion, criteria)
+        yield from _other_run(criterion, rubric)
 
 
-def _short_times(scenarios: Scenarios) -> Iterator[Fault]:
+def _short_times(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield times within which a correct package may not be done, times of many minutes, and messages that are rare."""
-    for name, scenario in scenarios.items():
+    for name, scenario in rubric.scenarios.items():
         until, steps = as_map(scenario.get("until")), as_maps(scenario.get("steps"))
         times: list[tuple[KeyPath, object, float]] = [
             (("until", key), until.get(key), least_s) for key, least_s in SHORT.items()
@@ -117,8 +112,8 @@ def _short_times(scenarios: Scenarios) -> Iterator[Fault]:
                 yield ("scenarios", name, *at), fault
 
 
-def _lone_quotes(rubric: dict[str, Any]) -> Iterator[Fault]:
-    for path, text in texts_in((), rubric):
+def _lone_quotes(rubric: WrittenRubric) -> Iterator[Fault]:
+    for path, text in rubric.texts:
         for quote in ('"', "'"):
             if text.count(quote) == 1 and (text.startswith(quote) or text.endswith(quote)):
                 yield path, f"has one quotation mark, {quote}, without its partner"
@@ -127,9 +122,9 @@ def _lone_quotes(rubric: dict[str, Any]) -> Iterator[Fault]:
                 yield path, "has quotation marks in its quotation marks: a node has to publish them, too"
 
 
-def _of_the_build(criteria: Criteria) -> Iterator[Fault]:
+def _of_the_build(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield packages that are asked for at run time, and that only a build needs."""
-    for criterion in criteria:
+    for criterion in rubric.criteria:
         asked = criterion.given if criterion.check in {"manifest", "dependencies"} else {}
         for path, name in texts_in(criterion.at, asked):
             if name == "message_generation":
@@ -139,9 +134,9 @@ def _of_the_build(criteria: Criteria) -> Iterator[Fault]:
 PATTERN = re.compile(r"\.[*+]|\\[dws]|^/.*/$|^\^.*\$$")
 
 
-def _patterns(criteria: Criteria) -> Iterator[Fault]:
+def _patterns(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield values of fields that look like a pattern: they are compared letter by letter."""
-    for criterion in criteria:
+    for criterion in rubric.criteria:
         for key in ("value", "values"):
             for at, text in texts_in((key,), criterion.given.get(key)):
                 is_one = criterion.check == "field-equals" and PATTERN.search(text)
@@ -153,50 +148,43 @@ def _words(name: str) -> set[str]:
     return {word for word in re.split(r"[^a-z0-9]+", PurePosixPath(name).stem.lower()) if word}
 
 
-def _misnamed_processes(rubric: dict[str, Any], scenarios: Scenarios) -> Iterator[Fault]:
+def _misnamed_processes(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield processes with the name of another script of the rubric's."""
-    texts = [text for _, text in texts_in((), rubric)]
+    texts = [text for _, text in rubric.texts]
     scripts = {name for text in texts for name in re.findall(r"[\w./-]+\.py\b", text)}
-    for scenario, one in scenarios.items():
-        for index, start in as_maps(one.get("start")):
-            name, script = start.get("name"), start.get("script")
-            if not isinstance(name, str) or not isinstance(script, str) or _words(name) & _words(script):
-                continue
-            meant = sorted(other for other in scripts if _words(name) <= _words(other))
-            if meant:
-                fault = (
-                    f"the process is called {name}, and elsewhere the rubric has {meant[-1]}: is it that one?"
-                )
-                yield ("scenarios", scenario, "start", index, "script"), fault
+    for at, start in rubric.starts():
+        name, script = start.get("name"), start.get("script")
+        if not isinstance(name, str) or not isinstance(script, str) or _words(name) & _words(script):
+            continue
+        meant = sorted(other for other in scripts if _words(name) <= _words(other))
+        if meant:
+            fault = f"the process is called {name}, and elsewhere the rubric has {meant[-1]}: is it that one?"
+            yield (*at, "script"), fault
 
 
-def _first_packages(rubric: dict[str, Any], scenarios: Scenarios) -> Iterator[Fault]:
+def _first_packages(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield starts without a package, if others have one."""
-    packages = packages_in(rubric)
-    starts = [
-        (("scenarios", name, "start", index), start)
-        for name, one in scenarios.items()
-        for index, start in as_maps(one.get("start"))
-        if start.get("program") is None and start.get("tests") is None
-    ]
-    if len(packages) > 1 and any(start.get("package") is not None for _, start in starts):
-        fault = f"is started from {packages[0]}, the first package: if it is of another one, give package"
+    keys = ("program", "tests")
+    starts = [(at, one) for at, one in rubric.starts() if all(one.get(key) is None for key in keys)]
+    if len(rubric.packages) > 1 and any(start.get("package") is not None for _, start in starts):
+        first = rubric.packages[0]
+        fault = f"is started from {first}, the first package: if it is of another one, give package"
         yield from ((at, fault) for at, start in starts if start.get("package") is None)
 
 
-def _same_criteria(criteria: Criteria) -> Iterator[Fault]:
+def _same_criteria(rubric: WrittenRubric) -> Iterator[Fault]:
     first: dict[str, str] = {}
-    for criterion in criteria:
+    for criterion in rubric.criteria:
         judged = json.dumps([criterion.data.get(key) for key in JUDGED], sort_keys=True)
         other = first.setdefault(judged, criterion.id)
         if other != criterion.id and criterion.check != "manual":
             yield (*criterion.place, "check"), f"judges the same as {other}, with the same parameters"
 
 
-def _other_rates(criteria: Criteria) -> Iterator[Fault]:
+def _other_rates(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield rates of a topic for which an earlier criterion wants another one, in a run of the same processes."""
     before: dict[tuple[str, ...], tuple[str, float, dict[str, Any]]] = {}
-    for criterion in criteria:
+    for criterion in rubric.criteria:
         given, scenario = criterion.given, criterion.scenario
         rate_hz, cause = given.get("rate_hz"), as_map(given.get("cause"))
         if not is_number(rate_hz):
@@ -209,11 +197,10 @@ def _other_rates(criteria: Criteria) -> Iterator[Fault]:
             yield (*criterion.at, "rate_hz"), fault
 
 
-def _other_process(criterion: WrittenCriterion, scenarios: Scenarios) -> Iterator[Fault]:
+def _other_process(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield names that a node has to have, and that are those of another process."""
     process = criterion.given.get("process")
-    starts = [start for one in scenarios.values() for start in starts_of(one)]
-    others = {str(start.get("name")) for start in starts} - {str(process)}
+    others = {str(start.get("name")) for _, start in rubric.starts()} - {str(process)}
     own = [start for start in starts_of(criterion.scenario) if start.get("name") == process]
     for index, name in as_texts(criterion.given.get("names")):
         is_own = any(_words(name) & {*_words(str(process)), *_words(str(one.get("script")))} for one in own)
@@ -235,29 +222,30 @@ def _answers(criterion: WrittenCriterion) -> Iterator[Fault]:
         yield (*criterion.at, "expect"), "is right for any answer: give the fields that it has to have"
 
 
-def _not_private(scenarios: Scenarios, handout: str) -> Iterator[Fault]:
+def _not_private(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield parameters without a node's name before them that the handout calls private."""
-    for name, scenario in scenarios.items():
-        for at, one in set_in(scenario):
-            param = str(one.get("name"))
-            if param.count("/") == 1 and re.search(rf"~{re.escape(param[1:])}\b", handout):
-                fault = f"the handout has ~{param[1:]}, which is below the node's own name: /<node>{param}"
-                yield ("scenarios", name, *at, "name"), fault
+    for at, one in rubric.params():
+        param = str(one.get("name"))
+        if param.count("/") == 1 and re.search(rf"~{re.escape(param[1:])}\b", rubric.handout):
+            fault = f"the handout has ~{param[1:]}, which is below the node's own name: /<node>{param}"
+            yield (*at, "name"), fault
 
 
 OF_NODES = frozenset({"node-lives", "node-name", "launch-runs", "launch-connects"})
 """Checks of whether the nodes of a run are there at all."""
 
 
-def _without_requires(criteria: Criteria) -> Iterator[Fault]:
+def _without_requires(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield criteria of a run that require no criterion of a run, where another one is about its node: what keeps the
     node from starting would be charged to whichever of them comes first."""
-    by_id = {criterion.id: criterion for criterion in criteria}
-    for criterion in criteria:
+    by_id = {criterion.id: criterion for criterion in rubric.criteria}
+    for criterion in rubric.criteria:
         process = criterion.given.get("process")
         if not criterion.has_run or criterion.check in {*OF_NODES, "manual"}:
             continue
-        of_nodes = [other for other in criteria if other.run == criterion.run and other.check in OF_NODES]
+        of_nodes = [
+            other for other in rubric.criteria if other.run == criterion.run and other.check in OF_NODES
+        ]
         nodes = [one for one in of_nodes if process is None or one.given.get("process", process) == process]
         if nodes and not any(one.has_run for one in _all_required(criterion, by_id)):
             root = nodes[0].id
@@ -297,13 +285,13 @@ def _set_otherwise(criterion: WrittenCriterion) -> Iterator[Fault]:
         yield (*criterion.at, "value"), f"{criterion.run} sets {name} to {json.dumps(values[-1])}"
 
 
-def _other_run(criterion: WrittenCriterion, criteria: Criteria) -> Iterator[Fault]:
+def _other_run(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield topics that another run is about, with other processes, and that this one nowhere names."""
     given, here = criterion.given, criterion.scenario
     topic = given.get("topic") or next(iter(as_map(given.get("topics"))), None)
     if not isinstance(topic, str) or "start" not in here or _is_named(topic, here):
         return
-    for other in criteria:
+    for other in rubric.criteria:
         is_same = other.given.get("topic") == topic and other.run != criterion.run
         there = other.scenario
         if is_same and _is_named(topic, there) and _processes(there).isdisjoint(_processes(here)):
@@ -373,10 +361,10 @@ def _easy(criterion: WrittenCriterion) -> Iterator[Fault]:
             yield (*at, "within_s"), fault
 
 
-def _silent_anyway(criteria: Criteria) -> Iterator[Fault]:
+def _silent_anyway(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield silence that is asked of a node, without a criterion that has to see it publish on this topic."""
-    known = {one.id: one for one in criteria}
-    for criterion in criteria:
+    known = {one.id: one for one in rubric.criteria}
+    for criterion in rubric.criteria:
         topic = as_map(criterion.given.get("effect")).get("topic")
         if criterion.check != "reacts" or criterion.given.get("never") is not True:
             continue
@@ -391,15 +379,15 @@ def _sees(criterion: WrittenCriterion, topic: object) -> bool:
     return topic in {given.get("topic"), as_map(given.get("effect")).get("topic")} and not given.get("never")
 
 
-def _ends_and_lives(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
+def _ends_and_lives(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield runs that wait for the end of a process, while a criterion wants the same one to stay alive."""
     lives: dict[str, str] = {}
-    for criterion in criteria:
+    for criterion in rubric.criteria:
         if criterion.check == "node-lives":
             process = criterion.given.get("process")
             found = (start for start in starts_of(criterion.scenario) if start.get("name") == process)
             lives.update({_what(start): criterion.id for start in found})
-    for name, scenario in scenarios.items():
+    for name, scenario in rubric.scenarios.items():
         starts = {str(start.get("name")): start for start in starts_of(scenario)}
         for index, ended in as_texts(as_map(scenario.get("until")).get("ended")):
             stopped = any(
@@ -421,12 +409,12 @@ ANSWERED_TIMES = 2
 """A node that answers each message may publish so many times as many, and what it publishes at its start."""
 
 
-def _answers_waited_for(scenarios: Scenarios, handout: str) -> Iterator[Fault]:
+def _answers_waited_for(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield counts of messages that come only if the node publishes many for each that it hears, where the handout has
     no rate."""
-    if PERIODIC.search(handout):
+    if PERIODIC.search(rubric.handout):
         return
-    for name, scenario in scenarios.items():
+    for name, scenario in rubric.scenarios.items():
         sent = _sent(scenario)
         for topic, count in as_map(as_map(scenario.get("until")).get("messages")).items():
             if sent and isinstance(count, int) and count > ANSWERED_TIMES * (sent + 1):
@@ -434,25 +422,30 @@ def _answers_waited_for(scenarios: Scenarios, handout: str) -> Iterator[Fault]:
                 yield ("scenarios", name, "until", "messages", topic), fault
 
 
-def _more_values(criteria: Criteria, handout: str) -> Iterator[Fault]:
+def _more_values(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield more values than the run sends messages, where the node answers each with one, or has causes to change."""
-    paced = {one.given.get("topic") for one in criteria if "rate_hz" in one.given}
-    for criterion in criteria:
+    paced = {one.given.get("topic") for one in rubric.criteria if "rate_hz" in one.given}
+    for criterion in rubric.criteria:
         sent, count = _sent(criterion.scenario), len(as_list(criterion.given.get("values")))
         causes = count_causes(criterion.scenario)
         if causes is not None and count - 1 > causes and criterion.given.get("topic") not in paced:
             gives = f"the steps of {criterion.run} give the node {plural(causes, 'cause')} to change it"
             yield (*criterion.at, "values"), f"are {count}, and {gives}: does it change by itself?"
             continue
-        if sent and count == sent + 1 and not PERIODIC.search(handout) and re.search(r"\beach\b", handout):
+        if (
+            sent
+            and count == sent + 1
+            and not PERIODIC.search(rubric.handout)
+            and re.search(r"\beach\b", rubric.handout)
+        ):
             fault = f"are {count}, and {criterion.run} sends {plural(sent, 'message')}"
             yield (*criterion.at, "values"), fault
 
 
-def _process_for_node(criterion: WrittenCriterion, criteria: Criteria) -> Iterator[Fault]:
+def _process_for_node(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield ends of a connection that are named as a process of the scenario, and as no node that a criterion names."""
     scripts = {start.get("name") for start in starts_of(criterion.scenario) if start.get("script")}
-    named = {name for one in criteria for _, name in as_texts(one.given.get("names"))}
+    named = {name for one in rubric.criteria for _, name in as_texts(one.given.get("names"))}
     for end in ("publisher", "subscriber"):
         if (name := criterion.given.get(end)) in scripts - named:
             fault = f"{name} is a process here: is a node of this name asked for? It is what counts"
@@ -476,22 +469,21 @@ def _sent(scenario: dict[str, Any]) -> int:
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 
 
-def _numbers_as_text(scenarios: Scenarios) -> Iterator[Fault]:
+def _numbers_as_text(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield parameters that are set to a number in quotes."""
-    for name, scenario in scenarios.items():
-        for at, one in set_in(scenario):
-            value = one.get("value")
-            if isinstance(value, str) and NUMBER.fullmatch(value):
-                fault = f'"{value}" in quotes is text: a node that reads a number needs {value}, without them'
-                yield ("scenarios", name, *at, "value"), fault
+    for at, one in rubric.params():
+        value = one.get("value")
+        if isinstance(value, str) and NUMBER.fullmatch(value):
+            fault = f'"{value}" in quotes is text: a node that reads a number needs {value}, without them'
+            yield (*at, "value"), fault
 
 
-def _launched_nodes(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
+def _launched_nodes(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield counts of nodes of a launch file that are more than the criterion about it names, and programs of the
     rubric's among these that another run starts from another package."""
-    programs = [str(start.get("program")) for one in scenarios.values() for start in starts_of(one)]
+    programs = [str(start.get("program")) for _, start in rubric.starts()]
     owners = {PurePosixPath(program).stem: program.partition("/")[0] for program in programs}
-    for criterion in criteria:
+    for criterion in rubric.criteria:
         nodes, scenario = as_map(criterion.given.get("nodes")), criterion.scenario
         for node, package in nodes.items():
             owner = owners.get(str(node).rpartition("/")[2])
