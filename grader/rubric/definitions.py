@@ -18,12 +18,7 @@ from grader.evidence.definitions import Field, Types, parse
 from grader.evidence.message_values import ANGLES, CLOCKS, FORMS, NOW, MessageType
 from grader.model.message_definitions import DIVIDER, PARTS
 from grader.ros_env import ros_packages
-from grader.rubric.yaml_lines import (
-    KeyPath,
-    WrittenRubric,
-    as_map,
-    services_in,
-)
+from grader.rubric.yaml_lines import KeyPath, WrittenRubric, as_map, services_in
 from grader.wording import closest, did_you_mean, is_one_edit, join_words
 
 ALMOST = 0.87

@@ -51,7 +51,6 @@ NEVER_OF_GRADER = frozenset({"latched", "counter-start", "counter-step", "counte
 """Checks of the student's messages that have no `of`."""
 ENDINGS = (".py", ".yaml", ".yml", ".sh", ".bash", ".exe", ".pl", ".lua", ".js", ".rb")
 """Of files that a start may name."""
-OTHER_DISTROS = ("melodic", "kinetic", "indigo", "foxy", "humble", "jazzy")
 
 
 def reference_faults(
@@ -75,9 +74,6 @@ def reference_faults(
             yield ("needs", "ros", index), "is the package that students hand in: no machine has it before"
         elif fault := ros_packages().misspelt(package):
             yield ("needs", "ros", index), fault
-    for index, package in as_texts(needs.get("apt")):
-        if fault := _no_debian_package(package):
-            yield ("needs", "apt", index), fault
     yield from field_faults(rubric, Definitions(rubric, files))
     yield from frame_faults(rubric)
     yield from _unused_faults(rubric, checks)
@@ -88,18 +84,6 @@ def reference_faults(
     yield from _forgotten_topics(rubric.criteria)
     yield from _same_names(rubric)
     yield from _other_goals_and_types(rubric.criteria)
-
-
-def _no_debian_package(package: str) -> str:
-    """Return why no machine with ROS Noetic has a Debian package of ROS's; empty where one may."""
-    _, *of_ros = re.split(r"^ros-([a-z]+)-", package)
-    if not of_ros:
-        return ""
-    distro, name = of_ros
-    if distro in OTHER_DISTROS:
-        return f"is of ROS {distro.capitalize()}: write ros-noetic-{name}"
-    fault = ros_packages().misspelt(name.replace("-", "_")) if distro == "noetic" else ""
-    return fault.replace("_", "-")
 
 
 def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: WrittenRubric) -> Iterator[Fault]:

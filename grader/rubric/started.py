@@ -14,15 +14,7 @@ from grader.rubric.definitions import slip_of
 from grader.rubric.scenario import ROSTEST_ENDING
 from grader.rubric.simulators import PROGRAMS, asked_topics
 from grader.rubric.spelling import PROSE, is_slip
-from grader.rubric.yaml_lines import (
-    Fault,
-    KeyPath,
-    WrittenRubric,
-    as_maps,
-    as_texts,
-    starts_of,
-    texts_in,
-)
+from grader.rubric.yaml_lines import Fault, KeyPath, WrittenRubric, as_maps, as_texts, starts_of, texts_in
 from grader.wording import did_you_mean, join_words
 
 KINDS_OF_FILES = ("script", "launch", "load")

@@ -8,11 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.authoring.propose import Proposal
+from grader.authoring.propose import Proposal, assign_points
 from grader.authoring.rubric_draft import (
     Parts,
     answers_to,
-    assign_points,
     find_parts,
     heard_template,
     nice_rate,
