@@ -17,6 +17,7 @@ from grader.rubric.yaml_lines import (
     as_map,
     as_maps,
     given_steps,
+    parts_of,
 )
 
 FRAME_KEYS = frozenset({"frame_id", "child_frame_id"})
@@ -51,15 +52,10 @@ def frame_faults(rubric: WrittenRubric) -> Iterator[Fault]:
 
 def _sent_turns(path: KeyPath, scenario: dict[str, Any], rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield angles in degrees in what a scenario sends, in messages and requests of ROS's own types."""
-    sent = [((*path, "probes", n), one) for n, one in as_maps(scenario.get("probes"))]
-    sent += [((*path, "calls", n), one) for n, one in as_maps(scenario.get("calls"))]
-    for index, step in as_maps(scenario.get("steps")):
-        sent += [((*path, "steps", index, key), as_map(step.get(key))) for key in ("publish", "call")]
-    for at, one in sent:
-        if str(one.get("type")).partition("/")[0] in rubric.own_packages:
-            continue
-        for key in ("value", "values", "request"):
-            yield from _turns((*at, key), one.get(key))
+    for at, kind, one in parts_of(scenario):
+        is_own = str(one.get("type")).partition("/")[0] in rubric.own_packages
+        for key in ("value", "values", "request") if kind in {"publish", "call"} and not is_own else ():
+            yield from _turns((*path, *at, key), one.get(key))
 
 
 def _turns(path: KeyPath, value: object, *, is_angle: bool = False) -> Iterator[Fault]:

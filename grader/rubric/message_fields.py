@@ -33,8 +33,8 @@ from grader.rubric.yaml_lines import (
     WrittenRubric,
     as_map,
     as_maps,
+    parts_of,
     services_in,
-    set_in,
 )
 from grader.wording import did_you_mean, join_words
 
@@ -86,7 +86,7 @@ def field_faults(rubric: WrittenRubric, known: Definitions) -> Iterator[Fault]:
         yield from _expected(criterion, known)
         yield from _other_definitions(criterion, known, rubric)
     for name, scenario in rubric.scenarios.items():
-        yield from ((("scenarios", name, *at), fault) for at, fault in _sent_fields(as_map(scenario), known))
+        yield from ((("scenarios", name, *at), fault) for at, fault in _sent_fields(scenario, known))
 
 
 def _no_types(rubric: WrittenRubric, known: Definitions) -> Iterator[Fault]:
@@ -194,10 +194,7 @@ def _or_type(topic: str) -> str:
 
 def _quoted_params(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield values of parameters in quotes that are meant as a truth value, or that are numbers elsewhere."""
-    given: list[tuple[KeyPath, object, object]] = []
-    for name, scenario in rubric.scenarios.items():
-        for at, one in set_in(as_map(scenario)):
-            given.append((("scenarios", name, *at, "value"), one.get("name"), one.get("value")))
+    given = [((*at, "value"), one.get("name"), one.get("value")) for at, one in rubric.params()]
     for criterion in rubric.criteria:
         at, asked = criterion.at, criterion.given
         if criterion.check in {"param-value", "params-set"}:
@@ -287,11 +284,11 @@ def _no_bounds(field: Field, given: dict[str, Any], what: str) -> str:
     return ""
 
 
-def types_of(topic: str, rubric: WrittenRubric, scenario: dict[str, Any] | None = None) -> Iterator[object]:
+def types_of(topic: str, rubric: WrittenRubric, run: dict[str, Any] | None = None) -> Iterator[object]:
     """Yield the types that the rubric gives a topic: those that it sends there or asks for, and that of a program of
-    the scenario."""
+    the run."""
     yield from (SYSTEM_TYPES[topic],) if topic in SYSTEM_TYPES else ()
-    programs = topics_of_programs(scenario or {})
+    programs = topics_of_programs(run or {})
     yield from (programs[topic],) if topic in programs else ()
     for criterion in rubric.criteria:
         if criterion.check == "topic-type" and criterion.given.get("topic") == topic:
@@ -299,9 +296,8 @@ def types_of(topic: str, rubric: WrittenRubric, scenario: dict[str, Any] | None 
         left = as_map(as_map(criterion.given.get("topics")).get(topic)).get("type")
         yield from (left,) if left else ()
     yield from said_types(topic, rubric.handout)
-    for one in rubric.scenarios.values():
-        sent = [probe for _, probe in as_maps(as_map(one).get("probes"))]
-        sent += [as_map(step.get("publish")) for _, step in as_maps(as_map(one).get("steps"))]
+    for scenario in rubric.scenarios.values():
+        sent = [one for _, kind, one in parts_of(scenario) if kind == "publish"]
         yield from (one.get("type") for one in sent if one.get("topic") == topic)
 
 

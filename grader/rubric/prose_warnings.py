@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -18,9 +18,8 @@ from grader.rubric.yaml_lines import (
     WrittenCriterion,
     WrittenRubric,
     as_map,
-    as_maps,
     as_texts,
-    services_in,
+    parts_of,
     starts_of,
     texts_in,
 )
@@ -64,7 +63,7 @@ FIELD = re.compile(r"^\s*([a-z]+\d*)\s+(\w+)\s*(?:#.*)?$", re.MULTILINE)
 def prose_warnings(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield what may be a slip in one of the two."""
     handout = rubric.handout
-    yield from _sent_otherwise(rubric.scenarios, handout)
+    yield from _sent_otherwise(rubric)
     for criterion in rubric.criteria:
         at, given, check = criterion.at, criterion.given, criterion.check
         yield from _shifted_numbers(criterion, rubric)
@@ -184,27 +183,24 @@ def _other_level(criterion: WrittenCriterion, handout: str) -> Iterator[Fault]:
         yield (*criterion.at, "level"), f"is {level}, and the rubric's text has {said.pop()}"
 
 
-def _sent_otherwise(scenarios: Mapping[str, dict[str, Any]], handout: str) -> Iterator[Fault]:
+def _sent_otherwise(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield types that the handout says otherwise of the topic on which the grader sends, and lines to type that it has
     in another case."""
-    quoted = {*re.findall(r"`([^`]+)`", handout)}
-    for name, scenario in scenarios.items():
-        sent: list[tuple[KeyPath, dict[str, Any]]] = [
-            (("probes", n, "type"), probe) for n, probe in as_maps(scenario.get("probes"))
-        ]
-        for at, _, one in services_in(scenario):
-            yield from _other_fields(("scenarios", name, *at, "definition"), one.get("definition"), handout)
-        for n, step in as_maps(scenario.get("steps")):
-            sent.append((("steps", n, "publish", "type"), as_map(step.get("publish"))))
-            line = as_map(step.get("type")).get("line")
-            other = next((one for one in sorted(quoted) if one.lower() == str(line).lower()), "")
+    handout = rubric.handout
+    quoted = sorted({*re.findall(r"`([^`]+)`", handout)})
+    for name, scenario in rubric.scenarios.items():
+        for at, kind, one in parts_of(scenario):
+            path: KeyPath = ("scenarios", name, *at)
+            line = str(one.get("line")) if kind == "type" else ""
+            other = next((text for text in quoted if text.lower() == line.lower()), "")
             if other and line not in quoted:
-                yield ("scenarios", name, "steps", n, "type", "line"), f"the handout has `{other}`"
-        for at, one in sent:
-            said = set(said_types(str(one.get("topic")), handout))
+                yield (*path, "line"), f"the handout has `{other}`"
+            if kind in {"call", "serve"}:
+                yield from _other_fields((*path, "definition"), one.get("definition"), handout)
+            said = set(said_types(str(one.get("topic")), handout)) if kind == "publish" else set()
             if said and str(one.get("type")) not in said:
                 fault = f"the handout says that {one['topic']} carries {join_words(sorted(said))}"
-                yield ("scenarios", name, *at), fault
+                yield (*path, "type"), fault
 
 
 def _other_types(at: KeyPath, given: dict[str, Any], handout: str) -> Iterator[Fault]:

@@ -25,8 +25,8 @@ from grader.rubric.yaml_lines import (
     WrittenRubric,
     as_list,
     as_map,
-    as_maps,
     given_steps,
+    parts_of,
     starts_of,
 )
 from grader.wording import plural
@@ -130,13 +130,11 @@ class TooShort(ValueError):
 
 def _sent_on(topic: str, scenario: dict[str, Any]) -> list[Any] | None:
     """Return all that is sent on a topic; None where something else may be."""
-    probes = [one for _, one in as_maps(scenario.get("probes")) if one.get("topic") == topic]
-    sent = [*probes, *(one for one in given_steps(scenario, "publish") if one.get("topic") == topic)]
-    if "recording" in scenario or "play" in {
-        key for _, step in as_maps(scenario.get("steps")) for key in step
-    }:
+    parts = [one for _, kind, one in parts_of(scenario) if kind == "publish"]
+    sent = [one for one in parts if one.get("topic") == topic]
+    if "recording" in scenario or given_steps(scenario, "play"):
         return None
-    if any(one.get(key) for one in probes for key in ("text", "integers", "among")):
+    if any(one.get(key) for one in sent for key in ("text", "integers", "among")):
         return None
     values = [
         value

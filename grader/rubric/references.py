@@ -32,6 +32,7 @@ from grader.rubric.yaml_lines import (
     as_maps,
     as_texts,
     given_steps,
+    parts_of,
     services_in,
     starts_of,
 )
@@ -41,6 +42,7 @@ LAUNCH_ENDINGS = (".launch", ".xml")
 OTHER_CONDITIONS = ("messages", "connected", "heard", "nodes", "opened", "ended", "quiet_s")
 """Conditions of `until` that say nothing of how long a run lasts."""
 TYPES: Mapping[str, TypeKind] = {"message": "msg", "field": "msg", "service": "srv", "action": "action"}
+TYPE_OF_PART = {"publish": "message", "call": "service", "serve": "service", "action": "action"}
 ASKED_OF_STUDENT = frozenset({
     "rate", "field-equals", "field-bounds", "topic-type", "latched", "message", "stamps", "counter-start",
     "counter-step", "counter-wrap", "reacts",
@@ -126,15 +128,10 @@ def _in_any_folder(launch: str) -> str:
 
 def _type_faults(path: KeyPath, scenario: dict[str, Any], rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield types that no machine has, of what a scenario sends, calls and offers."""
-    for at, _, one in services_in(scenario):
-        yield from _of_machine((*path, *at, "type"), "service", one.get("type"), rubric)
-    for index, step in as_maps(scenario.get("steps")):
-        for key, to in (("publish", "message"), ("action", "action")):
-            kind = as_map(step.get(key)).get("type")
-            yield from _of_machine((*path, "steps", index, key, "type"), to, kind, rubric)
-    for index, served in as_maps(scenario.get("serves")):
-        if served.get("action") is not None:
-            yield from _of_machine((*path, "serves", index, "type"), "action", served.get("type"), rubric)
+    for at, kind, one in parts_of(scenario):
+        to = "action" if one.get("action") is not None else TYPE_OF_PART.get(kind)
+        if to and at[0] != "probes":
+            yield from _of_machine((*path, *at, "type"), to, one.get("type"), rubric)
 
 
 def _file_fault(file: str, rubric: WrittenRubric) -> str:
@@ -428,8 +425,7 @@ def _is_given_up(goal: dict[str, Any], scenario: dict[str, Any]) -> bool:
 
 
 def _sent_by_grader(scenario: dict[str, Any]) -> set[str]:
-    probes = [probe for _, probe in as_maps(scenario.get("probes"))]
-    return {str(one.get("topic")) for one in (*given_steps(scenario, "publish"), *probes)}
+    return {str(one.get("topic")) for _, kind, one in parts_of(scenario) if kind == "publish"}
 
 
 def _sent_topics(scenario: dict[str, Any]) -> set[str]:

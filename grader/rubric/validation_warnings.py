@@ -26,6 +26,7 @@ from grader.rubric.yaml_lines import (
     as_maps,
     as_texts,
     given_steps,
+    parts_of,
     services_in,
     set_in,
     starts_of,
@@ -91,19 +92,17 @@ def warnings(rubric: WrittenRubric) -> Iterator[Fault]:
 def _short_times(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield times within which a correct package may not be done, times of many minutes, and messages that are rare."""
     for name, scenario in rubric.scenarios.items():
-        until, steps = as_map(scenario.get("until")), as_maps(scenario.get("steps"))
+        until = as_map(scenario.get("until"))
         times: list[tuple[KeyPath, object, float]] = [
             (("until", key), until.get(key), least_s) for key, least_s in SHORT.items()
         ]
-        for index, step in steps:
-            waits = [(kind, as_map(step.get(kind))) for kind in ("wait", "call", "action")]
-            times += [(("steps", index, kind, "limit_s"), one.get("limit_s"), WAIT_S) for kind, one in waits]
-            rate_hz = as_map(step.get("publish")).get("rate_hz")
+        for at, kind, one in parts_of(scenario):
+            if kind in {"wait", "call", "action"}:
+                times.append(((*at, "limit_s"), one.get("limit_s"), WAIT_S))
+            rate_hz = one.get("rate_hz") if at[-1] == "publish" else None
             if is_number(rate_hz) and 0 < rate_hz < 1 / SELDOM_S:
                 fault = f"is a message every {1 / rate_hz:g} s: rate_hz is messages a second"
-                yield ("scenarios", name, "steps", index, "publish", "rate_hz"), fault
-        calls = as_maps(scenario.get("calls"))
-        times += [(("calls", index, "limit_s"), one.get("limit_s"), WAIT_S) for index, one in calls]
+                yield ("scenarios", name, *at, "rate_hz"), fault
         for at, given_s, least_s in times:
             if is_number(given_s) and given_s < least_s:
                 yield ("scenarios", name, *at), f"{given_s:g} s is {TOO_SHORT}"
@@ -458,7 +457,7 @@ def _sent(scenario: dict[str, Any]) -> int:
     if not is_script or given_steps(scenario, "play"):
         return 0
     number = 0
-    for one in (*given_steps(scenario, "publish"), *(probe for _, probe in as_maps(scenario.get("probes")))):
+    for one in (one for _, kind, one in parts_of(scenario) if kind == "publish"):
         values = one.get("values")
         if {"count", "duration_s", "background", "times", "text", "integers", "among"} & one.keys():
             return 0

@@ -515,12 +515,18 @@ def set_in(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, dict[str, Any]]]
             yield ("steps", index, "set_param"), as_map(step["set_param"])
 
 
+def parts_of(scenario: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str, dict[str, Any]]]:
+    """Yield what a scenario sends, calls, offers and does: where, its kind as a step has it (`publish` of a probe, and
+    `serve`), and what is written there."""
+    for key, kind in (("probes", "publish"), ("calls", "call"), ("serves", "serve")):
+        yield from (((key, n), kind, one) for n, one in as_maps(scenario.get(key)))
+    for n, step in as_maps(scenario.get("steps")):
+        yield from ((("steps", n, kind), kind, as_map(given)) for kind, given in step.items())
+
+
 def services_in(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, str, dict[str, Any]]]:
     """Yield the services that a scenario calls or offers, where it says so, and the key of what it fills in."""
-    for key, part in (("calls", "request"), ("serves", "response")):
-        yield from (
-            ((key, n), part, one) for n, one in as_maps(scenario.get(key)) if one.get("action") is None
-        )
-    for index, step in as_maps(scenario.get("steps")):
-        if "call" in step:
-            yield ("steps", index, "call"), "request", as_map(step["call"])
+    for at, kind, one in parts_of(scenario):
+        part = {"call": "request", "serve": "response"}.get(kind)
+        if part is not None and one.get("action") is None:
+            yield at, part, one
