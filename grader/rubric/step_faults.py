@@ -23,13 +23,13 @@ from grader.rubric.spelling import is_slip
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
+    WrittenRubric,
     as_list,
     as_map,
     as_maps,
     as_texts,
     given_steps,
     starts_of,
-    texts_in,
 )
 from grader.wording import did_you_mean
 
@@ -50,23 +50,18 @@ MOMENTS = 20
 """At so many messages of a row a value that changes is looked at, the first and the last among them."""
 
 
-def played_bags(rubric: dict[str, Any]) -> dict[KeyPath, dict[str, Any]]:
+def played_bags(rubric: WrittenRubric) -> dict[KeyPath, dict[str, Any]]:
     """Return what steps play, by the place in the rubric where the recording is named."""
-    return {
-        ("scenarios", name, "steps", index, "play", "bag"): as_map(step["play"])
-        for name, scenario in as_map(rubric.get("scenarios")).items()
-        for index, step in as_maps(as_map(scenario).get("steps"))
-        if "play" in step
-    }
+    return {(*at, "play", "bag"): as_map(step["play"]) for at, step in rubric.steps() if "play" in step}
 
 
-def _topics_named(rubric: dict[str, Any], but: KeyPath) -> set[str]:
+def _topics_named(rubric: WrittenRubric, but: KeyPath) -> set[str]:
     """Return the names with a slash in a rubric, but for those in one of its parts."""
-    texts = [text for path, text in texts_in((), rubric) if path[: len(but)] != but]
+    texts = [text for path, text in rubric.texts if path[: len(but)] != but]
     return {name for text in texts for name in re.findall(r"(?<![\w.])/[A-Za-z][\w/]*\w", text)}
 
 
-def bag_faults(path: KeyPath, file: Path, play: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+def bag_faults(path: KeyPath, file: Path, play: dict[str, Any], rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield what is wrong with a recording that a step plays. `path` is the place of its name."""
     from grader.evidence.reader import load_run  # noqa: PLC0415 - few rubrics play anything
 
