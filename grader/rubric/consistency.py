@@ -28,6 +28,7 @@ from grader.rubric.yaml_lines import (
     as_maps,
     as_texts,
     dotted,
+    give_one,
     given_steps,
 )
 from grader.wording import did_you_mean, join_words
@@ -337,8 +338,7 @@ def _starts(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
         at = (*path, "start", index)
         given = [key for key in KINDS_OF_START if start.get(key) not in (None, False)]
         if len(given) != 1:
-            found = f"{' and '.join(given)} are there" if given else "none is there"
-            yield at, f"give one of {', '.join(KINDS_OF_START[:-1])} and {KINDS_OF_START[-1]}: {found}"
+            yield at, give_one(KINDS_OF_START, given)
         name, after = start.get("name"), start.get("after")
         if isinstance(after, str) and after not in names:
             yield (*at, "after"), f'there is no earlier start "{after}"{did_you_mean(after, names)}'

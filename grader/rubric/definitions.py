@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import PurePosixPath
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeGuard
 
 from grader.checks.support.fields import is_number
 from grader.evidence.decode import full_definition
@@ -40,6 +40,11 @@ def slip_of(name: str, there: Iterable[str]) -> str:
 def instead_of(name: str, there: Iterable[str]) -> str:
     names = list(there)
     return did_you_mean(name, names) or (f": there is {join_words(names)}" if names else "")
+
+
+def is_form(value: Any) -> TypeGuard[dict[str, Any]]:  # noqa: ANN401 - any part of a message
+    """Return whether a value is made for each message, as `{from: 0, to: 1}` is."""
+    return isinstance(value, dict) and bool(value) and {*FORMS, ANGLES}.issuperset(value)
 
 
 class Misfit(ValueError):
@@ -114,12 +119,7 @@ class Shape(NamedTuple):
     def compare(self, field: Field, value: object, done: str) -> None:
         """Raise Misfit where the field can never have the value."""
         fields = {one.name for one in self.types.get(field.type, ())}
-        if (
-            isinstance(value, Mapping)
-            and value
-            and {*FORMS, ANGLES}.issuperset(value)
-            and fields.isdisjoint(value)
-        ):
+        if is_form(value) and fields.isdisjoint(value):
             return  # a value that changes: what is sent is looked at elsewhere
         if field.array:
             self._compare_items(field, value, done)

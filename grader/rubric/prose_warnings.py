@@ -10,8 +10,7 @@ from typing import Any
 from grader.checks.support.fields import is_number
 from grader.model.message_definitions import BUILT_IN
 from grader.rubric.message_fields import said_types
-from grader.rubric.spelling import is_slip
-from grader.rubric.unknown_names import topics_in
+from grader.rubric.spelling import is_slip, topics_in
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,

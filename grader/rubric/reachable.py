@@ -13,8 +13,7 @@ from pydantic import ValidationError
 from grader.checks.reacts import Condition
 from grader.checks.registry import Check
 from grader.checks.support.fields import Reading, is_number
-from grader.evidence.message_values import ANGLES, FORMS
-from grader.rubric.definitions import PATH_PARTS
+from grader.rubric.definitions import PATH_PARTS, is_form
 from grader.rubric.durations import late_faults, longest_s, stretch_faults, within_faults
 from grader.rubric.scenario import Scenario, Until
 from grader.rubric.simulators import FIELD_M, PROGRAMS, TRUE_POSE, pair, robot_of, start_faults
@@ -147,14 +146,10 @@ def _sent_on(topic: str, scenario: dict[str, Any]) -> list[Any] | None:
 def _values_at(value: object, parts: Sequence[str]) -> list[Any] | None:
     """Return what a value that is sent has at a path; None where a form makes it another each time. Raises TooShort."""
     part = parts[0] if parts else ""
-    if isinstance(value, dict) and value and {*FORMS, ANGLES}.issuperset(value):
-        if (
-            part[:1] == "["
-            and part != "[*]"
-            and isinstance(value.get("count"), int)
-            and int(part[1:-1]) >= value["count"]
-        ):
-            raise TooShort(value["count"])
+    if is_form(value):
+        count, is_item = value.get("count"), part[:1] == "[" and part != "[*]"
+        if is_item and isinstance(count, int) and int(part[1:-1]) >= count:
+            raise TooShort(count)
         return None
     if not parts:
         return [value]

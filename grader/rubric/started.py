@@ -189,11 +189,8 @@ def _of_launch(text: str, start: dict[str, Any], known: Known) -> str:
 
 def _fault(text: str, start: dict[str, Any], known: Known) -> str:
     name, mark, value = text.partition(":=")
-    if (
-        not mark
-        or start.get("launch") is not None
-        or str(start.get("program")).endswith((".launch", ".test"))
-    ):
+    is_launch = start.get("launch") is not None or str(start.get("program")).endswith((".launch", ".test"))
+    if not mark or is_launch:
         return ""
     if name.startswith("__"):
         return "" if name in SPECIAL else f"ROS has no {name}{did_you_mean(name, SPECIAL)}"
@@ -224,12 +221,8 @@ def _other_way(text: str, start: dict[str, Any], scenario: dict[str, Any], known
             f"what the node names comes before :=, and {old} is what the run asks for: write {value}:={name}"
         )
     spaces = [one.rpartition("/")[0] for one in here if one.endswith(f"/{value}") and one != new]
-    if (
-        not any("ns" in key for key in given)
-        and new not in known.topics
-        and len(spaces) == 1
-        and "/" not in value
-    ):
+    is_placed = any("ns" in key for key in given) or new in known.topics or "/" in value
+    if len(spaces) == 1 and not is_placed:
         return f"this is {new}, and the run asks for {spaces[0]}/{value}: add __ns:={spaces[0].strip('/')}"
     if space and name.startswith("/") and name[1:] in known.words and name not in known.said:
         return f"{name} is not in the namespace {space}: write {name.lstrip('/')}:={value}"

@@ -28,6 +28,7 @@ from grader.rubric.yaml_lines import (
     as_map,
     as_maps,
     as_texts,
+    give_one,
     given_steps,
     starts_of,
 )
@@ -88,7 +89,7 @@ def step_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
         at = (*path, "steps", index)
         given = [kind for kind in KINDS if step.get(kind) is not None]
         if len(given) != 1:
-            yield at, f"give one of {_one_of(KINDS)}: {_found_text(given)}"
+            yield at, give_one(KINDS, given)
         for kind in given:
             yield from _faults_of((*at, kind), kind, as_map(step[kind]), types)
     lasting_s = sum(_seconds(step) for _, step in as_maps(scenario.get("steps")))
@@ -147,14 +148,6 @@ def _cancelled_late(at: KeyPath, given: dict[str, Any]) -> Iterator[Fault]:
     if numbers and after_s >= limit_s:
         fault = f"{after_s:g} s is not before limit_s, {limit_s:g} s, after which the run goes on: nothing is cancelled"
         yield (*at, "cancel_after_s"), fault
-
-
-def _one_of(names: tuple[str, ...]) -> str:
-    return f"{', '.join(names[:-1])} and {names[-1]}"
-
-
-def _found_text(given: list[str]) -> str:
-    return f"{' and '.join(given)} are there" if given else "none is there"
 
 
 def _seconds(step: dict[str, Any]) -> float:
@@ -299,7 +292,7 @@ def _after_the_last(
 def _wait(at: KeyPath, wait: dict[str, Any]) -> Iterator[Fault]:
     given = [key for key in WAITS if wait.get(key) is not None]
     if len(given) != 1:
-        yield at, f"give one of {_one_of(WAITS)}: {_found_text(given)}"
+        yield at, give_one(WAITS, given)
     for key in ("messages", "new"):
         if key in wait and "topic" not in given:
             yield (*at, key), "is for a topic"
@@ -354,8 +347,7 @@ def served_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
 def _answers(at: KeyPath, served: dict[str, Any]) -> Iterator[Fault]:
     given = [key for key in ANSWERS if served.get(key) or served.get(key) == {}]
     if len(given) != 1:
-        found = f"{' and '.join(given)} are there" if given else "none is there"
-        yield at, f"give one of answer, answers and fails: {found}"
+        yield at, give_one(ANSWERS, given)
 
 
 def of_type(at: KeyPath, served: dict[str, Any]) -> Iterator[Fault]:

@@ -424,6 +424,7 @@ def _answers_waited_for(rubric: WrittenRubric) -> Iterator[Fault]:
 def _more_values(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield more values than the run sends messages, where the node answers each with one, or has causes to change."""
     paced = {one.given.get("topic") for one in rubric.criteria if "rate_hz" in one.given}
+    is_answer = re.search(r"\beach\b", rubric.handout) and not PERIODIC.search(rubric.handout)
     for criterion in rubric.criteria:
         sent, count = _sent(criterion.scenario), len(as_list(criterion.given.get("values")))
         causes = count_causes(criterion.scenario)
@@ -431,12 +432,7 @@ def _more_values(rubric: WrittenRubric) -> Iterator[Fault]:
             gives = f"the steps of {criterion.run} give the node {plural(causes, 'cause')} to change it"
             yield (*criterion.at, "values"), f"are {count}, and {gives}: does it change by itself?"
             continue
-        if (
-            sent
-            and count == sent + 1
-            and not PERIODIC.search(rubric.handout)
-            and re.search(r"\beach\b", rubric.handout)
-        ):
+        if sent and count == sent + 1 and is_answer:
             fault = f"are {count}, and {criterion.run} sends {plural(sent, 'message')}"
             yield (*criterion.at, "values"), fault
 

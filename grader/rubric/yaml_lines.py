@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import date
@@ -461,6 +461,12 @@ def _other_base(written: str) -> str:
     if re.fullmatch(r"[-+]?0[0-7_]+", written):
         return f"as its first digit is 0: write {written.lstrip('-+0') or 0}"
     return "in minutes and seconds: write it without a colon, or in quotes" if ":" in written else ""
+
+
+def give_one(keys: Sequence[str], given: Sequence[str]) -> str:
+    """Return that one of the keys has to be given, and which are."""
+    found = f"{' and '.join(given)} are there" if given else "none is there"
+    return f"give one of {', '.join(keys[:-1])} and {keys[-1]}: {found}"
 
 
 def as_list(value: object) -> list[Any]:
