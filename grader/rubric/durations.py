@@ -15,6 +15,8 @@ from grader.rubric.scenario import ROSTEST_ENDING, Action, Probe, Scenario, Step
 from grader.rubric.yaml_lines import Fault, KeyPath, WrittenCriterion, as_list, as_map, as_maps, given_steps
 from grader.wording import significant
 
+FASTEST_HZ = 100
+"""No lab asks for rows of a table, or feedback, more often than this."""
 SUBSCRIBE_S, ANSWER_S = 6.0, 10.0
 """How long a run waits for a subscriber of one more topic, and for the answer of a service."""
 LASTING = ("window_s", "alive_s")
@@ -85,9 +87,9 @@ def _probed_s(scenario: dict[str, Any]) -> float:
     return lasting_s
 
 
-def longest_s(scenario: dict[str, Any]) -> float | None:
-    """Return how long a run lasts at most once its last process is started, in the time of its clock; None where
-    that is not known."""
+def longest_s(scenario: dict[str, Any], played_s: float | None = None) -> float | None:
+    """Return how long a run lasts at most once its last process is started, in the time of its clock, if its recording
+    lasts so long; None where that is not known."""
     first_s, limit_s = _until(scenario, "first_message_s"), _until(scenario, "limit_s")
     warp = scenario.get("warp", Scenario.model_fields["warp"].default)
     warp = warp if scenario.get("clock") == "warped" else 1
@@ -102,9 +104,9 @@ def longest_s(scenario: dict[str, Any]) -> float | None:
     if "probes" in scenario:
         waits_s += first_s + SUBSCRIBE_S + _probed_s(scenario)
     for step in steps:
-        if step.play:
+        if step.play and played_s is None:
             return None
-        total_s += step.lasts_s
+        total_s += played_s or 0.0 if step.play else step.lasts_s
         waits_s += _waits_s(step, first_s)
     return float(total_s + warp * waits_s)
 
@@ -117,7 +119,33 @@ def _waits_s(step: Step, first_s: float) -> float:
         return 2 * first_s + (step.action.cancel_after_s or 0) + step.action.limit_s
     if step.wait is not None and step.wait.seconds is None:
         return first_s if step.wait.limit_s is None else step.wait.limit_s
-    return first_s if step.published is not None else 0.0
+    return first_s if step.published is not None or step.play is not None else 0.0
+
+
+def until_next_s(topic: object, number: object, scenario: dict[str, Any]) -> float | None:
+    """Return how long after a message of that number on a topic the steps send the next one there; None where nobody
+    knows, or it is the last."""
+    steps = as_maps(scenario.get("steps"))
+    sent = [n for n, step in steps if as_map(step.get("publish")).get("topic") == topic]
+    if not isinstance(number, int) or not 0 < number < len(sent):
+        return None
+    passed = scenario["steps"][sent[number - 1] : sent[number]]
+    is_known = all({"publish", "wait"} & as_map(step).keys() for step in passed)
+    return steps_s({"steps": passed}) if is_known else None
+
+
+def often_faults(about: WrittenCriterion) -> Iterator[Fault]:
+    """Yield rows and feedback of which more are asked for than come in that time, however fast a node is."""
+    goal, most_s = _goal(about), longest_s(about.scenario) if about.check == "file-left" else None
+    times = {
+        "rows_at_least": (most_s, f"{about.run} lasts at most"),
+        "feedback": (None if goal is None else _limit_s(goal), "the step gives the goal"),
+    }
+    for key, (lasting_s, words) in times.items():
+        asked = about.given.get(key)
+        if is_number(asked) and is_number(lasting_s) and asked > FASTEST_HZ * lasting_s:
+            fault = f"{asked} in {lasting_s:g} s, which {words}, are more than {FASTEST_HZ} a second"
+            yield (*about.at, key), fault
 
 
 def _goal(about: WrittenCriterion) -> dict[str, Any] | None:

@@ -14,9 +14,25 @@ from grader.checks.reacts import Condition
 from grader.checks.registry import Check
 from grader.checks.support.fields import Reading, is_number
 from grader.rubric.definitions import PATH_PARTS, is_form
-from grader.rubric.durations import late_faults, longest_s, stretch_faults, within_faults
+from grader.rubric.durations import (
+    late_faults,
+    longest_s,
+    often_faults,
+    stretch_faults,
+    until_next_s,
+    within_faults,
+)
 from grader.rubric.scenario import Scenario, Until
-from grader.rubric.simulators import FIELD_M, PROGRAMS, TRUE_POSE, pair, robot_of, start_faults
+from grader.rubric.simulators import (
+    FIELD_M,
+    PROGRAMS,
+    TRUE_POSE,
+    Spot,
+    pair,
+    robot_of,
+    room_faults,
+    start_faults,
+)
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
@@ -51,8 +67,10 @@ def reach_faults(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator
         yield from start_faults(("scenarios", name), scenario)
     for about in criteria:
         others = [one for one in criteria if one is not about and one.run == about.run]
+        yield from often_faults(about)
         yield from within_faults(about)
         yield from stretch_faults(about)
+        yield from room_faults(about, longest_s(about.scenario))
         yield from _never_sent(about, others)
         if about.check in {"ends-at", "path", "stays-within"}:
             yield from _too_far(about, others)
@@ -219,7 +237,7 @@ def _condition(asked: dict[str, Any]) -> Condition | None:
         return None
 
 
-def _spot(value: object) -> tuple[float, float] | None:
+def _spot(value: object) -> Spot | None:
     return (
         (value[0], value[1])
         if isinstance(value, list | tuple) and len(value) >= 2 and all(map(is_number, value))
@@ -227,9 +245,9 @@ def _spot(value: object) -> tuple[float, float] | None:
     )
 
 
-def _asked_spots(topic: object, scenario: dict[str, Any]) -> list[tuple[float, float] | None]:
+def _asked_spots(topic: object, scenario: dict[str, Any]) -> list[Spot | None]:
     """Return the places for which the messages on a topic ask, in their order; None for one without a place."""
-    spots: list[tuple[float, float] | None] = []
+    spots: list[Spot | None] = []
     for one in given_steps(scenario, "publish"):
         if one.get("topic") != topic:
             continue
@@ -239,7 +257,7 @@ def _asked_spots(topic: object, scenario: dict[str, Any]) -> list[tuple[float, f
     return spots
 
 
-def _place_in(value: object) -> tuple[float, float] | None:
+def _place_in(value: object) -> Spot | None:
     for where in POSITIONS:
         inside = as_map(value)
         for key in where.split(".") if where else ():
@@ -252,7 +270,7 @@ def _place_in(value: object) -> tuple[float, float] | None:
 class _Robot(NamedTuple):
     """Where a robot starts, how fast it is, and how far its field reaches, where that is known."""
 
-    start: tuple[float, float] | None
+    start: Spot | None
     fastest_m_s: float | None = None
     field_m: float | None = None
 
@@ -300,7 +318,7 @@ def _too_far(about: WrittenCriterion, others: Sequence[WrittenCriterion]) -> Ite
                 yield (*about.at, "points", number), _outside(x + shift[0], y + shift[1])
 
 
-def _is_inside(spot: tuple[float, float], field_m: float, tolerance_m: float) -> bool:
+def _is_inside(spot: Spot, field_m: float, tolerance_m: float) -> bool:
     return all(-tolerance_m <= one <= field_m + tolerance_m for one in spot)
 
 
@@ -317,7 +335,7 @@ def _goal_faults(
         return
     at = (*about.at, "goal")
     asked = _asked_spots(given.get("asked_on"), about.scenario)
-    start = robot.start
+    start = robot.start if number == 1 or "asked_on" not in given else None
     if isinstance(number, int) and 0 < number <= len(asked):
         start = asked[number - 2] if number > 1 else start
         meant = asked[number - 1]
@@ -333,9 +351,38 @@ def _goal_faults(
     away_m = math.dist(start, goal) - 2 * tolerance_m if start else 0
     if away_m > farthest_m:
         yield at, f"it cannot come so far: {limit}"
+    elif start and robot.fastest_m_s:
+        yield from _too_soon(about, robot.fastest_m_s, away_m, f"{away_m:.3g} m from {pair(start)}")
+    for one in others:
+        kept, corners = one.given, [_spot(corner) for corner in as_list(one.given.get("box"))]
+        is_kept = one.check == "stays-within" and kept.get("topic") == given.get("topic")
+        is_always = kept.get("share", 1) == 1 and not kept.get("from_s") and not kept.get("relative")
+        if is_kept and is_always and len(corners) == 2 and not _is_between(goal, corners, tolerance_m):
+            yield at, f"is outside of the box that {one.id} keeps it in"
 
 
-def _not_last(about: WrittenCriterion, others: Sequence[WrittenCriterion], goal: tuple[float, float]) -> str:
+def _too_soon(about: WrittenCriterion, fastest_m_s: float, away_m: float, way: str) -> Iterator[Fault]:
+    """Yield a goal that the robot cannot come to before the next one is asked for, or within the time."""
+    within_s, topic = about.given.get("within_s"), about.given.get("asked_on")
+    until_s = until_next_s(topic, about.given.get("number", 1), about.scenario)
+    needed = f"{way} at {fastest_m_s:g} m/s take longer than"
+    if until_s is not None and away_m > fastest_m_s * until_s:
+        after = f"the {until_s:g} s until the next message on {topic}"
+        yield (*about.at, "goal"), f"{needed} {after} asks for another place"
+    elif is_number(within_s) and away_m > fastest_m_s * within_s:
+        yield (*about.at, "within_s"), f"{needed} {within_s:g} s"
+
+
+def _is_between(spot: Spot, corners: Sequence[Spot | None], tolerance_m: float) -> bool:
+    """Return whether a spot is in a box, or so near to it; it is where a corner is none."""
+    one, other = (corner or spot for corner in corners)
+    return all(
+        min(a, b) - tolerance_m <= at <= max(a, b) + tolerance_m
+        for at, a, b in zip(spot, one, other, strict=True)
+    )
+
+
+def _not_last(about: WrittenCriterion, others: Sequence[WrittenCriterion], goal: Spot) -> str:
     """Return that the robot is judged at the end of the run, and its last goal is another; empty where it may be this
     one."""
     topics = {one.given.get("asked_on") for one in others if one.check == about.check}
@@ -439,7 +486,7 @@ class _Demand(NamedTuple):
         return type(self.word) is type(other.word) and self.word != other.word
 
 
-def _may_be_equal(one: tuple[Any, ...], other: tuple[Any, ...], tolerances: tuple[float, float]) -> bool:
+def _may_be_equal(one: tuple[Any, ...], other: tuple[Any, ...], tolerances: Spot) -> bool:
     """Return whether a list may be both of these; of what is no number, nothing is said."""
     if len(one) != len(other):
         return False

@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 from grader.checks.support.fields import is_number
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, set_in
+from grader.rubric.yaml_lines import Fault, KeyPath, WrittenCriterion, as_map, as_maps, as_texts, set_in
 from grader.wording import closest
 
 Spot = tuple[float, float]
@@ -68,6 +68,8 @@ ROBOTS = {
 """What the robots of the robot world are like, where no parameter says otherwise."""
 FIELD_M = 11.09
 """How long the field of turtlesim is on each side."""
+AHEAD_M = 0.3
+"""By so much a laser may be nearer to a wall than the robot's centre."""
 OTHERS_SCAN = {"/base_scan": {"turtlebot3": "/scan"}, "/scan": {"stage": "/base_scan"}}
 """By a topic that one robot of the robot world has, that of the other robot."""
 
@@ -235,6 +237,38 @@ def start_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
     elif away_m < radius_m:
         touches = f"{away_m:.2g} m from a wall, which it touches before it has moved"
         yield where, f"the robot starts at {pair(place)}, {touches}"
+
+
+def room_faults(about: WrittenCriterion, most_s: float | None) -> Iterator[Fault]:
+    """Yield distances from walls that the robot does not have at its start, and walls and goals to which it cannot come
+    in a run of so many seconds."""
+    robot, given, scenario = robot_of(about.scenario), about.given, about.scenario
+    lines, place, radius_m = _lines(robot), _start(robot), robot.get("radius")
+    if not lines or place is None or not is_number(radius_m) or any(start_faults((), scenario)):
+        return
+    away_m = min(_distance(place, *ends) for line in lines for ends in pairwise(line))
+    if about.check == "stays-within" and given.get("topic") == TRUE_POSE:
+        is_always = not given.get("walls") and not given.get("from_s") and given.get("share", 1) == 1
+        for key, sign in (("min_m", 1), ("max_m", -1)):
+            if is_always and is_number(given.get(key)) and sign * away_m < sign * given[key]:
+                yield (*about.at, key), f"the robot starts {away_m:.2g} m from the nearest wall"
+    cause, fastest = as_map(given.get("cause")), robot.get("max_linear")
+    is_range = cause.get("topic") in OTHERS_SCAN and str(cause.get("field")).startswith("ranges[")
+    way_m = fastest * most_s if most_s is not None and is_number(fastest) else math.inf
+    most_m = cause.get("max") if about.check == "reacts" and is_range else None
+    if is_number(most_m) and away_m - way_m - AHEAD_M > most_m:
+        far = f"{away_m:.3g} m away, and {most_s:g} s at {fastest:g} m/s are {way_m:.3g} m"
+        yield (*about.at, "cause", "max"), f"the nearest wall is {far}: the cause never comes"
+    goal, tolerance_m = given.get("goal"), given.get("tolerance_m")
+    is_place = about.check == "ends-at" and given.get("topic") == TRUE_POSE and not given.get("relative")
+    if is_place and isinstance(goal, list) and _are_numbers(goal, 2) and is_number(tolerance_m):
+        spot = (goal[0], goal[1])
+        for line in lines if math.dist(place, spot) - 2 * tolerance_m <= way_m else ():  # said elsewhere
+            is_apart = line[0] == line[-1] and _is_inside(place, line) != _is_inside(spot, line)
+            if is_apart and min(_distance(spot, *ends) for ends in pairwise(line)) > tolerance_m:
+                fault = f"walls are between the start, {pair(place)}, and {pair(spot)}"
+                yield (*about.at, "goal"), fault
+                return
 
 
 def _start(robot: dict[str, Any]) -> Spot | None:

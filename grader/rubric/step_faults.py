@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from grader.checks.support.fields import is_number
 from grader.checks.support.processes import odd_name
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.errors import EvidenceError
@@ -17,8 +18,9 @@ from grader.evidence.message_values import FIRST, OTHER_TEXTS, MessageType, Serv
 from grader.installable import noetic_messages
 from grader.model.message_definitions import NOT_FINITE
 from grader.ros_env import ros_packages
+from grader.rubric.durations import FASTEST_HZ, longest_s
 from grader.rubric.fault_words import model_faults
-from grader.rubric.scenario import STEP_S_MAX, Action, Step, Transform
+from grader.rubric.scenario import STEP_S_MAX, Action, Play, Step, Transform
 from grader.rubric.spelling import is_slip
 from grader.rubric.yaml_lines import (
     Fault,
@@ -46,6 +48,8 @@ NAMED = {
     "set_param": ("name", "a parameter"),
 }
 """The key of a step that is a name of ROS's."""
+ROWS_PER_MESSAGE = 3
+"""A node that writes more rows than this for each message, and `FASTEST_HZ` a second, is none of a lab's."""
 WAITS = ("seconds", "topic", "node")
 MOMENTS = 20
 """At so many messages of a row a value that changes is looked at, the first and the last among them."""
@@ -72,6 +76,7 @@ def bag_faults(path: KeyPath, file: Path, play: dict[str, Any], rubric: WrittenR
         yield path, f"cannot be played: {error.message}"
         return
     topics, named = {channel.topic for channel in channels}, _topics_named(rubric, path[:-1])
+    yield from _rows_faults(path, file.name, [time for one in channels for time in one.times_ns], rubric)
     for number, topic in as_texts(play.get("topics")):
         if topic not in topics:
             yield (*path[:-1], "topics", number), f"{file.name} has no {topic}{did_you_mean(topic, topics)}"
@@ -79,6 +84,20 @@ def bag_faults(path: KeyPath, file: Path, play: dict[str, Any], rubric: WrittenR
         near = next((one for one in sorted(named - topics) if is_slip(topic, one)), "")
         if near:
             yield path, f"{file.name} has {topic}, and the rubric names {near}: give the recording that topic"
+
+
+def _rows_faults(path: KeyPath, name: str, times_ns: list[int], rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield tables with more rows than can come of so many messages, or in that time."""
+    lasts_s = (max(times_ns, default=0) - min(times_ns, default=0)) / 1e9
+    for criterion in rubric.criteria:
+        played, rows = given_steps(criterion.scenario, "play"), criterion.given.get("rows_at_least")
+        speed = played[0].get("speed", Play.model_fields["speed"].default) if len(played) == 1 else None
+        if criterion.run != path[1] or not is_number(rows) or not is_number(speed) or speed <= 0:
+            continue
+        most_s = longest_s(criterion.scenario, lasts_s / speed)
+        if most_s is not None and rows > ROWS_PER_MESSAGE * len(times_ns) + FASTEST_HZ * most_s:
+            fault = f"{name} has {len(times_ns)} messages in {lasts_s:.3g} s: so many rows never come"
+            yield (*criterion.at, "rows_at_least"), fault
 
 
 def step_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:

@@ -340,6 +340,36 @@ def test_a_warp_of_nothing_is_refused(tmp_path: Path) -> None:
     assert faults(path) == ["lab.yaml:21: scenarios.wraps.warp: must be at least 1, not 0"]
 
 
+def test_more_rows_than_a_recording_or_the_run_gives_are_refused(examples: Path) -> None:
+    path = _spoiled(examples, "record-and-replay", "rows_at_least: 8", "rows_at_least: 8000")
+    text, slower = path.read_text(encoding="utf-8"), "walk.bag, speed: 0.01}"
+    path.write_text(text.replace("walk.bag}", slower), encoding="utf-8")
+    assert load_rubric(str(path)).rubric.id == "record-and-replay", "it plays for more than a minute"
+    sent = "{publish: {topic: /steps, type: std_msgs/Float64, values: [1, 2, 0.25]}}"
+    path.write_text(text.replace("{play: {bag: bags/walk.bag}}", sent), encoding="utf-8")
+    told = "8000 in 40.3 s, which replay lasts at most, are more than 100 a second"
+    assert faults(path) == [f"spoiled.yaml:50: criteria[6].with.rows_at_least: {told}"]
+
+
+def test_a_goal_outside_of_the_box_that_another_criterion_keeps_the_robot_in(examples: Path) -> None:
+    path = _spoiled(examples, "go-to-goal", "box: [[0.5, 0.5],", "box: [[6, 6],")
+    fault = "is outside of the box that inside keeps it in"
+    assert faults(path) == [
+        f"spoiled.yaml:{line}.with.goal: {fault}" for line in ("37: criteria[3]", "39: criteria[4]")
+    ]
+    text = path.read_text(encoding="utf-8").replace("box: [[6, 6],", "share: 0.5, box: [[6, 6],")
+    path.write_text(text, encoding="utf-8")
+    assert load_rubric(str(path)).rubric.id == "go-to-goal", "for half of the time it may be elsewhere"
+
+
+def test_lists_of_one_field_that_no_message_can_both_be_are_refused(examples: Path) -> None:
+    path = _spoiled(
+        examples, "latched-map", "100, 100, 0, 0, 0, 0, 0], when: last", "100, 0, 0, 0, 0, 0], when: first"
+    )
+    told = "free wants data of /map otherwise in the same run"
+    assert faults(path) == [f"spoiled.yaml:47: criteria[7].with: {told}"]
+
+
 def test_what_is_known_of_the_simulators_is_what_they_are() -> None:
     """They run on ROS's Python alone: their sources are read."""
     source = ast.parse((STANDINS / "robot_world" / "world_node.py").read_text(encoding="utf-8"))
@@ -411,6 +441,10 @@ def test_a_name_that_is_a_letter_off_is_refused(examples: Path, slip: tuple[str,
         ("follow-wall", "least_m: 3}", "least_m: 13}"),
         ("turtle-square", "topics: [/turtle1/cmd_vel,", 'topics: ["/turtle1/*",'),
         ("service-client", '"20000000000", "5"', '"20000000000 or so", "5"'),
+        ("record-and-replay", "rows_at_least: 8", "rows_at_least: 80"),
+        ("record-and-replay", "walk.bag}}]", "walk.bag, speed: 0.01}}]"),
+        ("action-server", "feedback: 5}", "feedback: 50}"),
+        ("go-to-goal", "seconds: 9}", "seconds: 2.2}"),
         ("action-server", "within_s: 1.5", "within_s: 5"),
         ("avoid-obstacles", "within_s: 1.5", "within_s: 15"),
         (
