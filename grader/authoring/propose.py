@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
 
 from grader import pipeline
@@ -15,21 +15,17 @@ from grader.authoring.rubric_draft import (
     SENT,
     STRING,
     TEXT_PROBES,
-    DraftSheet,
     Observed,
     Parts,
     RubricEntry,
     Topic,
     answers_to,
-    assign_points,
     calls_of,
-    drop_empty,
     dump_flow,
     find_parts,
     first_look,
     format_number,
     heard_template,
-    label_of,
     observe,
     plain_fields,
     printed_answer,
@@ -51,21 +47,31 @@ from grader.model.package import Interface, PackageFacts
 from grader.model.result import Progress
 from grader.model.verdict import Status
 from grader.package import read_package
+from grader.rubric.consistency import TOTAL_POINTS
 from grader.rubric.load import LoadedRubric
 
+WEIGHTS = {
+    "manifest": 1, "cmake": 1, "build": 1, "executable": 1, "node-lives": 1, "node-name": 1, "topic-type": 2, "rate": 3,
+    "counter-start": 1, "counter-step": 1, "counter-wrap": 3, "message": 1, "hears": 2, "service": 2, "latched": 1,
+    "cmake-install": 2, "launch-xml": 2, "launch-runs": 2, "reacts": 2, "definition": 1, "service-answers": 3,
+    "calls": 2, "prints": 2,
+}  # fmt: skip
 WINDOW_S = 6
 WRAPS = 2
 LIVES_S = 5
 OF_THE_COURSE = "A package of the course's goes into one folder with it: --from FOLDER --package NAME"
 
 
-class Proposal(DraftSheet):
-    """The rubric that asks for what a correct package was seen to do."""
+class Proposal:
+    """The rubric that asks for what a correct package was seen to do. `notes` are for the author: what was seen and is
+    not covered."""
 
     def __init__(
         self, facts: PackageFacts, parts: Parts, seen: Mapping[str, Observed], runs: Mapping[str, Run]
     ) -> None:
-        super().__init__()
+        self.notes: list[str] = []
+        self.scenarios: dict[str, RubricEntry] = {}
+        self.criteria: list[RubricEntry] = []
         self._facts, self._parts, self._seen, self._runs = facts, parts, seen, runs
         self._files()
         build = runs.get("package")
@@ -77,24 +83,34 @@ class Proposal(DraftSheet):
             self._launch(name, launch, seen[name])
         assign_points(self.criteria)
 
+    def _add(self, id_: str, title: str, check: str, parameters: RubricEntry, **more: object) -> str:
+        """Add a criterion without points and return its id, numbered where it is taken."""
+        taken = {c["id"] for c in self.criteria}
+        name = next(n for n in (id_, *(f"{id_}-{i}" for i in range(2, 100))) if n not in taken)
+        entry = {"id": name, "title": title, "points": 0, "check": check}
+        self.criteria.append(
+            entry | ({"with": parameters} if parameters else {}) | {k: v for k, v in more.items() if v}
+        )
+        return name
+
     def _files(self) -> None:
         facts = self._facts
         declared = facts.manifest.dependencies if facts.manifest else ()
         names = list(dict.fromkeys(d.name for d in declared if d.kind in RUNTIME_KINDS))
         package = {"name": facts.name}
-        self.add(
+        self._add(
             "manifest", "The manifest names the package and what it needs", "manifest",
             package | ({"dependencies": names} if names else {}), reproduce="cat package.xml",
         )  # fmt: skip
         title = "CMakeLists.txt makes it a catkin package"
-        self.add("cmake", title, "cmake", package, reproduce="cat CMakeLists.txt")
+        self._add("cmake", title, "cmake", package, reproduce="cat CMakeLists.txt")
         if installed := self._installed_scripts():
             title, parameters = "CMake installs the scripts", {"scripts": installed}
-            self.add("cmake-install", title, "cmake-install", parameters, requires=["cmake"])
+            self._add("cmake-install", title, "cmake-install", parameters, requires=["cmake"])
         for one in facts.interfaces:
             self._definition(one)
         before = ["manifest", "cmake"]
-        self.add("build", "The package builds", "build", {}, requires=before, reproduce="catkin_make")
+        self._add("build", "The package builds", "build", {}, requires=before, reproduce="catkin_make")
 
     def _definition(self, one: Interface) -> None:
         """A message, service or action of the package's own, with all of its fields and constants."""
@@ -104,7 +120,7 @@ class Proposal(DraftSheet):
         parameters = {"file": one.path, **{key: value for key, value in about.items() if value}}
         if one.fault is None and (fields or constants):
             title = f"{one.path} is as in the handout"
-            self.add(f"{label_of(PurePosixPath(one.path).stem)}-definition", title, "definition", parameters)
+            self._add(f"{label_of(PurePosixPath(one.path).stem)}-definition", title, "definition", parameters)
 
     def _installed_scripts(self) -> list[str]:
         calls = self._facts.cmake.calls if self._facts.cmake else ()
@@ -116,7 +132,7 @@ class Proposal(DraftSheet):
         requires: list[str] = []
         if script.endswith(".py"):
             requires = [
-                self.add(
+                self._add(
                     f"{name}-executable", f"{file} can be run", "executable", {"path": script},
                     reproduce=f"ls -lF {PurePosixPath(script).parent}"
                 )
@@ -139,7 +155,7 @@ class Proposal(DraftSheet):
             if kind:
                 id_, parameters = f"service-{label_of(service)}", {"service": service, "type": kind}
                 title = f"{service} is offered"
-                self.add(id_, title, "service", parameters, scenario=name, requires=[node])
+                self._add(id_, title, "service", parameters, scenario=name, requires=[node])
                 self._called(name, service, kind, id_)
         self._hearing(name, script, seen, requires)
 
@@ -163,7 +179,7 @@ class Proposal(DraftSheet):
             )
         title = f"{service} answers as it should"
         id_ = f"answers-{label_of(service)}"
-        self.add(id_, title, "service-answers", parameters, scenario=scenario, requires=[requires])
+        self._add(id_, title, "service-answers", parameters, scenario=scenario, requires=[requires])
 
     def _client(self, name: str, file: str, run: Run, requires: list[str]) -> None:
         """What a program asks of a service of the package's, and prints of its answer."""
@@ -178,11 +194,11 @@ class Proposal(DraftSheet):
             parameters: RubricEntry = {"service": service, "expect": list(map(plain_fields, asked))}
             title, id_ = f"{file} calls {service}", f"{name}-calls-{label_of(service)}"
             needs: RubricEntry = {"scenario": scenario, "requires": requires}
-            calls = self.add(id_, title, "calls", parameters, **needs)
+            calls = self._add(id_, title, "calls", parameters, **needs)
             if printed := printed_answer(run, answer):
                 needs["requires"] = [calls]
                 title = f"{file} prints the answer"
-                self.add(f"{name}-prints", title, "prints", {"process": name, **printed}, **needs)
+                self._add(f"{name}-prints", title, "prints", {"process": name, **printed}, **needs)
 
     def _request(self, kind: str) -> str:
         """Return a request of a service of the package's own, as it can be written in a step."""
@@ -196,10 +212,10 @@ class Proposal(DraftSheet):
         """What it logs and which parameters it shows."""
         needs: RubricEntry = {"scenario": name, "requires": [node]}
         for text in seen.logged[:1] if not seen.topics else ():
-            self.add(f"{name}-logs", f"{file} logs {text!r}", "logs", {"text": text}, **needs)
+            self._add(f"{name}-logs", f"{file} logs {text!r}", "logs", {"text": text}, **needs)
         if seen.read:
             names = {"names": list(seen.read)}
-            self.add(f"{name}-reads", f"{file} shows the parameters", "params-read", names, **needs)
+            self._add(f"{name}-reads", f"{file} shows the parameters", "params-read", names, **needs)
 
     def _alone(self, name: str, words: str, *, clock: str = "", **how: object) -> RubricEntry:
         """Return a scenario that starts one node, with the package's own parameters set before; `words` follow its
@@ -229,7 +245,7 @@ class Proposal(DraftSheet):
             check, title = "node-lives", f"/{seen.nodes[0]} stays alive and ends on Ctrl-C"
             parameters = {"process": name, "min_s": LIVES_S, **named}
         needs: RubricEntry = {"scenario": name, "requires": requires}
-        return self.add(f"{name}-node", title, check, parameters, **needs, reproduce=run)
+        return self._add(f"{name}-node", title, check, parameters, **needs, reproduce=run)
 
     def _topic(self, name: str, topic: Topic, node: str, fast: Run | None) -> None:
         label = self._label(name, topic)
@@ -240,7 +256,7 @@ class Proposal(DraftSheet):
                 "publish, call a service, set a parameter, or type a line on the node's standard input"
             )
             return
-        kind = self.add(
+        kind = self._add(
             label,
             f"{topic.name} carries {topic.type}",
             "topic-type",
@@ -253,14 +269,14 @@ class Proposal(DraftSheet):
         if topic.rate_hz:
             parameters: RubricEntry = {"topic": topic.name, "rate_hz": format_number(topic.rate_hz)}
             hz = f"{topic.name} runs at {topic.rate_hz:g} Hz"
-            self.add(f"{label}-rate", hz, "rate", parameters, **needs, reproduce=f"rostopic hz {topic.name}")
+            self._add(f"{label}-rate", hz, "rate", parameters, **needs, reproduce=f"rostopic hz {topic.name}")
         if topic.latched:
             title = f"{topic.name} is latched"
-            self.add(f"{label}-latched", title, "latched", {"topic": topic.name}, **needs)
+            self._add(f"{label}-latched", title, "latched", {"topic": topic.name}, **needs)
         if topic.template:
             parameters = {"topic": topic.name, "template": topic.template}
             title = f"The messages on {topic.name} tell the time"
-            self.add(f"{label}-message", title, "message", parameters, **needs)
+            self._add(f"{label}-message", title, "message", parameters, **needs)
         if topic.counts_from is not None:
             self._counter(name, topic, [kind, node], fast)
 
@@ -281,13 +297,13 @@ class Proposal(DraftSheet):
             self.scenarios[f"{name}-fast"] = self._alone(name, words, clock="warped", until=until)
             needs["scenario"] = f"{name}-fast"
         title, start = f"The counter begins with {topic.counts_from}", {**about, "start": topic.counts_from}
-        self.add(f"{label}-start", title, "counter-start", start, **needs)
+        self._add(f"{label}-start", title, "counter-start", start, **needs)
         step = {**about, "maximum": wrap[0] if wrap else 2**31 - 1, **rate}
-        self.add(f"{label}-step", "The counter goes up by one", "counter-step", step, **needs)
+        self._add(f"{label}-step", "The counter goes up by one", "counter-step", step, **needs)
         if wrap:
             parameters = {**about, "minimum": wrap[1], "maximum": wrap[0], "wraps": WRAPS, **rate}
             title = f"After {wrap[0]} comes {wrap[1]}"
-            self.add(f"{label}-wrap", title, "counter-wrap", parameters, **needs)
+            self._add(f"{label}-wrap", title, "counter-wrap", parameters, **needs)
 
     def _hearing(self, name: str, script: str, seen: Observed, requires: list[str]) -> None:
         run = self._runs.get(f"{name}-hears")
@@ -303,7 +319,7 @@ class Proposal(DraftSheet):
             parameters = {"topic": topic} | ({"template": template} if template != "{value}" else {})
             id_ = f"{name}-hears-{label_of(topic)}"
             title = f"{PurePosixPath(script).name} prints what it hears on {topic}"
-            self.add(id_, title, "hears", parameters, scenario=scenario, requires=requires)
+            self._add(id_, title, "hears", parameters, scenario=scenario, requires=requires)
 
     def _answers(self, name: str, topic: str) -> set[str]:
         """Return the topics on which a node was seen to answer what it heard on one."""
@@ -326,7 +342,7 @@ class Proposal(DraftSheet):
                 parameters = {"cause": {"topic": topic}, "effect": {"topic": answer}, "within_s": ANSWERS_S}
                 id_ = f"{name}-answers-{label_of(topic)}-{label_of(answer)}"
                 title = f"{PurePosixPath(script).name} publishes on {answer} after each message on {topic}"
-                self.add(id_, title, "reacts", parameters, scenario=scenario, requires=requires)
+                self._add(id_, title, "reacts", parameters, scenario=scenario, requires=requires)
         if steps:
             wait = {"wait": {"seconds": ANSWERS_S}}
             self.scenarios[scenario] = self._alone(name, SENT, steps=[*steps, wait])
@@ -343,7 +359,7 @@ class Proposal(DraftSheet):
                 f"{launch} brought up no node ({seen.failed or 'none registered'}): not covered"
             )
             return
-        xml = self.add(
+        xml = self._add(
             f"{name}-xml", f"{launch} is well-formed and names its nodes", "launch-xml", wanted | programs
         )
         until: RubricEntry = {"nodes": len(seen.nodes), "alive_s": 1}
@@ -354,7 +370,7 @@ class Proposal(DraftSheet):
         }
         named = {"nodes": {str(n.name): str(n.pkg) for n in others}} if others else {}
         parameters = wanted | ({"topic": seen.connected[0]} if seen.connected else {}) | named
-        self.add(
+        self._add(
             f"{name}-runs", f"roslaunch brings up the nodes of {launch}", "launch-runs", parameters,
             scenario=name, requires=[xml], reproduce=f"roslaunch {self._facts.name} {launch}",
         )  # fmt: skip
@@ -363,6 +379,29 @@ class Proposal(DraftSheet):
 def _probe(topic: str, kind: str) -> RubricEntry:
     made_up = {"text": TEXT_PROBES} if kind == STRING else {"integers": INTEGER_PROBES, "among": [0]}
     return {"topic": topic, "type": kind, **made_up}
+
+
+def drop_empty(**lists: list[str]) -> RubricEntry:
+    """Return the lists that are not empty."""
+    return {name: items for name, items in lists.items() if items}
+
+
+def assign_points(criteria: list[RubricEntry]) -> None:
+    """Set each criterion's points by its check's weight: whole numbers, together 100."""
+    weights = [WEIGHTS.get(c["check"], 1) for c in criteria]
+    exact = [TOTAL_POINTS * w / sum(weights) for w in weights]
+    for criterion, points in zip(criteria, exact, strict=True):
+        criterion["points"] = int(points)
+    order = sorted(range(len(exact)), key=lambda i: (int(exact[i]) - exact[i], i))
+    for index in order[: TOTAL_POINTS - sum(c["points"] for c in criteria)]:
+        criteria[index]["points"] += 1
+
+
+def label_of(name: str) -> str:
+    """Return a topic's or service's name as part of a criterion's id: letters, digits and hyphens."""
+    letters: Iterator[str] = (c if c.isalnum() and c.isascii() else "-" for c in name.lower())
+    label = "-".join(part for part in "".join(letters).split("-") if part)
+    return label if label[:1].isalpha() else f"t-{label}"
 
 
 # ---- the whole way from a package to a rubric's text

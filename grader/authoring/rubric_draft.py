@@ -1,15 +1,15 @@
 """Drafts of rubrics for `grader rubric new`: what is run to look at a correct package, and the YAML that comes of it.
 
 A package's folder and facts come in, and `find_parts` gives what can be started. `first_look` and `second_look` give
-rubrics that only run it and judge nothing. What was observed there (`observe`) becomes scenarios, criteria and points
-(`assign_points`) on a `DraftSheet`, and `rubric_text` gives the YAML that people go on to edit.
+rubrics that only run it and judge nothing. What was observed there (`observe`) becomes scenarios and criteria in
+`propose.py`, and `rubric_text` gives the YAML that people go on to edit.
 """
 
 from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from math import isfinite
 from pathlib import Path, PurePosixPath
@@ -26,7 +26,6 @@ from grader.evidence.inspect import periodic_share, rate_stats
 from grader.evidence.run import Channel, Run
 from grader.model.package import Interface, PackageFacts
 from grader.model.record import Record
-from grader.rubric.consistency import TOTAL_POINTS
 from grader.rubric.load import LoadedRubric
 from grader.rubric.scenario import Call, Param, Probe, Scenario, Served, Start, Step, Until
 from grader.untrusted_text import line, visible, without_ci_commands
@@ -253,60 +252,11 @@ def _last_words(run: Run) -> str:
     return lines[-1] if lines else "it ended with an error"
 
 
-WEIGHTS = {
-    "manifest": 1, "cmake": 1, "build": 1, "executable": 1, "node-lives": 1, "node-name": 1, "topic-type": 2, "rate": 3,
-    "counter-start": 1, "counter-step": 1, "counter-wrap": 3, "message": 1, "hears": 2, "service": 2, "latched": 1,
-    "cmake-install": 2, "launch-xml": 2, "launch-runs": 2, "reacts": 2, "definition": 1,
-    "service-answers": 3, "calls": 2, "prints": 2,
-}  # fmt: skip
-
-RubricEntry = dict[str, Any]
-
-
-class DraftSheet:
-    """Collects the parts of a rubric. `notes` are for the author: what was seen and is not covered."""
-
-    def __init__(self) -> None:
-        self.notes: list[str] = []
-        self.scenarios: dict[str, RubricEntry] = {}
-        self.criteria: list[RubricEntry] = []
-
-    def add(self, id_: str, title: str, check: str, parameters: RubricEntry, **more: object) -> str:
-        """Add a criterion without points and return its id, numbered where it is taken."""
-        taken = {c["id"] for c in self.criteria}
-        name = next(n for n in (id_, *(f"{id_}-{i}" for i in range(2, 100))) if n not in taken)
-        entry = {"id": name, "title": title, "points": 0, "check": check}
-        self.criteria.append(
-            entry | ({"with": parameters} if parameters else {}) | {k: v for k, v in more.items() if v}
-        )
-        return name
-
-
-def drop_empty(**lists: list[str]) -> RubricEntry:
-    """Return the lists that are not empty."""
-    return {name: items for name, items in lists.items() if items}
-
-
-def assign_points(criteria: list[RubricEntry]) -> None:
-    """Set each criterion's points by its check's weight: whole numbers, together 100."""
-    weights = [WEIGHTS.get(c["check"], 1) for c in criteria]
-    exact = [TOTAL_POINTS * w / sum(weights) for w in weights]
-    for criterion, points in zip(criteria, exact, strict=True):
-        criterion["points"] = int(points)
-    order = sorted(range(len(exact)), key=lambda i: (int(exact[i]) - exact[i], i))
-    for index in order[: TOTAL_POINTS - sum(c["points"] for c in criteria)]:
-        criteria[index]["points"] += 1
-
-
 def format_number(number: float) -> float | int:
     return int(number) if number == int(number) else number
 
 
-def label_of(name: str) -> str:
-    """Return a topic's or service's name as part of a criterion's id: letters, digits and hyphens."""
-    letters: Iterator[str] = (c if c.isalnum() and c.isascii() else "-" for c in name.lower())
-    label = "-".join(part for part in "".join(letters).split("-") if part)
-    return label if label[:1].isalpha() else f"t-{label}"
+RubricEntry = dict[str, Any]
 
 
 # ---- as YAML

@@ -21,29 +21,11 @@ RepairKind = Literal[
 """In the order in which a student would meet them."""
 
 KINDS: tuple[RepairKind, ...] = get_args(RepairKind)
-DEFAULT_SHARES: dict[RepairKind, float] = {
-    "executable-bit": 1.0,
-    "encoding": 1.0,
-    "byte-order-mark": 1.0,
-    "line-ends": 1.0,
-    "shebang": 1.0,
-    "file-name": 1.0,
-    "python-syntax": 0.5,
-    "manifest-line": 0.5,
-    "build-line": 0.5,
-    "launch-syntax": 0.5,
-    "yaml-syntax": 0.5,
-    "package-name": 1.0,
-    "launch-type": 1.0,
-    "missing-import": 0.5,
-    "missing-call": 0.5,
-    "node-name": 1.0,
-    "topic-name": 1.0,
-    "service-name": 1.0,
-    "parameter-name": 1.0,
-    "ros-clock": 1.0,
-    "turn-sign": 0.5,
-}
+HALVING = frozenset({
+    "python-syntax", "manifest-line", "build-line", "launch-syntax", "yaml-syntax", "missing-import", "missing-call",
+    "turn-sign",
+})  # fmt: skip
+DEFAULT_SHARES: dict[RepairKind, float] = {kind: 0.5 if kind in HALVING else 1.0 for kind in KINDS}
 """Which share of its points a criterion keeps that passes on a copy with a repair of this kind. The criterion that asks
 for what was repaired loses its own points. A rubric's `repairs` can say otherwise."""
 BY_HAND: dict[RepairKind, str] = {

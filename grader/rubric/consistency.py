@@ -17,26 +17,19 @@ from grader.rubric.fault_words import model_faults
 from grader.rubric.model import ManualParams
 from grader.rubric.references import reference_faults
 from grader.rubric.scenario import ROSTEST_ENDING
-from grader.rubric.step_faults import (
-    empty_in,
-    given_steps,
-    of_type,
-    private,
-    served_faults,
-    slash,
-    step_faults,
-)
+from grader.rubric.step_faults import empty_in, of_type, private, served_faults, slash, step_faults
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
     WrittenCriterion,
+    WrittenRubric,
     as_list,
     as_map,
     as_maps,
     as_texts,
-    criteria_of,
     dotted,
-    packages_in,
+    give_one,
+    given_steps,
 )
 from grader.wording import did_you_mean, join_words
 
@@ -54,22 +47,17 @@ INTEGERS = {
 
 
 def cross_faults(
-    data: object,
-    checks: Mapping[str, Check],
-    *,
-    complete: bool = True,
-    files: Mapping[str, bytes] | None = None,
+    data: object, checks: Mapping[str, Check], *, complete: bool, files: Mapping[str, bytes]
 ) -> list[Fault]:
     """Return every fault that shows only between one part of a rubric and another, or between it and the checks.
 
     Where `checks` are not complete, because the instructor's file of them is broken, a name that is near none is
     left alone: it may be one of theirs. `files` are those beside the rubric, of which the course's types are read.
     """
-    rubric = as_map(data)
-    scenarios = as_map(rubric.get("scenarios"))
-    criteria = criteria_of(rubric)
-    faults = [f for name, s in scenarios.items() for f in scenario_faults(("scenarios", name), as_map(s))]
-    if not isinstance(rubric.get("criteria"), list):
+    rubric = WrittenRubric(data)
+    criteria, scenarios = rubric.criteria, rubric.scenarios
+    faults = [f for name, s in scenarios.items() for f in scenario_faults(("scenarios", name), s)]
+    if not isinstance(rubric.data.get("criteria"), list):
         return faults  # that is what is wrong; what else would not fit, follows from it
     for criterion in criteria:
         faults += _check(criterion, checks, complete=complete)
@@ -77,42 +65,38 @@ def cross_faults(
         faults += _uncalled_faults(criterion, scenarios)
     faults += _names(criteria)
     faults += _circles(criteria)
-    faults += _points(rubric, criteria)
-    faults += _groups(rubric, criteria)
-    faults += _gates(rubric, criteria)
+    faults += _points(rubric)
+    faults += _groups(rubric)
+    faults += _gates(rubric)
     faults += _late(rubric)
-    faults += _packages(rubric, scenarios, criteria)
-    faults += reference_faults(rubric, checks, files or {})
+    faults += _packages(rubric)
+    faults += reference_faults(rubric, checks, files)
     return faults
 
 
 def swallowed_keys(rubric: dict[str, Any]) -> Iterator[Fault]:
     """Yield keys of the rubric that are a part of the handout's text, as they are indented like it."""
-    handout = str(rubric.get("handout"))
     for key in ("made_up", "scenarios", "criteria"):
-        if key not in rubric and re.search(rf"(^|\s){key}:\s", handout):
+        if key not in rubric and re.search(rf"(^|\s){key}:\s", str(rubric.get("handout"))):
             yield ("handout",), f'"{key}:" counts as its text: begin that line without blanks'
 
 
-def _packages(
-    rubric: dict[str, Any], scenarios: dict[str, Any], criteria: list[WrittenCriterion]
-) -> Iterator[Fault]:
+def _packages(rubric: WrittenRubric) -> Iterator[Fault]:
     """Each package is named once, none is the course's, and starts and criteria name those that there are."""
-    known = packages_in(rubric)
-    for index, name in as_texts(rubric.get("package")):
+    known = rubric.packages
+    for index, name in as_texts(rubric.data.get("package")):
         if name in known[:index]:
             yield ("package", index), f'"{name}" is there twice'
-    for index, name in as_texts(rubric.get("packages")):
+    for index, name in as_texts(rubric.data.get("packages")):
         if name in known[1:]:
             yield ("packages", index), f'"{name}" is one that students hand in: take it out of one of the two'
-    for criterion in criteria:
+    for criterion in rubric.criteria:
         yield from _of_known((*criterion.place, "package"), criterion.data, known)
-    for scenario, one in scenarios.items():
-        for index, start in as_maps(as_map(one).get("start")):
-            at = ("scenarios", scenario, "start", index, "package")
-            yield from _of_known(at, start, known)
-            if start.get("package") is not None and start.get("program") is not None:
-                yield at, "is not for a program: that names its package itself"
+    for place, start in rubric.starts():
+        at = (*place, "package")
+        yield from _of_known(at, start, known)
+        if start.get("package") is not None and start.get("program") is not None:
+            yield at, "is not for a program: that names its package itself"
 
 
 def _of_known(path: KeyPath, one: dict[str, Any], known: list[str]) -> Iterator[Fault]:
@@ -207,32 +191,32 @@ def _circle(start: str, needs: dict[str, list[str]]) -> list[str]:
     return []
 
 
-def _points(rubric: dict[str, Any], criteria: list[WrittenCriterion]) -> Iterator[Fault]:
-    for criterion in criteria:
+def _points(rubric: WrittenRubric) -> Iterator[Fault]:
+    for criterion in rubric.criteria:
         given = [key for key in KINDS_OF_POINTS if criterion.data.get(key) is not None]
         if not given:
             yield (*criterion.place, "points"), "is missing (or bonus, or penalty)"
         elif len(given) > 1:
             fault = f"give one of points, bonus and penalty, not {' and '.join(given)}"
             yield (*criterion.place, given[1]), fault
-    given_points = [criterion.data.get("points", 0) for criterion in criteria]
+    given_points = [criterion.data.get("points", 0) for criterion in rubric.criteria]
     if not all(is_number(points) for points in given_points):
         return
-    total = _total(rubric, criteria)
+    total = _total(rubric)
     if abs(total - TOTAL_POINTS) > 1e-6:
         yield ("criteria",), f"the points add up to {total:g}, not to {TOTAL_POINTS}"
-    mark = rubric.get("pass_mark")
+    mark = rubric.data.get("pass_mark")
     if is_number(mark) and 0 < mark < 1:
         yield ("pass_mark",), f"is in points, not a share: write {mark * TOTAL_POINTS:g}"
     if isinstance(mark, int | float) and mark > total:
         yield ("pass_mark",), f"{mark:g} is more than all the points, {total:g}"
 
 
-def _total(rubric: dict[str, Any], criteria: list[WrittenCriterion]) -> float:
+def _total(rubric: WrittenRubric) -> float:
     """Return the most points that can be reached: those of a group in place of its criteria's."""
-    worth = {criterion.id: float(criterion.data.get("points", 0)) for criterion in criteria}
+    worth = {criterion.id: float(criterion.data.get("points", 0)) for criterion in rubric.criteria}
     total = 0.0
-    for group in map(as_map, as_map(rubric.get("groups")).values()):
+    for group in map(as_map, as_map(rubric.data.get("groups")).values()):
         found = [worth.pop(name, 0.0) for _, name in as_texts(group.get("criteria"))]
         best, points = group.get("best"), group.get("points")
         counted = sum(found[:best] if isinstance(best, int) else found)
@@ -240,11 +224,11 @@ def _total(rubric: dict[str, Any], criteria: list[WrittenCriterion]) -> float:
     return total + sum(worth.values())
 
 
-def _groups(rubric: dict[str, Any], criteria: list[WrittenCriterion]) -> Iterator[Fault]:
+def _groups(rubric: WrittenRubric) -> Iterator[Fault]:
     """A criterion is in one group at most, and those of which the best count are alike."""
-    known = {criterion.id: criterion.data for criterion in criteria}
+    known = {criterion.id: criterion.data for criterion in rubric.criteria}
     other: dict[str, str] = {}
-    for name, group in as_map(rubric.get("groups")).items():
+    for name, group in as_map(rubric.data.get("groups")).items():
         members = as_texts(as_map(group).get("criteria"))
         for index, member in members:
             at = ("groups", name, "criteria", index)
@@ -256,7 +240,7 @@ def _groups(rubric: dict[str, Any], criteria: list[WrittenCriterion]) -> Iterato
                 yield at, f'"{member}" has no points that a group could count'
             other.setdefault(member, name)
         found = [known[m] for _, m in members if m in known]
-        yield from _best(("groups", name), as_map(group), found, rubric.get("digits", 1))
+        yield from _best(("groups", name), as_map(group), found, rubric.data.get("digits", 1))
 
 
 def _best(
@@ -276,9 +260,9 @@ def _best(
             yield (*path, "criteria"), f"need the same {key}, for only the best of them count"
 
 
-def _gates(rubric: dict[str, Any], criteria: list[WrittenCriterion]) -> Iterator[Fault]:
-    known = {criterion.id: criterion.data for criterion in criteria}
-    for index, gate in as_maps(rubric.get("gates")):
+def _gates(rubric: WrittenRubric) -> Iterator[Fault]:
+    known = {criterion.id: criterion.data for criterion in rubric.criteria}
+    for index, gate in as_maps(rubric.data.get("gates")):
         name, at_most = gate.get("criterion"), gate.get("at_most")
         if isinstance(name, str) and name not in known:
             near = did_you_mean(name, known)
@@ -294,9 +278,9 @@ def _gates(rubric: dict[str, Any], criteria: list[WrittenCriterion]) -> Iterator
             yield ("gates", index, "at_most"), fault
 
 
-def _late(rubric: dict[str, Any]) -> Iterator[Fault]:
-    late = as_map(rubric.get("late"))
-    if late and rubric.get("deadline") is None:
+def _late(rubric: WrittenRubric) -> Iterator[Fault]:
+    late = as_map(rubric.data.get("late"))
+    if late and rubric.data.get("deadline") is None:
         yield ("late",), "needs a deadline: deadline: 2026-11-20T23:59:00+01:00"
     for key in ("lost", "cap"):
         if is_number(late.get(key)) and 0 < late[key] < 1:
@@ -354,8 +338,7 @@ def _starts(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
         at = (*path, "start", index)
         given = [key for key in KINDS_OF_START if start.get(key) not in (None, False)]
         if len(given) != 1:
-            found = f"{' and '.join(given)} are there" if given else "none is there"
-            yield at, f"give one of {', '.join(KINDS_OF_START[:-1])} and {KINDS_OF_START[-1]}: {found}"
+            yield at, give_one(KINDS_OF_START, given)
         name, after = start.get("name"), start.get("after")
         if isinstance(after, str) and after not in names:
             yield (*at, "after"), f'there is no earlier start "{after}"{did_you_mean(after, names)}'

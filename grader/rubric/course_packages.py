@@ -9,11 +9,10 @@ import os
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 from grader.model.package import MANIFEST
 from grader.rubric.scenario import FOLDER_PATTERN, ROSTEST_ENDING
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, criteria_of, packages_in
+from grader.rubric.yaml_lines import Fault, WrittenRubric, as_texts
 from grader.wording import did_you_mean
 
 FILES_MAX = 500
@@ -47,11 +46,11 @@ def folder_files(folder: Path, name: str) -> dict[str, bytes]:
     return found
 
 
-def read_packages(rubric: dict[str, Any], folder: Path) -> tuple[dict[str, bytes], list[Fault]]:
+def read_packages(rubric: WrittenRubric, folder: Path) -> tuple[dict[str, bytes], list[Fault]]:
     """Return the files of all packages that the rubric names, and what is wrong with them or with what starts them."""
     read: dict[str, bytes] = {}
     faults: list[Fault] = []
-    for index, name in as_texts(rubric.get("packages")):
+    for index, name in as_texts(rubric.data.get("packages")):
         if not re.fullmatch(r"[A-Za-z]\w*", name):
             continue  # said elsewhere
         try:
@@ -70,9 +69,9 @@ def read_packages(rubric: dict[str, Any], folder: Path) -> tuple[dict[str, bytes
     return read, faults
 
 
-def read_starter(rubric: dict[str, Any], folder: Path) -> tuple[dict[str, bytes], list[Fault]]:
+def read_starter(rubric: WrittenRubric, folder: Path) -> tuple[dict[str, bytes], list[Fault]]:
     """Return the files that the course hands out, and what is wrong with their folder."""
-    name = rubric.get("starter")
+    name = rubric.data.get("starter")
     if not isinstance(name, str) or not re.fullmatch(FOLDER_PATTERN, name):
         return {}, []  # said elsewhere
     try:
@@ -84,46 +83,38 @@ def read_starter(rubric: dict[str, Any], folder: Path) -> tuple[dict[str, bytes]
     return files, []
 
 
-def _programs(rubric: dict[str, Any], package: str, files: Mapping[str, bytes]) -> Iterator[Fault]:
+def _programs(rubric: WrittenRubric, package: str, files: Mapping[str, bytes]) -> Iterator[Fault]:
     """Yield a fault for each program that the package does not have."""
     known = {path.rpartition("/")[2] for path, data in files.items() if data.startswith(SCRIPT)}
     known |= {path.rpartition("/")[2] for path in files if path.endswith((*LAUNCH_ENDINGS, ROSTEST_ENDING))}
     cmake = files.get(f"{package}/CMakeLists.txt", b"").decode(errors="replace")
     known |= set(_TARGET.findall(cmake))
-    for path, program in _started_programs(rubric):
-        owner, _, name = program.partition("/")
+    for at, start in rubric.starts():
+        path, (owner, _, name) = (*at, "program"), str(start.get("program")).partition("/")
         if owner == package and name not in known and "${" not in cmake:
             yield path, f'{package} has no program or launch file "{name}"{did_you_mean(name, known)}'
         elif owner == package and name.endswith(ROSTEST_ENDING):
             data = next(data for file, data in files.items() if file.endswith(f"/{name}"))
             text = _COMMENT.sub("", data.decode(errors="replace"))
             yield from ((path, fault) for fault in _started_by_test(rubric, name, text))
-            yield from _unknown_tests(rubric, path, name, text)
+            yield from _unknown_tests(rubric, at[1], start.get("name"), name, text)
 
 
-def _started_by_test(rubric: dict[str, Any], name: str, text: str) -> Iterator[str]:
+def _started_by_test(rubric: WrittenRubric, name: str, text: str) -> Iterator[str]:
     """Yield why a `.test` file cannot be used: where tests are, nothing of a student's runs."""
-    for own in packages_in(rubric):
+    for own in rubric.packages:
         if re.search(rf"""pkg\s*=\s*["']{own}["']|\$\(find {own}\)""", text):
             yield f"{name} starts something of {own}: take it out, and start it in the scenario, before the tests"
 
 
-def _unknown_tests(rubric: dict[str, Any], start: KeyPath, name: str, text: str) -> Iterator[Fault]:
-    """Yield the tests that criteria ask for and that the `.test` file, started at that place, does not have."""
+def _unknown_tests(
+    rubric: WrittenRubric, run: object, process: object, name: str, text: str
+) -> Iterator[Fault]:
+    """Yield the tests that criteria ask for and that the `.test` file, started as that process, does not have."""
     tests = set(_TEST_NAME.findall(text))
-    scenario = as_map(as_map(rubric.get("scenarios")).get(str(start[1])))
-    process = next((one.get("name") for n, one in as_maps(scenario.get("start")) if n == start[3]), None)
-    for criterion in criteria_of(rubric):
+    for criterion in rubric.criteria:
         test = criterion.given.get("test")
-        is_asked = criterion.run == start[1] and criterion.given.get("process") == process
+        is_asked = criterion.run == run and criterion.given.get("process") == process
         if is_asked and isinstance(test, str) and test and "$(" not in text and test not in tests:
             fault = f'{name} has no <test test-name="{test}">{did_you_mean(test, tests)}'
             yield (*criterion.at, "test"), fault
-
-
-def _started_programs(rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
-    for name, scenario in as_map(rubric.get("scenarios")).items():
-        for index, start in as_maps(as_map(scenario).get("start")):
-            program = start.get("program")
-            if isinstance(program, str):
-                yield ("scenarios", name, "start", index, "program"), program

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import PurePosixPath
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeGuard
 
 from grader.checks.support.fields import is_number
 from grader.evidence.decode import full_definition
@@ -18,7 +18,7 @@ from grader.evidence.definitions import Field, Types, parse
 from grader.evidence.message_values import ANGLES, CLOCKS, FORMS, NOW, MessageType
 from grader.model.message_definitions import DIVIDER, PARTS
 from grader.ros_env import ros_packages
-from grader.rubric.yaml_lines import KeyPath, as_map, as_maps, criteria_of, packages_in
+from grader.rubric.yaml_lines import KeyPath, WrittenRubric, as_map, services_in
 from grader.wording import closest, did_you_mean, is_one_edit, join_words
 
 ALMOST = 0.87
@@ -40,6 +40,11 @@ def slip_of(name: str, there: Iterable[str]) -> str:
 def instead_of(name: str, there: Iterable[str]) -> str:
     names = list(there)
     return did_you_mean(name, names) or (f": there is {join_words(names)}" if names else "")
+
+
+def is_form(value: Any) -> TypeGuard[dict[str, Any]]:  # noqa: ANN401 - any part of a message
+    """Return whether a value is made for each message, as `{from: 0, to: 1}` is."""
+    return isinstance(value, dict) and bool(value) and {*FORMS, ANGLES}.issuperset(value)
 
 
 class Misfit(ValueError):
@@ -114,12 +119,7 @@ class Shape(NamedTuple):
     def compare(self, field: Field, value: object, done: str) -> None:
         """Raise Misfit where the field can never have the value."""
         fields = {one.name for one in self.types.get(field.type, ())}
-        if (
-            isinstance(value, Mapping)
-            and value
-            and {*FORMS, ANGLES}.issuperset(value)
-            and fields.isdisjoint(value)
-        ):
+        if is_form(value) and fields.isdisjoint(value):
             return  # a value that changes: what is sent is looked at elsewhere
         if field.array:
             self._compare_items(field, value, done)
@@ -186,7 +186,7 @@ def limits_of(kind: str) -> tuple[int, int] | None:
 class Definitions:
     """The definitions that are known before a run."""
 
-    def __init__(self, rubric: dict[str, Any], files: Mapping[str, bytes]) -> None:
+    def __init__(self, rubric: WrittenRubric, files: Mapping[str, bytes]) -> None:
         paths = [PurePosixPath(path) for path in files if PurePosixPath(path).suffix in PARTS]
         self.of_course = {f"{path.parts[0]}/{path.stem}" for path in paths}
         self._own: dict[tuple[str, str], OwnText] = {
@@ -243,22 +243,22 @@ class Definitions:
         return own.text if own else None
 
 
-def own_texts(rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str, str, OwnText]]:
+def own_texts(rubric: WrittenRubric) -> Iterator[tuple[KeyPath, str, str, OwnText]]:
     """Yield each definition of a type that the rubric has: where, its type, the ending of its file."""
-    for criterion in criteria_of(rubric):
+    for criterion in rubric.criteria:
         given = criterion.given
         if criterion.check == "topic-type" and isinstance(given.get("definition"), str):
             path: KeyPath = (*criterion.at, "definition")
             yield path, str(given.get("type")), ".msg", OwnText(given["definition"], whole=True)
         if criterion.check == "definition":
             file = PurePosixPath(str(given.get("file")))
-            package = criterion.data.get("package") or next(iter(packages_in(rubric)), "")
+            package = criterion.data.get("package") or next(iter(rubric.packages), "")
             text = given.get("text")
             own = OwnText(text, whole=True) if isinstance(text, str) and text else _of_fields(file, given)
             if file.suffix in PARTS:
                 path = (*criterion.at, "text" if own.whole else "fields")
                 yield path, f"{package}/{file.stem}", file.suffix, own
-    for name, scenario in as_map(rubric.get("scenarios")).items():
+    for name, scenario in rubric.scenarios.items():
         for at, _, one in services_in(as_map(scenario)):
             if isinstance(one.get("definition"), str):
                 path = ("scenarios", name, *at, "definition")
@@ -271,14 +271,3 @@ def _of_fields(file: PurePosixPath, given: dict[str, Any]) -> OwnText:
         part, _, bare = str(name).rpartition(".")
         lines.get(part, []).append(f"{kind} {bare}")
     return OwnText("\n---\n".join("\n".join(part) for part in lines.values()), whole=False)
-
-
-def services_in(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, str, dict[str, Any]]]:
-    """Yield the services that a scenario calls or offers, where it says so, and the key of what it fills in."""
-    for key, part in (("calls", "request"), ("serves", "response")):
-        yield from (
-            ((key, n), part, one) for n, one in as_maps(scenario.get(key)) if one.get("action") is None
-        )
-    for index, step in as_maps(scenario.get("steps")):
-        if "call" in step:
-            yield ("steps", index, "call"), "request", as_map(step["call"])

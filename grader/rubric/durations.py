@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -13,20 +12,13 @@ from grader.checks.rate import RateParams
 from grader.checks.reacts import Condition
 from grader.checks.support.fields import Reading, is_number
 from grader.rubric.scenario import ROSTEST_ENDING, Action, Probe, Scenario, Step, Until
-from grader.rubric.step_faults import ROWS_PER_MESSAGE, given_steps
-from grader.rubric.yaml_lines import Fault, KeyPath, WrittenCriterion, as_map, as_maps
-from grader.wording import plural, significant
+from grader.rubric.yaml_lines import Fault, KeyPath, WrittenCriterion, as_list, as_map, as_maps, given_steps
+from grader.wording import significant
 
 FASTEST_HZ = 100
 """No lab asks for rows of a table, or feedback, more often than this."""
-ROWS_HZ, ROWS_LONGER_S = 30, 5.0
-"""So many rows a second a node may write that hears few messages, and so much longer than these last."""
 SUBSCRIBE_S, ANSWER_S = 6.0, 10.0
 """How long a run waits for a subscriber of one more topic, and for the answer of a service."""
-SEEN = ("messages", "connected", "heard", "nodes", "opened")
-"""Conditions of `until` that hold soon after the grader's last message, or not at all."""
-
-
 LASTING = ("window_s", "alive_s")
 """Conditions of `until` that hold after a time, once the last step is done."""
 
@@ -83,23 +75,21 @@ def steps_s(scenario: dict[str, Any]) -> float | None:
     return sum(step.lasts_s for step in steps if step is not None)
 
 
-def _probed(scenario: dict[str, Any]) -> tuple[int, float]:
-    """Return how many messages the probes are, and how many seconds they take."""
-    count, lasting_s = 0, 0.0
+def _probed_s(scenario: dict[str, Any]) -> float:
+    """Return how many seconds the probes take."""
+    lasting_s = 0.0
     for _, probe in as_maps(scenario.get("probes")):
         made = [probe.get(key, 0) for key in ("text", "integers")]
-        listed = [probe.get(key) for key in ("among", "values")]
-        among, values = (len(one) if isinstance(one, list) else 0 for one in listed)
+        among, values = (len(as_list(probe.get(key))) for key in ("among", "values"))
         times, rate_hz = (probe.get(key, Probe.model_fields[key].default) for key in ("times", "rate_hz"))
         if all(map(is_number, (*made, times, rate_hz))) and rate_hz > 0:
-            number = sum(made) + among + values * times
-            count, lasting_s = count + number, lasting_s + number / rate_hz
-    return count, lasting_s
+            lasting_s += (sum(made) + among + values * times) / rate_hz
+    return lasting_s
 
 
-def longest_s(scenario: dict[str, Any]) -> float | None:
-    """Return how long a run lasts at most once its last process is started, in the time of its clock; None where
-    that is not known."""
+def longest_s(scenario: dict[str, Any], played_s: float | None = None) -> float | None:
+    """Return how long a run lasts at most once its last process is started, in the time of its clock, if its recording
+    lasts so long; None where that is not known."""
     first_s, limit_s = _until(scenario, "first_message_s"), _until(scenario, "limit_s")
     warp = scenario.get("warp", Scenario.model_fields["warp"].default)
     warp = warp if scenario.get("clock") == "warped" else 1
@@ -112,11 +102,11 @@ def longest_s(scenario: dict[str, Any]) -> float | None:
     if "until" in scenario or "steps" not in scenario:
         waits_s += limit_s
     if "probes" in scenario:
-        waits_s += first_s + SUBSCRIBE_S + _probed(scenario)[1]
+        waits_s += first_s + SUBSCRIBE_S + _probed_s(scenario)
     for step in steps:
-        if step.play:
+        if step.play and played_s is None:
             return None
-        total_s += step.lasts_s
+        total_s += played_s or 0.0 if step.play else step.lasts_s
         waits_s += _waits_s(step, first_s)
     return float(total_s + warp * waits_s)
 
@@ -129,23 +119,33 @@ def _waits_s(step: Step, first_s: float) -> float:
         return 2 * first_s + (step.action.cancel_after_s or 0) + step.action.limit_s
     if step.wait is not None and step.wait.seconds is None:
         return first_s if step.wait.limit_s is None else step.wait.limit_s
-    return first_s if step.published is not None else 0.0
+    return first_s if step.published is not None or step.play is not None else 0.0
+
+
+def until_next_s(topic: object, number: object, scenario: dict[str, Any]) -> float | None:
+    """Return how long after a message of that number on a topic the steps send the next one there; None where nobody
+    knows, or it is the last."""
+    steps = as_maps(scenario.get("steps"))
+    sent = [n for n, step in steps if as_map(step.get("publish")).get("topic") == topic]
+    if not isinstance(number, int) or not 0 < number < len(sent):
+        return None
+    passed = scenario["steps"][sent[number - 1] : sent[number]]
+    is_known = all({"publish", "wait"} & as_map(step).keys() for step in passed)
+    return steps_s({"steps": passed}) if is_known else None
 
 
 def often_faults(about: WrittenCriterion) -> Iterator[Fault]:
     """Yield rows and feedback of which more are asked for than come in that time, however fast a node is."""
-    rows = about.given.get("rows_at_least")
-    if about.check == "file-left" and is_number(rows):
-        yield from (((*about.at, "rows_at_least"), fault) for fault in _too_many_rows(rows, about))
-    goal = _goal(about)
-    asked = about.given.get("feedback")
-    if goal is not None and is_number(asked):
-        lasting_s = min(
-            (s for s in (_limit_s(goal), goal.get("cancel_after_s")) if is_number(s)), default=math.inf
-        )
-        if asked > FASTEST_HZ * lasting_s:
-            fault = f"{asked} in {lasting_s:g} s, which the step gives the goal, are more than {FASTEST_HZ} a second"
-            yield (*about.at, "feedback"), fault
+    goal, most_s = _goal(about), longest_s(about.scenario) if about.check == "file-left" else None
+    times = {
+        "rows_at_least": (most_s, f"{about.run} lasts at most"),
+        "feedback": (None if goal is None else _limit_s(goal), "the step gives the goal"),
+    }
+    for key, (lasting_s, words) in times.items():
+        asked = about.given.get(key)
+        if is_number(asked) and is_number(lasting_s) and asked > FASTEST_HZ * lasting_s:
+            fault = f"{asked} in {lasting_s:g} s, which {words}, are more than {FASTEST_HZ} a second"
+            yield (*about.at, key), fault
 
 
 def _goal(about: WrittenCriterion) -> dict[str, Any] | None:
@@ -160,37 +160,6 @@ def _goal(about: WrittenCriterion) -> dict[str, Any] | None:
 
 def _limit_s(goal: dict[str, Any]) -> Any:  # noqa: ANN401 - whatever the rubric has
     return goal.get("limit_s", Action.model_fields["limit_s"].default)
-
-
-def _too_many_rows(rows: float, about: WrittenCriterion) -> Iterator[str]:
-    most_s = longest_s(about.scenario)
-    if most_s and rows > FASTEST_HZ * most_s:
-        yield f"{rows} rows in {most_s:g} s, which {about.run} lasts at most, are more than {FASTEST_HZ} a second"
-        return
-    fed = _fed(about.scenario)
-    if fed is None:
-        return
-    count, lasting_s = fed
-    if count and rows > ROWS_PER_MESSAGE * count + ROWS_HZ * (lasting_s + ROWS_LONGER_S):
-        sends = f"{about.run} sends the node {plural(count, 'message')}, and is over {lasting_s + ROWS_LONGER_S:.2g} s"
-        yield f"{sends} after its start: so many rows never come"
-
-
-def _fed(scenario: dict[str, Any]) -> tuple[int, float] | None:
-    """Return how many messages the grader sends to a script that runs alone, and how long such a run lasts where the
-    script answers each at once; None where something else may send it more, or set the run's length."""
-    until, starts = as_map(scenario.get("until")), as_maps(scenario.get("start"))
-    steps, alone = _read_steps(scenario), len(starts) == 1 and "script" in starts[0][1]
-    lasting = [until.get(key, 0) for key in ("window_s", "alive_s", "quiet_s")]
-    ends = "steps" in scenario or any(until.get(key) for key in (*SEEN, "window_s", "alive_s", "quiet_s"))
-    if not alone or not ends or steps is None or steps_s({"steps": scenario.get("steps")}) is None:
-        return None
-    if "calls" in scenario or until.get("ended") or not all(map(is_number, lasting)):
-        return None
-    sent = [step.published for step in steps if step.published is not None]
-    count, probed_s = _probed(scenario)
-    count += sum(one.total or 0 for one in sent)
-    return count, probed_s + sum(step.lasts_s for step in steps) + max(lasting)
 
 
 def within_faults(about: WrittenCriterion) -> Iterator[Fault]:

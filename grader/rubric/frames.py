@@ -9,15 +9,15 @@ from typing import Any
 
 from grader.checks.support.fields import is_number
 from grader.rubric.message_fields import POSES, types_of
-from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
     WrittenCriterion,
+    WrittenRubric,
     as_map,
     as_maps,
-    criteria_of,
-    own_packages,
+    given_steps,
+    parts_of,
 )
 
 FRAME_KEYS = frozenset({"frame_id", "child_frame_id"})
@@ -32,39 +32,30 @@ ROUNDED = 0.004
 """So much is 1.57 off from a quarter turn in radians, and 6.28 from a whole one."""
 
 
-def frame_faults(rubric: dict[str, Any]) -> Iterator[Fault]:
+def frame_faults(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield frames that begin with a slash, angles in the other unit, and parents that are children elsewhere."""
-    criteria = criteria_of(rubric)
-    for name, scenario in as_map(rubric.get("scenarios")).items():
-        for index, step in as_maps(as_map(scenario).get("steps")):
-            for key in ("parent", "child"):
-                place = ("scenarios", name, "steps", index, "transform", key)
-                yield from _slash(place, as_map(step.get("transform")).get(key))
+    for at, step in rubric.steps():
+        for key in ("parent", "child"):
+            yield from _slash((*at, "transform", key), as_map(step.get("transform")).get(key))
+    for name, scenario in rubric.scenarios.items():
         yield from _in_values(("scenarios", name), scenario)
-        yield from _two_parents(("scenarios", name), as_map(scenario))
-        others = [one for one in criteria if one.run != name and not any(_swapped_frames(one, criteria))]
-        yield from _swapped_steps(("scenarios", name), as_map(scenario), _asked_frames(others))
-        yield from _sent_turns(("scenarios", name), as_map(scenario), rubric)
-    for criterion in criteria:
+        yield from _two_parents(("scenarios", name), scenario)
+        yield from _sent_turns(("scenarios", name), scenario, rubric)
+    for criterion in rubric.criteria:
         yield from _in_values(criterion.at, criterion.given)
         for at, asked in criterion.conditions:
             yield from _judged_turns(at, asked, rubric, criterion.scenario)
         if criterion.check == "transform":
-            yield from _swapped_frames(criterion, criteria)
+            yield from _swapped_frames(criterion, rubric.criteria)
             yield from _no_pose(criterion, rubric)
 
 
-def _sent_turns(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+def _sent_turns(path: KeyPath, scenario: dict[str, Any], rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield angles in degrees in what a scenario sends, in messages and requests of ROS's own types."""
-    sent = [((*path, "probes", n), one) for n, one in as_maps(scenario.get("probes"))]
-    sent += [((*path, "calls", n), one) for n, one in as_maps(scenario.get("calls"))]
-    for index, step in as_maps(scenario.get("steps")):
-        sent += [((*path, "steps", index, key), as_map(step.get(key))) for key in ("publish", "call")]
-    for at, one in sent:
-        if str(one.get("type")).partition("/")[0] in own_packages(rubric):
-            continue
-        for key in ("value", "values", "request"):
-            yield from _turns((*at, key), one.get(key))
+    for at, kind, one in parts_of(scenario):
+        is_own = str(one.get("type")).partition("/")[0] in rubric.own_packages
+        for key in ("value", "values", "request") if kind in {"publish", "call"} and not is_own else ():
+            yield from _turns((*path, *at, key), one.get(key))
 
 
 def _turns(path: KeyPath, value: object, *, is_angle: bool = False) -> Iterator[Fault]:
@@ -80,14 +71,14 @@ def _turns(path: KeyPath, value: object, *, is_angle: bool = False) -> Iterator[
 
 
 def _judged_turns(
-    path: KeyPath, given: dict[str, Any], rubric: dict[str, Any], scenario: dict[str, Any]
+    path: KeyPath, given: dict[str, Any], rubric: WrittenRubric, scenario: dict[str, Any]
 ) -> Iterator[Fault]:
     """Yield angles in degrees that a criterion asks for in a field of one of ROS's own types."""
     field, topic = str(given.get("field")), str(given.get("topic"))
     if not field.startswith("angular.") and field.partition(".")[0].partition("[")[0] not in IN_RADIANS:
         return
     types = [str(kind) for kind in types_of(topic, rubric, scenario)]
-    own = [kind for kind in types if kind.partition("/")[0] in own_packages(rubric)]
+    own = [kind for kind in types if kind.partition("/")[0] in rubric.own_packages]
     if not own and (types or field.startswith("angular.")):
         for key in ("value", "values", "min", "max"):
             yield from _turns((*path, key), given.get(key), is_angle=True)
@@ -104,13 +95,13 @@ def _two_parents(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
             yield (*path, "steps", index, "transform", "child"), fault
 
 
-def _no_pose(criterion: WrittenCriterion, rubric: dict[str, Any]) -> Iterator[Fault]:
+def _no_pose(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield a topic of poses that has none, and poses of the grader's that no transform can follow."""
     scenario, topic = criterion.scenario, criterion.given.get("pose_of")
     if not isinstance(topic, str):
         return
     types = {str(kind) for kind in types_of(topic, rubric, scenario)}
-    known = {kind for kind in types if kind.partition("/")[0] not in own_packages(rubric)}
+    known = {kind for kind in types if kind.partition("/")[0] not in rubric.own_packages}
     if known and known.isdisjoint(POSES):
         yield (*criterion.at, "pose_of"), f"{topic} carries {min(known)}, which has no pose"
     for index, step in as_maps(scenario.get("steps")):
@@ -198,7 +189,8 @@ def _swapped_frames(criterion: WrittenCriterion, criteria: list[WrittenCriterion
     if given.get("through") is True:
         return
     sent = [(one.get("parent"), one.get("child")) for one in given_steps(scenario, "transform")]
-    sent += _asked_frames(one for one in criteria if one.place < criterion.place)
+    earlier = [one.given for one in criteria if one.check == "transform" and one.place < criterion.place]
+    sent += [(one.get("parent"), one.get("child")) for one in earlier if one.get("through") is not True]
     equal = [one.given for one in criteria if one.check == "field-equals"]
     of_pose = [one for one in equal if one.get("topic") == given.get("pose_of")]
     named = {str(one.get("field")): one.get("value") for one in of_pose}
@@ -208,25 +200,7 @@ def _swapped_frames(criterion: WrittenCriterion, criteria: list[WrittenCriterion
         if publish.get("topic") == given.get("pose_of"):
             sent.append((as_map(value.get("header")).get("frame_id"), value.get("child_frame_id")))
     if parent and child and (child, parent) in sent:
-        yield (*criterion.at, "parent"), _swapped(parent, child)
-
-
-def _asked_frames(criteria: Iterable[WrittenCriterion]) -> list[tuple[object, object]]:
-    """Return the parents and children for which criteria ask, but for those with other frames between them."""
-    asked = [one.given for one in criteria if one.check == "transform"]
-    return [(one.get("parent"), one.get("child")) for one in asked if one.get("through") is not True]
-
-
-def _swapped_steps(
-    path: KeyPath, scenario: dict[str, Any], asked: list[tuple[object, object]]
-) -> Iterator[Fault]:
-    """Yield transforms of the grader's whose parent is the child for criteria of other runs."""
-    for index, step in as_maps(scenario.get("steps")):
-        given = as_map(step.get("transform"))
-        parent, child = given.get("parent"), given.get("child")
-        if (child, parent) in asked and (parent, child) not in asked:
-            yield (*path, "steps", index, "transform", "parent"), _swapped(parent, child)
-
-
-def _swapped(parent: object, child: object) -> str:
-    return f"{child} is the parent elsewhere in the rubric, and {parent} the child: a frame has one parent"
+        fault = (
+            f"{child} is the parent elsewhere in the rubric, and {parent} the child: a frame has one parent"
+        )
+        yield (*criterion.at, "parent"), fault

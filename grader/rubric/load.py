@@ -26,7 +26,7 @@ from grader.rubric.own_checks import Beside, known_checks, read_instructor, run_
 from grader.rubric.scenario import Scenario
 from grader.rubric.spelling import misspelt_names, names_seen_once
 from grader.rubric.validation_warnings import warnings
-from grader.rubric.yaml_lines import Fault, KeyPath, Source, Value, as_map, read_source
+from grader.rubric.yaml_lines import Fault, KeyPath, Source, Value, WrittenRubric, as_map, read_source
 
 PIN = "#sha256:"
 """Between a rubric's name and the digest that it must have."""
@@ -201,7 +201,8 @@ def read_beside_rubric(rubric: LoadedRubric) -> dict[str, bytes]:
 def warnings_of(loaded: LoadedRubric, name: str) -> list[str]:
     """Return what may be a slip in the rubric of that file, each as `name:line: key.path: why`."""
     source = read_source(loaded.path, name)
-    found = [*names_seen_once(source.data, loaded.path.parent), *warnings(source.data)]
+    rubric = WrittenRubric(source.data)
+    found = [*names_seen_once(rubric, loaded.path.parent), *warnings(rubric)]
     return [source.fault(*one) for one in sorted(found, key=lambda one: source.line(one[0]))]
 
 
@@ -261,7 +262,7 @@ def _faults(source: Source, samples: Sequence[Value], beside: Beside, folder: Pa
     known = {path for path, _ in found}
     found += [
         (path, fault)
-        for path, fault in misspelt_names(source.data, folder)
+        for path, fault in misspelt_names(WrittenRubric(source.data), folder)
         if known.isdisjoint(path[:n] for n in range(1, len(path) + 1))
     ]
     unique: dict[tuple[KeyPath, str], Fault] = {}

@@ -21,7 +21,7 @@ from pydantic import Field, ValidationError
 
 from grader.errors import EvidenceError
 from grader.model.record import Record
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, criteria_of, dotted
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, criteria_of, dotted, give_one
 from grader.wording import did_you_mean, join_words
 
 if TYPE_CHECKING:
@@ -397,8 +397,7 @@ def _faults_of(one: dict[str, Any], above: Mapping[str, MadeUp]) -> Iterator[tup
     """Yield the faults of one declaration, each with its key. `above` are the sound ones above it."""
     given = [key for key in KINDS if one.get(key) not in (None, [])]
     if len(given) != 1:
-        found = f"{' and '.join(given)} are there" if given else "none is there"
-        yield (), f"give one of {', '.join(KINDS[:-1])} and {KINDS[-1]}: {found}"
+        yield (), give_one(KINDS, given)
         return
     (kind,) = given
     if kind != "from":

@@ -23,20 +23,18 @@ from grader.rubric.definitions import (
     no_name,
     no_value,
     own_texts,
-    services_in,
     slip_of,
 )
-from grader.rubric.simulators import set_in, topics_of_programs
+from grader.rubric.simulators import topics_of_programs
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
     WrittenCriterion,
+    WrittenRubric,
     as_map,
     as_maps,
-    criteria_of,
-    own_packages,
-    packages_in,
-    texts_in,
+    parts_of,
+    services_in,
 )
 from grader.wording import did_you_mean, join_words
 
@@ -70,12 +68,12 @@ STAMPED = "is_stamp"
 _NUMBER = re.compile(r"[-+]?\d+(\.\d*)?([eE][-+]?\d+)?")
 
 
-def field_faults(rubric: dict[str, Any], known: Definitions) -> Iterator[Fault]:
+def field_faults(rubric: WrittenRubric, known: Definitions) -> Iterator[Fault]:
     """Yield fields that are not there, and values that they can never have."""
     yield from _no_types(rubric, known)
     yield from _quoted_params(rubric)
     other_kinds = list(_other_kinds(rubric))
-    for criterion in criteria_of(rubric):
+    for criterion in rubric.criteria:
         path, given = criterion.at, criterion.given
         if criterion.check == "stamps":
             given = {"field": "header", STAMPED: True, **given}
@@ -87,13 +85,13 @@ def field_faults(rubric: dict[str, Any], known: Definitions) -> Iterator[Fault]:
             yield from _other_type(criterion, rubric)
         yield from _expected(criterion, known)
         yield from _other_definitions(criterion, known, rubric)
-    for name, scenario in as_map(rubric.get("scenarios")).items():
-        yield from ((("scenarios", name, *at), fault) for at, fault in _sent_fields(as_map(scenario), known))
+    for name, scenario in rubric.scenarios.items():
+        yield from ((("scenarios", name, *at), fault) for at, fault in _sent_fields(scenario, known))
 
 
-def _no_types(rubric: dict[str, Any], known: Definitions) -> Iterator[Fault]:
+def _no_types(rubric: WrittenRubric, known: Definitions) -> Iterator[Fault]:
     """Yield types of fields in the rubric's definitions that there are not, or not without their package."""
-    for path, type_ in texts_in((), rubric):
+    for path, type_ in rubric.texts:
         package, _, name = type_.partition("/")
         there = [one.partition("/")[2] for one in known.of_course if one.startswith(f"{package}/")]
         if path[-1] == "type" and there and name and name not in there:
@@ -105,7 +103,7 @@ def _no_types(rubric: dict[str, Any], known: Definitions) -> Iterator[Fault]:
             kind = one.type.partition("[")[0]
             at = path if own.whole else (*path, one.path)
             if "/" in kind:
-                fault = ros_packages().type_fault(kind, "msg", own_packages(rubric)) if own.whole else ""
+                fault = ros_packages().type_fault(kind, "msg", rubric.own_packages) if own.whole else ""
             elif kind.islower() or kind in {*BUILT_IN, *FULL_NAMES, *messages}:
                 fault = ""  # one that is none is said where it stands
             else:
@@ -124,7 +122,7 @@ def _no_type(kind: str, package: str, messages: set[str]) -> str:
 
 
 def _judged_fields(
-    path: KeyPath, given: dict[str, Any], known: Definitions, rubric: dict[str, Any], scenario: dict[str, Any]
+    path: KeyPath, given: dict[str, Any], known: Definitions, rubric: WrittenRubric, scenario: dict[str, Any]
 ) -> Iterator[Fault]:
     """Yield fields that no type of the topic has, and bounds and values that such a field never has."""
     topic = given.get("topic")
@@ -150,12 +148,12 @@ def _judged_fields(
             yield from _judged_fields((*path, key), inner, known, rubric, scenario)
 
 
-def _no_place(criterion: WrittenCriterion, rubric: dict[str, Any]) -> Iterator[Fault]:
+def _no_place(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield topics of which no place of a robot can be read."""
     given = criterion.given
     types = {str(kind) for kind in types_of(str(given.get("topic")), rubric, criterion.scenario)}
     are_known = types and all(kind.partition("/")[0] in noetic_messages() for kind in types)
-    if are_known and "fields" not in given and types.isdisjoint({*POSES, *VELOCITIES, *own_packages(rubric)}):
+    if are_known and "fields" not in given and types.isdisjoint({*POSES, *VELOCITIES, *rubric.own_packages}):
         fault = f"{given['topic']} carries {min(types)}, which has neither a pose nor a velocity"
         yield (*criterion.at, "topic"), fault
 
@@ -194,13 +192,10 @@ def _or_type(topic: str) -> str:
     return f", or give {topic} its type in a criterion with topic-type" if topic else ""
 
 
-def _quoted_params(rubric: dict[str, Any]) -> Iterator[Fault]:
+def _quoted_params(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield values of parameters in quotes that are meant as a truth value, or that are numbers elsewhere."""
-    given: list[tuple[KeyPath, object, object]] = []
-    for name, scenario in as_map(rubric.get("scenarios")).items():
-        for at, one in set_in(as_map(scenario)):
-            given.append((("scenarios", name, *at, "value"), one.get("name"), one.get("value")))
-    for criterion in criteria_of(rubric):
+    given = [((*at, "value"), one.get("name"), one.get("value")) for at, one in rubric.params()]
+    for criterion in rubric.criteria:
         at, asked = criterion.at, criterion.given
         if criterion.check in {"param-value", "params-set"}:
             given.append(((*at, "value"), asked.get("name"), asked.get("value")))
@@ -215,10 +210,10 @@ def _quoted_params(rubric: dict[str, Any]) -> Iterator[Fault]:
             yield at, f'"{value}" in quotes is text, and elsewhere {param} is a number: write {value}'
 
 
-def _other_kinds(rubric: dict[str, Any]) -> Iterator[Fault]:
+def _other_kinds(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield values of a field that are of another kind than those which earlier criteria ask for in it."""
     first: dict[tuple[str, str], tuple[str, str]] = {}
-    for criterion in criteria_of(rubric):
+    for criterion in rubric.criteria:
         for at, asked in criterion.conditions:
             for key in ("value", "min", "max"):
                 kind, place = _kind_of(asked.get(key)), (str(asked.get("topic")), str(asked.get("field")))
@@ -244,9 +239,9 @@ def _kind_of(value: object) -> str:
     return kinds.get(type(value), "")
 
 
-def _other_type(criterion: WrittenCriterion, rubric: dict[str, Any]) -> Iterator[Fault]:
+def _other_type(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield a type that a topic has not elsewhere in the rubric: two types on one topic are never connected."""
-    topic, kind, own = criterion.given.get("topic"), str(criterion.given.get("type")), own_packages(rubric)
+    topic, kind, own = criterion.given.get("topic"), str(criterion.given.get("type")), rubric.own_packages
     there = {str(one) for one in (kind, *types_of(str(topic), rubric))}
     there = {one for one in there if not ros_packages().type_fault(one, "msg", own)}
     others = sorted(there - {kind})
@@ -289,21 +284,20 @@ def _no_bounds(field: Field, given: dict[str, Any], what: str) -> str:
     return ""
 
 
-def types_of(topic: str, rubric: dict[str, Any], scenario: dict[str, Any] | None = None) -> Iterator[object]:
+def types_of(topic: str, rubric: WrittenRubric, run: dict[str, Any] | None = None) -> Iterator[object]:
     """Yield the types that the rubric gives a topic: those that it sends there or asks for, and that of a program of
-    the scenario."""
+    the run."""
     yield from (SYSTEM_TYPES[topic],) if topic in SYSTEM_TYPES else ()
-    programs = topics_of_programs(scenario or {})
+    programs = topics_of_programs(run or {})
     yield from (programs[topic],) if topic in programs else ()
-    for criterion in criteria_of(rubric):
+    for criterion in rubric.criteria:
         if criterion.check == "topic-type" and criterion.given.get("topic") == topic:
             yield criterion.given.get("type")
         left = as_map(as_map(criterion.given.get("topics")).get(topic)).get("type")
         yield from (left,) if left else ()
-    yield from said_types(topic, str(rubric.get("handout") or ""))
-    for one in as_map(rubric.get("scenarios")).values():
-        sent = [probe for _, probe in as_maps(as_map(one).get("probes"))]
-        sent += [as_map(step.get("publish")) for _, step in as_maps(as_map(one).get("steps"))]
+    yield from said_types(topic, rubric.handout)
+    for scenario in rubric.scenarios.values():
+        sent = [one for _, kind, one in parts_of(scenario) if kind == "publish"]
         yield from (one.get("type") for one in sent if one.get("topic") == topic)
 
 
@@ -338,9 +332,9 @@ def _asked(
     return part, about if part else None, of_action
 
 
-def type_judged(criterion: dict[str, Any], rubric: dict[str, Any]) -> str:
+def type_judged(criterion: dict[str, Any], rubric: WrittenRubric) -> str:
     """Return the type of the service or action whose fields a criterion judges; "" where the rubric says none."""
-    scenario = as_map(as_map(rubric.get("scenarios")).get(str(criterion.get("scenario"))))
+    scenario = as_map(rubric.scenarios.get(str(criterion.get("scenario"))))
     _, about, _ = _asked(str(criterion.get("check")), as_map(criterion.get("with")), scenario)
     return str((about or {}).get("type") or "")
 
@@ -409,13 +403,13 @@ def _sent_fields(scenario: dict[str, Any], known: Definitions) -> Iterator[tuple
 
 
 def _other_definitions(
-    criterion: WrittenCriterion, known: Definitions, rubric: dict[str, Any]
+    criterion: WrittenCriterion, known: Definitions, rubric: WrittenRubric
 ) -> Iterator[Fault]:
     """Yield fields that a criterion asks of a definition, and that another place in the rubric defines otherwise."""
     file = PurePosixPath(str(criterion.given.get("file")))
     if criterion.check != "definition" or file.suffix not in PARTS:
         return
-    package = criterion.data.get("package") or next(iter(packages_in(rubric)), "")
+    package = criterion.data.get("package") or next(iter(rubric.packages), "")
     type_ = f"{package}/{file.stem}"
     own = known.text(type_, file.suffix)
     if own is None or not own.whole or not all(known.shape(type_, part) for part in PARTS[file.suffix]):

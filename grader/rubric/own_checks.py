@@ -25,8 +25,8 @@ from grader.checks.registry import collecting
 from grader.model.verdict import Verdict
 from grader.rubric.course_packages import read_packages, read_starter
 from grader.rubric.pytest_check import BAG, PYTHON, FileFault, faults_of_tests, pytest_check, read_beside
-from grader.rubric.step_faults import bag_faults, played_bags, topics_named
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, criteria_of
+from grader.rubric.step_faults import bag_faults, played_bags
+from grader.rubric.yaml_lines import Fault, KeyPath, WrittenRubric
 from grader.untrusted_text import visible
 
 PYTEST = "pytest"
@@ -50,22 +50,18 @@ class Beside:
 
 def read_instructor(data: object, folder: Path) -> Beside:
     """Read what the rubric names beside it (checks, packages, a starter, tests, bags), and run the file of checks."""
-    rubric = as_map(data)
-    named: list[tuple[KeyPath, object]] = [(("checks",), rubric["checks"])] if "checks" in rubric else []
-    of_tests = [criterion for criterion in criteria_of(rubric) if criterion.check == PYTEST]
+    rubric = WrittenRubric(data)
+    named: list[tuple[KeyPath, object]] = [(("checks",), rubric.data.get("checks"))]
+    of_tests = [criterion for criterion in rubric.criteria if criterion.check == PYTEST]
     named += [((*criterion.at, "file"), criterion.given.get("file")) for criterion in of_tests]
-    named += [
-        (("scenarios", name, "start", index, "tests"), start.get("tests"))
-        for name, scenario in as_map(rubric.get("scenarios")).items()
-        for index, start in as_maps(as_map(scenario).get("start"))
-    ]
+    named += [((*at, "tests"), start.get("tests")) for at, start in rubric.starts()]
     played = played_bags(rubric)
     named += [(path, play.get("bag")) for path, play in played.items()]
     files, faults = read_packages(rubric, folder)
     starter, more = read_starter(rubric, folder)
     files |= starter
     faults += more
-    own = OwnChecks(complete=rubric.get("checks") is None)
+    own = OwnChecks(complete=rubric.data.get("checks") is None)
     for path, name in named:
         if not isinstance(name, str):
             continue
@@ -75,7 +71,7 @@ def read_instructor(data: object, folder: Path) -> Beside:
             faults.append((path, str(fault)))
             continue
         if path in played:
-            faults += bag_faults(path, file, played[path], topics_named(rubric, path[:-1]), rubric)
+            faults += bag_faults(path, file, played[path], rubric)
         if path == ("checks",):
             own = run_checks_file(file, files[name])
     handed_out = frozenset(hashlib.sha256(content).hexdigest() for content in starter.values() if content)

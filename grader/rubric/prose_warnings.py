@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.support.fields import is_number
 from grader.model.message_definitions import BUILT_IN
-from grader.rubric.definitions import services_in
 from grader.rubric.message_fields import said_types
-from grader.rubric.simulators import set_in
-from grader.rubric.spelling import is_slip
-from grader.rubric.started import starts_of
-from grader.rubric.unknown_names import topics_in
+from grader.rubric.spelling import is_slip, topics_in
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
     WrittenCriterion,
+    WrittenRubric,
     as_map,
-    as_maps,
     as_texts,
-    criteria_of,
-    packages_in,
+    parts_of,
+    starts_of,
     texts_in,
 )
 from grader.wording import join_words
@@ -64,26 +59,23 @@ FIELD = re.compile(r"^\s*([a-z]+\d*)\s+(\w+)\s*(?:#.*)?$", re.MULTILINE)
 """A field of a primitive type in a definition."""
 
 
-def prose_warnings(rubric: dict[str, Any]) -> Iterator[Fault]:
+def prose_warnings(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield what may be a slip in one of the two."""
-    scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
-    handout = str(rubric.get("handout") or "")
-    yield from _sent_otherwise(scenarios, handout)
-    criteria = criteria_of(rubric)
-    yield from _unsaid_topic(criteria, rubric, handout)
-    yield from _shifted_factors(as_map(rubric.get("made_up")), handout)
-    for criterion in criteria:
+    handout = rubric.handout
+    yield from _sent_otherwise(rubric)
+    yield from _unsaid_topic(rubric)
+    yield from _shifted_factors(as_map(rubric.data.get("made_up")), handout)
+    for criterion in rubric.criteria:
         at, given, check = criterion.at, criterion.given, criterion.check
         yield from _shifted_numbers(criterion, rubric)
-        yield from _numbers_of_title(criterion, criteria, rubric)
+        yield from _numbers_of_title(criterion, rubric)
         yield from _other_node(criterion, handout)
-        yield from _other_number(criterion)
         yield from _other_types(at, given, handout)
         yield from _misspelt_keys(at, given, rubric)
         if check in {"node-lives", "node-name", "launch-runs"}:
-            yield from _unsaid_node(at, given, rubric, handout)
+            yield from _unsaid_node(at, given, rubric)
         yield from _other_text(at, given, handout, TEXTS.get(check, VALUES))
-        yield from _of_another_topic(criterion, criteria)
+        yield from _of_another_topic(criterion, rubric)
         if check == "logs":
             yield from _other_level(criterion, handout)
         parent, child = (rf"`?{re.escape(str(given.get(key)))}`?(?!\w)" for key in ("parent", "child"))
@@ -92,14 +84,14 @@ def prose_warnings(rubric: dict[str, Any]) -> Iterator[Fault]:
             yield (*at, "parent"), f"the handout has it from {given.get('child')} to {given.get('parent')}"
 
 
-def _shifted_numbers(criterion: WrittenCriterion, rubric: dict[str, Any]) -> Iterator[Fault]:
+def _shifted_numbers(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield numbers that only this line has, and that the criterion's title or the handout has with another sign, or
     ten times as large or as small."""
     about = [str(criterion.data.get(key, "")) for key in ("title", "hint")]
-    prose = " ".join([*about, str(rubric.get("handout", ""))])
+    prose = " ".join([*about, rubric.handout])
     said = {float(number) for number in PLAIN_NUMBER.findall(prose)}
     said_hz = _rates(prose)
-    there = [number for at, number in numbers_in((), rubric) if not _is_setting(at)]
+    there = [number for at, number in numbers_in((), rubric.data) if not _is_setting(at)]
     own = {number for _, number in numbers_in((), criterion.given)}
     for key in EXPECTED:
         asked = criterion.given.get(key)
@@ -129,15 +121,17 @@ def _shifted_factors(made_up: dict[str, Any], handout: str) -> Iterator[Fault]:
                 yield ("made_up", name, *at), f"{number:g} is not what the handout has: {meant:g}"
 
 
-def _unsaid_topic(criteria: list[WrittenCriterion], rubric: dict[str, Any], handout: str) -> Iterator[Fault]:
+def _unsaid_topic(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield the first topic or service of a criterion that the handout does not name, where the handout has others in
     backticks that nothing else in the rubric names."""
-    said = re.findall(r"(?<=`)\w+(?=`)|(?<=/)\w+", handout)
-    named = {text for key, part in rubric.items() if key != "handout" for _, text in texts_in((), part)}
+    said = re.findall(r"(?<=`)\w+(?=`)|(?<=/)\w+", rubric.handout)
+    named = {text for key, part in rubric.data.items() if key != "handout" for _, text in texts_in((), part)}
     used = {word for text in named for word in re.findall(r"(?<![\w.])/[\w/]*\w", text)}
     used |= {f"/{text}" for text in named}  # a node's
-    others = [name for name in dict.fromkeys(re.findall(r"`(/[\w/]*\w)`", handout)) if name not in used]
-    for criterion in criteria if others else ():
+    others = [
+        name for name in dict.fromkeys(re.findall(r"`(/[\w/]*\w)`", rubric.handout)) if name not in used
+    ]
+    for criterion in rubric.criteria if others else ():
         for key in ("topic", "service"):
             name = criterion.given.get(key)
             if isinstance(name, str) and name.rpartition("/")[2] not in said:
@@ -182,34 +176,32 @@ def _other_node(criterion: WrittenCriterion, handout: str) -> Iterator[Fault]:
         yield (*criterion.at, "names", 0), fault
 
 
-def _unsaid_node(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any], handout: str) -> Iterator[Fault]:
+def _unsaid_node(at: KeyPath, given: dict[str, Any], rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield names that the handout gives to the package or to a file alone, and not to a node as it does to others."""
+    handout, starts = rubric.handout, [start for _, start in rubric.starts()]
     nodes = {
         name for said in re.findall(r"\bnodes? `[^.;:(]*", handout) for name in re.findall(r"`/?(\w+)`", said)
     }
-    runs = [as_map(one) for one in as_map(rubric.get("scenarios")).values()]
-    scripts = [str(start.get("script")) for scenario in runs for start in starts_of(scenario)]
-    files = " ".join([*packages_in(rubric), *scripts, *re.findall(r"[\w/]+\.(?:py|cpp)\b", handout)])
+    scripts = [str(start.get("script")) for start in starts]
+    files = " ".join([*rubric.packages, *scripts, *re.findall(r"[\w/]+\.(?:py|cpp)\b", handout)])
     for number, name in as_texts(given.get("names")):
         if nodes and name.strip("/") not in nodes and re.search(rf"\b{re.escape(name.strip('/'))}\b", files):
-            others = nodes - set(packages_in(rubric)) | {*re.findall(r"\bnode `/?(\w+)`", handout)}
+            others = nodes - set(rubric.packages) | {*re.findall(r"\bnode `/?(\w+)`", handout)}
             fault = f"is no node of the handout, which has {join_words(sorted(others))}"
             yield (*at, "names", number), fault
     for name, package in as_map(given.get("nodes")).items():
         last = str(name).rpartition("/")[2]
-        is_started = any(
-            PurePosixPath(str(s.get("program"))).stem == last for one in runs for s in starts_of(one)
-        )
-        if package in packages_in(rubric) and nodes and last not in nodes and not is_started:
+        is_started = any(PurePosixPath(str(start.get("program"))).stem == last for start in starts)
+        if package in rubric.packages and nodes and last not in nodes and not is_started:
             others = {*re.findall(r"\bnode `/?(\w+)`", handout)} or nodes
             yield (*at, "nodes", name), f"is no node of the handout, which has {join_words(sorted(others))}"
 
 
-def _of_another_topic(criterion: WrittenCriterion, criteria: list[WrittenCriterion]) -> Iterator[Fault]:
+def _of_another_topic(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield a topic that the title does not name, where it names another one of the rubric."""
     own = {*topics_in(criterion.given)}
     named = {*re.findall(r"(?<![\w/])/[\w/]*\w", str(criterion.data.get("title")))}
-    others = {topic for one in criteria for topic in topics_in(one.given)}
+    others = {topic for one in rubric.criteria for topic in topics_in(one.given)}
     if isinstance(criterion.given.get("topic"), str) and named and named <= others and not named & own:
         yield (*criterion.at, "topic"), f"is not what the title has: {join_words(sorted(named))}"
 
@@ -224,44 +216,24 @@ def _other_level(criterion: WrittenCriterion, handout: str) -> Iterator[Fault]:
         yield (*criterion.at, "level"), f"is {level}, and the rubric's text has {said.pop()}"
 
 
-def _sent_otherwise(scenarios: Mapping[str, dict[str, Any]], handout: str) -> Iterator[Fault]:
+def _sent_otherwise(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield types that the handout says otherwise of the topic on which the grader sends, and lines to type that it has
     in another case."""
-    quoted = {*re.findall(r"`([^`]+)`", handout)}
-    for name, scenario in scenarios.items():
-        sent: list[tuple[KeyPath, dict[str, Any]]] = [
-            (("probes", n, "type"), probe) for n, probe in as_maps(scenario.get("probes"))
-        ]
-        for at, _, one in services_in(scenario):
-            yield from _other_fields(("scenarios", name, *at, "definition"), one.get("definition"), handout)
-        for n, step in as_maps(scenario.get("steps")):
-            sent.append((("steps", n, "publish", "type"), as_map(step.get("publish"))))
-            line = as_map(step.get("type")).get("line")
-            other = next((one for one in sorted(quoted) if one.lower() == str(line).lower()), "")
+    handout = rubric.handout
+    quoted = sorted({*re.findall(r"`([^`]+)`", handout)})
+    for name, scenario in rubric.scenarios.items():
+        for at, kind, one in parts_of(scenario):
+            path: KeyPath = ("scenarios", name, *at)
+            line = str(one.get("line")) if kind == "type" else ""
+            other = next((text for text in quoted if text.lower() == line.lower()), "")
             if other and line not in quoted:
-                yield ("scenarios", name, "steps", n, "type", "line"), f"the handout has `{other}`"
-        for at, one in sent:
-            said = set(said_types(str(one.get("topic")), handout))
+                yield (*path, "line"), f"the handout has `{other}`"
+            if kind in {"call", "serve"}:
+                yield from _other_fields((*path, "definition"), one.get("definition"), handout)
+            said = set(said_types(str(one.get("topic")), handout)) if kind == "publish" else set()
             if said and str(one.get("type")) not in said:
                 fault = f"the handout says that {one['topic']} carries {join_words(sorted(said))}"
-                yield ("scenarios", name, *at), fault
-
-
-def _other_number(criterion: WrittenCriterion) -> Iterator[Fault]:
-    """Yield a value of a field that is named as a parameter of the run, and that the run sets otherwise."""
-    last, value = re.split(r"[.\[]", str(criterion.given.get("field")))[-1], criterion.given.get("value")
-    if criterion.check != "field-equals" or not is_number(value):
-        return
-    for _, one in set_in(criterion.scenario):
-        param = str(one.get("name"))
-        if param.rpartition("/")[2] != last or not is_number(one.get("value")):
-            continue
-        is_float = isinstance(one["value"], float) and isinstance(value, int)
-        if one["value"] != value or is_float:
-            no_int = ", which is no whole number for ROS" if one["value"] == value else ""
-            fault = f"{criterion.run} sets {param} to {json.dumps(one['value'])}{no_int}"
-            yield (*criterion.at, "value"), fault
-            return
+                yield (*path, "type"), fault
 
 
 def _other_types(at: KeyPath, given: dict[str, Any], handout: str) -> Iterator[Fault]:
@@ -302,12 +274,12 @@ def _plain(kind: object) -> str:
     return str(kind).rpartition("/")[2].lower()
 
 
-def _misspelt_keys(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+def _misspelt_keys(at: KeyPath, given: dict[str, Any], rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield constants and nodes of which a part is one letter off from a word of the handout, and that no other line
     has."""
-    handout = str(rubric.get("handout") or "")
+    handout = rubric.handout
     words = set(re.findall(r"\w+", handout))
-    texts = [text for _, text in texts_in((), rubric)]
+    texts = [text for _, text in rubric.texts]
     for name, value in as_map(given.get("constants")).items():
         said = re.search(rf"\b{re.escape(str(name))}\b[^\w,.-]{{0,5}}(-?\d+)\b", handout)
         if said and is_number(value) and float(said[1]) != value:
@@ -323,25 +295,23 @@ def _misspelt_keys(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -
                     yield (*at, key, name), fault
 
 
-def _numbers_of_title(
-    criterion: WrittenCriterion, criteria: list[WrittenCriterion], rubric: dict[str, Any]
-) -> Iterator[Fault]:
+def _numbers_of_title(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield numbers of a criterion's title that neither the criterion nor a run has, where they have others; and a rate
     that is not the title's, or where that has none, the handout's."""
     given, title = criterion.given, str(criterion.data.get("title"))
     rate_hz, rates = given.get("rate_hz"), _rates(title)
-    of_topic = [one.given for one in criteria if one.given.get("topic") == given.get("topic")]
+    of_topic = [one.given for one in rubric.criteria if one.given.get("topic") == given.get("topic")]
     known = {one.get("rate_hz") for one in of_topic}
     is_told = "cause" not in given and len(known) > 1  # said of the two criteria
     run = criterion.scenario
     is_told = is_told or rate_hz in _numbers_within([run.get("start"), run.get("params")])  # by a parameter
-    sentences = SENTENCE_END.split(str(rubric.get("handout", "")))
+    sentences = SENTENCE_END.split(rubric.handout)
     about = [one for one in sentences if re.search(rf"{re.escape(str(given.get('topic')))}(?!\w)", one)]
     said_hz = _rates(" ".join(about))
-    if not rates and not is_told and "made_up" not in rubric and is_number(rate_hz):
+    if not rates and not is_told and "made_up" not in rubric.data and is_number(rate_hz):
         rates = said_hz
     is_first = given is next((one for one in of_topic if "rate_hz" in one), None)
-    if "made_up" not in rubric and is_first and rate_hz in rates and not said_hz & known:
+    if "made_up" not in rubric.data and is_first and rate_hz in rates and not said_hz & known:
         rates = said_hz or rates  # the title agrees
     if any(is_number(rate_hz) and round(rate_hz / by, 9) in rates for by in SHIFTS):
         return  # said elsewhere
@@ -351,7 +321,7 @@ def _numbers_of_title(
         yield (*criterion.at, "rate_hz"), f"{rate_hz:g} is not what the {where} has: {said}"
         return
     numbers = [float(one) for one in PLAIN_NUMBER.findall(title)]
-    runs = [as_map(one) for one in as_map(rubric.get("scenarios")).values()]
+    runs = list(rubric.scenarios.values())
     there, texts = _numbers_within([given, runs]), " ".join(text for _, text in texts_in((), [given, runs]))
     is_open = "made_up" in texts or not any(key in given for key in EXPECTED) or "launch" in given
     own = {number for _, number in numbers_in((), given)}

@@ -14,7 +14,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache, partial
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -25,7 +25,7 @@ from grader.checks.registry import parts
 from grader.files import temporary_folder
 from grader.model.verdict import Status
 from grader.portable import own_session
-from grader.rubric.yaml_lines import Fault, criteria_of
+from grader.rubric.yaml_lines import Fault, WrittenRubric
 from grader.wording import closest, join_words, plural
 
 HINTS = 4
@@ -68,12 +68,11 @@ class _Test(NamedTuple):
     names: tuple[str, ...]
 
 
-def faults_of_tests(rubric: dict[str, Any], files: Mapping[str, bytes]) -> Iterator[Fault]:
+def faults_of_tests(rubric: WrittenRubric, files: Mapping[str, bytes]) -> Iterator[Fault]:
     """Yield what is wrong with an instructor's test files: they are no Python, they ask for files and functions that
     the handout calls otherwise, or none of their tests is called as a criterion selects."""
-    handout = str(rubric.get("handout") or "")
     broken, read = set[str](), set[str]()
-    for criterion in criteria_of(rubric):
+    for criterion in rubric.criteria:
         file, select = str(criterion.given.get("file")), criterion.given.get("select")
         if criterion.check != "pytest" or file not in files or file in broken:
             continue
@@ -84,7 +83,7 @@ def faults_of_tests(rubric: dict[str, Any], files: Mapping[str, bytes]) -> Itera
             yield (*criterion.at, "file"), f"{file}{line}: {getattr(error, 'msg', error)}"
             broken.add(file)
             continue
-        if file not in read and (fault := _called_otherwise(tree, handout)):
+        if file not in read and (fault := _called_otherwise(tree, rubric.handout)):
             yield (*criterion.at, "file"), f"{file}, {fault}"
         read.add(file)
         tests = _tests_in(tree, files[file])

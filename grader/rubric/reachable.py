@@ -13,15 +13,37 @@ from pydantic import ValidationError
 from grader.checks.reacts import Condition
 from grader.checks.registry import Check
 from grader.checks.support.fields import Reading, is_number
-from grader.evidence.message_values import ANGLES, FORMS
-from grader.rubric.definitions import PATH_PARTS
-from grader.rubric.durations import late_faults, longest_s, often_faults, stretch_faults, within_faults
-from grader.rubric.robot_walls import pair, room_faults, start_faults
+from grader.rubric.definitions import PATH_PARTS, is_form
+from grader.rubric.durations import (
+    late_faults,
+    longest_s,
+    often_faults,
+    stretch_faults,
+    until_next_s,
+    within_faults,
+)
 from grader.rubric.scenario import Scenario, Until
-from grader.rubric.simulators import FIELD_M, PROGRAMS, TRUE_POSE, robot_of
-from grader.rubric.started import starts_of
-from grader.rubric.step_faults import given_steps
-from grader.rubric.yaml_lines import Fault, KeyPath, WrittenCriterion, as_list, as_map, as_maps, criteria_of
+from grader.rubric.simulators import (
+    FIELD_M,
+    PROGRAMS,
+    TRUE_POSE,
+    Spot,
+    pair,
+    robot_of,
+    room_faults,
+    start_faults,
+)
+from grader.rubric.yaml_lines import (
+    Fault,
+    KeyPath,
+    WrittenCriterion,
+    WrittenRubric,
+    as_list,
+    as_map,
+    given_steps,
+    parts_of,
+    starts_of,
+)
 from grader.wording import plural
 
 WRAPS = {"minimum": 0, "maximum": 127, "wraps": 2}
@@ -34,23 +56,21 @@ POSITIONS = ("", "pose", "position", "point", "pose.position", "pose.pose.positi
 """Where in messages `x` and `y` are."""
 
 
-def reach_faults(
-    rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
-) -> Iterator[Fault]:
+def reach_faults(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator[Fault]:
     """Yield what the runs of a rubric's scenarios cannot show."""
-    criteria = criteria_of(rubric)
-    yield from _too_many(criteria, scenarios, checks)
+    criteria = rubric.criteria
+    yield from _too_many(rubric, checks)
     yield from _too_few(criteria)
-    yield from _too_many_nodes(scenarios)
-    yield from late_faults(scenarios)
-    for name, scenario in scenarios.items():
+    yield from _too_many_nodes(rubric)
+    yield from late_faults(rubric.scenarios)
+    for name, scenario in rubric.scenarios.items():
         yield from start_faults(("scenarios", name), scenario)
     for about in criteria:
         others = [one for one in criteria if one is not about and one.run == about.run]
         yield from often_faults(about)
         yield from within_faults(about)
         yield from stretch_faults(about)
-        yield from room_faults(about)
+        yield from room_faults(about, longest_s(about.scenario))
         yield from _never_sent(about, others)
         if about.check in {"ends-at", "path", "stays-within"}:
             yield from _too_far(about, others)
@@ -59,18 +79,16 @@ def reach_faults(
     yield from _other_ends(criteria)
 
 
-def _too_many(
-    criteria: Sequence[WrittenCriterion], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
-) -> Iterator[Fault]:
+def _too_many(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator[Fault]:
     """Yield counts of messages that cannot come before the run's limit, at the rate that a criterion asks for."""
     rates: dict[str, float] = {}
-    for criterion in criteria:
+    for criterion in rubric.criteria:
         given, check = criterion.given, checks.get(criterion.check)
         topic, rate_hz = given.get("topic"), given.get("rate_hz")
         of_rate = check is not None and hasattr(check.params, "rate_bounds")
         if of_rate and isinstance(rate_hz, int | float) and rate_hz > 0:
             rates[str(topic)] = max(rates.get(str(topic), 0), float(rate_hz))
-    for name, scenario in scenarios.items():
+    for name, scenario in rubric.scenarios.items():
         until = as_map(scenario.get("until"))
         limit_s = until.get("limit_s", Until.model_fields["limit_s"].default)
         warp = scenario.get("warp", Scenario.model_fields["warp"].default)
@@ -84,9 +102,9 @@ def _too_many(
                 yield ("scenarios", name, "until", "messages", topic), fault
 
 
-def _too_many_nodes(scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
+def _too_many_nodes(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield counts of nodes that a run's scripts, each of which is one node, never are."""
-    for name, scenario in scenarios.items():
+    for name, scenario in rubric.scenarios.items():
         nodes, starts = as_map(scenario.get("until")).get("nodes"), starts_of(scenario)
         scripts = [start for start in starts if start.get("script") is not None]
         of_scripts = all(start.get("script") or start.get("program") in PROGRAMS for start in starts)
@@ -129,13 +147,11 @@ class TooShort(ValueError):
 
 def _sent_on(topic: str, scenario: dict[str, Any]) -> list[Any] | None:
     """Return all that is sent on a topic; None where something else may be."""
-    probes = [one for _, one in as_maps(scenario.get("probes")) if one.get("topic") == topic]
-    sent = [*probes, *(one for one in given_steps(scenario, "publish") if one.get("topic") == topic)]
-    if "recording" in scenario or "play" in {
-        key for _, step in as_maps(scenario.get("steps")) for key in step
-    }:
+    parts = [one for _, kind, one in parts_of(scenario) if kind == "publish"]
+    sent = [one for one in parts if one.get("topic") == topic]
+    if "recording" in scenario or given_steps(scenario, "play"):
         return None
-    if any(one.get(key) for one in probes for key in ("text", "integers", "among")):
+    if any(one.get(key) for one in sent for key in ("text", "integers", "among")):
         return None
     values = [
         value
@@ -148,14 +164,10 @@ def _sent_on(topic: str, scenario: dict[str, Any]) -> list[Any] | None:
 def _values_at(value: object, parts: Sequence[str]) -> list[Any] | None:
     """Return what a value that is sent has at a path; None where a form makes it another each time. Raises TooShort."""
     part = parts[0] if parts else ""
-    if isinstance(value, dict) and value and {*FORMS, ANGLES}.issuperset(value):
-        if (
-            part[:1] == "["
-            and part != "[*]"
-            and isinstance(value.get("count"), int)
-            and int(part[1:-1]) >= value["count"]
-        ):
-            raise TooShort(value["count"])
+    if is_form(value):
+        count, is_item = value.get("count"), part[:1] == "[" and part != "[*]"
+        if is_item and isinstance(count, int) and int(part[1:-1]) >= count:
+            raise TooShort(count)
         return None
     if not parts:
         return [value]
@@ -225,7 +237,7 @@ def _condition(asked: dict[str, Any]) -> Condition | None:
         return None
 
 
-def _spot(value: object) -> tuple[float, float] | None:
+def _spot(value: object) -> Spot | None:
     return (
         (value[0], value[1])
         if isinstance(value, list | tuple) and len(value) >= 2 and all(map(is_number, value))
@@ -233,9 +245,9 @@ def _spot(value: object) -> tuple[float, float] | None:
     )
 
 
-def _asked_spots(topic: object, scenario: dict[str, Any]) -> list[tuple[float, float] | None]:
+def _asked_spots(topic: object, scenario: dict[str, Any]) -> list[Spot | None]:
     """Return the places for which the messages on a topic ask, in their order; None for one without a place."""
-    spots: list[tuple[float, float] | None] = []
+    spots: list[Spot | None] = []
     for one in given_steps(scenario, "publish"):
         if one.get("topic") != topic:
             continue
@@ -245,7 +257,7 @@ def _asked_spots(topic: object, scenario: dict[str, Any]) -> list[tuple[float, f
     return spots
 
 
-def _place_in(value: object) -> tuple[float, float] | None:
+def _place_in(value: object) -> Spot | None:
     for where in POSITIONS:
         inside = as_map(value)
         for key in where.split(".") if where else ():
@@ -258,7 +270,7 @@ def _place_in(value: object) -> tuple[float, float] | None:
 class _Robot(NamedTuple):
     """Where a robot starts, how fast it is, and how far its field reaches, where that is known."""
 
-    start: tuple[float, float] | None
+    start: Spot | None
     fastest_m_s: float | None = None
     field_m: float | None = None
 
@@ -306,7 +318,7 @@ def _too_far(about: WrittenCriterion, others: Sequence[WrittenCriterion]) -> Ite
                 yield (*about.at, "points", number), _outside(x + shift[0], y + shift[1])
 
 
-def _is_inside(spot: tuple[float, float], field_m: float, tolerance_m: float) -> bool:
+def _is_inside(spot: Spot, field_m: float, tolerance_m: float) -> bool:
     return all(-tolerance_m <= one <= field_m + tolerance_m for one in spot)
 
 
@@ -323,7 +335,7 @@ def _goal_faults(
         return
     at = (*about.at, "goal")
     asked = _asked_spots(given.get("asked_on"), about.scenario)
-    start = robot.start
+    start = robot.start if number == 1 or "asked_on" not in given else None
     if isinstance(number, int) and 0 < number <= len(asked):
         start = asked[number - 2] if number > 1 else start
         meant = asked[number - 1]
@@ -339,50 +351,38 @@ def _goal_faults(
     away_m = math.dist(start, goal) - 2 * tolerance_m if start else 0
     if away_m > farthest_m:
         yield at, f"it cannot come so far: {limit}"
-    else:
-        yield from _too_soon(about, robot, away_m, f"{away_m:.3g} m from {pair(start or goal)}")
-    for one in others if not given.get("relative") else ():
-        kept = one.given
-        corners = [_spot(corner) for corner in as_list(kept.get("box"))]
-        same = one.check == "stays-within" and kept.get("topic") == given.get("topic")
-        known = len(corners) == 2 and None not in corners and not kept.get("relative")
-        if same and known and not _is_between(goal, corners, tolerance_m):
+    elif start and robot.fastest_m_s:
+        yield from _too_soon(about, robot.fastest_m_s, away_m, f"{away_m:.3g} m from {pair(start)}")
+    for one in others:
+        kept, corners = one.given, [_spot(corner) for corner in as_list(one.given.get("box"))]
+        is_kept = one.check == "stays-within" and kept.get("topic") == given.get("topic")
+        is_always = kept.get("share", 1) == 1 and not kept.get("from_s") and not kept.get("relative")
+        if is_kept and is_always and len(corners) == 2 and not _is_between(goal, corners, tolerance_m):
             yield at, f"is outside of the box that {one.id} keeps it in"
 
 
-def _too_soon(about: WrittenCriterion, robot: _Robot, away_m: float, way: str) -> Iterator[Fault]:
+def _too_soon(about: WrittenCriterion, fastest_m_s: float, away_m: float, way: str) -> Iterator[Fault]:
     """Yield a goal that the robot cannot come to before the next one is asked for, or within the time."""
-    within_s, fastest, until_s = about.given.get("within_s"), robot.fastest_m_s, _until_next_s(about)
-    if not fastest:
-        return
-    needed = f"{way} at {fastest:g} m/s take longer than"
-    if until_s is not None and away_m > fastest * until_s:
-        after = f"the {until_s:g} s until the next message on {about.given['asked_on']}"
+    within_s, topic = about.given.get("within_s"), about.given.get("asked_on")
+    until_s = until_next_s(topic, about.given.get("number", 1), about.scenario)
+    needed = f"{way} at {fastest_m_s:g} m/s take longer than"
+    if until_s is not None and away_m > fastest_m_s * until_s:
+        after = f"the {until_s:g} s until the next message on {topic}"
         yield (*about.at, "goal"), f"{needed} {after} asks for another place"
-    elif is_number(within_s) and away_m > fastest * within_s:
+    elif is_number(within_s) and away_m > fastest_m_s * within_s:
         yield (*about.at, "within_s"), f"{needed} {within_s:g} s"
 
 
-def _until_next_s(about: WrittenCriterion) -> float | None:
-    """Return how long after the message that a goal is asked with the next one is sent; None where that is not known,
-    or it is the last."""
-    passed_s, number = None, 0
-    for _, step in as_maps(about.scenario.get("steps")):
-        is_goal = "publish" in step and as_map(step["publish"]).get("topic") == about.given.get("asked_on")
-        if is_goal and passed_s is not None:
-            return passed_s
-        seconds = as_map(step.get("wait")).get("seconds")
-        number += is_goal
-        if is_goal and number == about.given.get("number", 1):
-            passed_s = 0.0
-        elif passed_s is not None:
-            if not is_number(seconds):
-                return None
-            passed_s += seconds
-    return None
+def _is_between(spot: Spot, corners: Sequence[Spot | None], tolerance_m: float) -> bool:
+    """Return whether a spot is in a box, or so near to it; it is where a corner is none."""
+    one, other = (corner or spot for corner in corners)
+    return all(
+        min(a, b) - tolerance_m <= at <= max(a, b) + tolerance_m
+        for at, a, b in zip(spot, one, other, strict=True)
+    )
 
 
-def _not_last(about: WrittenCriterion, others: Sequence[WrittenCriterion], goal: tuple[float, float]) -> str:
+def _not_last(about: WrittenCriterion, others: Sequence[WrittenCriterion], goal: Spot) -> str:
     """Return that the robot is judged at the end of the run, and its last goal is another; empty where it may be this
     one."""
     topics = {one.given.get("asked_on") for one in others if one.check == about.check}
@@ -395,13 +395,6 @@ def _not_last(about: WrittenCriterion, others: Sequence[WrittenCriterion], goal:
     topic, spot = next(iter(last.items()))
     asks = f"the last message on {topic} asks for {pair(spot or goal)}"
     return f"without asked_on this is where the run ends, and {asks}: write asked_on: {topic}, with number"
-
-
-def _is_between(spot: tuple[float, float], corners: Sequence[Any], tolerance_m: float) -> bool:
-    return all(
-        min(a, b) - tolerance_m <= one <= max(a, b) + tolerance_m
-        for one, a, b in zip(spot, *corners, strict=True)
-    )
 
 
 def _other_effects(criteria: Sequence[WrittenCriterion]) -> Iterator[Fault]:
@@ -493,7 +486,7 @@ class _Demand(NamedTuple):
         return type(self.word) is type(other.word) and self.word != other.word
 
 
-def _may_be_equal(one: tuple[Any, ...], other: tuple[Any, ...], tolerances: tuple[float, float]) -> bool:
+def _may_be_equal(one: tuple[Any, ...], other: tuple[Any, ...], tolerances: Spot) -> bool:
     """Return whether a list may be both of these; of what is no number, nothing is said."""
     if len(one) != len(other):
         return False

@@ -14,26 +14,27 @@ from typing import Any
 from grader.checks.registry import Check, Reference
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.ros_env import TypeKind, ros_packages
-from grader.rubric.definitions import Definitions, services_in
+from grader.rubric.definitions import Definitions
 from grader.rubric.durations import longest_s, steps_s
 from grader.rubric.frames import frame_faults
 from grader.rubric.message_fields import field_faults
 from grader.rubric.reachable import reach_faults
 from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Until
 from grader.rubric.simulators import PROGRAMS, asked_faults, only_publisher, parameter_faults
-from grader.rubric.started import argument_faults, started_faults, starts_of
-from grader.rubric.step_faults import given_steps
-from grader.rubric.unknown_names import SURE, topics_in, unknown_names, values_of, with_other_topics
+from grader.rubric.spelling import SURE, topics_in, unknown_names, values_of, with_other_topics
+from grader.rubric.started import argument_faults, started_faults
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
     WrittenCriterion,
+    WrittenRubric,
     as_map,
     as_maps,
     as_texts,
-    criteria_of,
-    packages_in,
-    texts_in,
+    given_steps,
+    parts_of,
+    services_in,
+    starts_of,
 )
 from grader.wording import closest, did_you_mean, join_words
 
@@ -41,6 +42,7 @@ LAUNCH_ENDINGS = (".launch", ".xml")
 OTHER_CONDITIONS = ("messages", "connected", "heard", "nodes", "opened", "ended", "quiet_s")
 """Conditions of `until` that say nothing of how long a run lasts."""
 TYPES: Mapping[str, TypeKind] = {"message": "msg", "field": "msg", "service": "srv", "action": "action"}
+TYPE_OF_PART = {"publish": "message", "call": "service", "serve": "service", "action": "action"}
 ASKED_OF_STUDENT = frozenset({
     "rate", "field-equals", "field-bounds", "topic-type", "latched", "message", "stamps", "counter-start",
     "counter-step", "counter-wrap", "reacts",
@@ -51,15 +53,13 @@ NEVER_OF_GRADER = frozenset({"latched", "counter-start", "counter-step", "counte
 """Checks of the student's messages that have no `of`."""
 ENDINGS = (".py", ".yaml", ".yml", ".sh", ".bash", ".exe", ".pl", ".lua", ".js", ".rb")
 """Of files that a start may name."""
-OTHER_DISTROS = ("melodic", "kinetic", "indigo", "foxy", "humble", "jazzy")
 
 
 def reference_faults(
-    rubric: dict[str, Any], checks: Mapping[str, Check], files: Mapping[str, bytes]
+    rubric: WrittenRubric, checks: Mapping[str, Check], files: Mapping[str, bytes]
 ) -> Iterator[Fault]:
     """Yield a fault for everything that is named and not there."""
-    scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
-    for name, scenario in scenarios.items():
+    for name, scenario in rubric.scenarios.items():
         yield from _outside_faults(("scenarios", name), scenario, rubric)
         yield from _type_faults(("scenarios", name), scenario, rubric)
         found = (*parameter_faults(scenario), *argument_faults(scenario, rubric))
@@ -70,42 +70,27 @@ def reference_faults(
             yield from _criterion_faults(criterion, check, rubric)
             asked = asked_faults(criterion.given, judged, others | set(topics_in(judged)))
             yield from (((*criterion.at, *at), fault) for at, fault in asked)
-    for index, package in as_texts(as_map(rubric.get("needs")).get("ros")):
-        if package in packages_in(rubric):
+    needs = as_map(rubric.data.get("needs"))
+    for index, package in as_texts(needs.get("ros")):
+        if package in rubric.packages:
             yield ("needs", "ros", index), "is the package that students hand in: no machine has it before"
         elif fault := ros_packages().misspelt(package):
             yield ("needs", "ros", index), fault
-    for index, package in as_texts(as_map(rubric.get("needs")).get("apt")):
-        if fault := _no_debian_package(package):
-            yield ("needs", "apt", index), fault
     yield from field_faults(rubric, Definitions(rubric, files))
     yield from frame_faults(rubric)
-    yield from _unused_faults(rubric, scenarios, checks)
-    yield from started_faults(rubric, scenarios, checks)
-    yield from unknown_names(rubric, scenarios, checks)
-    yield from reach_faults(rubric, scenarios, checks)
-    criteria = criteria_of(rubric)
-    yield from _of_grader(criteria, scenarios)
-    yield from _forgotten_topics(criteria)
-    yield from _same_names(criteria, scenarios)
-    yield from _other_goals_and_types(criteria)
+    yield from _unused_faults(rubric, checks)
+    yield from started_faults(rubric, checks)
+    yield from unknown_names(rubric, checks)
+    yield from reach_faults(rubric, checks)
+    yield from _of_grader(rubric)
+    yield from _forgotten_topics(rubric.criteria)
+    yield from _same_names(rubric)
+    yield from _other_goals_and_types(rubric.criteria)
 
 
-def _no_debian_package(package: str) -> str:
-    """Return why no machine with ROS Noetic has a Debian package of ROS's; empty where one may."""
-    _, *of_ros = re.split(r"^ros-([a-z]+)-", package)
-    if not of_ros:
-        return ""
-    distro, name = of_ros
-    if distro in OTHER_DISTROS:
-        return f"is of ROS {distro.capitalize()}: write ros-noetic-{name}"
-    fault = ros_packages().misspelt(name.replace("-", "_")) if distro == "noetic" else ""
-    return fault.replace("_", "-")
-
-
-def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield what a scenario asks for that no machine has."""
-    course = {name for _, name in as_texts(rubric.get("packages"))}
+    course = {name for _, name in as_texts(rubric.data.get("packages"))}
     for index, start in as_maps(scenario.get("start")):
         for key in ("script", "launch"):
             owner, slash, _ = str(start.get(key)).partition("/")
@@ -120,7 +105,7 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
         at = (*path, "start", index, "program")
         yield from _of_machine(at, "program", start.get("program"), rubric)
         package, _, file = str(start.get("program")).partition("/")
-        if package in packages_in(rubric):
+        if package in rubric.packages:
             key = "launch" if file.endswith(LAUNCH_ENDINGS) else "script"
             yield at, f"is the student's: with program it would count as the grader's. Write {key}: {file}"
 
@@ -141,20 +126,15 @@ def _in_any_folder(launch: str) -> str:
     return f"write the file's name without its folder: {PurePosixPath(launch).name}"
 
 
-def _type_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+def _type_faults(path: KeyPath, scenario: dict[str, Any], rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield types that no machine has, of what a scenario sends, calls and offers."""
-    for at, _, one in services_in(scenario):
-        yield from _of_machine((*path, *at, "type"), "service", one.get("type"), rubric)
-    for index, step in as_maps(scenario.get("steps")):
-        for key, to in (("publish", "message"), ("action", "action")):
-            kind = as_map(step.get(key)).get("type")
-            yield from _of_machine((*path, "steps", index, key, "type"), to, kind, rubric)
-    for index, served in as_maps(scenario.get("serves")):
-        if served.get("action") is not None:
-            yield from _of_machine((*path, "serves", index, "type"), "action", served.get("type"), rubric)
+    for at, kind, one in parts_of(scenario):
+        to = "action" if one.get("action") is not None else TYPE_OF_PART.get(kind)
+        if to and at[0] != "probes":
+            yield from _of_machine((*path, *at, "type"), to, one.get("type"), rubric)
 
 
-def _file_fault(file: str, rubric: dict[str, Any]) -> str:
+def _file_fault(file: str, rubric: WrittenRubric) -> str:
     """Return why a start's file is none of the student's package; empty where it may be one."""
     path = PurePosixPath(file)
     if file.startswith(("/", "~")) or ".." in path.parts:
@@ -163,28 +143,27 @@ def _file_fault(file: str, rubric: dict[str, Any]) -> str:
         return f"is a source: write the name of the program that add_executable makes of it, {path.stem}"
     if file in PROGRAMS:
         return f"is not one of the student's files: write program: {file}"
-    handout = str(rubric.get("handout"))
-    source = re.search(rf"\b{re.escape(path.stem)}\.(?:cpp|cc|cxx)\b", handout)
-    if path.suffix == ".py" and source and path.name not in handout:
+    source = re.search(rf"\b{re.escape(path.stem)}\.(?:cpp|cc|cxx)\b", rubric.handout)
+    if path.suffix == ".py" and source and path.name not in rubric.handout:
         return f"the handout has {source[0]}: write the name of its program, {path.stem}"
     whole = _with_ending(file, rubric)
     return f"the rubric names {whole} elsewhere: write it with its ending" if whole else ""
 
 
-def _with_ending(file: str, rubric: dict[str, Any]) -> str:
+def _with_ending(file: str, rubric: WrittenRubric) -> str:
     """Return the name of a Python or YAML file that the rubric names with its ending, where this one has none, or one
     that no such file has."""
     path = PurePosixPath(file)
     whole = re.compile(rf"(?<![\w.]){re.escape(path.stem)}\.(?:py|ya?ml)(?!\w)")
-    texts = [text for _, text in texts_in((), rubric)] if path.suffix.strip() not in ENDINGS else []
+    texts = [text for _, text in rubric.texts] if path.suffix.strip() not in ENDINGS else []
     return next((match[0] for text in texts if (match := whole.search(text))), "")
 
 
-def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -> Iterator[Fault]:
+def _of_machine(path: KeyPath, to: str, value: object, rubric: WrittenRubric) -> Iterator[Fault]:
     """A program, or a type of messages or services. The student's own package may have any type."""
     if not isinstance(value, str):
         return
-    own = {*packages_in(rubric), *(PurePosixPath(name).name for _, name in as_texts(rubric.get("packages")))}
+    own = {*rubric.packages, *(PurePosixPath(name).name for _, name in as_texts(rubric.data.get("packages")))}
     fault = ""
     if to == "program" and not re.fullmatch(PROGRAM_PATTERN, value):
         fault = f'name its package too, like turtlesim/turtlesim_node, not "{value}"'
@@ -200,15 +179,15 @@ def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -
         of_node = "nodes" in path  # a launch file's pkg, and none of rosdep's keys
         if not fault and of_node and value not in own:
             fault = ros_packages().package_fault(value)
-    elif to == "package" and value not in packages_in(rubric):
-        fault = f'the lab has no package "{value}"{_instead(value, packages_in(rubric))}'
+    elif to == "package" and value not in rubric.packages:
+        fault = f'the lab has no package "{value}"{_instead(value, rubric.packages)}'
     elif to in TYPES and re.fullmatch(TYPE_PATTERN, value := value.partition("[")[0]):
         fault = ros_packages().type_fault(value, TYPES[to], own)
     if fault:
         yield path, fault
 
 
-def _criterion_faults(criterion: WrittenCriterion, check: Check, rubric: dict[str, Any]) -> Iterator[Fault]:
+def _criterion_faults(criterion: WrittenCriterion, check: Check, rubric: WrittenRubric) -> Iterator[Fault]:
     scenario = criterion.scenario
     for one in check.references(criterion.given):
         at = (*criterion.at, *one.path)
@@ -274,15 +253,15 @@ def _wrong_sender(topic: str, says_of: object, check: Check, scenario: dict[str,
         yield f"the scenario starts no program, and {check.name} judges the messages of one (of: program)"
 
 
-def _of_grader(criteria: list[WrittenCriterion], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
+def _of_grader(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield services and messages of the grader's that are taken for the student's."""
-    for name, scenario in scenarios.items():
+    for name, scenario in rubric.scenarios.items():
         for at, part, one in services_in(scenario):
             if part == "request" and one.get("service") in _served_names(scenario):
                 fault = f"the grader offers {one['service']} itself (serves): a student's node should call it"
                 yield ("scenarios", name, *at, "service"), fault
-    asked = [str(one.given.get("topic")) for one in criteria if one.check in ASKED_OF_STUDENT]
-    for criterion in criteria:
+    asked = [str(one.given.get("topic")) for one in rubric.criteria if one.check in ASKED_OF_STUDENT]
+    for criterion in rubric.criteria:
         path, check, given, scenario = criterion.at, criterion.check, criterion.given, criterion.scenario
         is_place = check in WHERE_IT_IS and given.get("of") is None
         for at, topic in (
@@ -323,14 +302,13 @@ def _forgotten_topics(criteria: list[WrittenCriterion]) -> Iterator[Fault]:
                 yield (*criterion.at, "topics"), f"{other.id} asks for {topic}: add it"
 
 
-def _same_names(criteria: list[WrittenCriterion], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
+def _same_names(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield starts of one script that would give two nodes the same name, of which the second one ends the first."""
-    strict = [c for c in criteria if c.check == "node-lives" and c.given.get("anonymous") == "forbidden"]
-    for name in sorted({criterion.run for criterion in strict}):
+    lives = [criterion for criterion in rubric.criteria if criterion.check == "node-lives"]
+    for name in sorted({one.run for one in lives if one.given.get("anonymous") == "forbidden"}):
         first: dict[str, int] = {}
-        if given_steps(scenarios.get(name, {}), "start"):
-            continue
-        for index, start in as_maps(scenarios.get(name, {}).get("start")):
+        scenario = rubric.scenarios.get(name, {})
+        for index, start in as_maps(scenario.get("start")) if not given_steps(scenario, "start") else ():
             named = any(text.startswith(("__ns:=", "__name:=")) for _, text in as_texts(start.get("args")))
             script = start.get("script")
             if isinstance(script, str) and not named and first.setdefault(script, index) != index:
@@ -405,17 +383,15 @@ def _too_short(one: Reference, check: Check, scenario: dict[str, Any]) -> Iterat
         yield f"{one.value:g} s is more than the scenario lasts: {key}, {lasts_s:g} s"
 
 
-def _unused_faults(
-    rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
-) -> Iterator[Fault]:
+def _unused_faults(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator[Fault]:
     """Yield scenarios that are run for nothing; a check that sees all of them may ask for any."""
     used: set[str] = set()
-    for criterion in criteria_of(rubric):
+    for criterion in rubric.criteria:
         check = checks.get(criterion.check)
         if (check is None and criterion.check != "manual") or (check and "evidence" in check.facts):
             return
         used.add(criterion.run)
-    for name in scenarios:
+    for name in rubric.scenarios:
         if name not in used:
             yield ("scenarios", name), "no criterion judges this scenario: remove it, or name it in one"
 
@@ -457,8 +433,7 @@ def _is_given_up(goal: dict[str, Any], scenario: dict[str, Any]) -> bool:
 
 
 def _sent_by_grader(scenario: dict[str, Any]) -> set[str]:
-    probes = [probe for _, probe in as_maps(scenario.get("probes"))]
-    return {str(one.get("topic")) for one in (*given_steps(scenario, "publish"), *probes)}
+    return {str(one.get("topic")) for _, kind, one in parts_of(scenario) if kind == "publish"}
 
 
 def _sent_topics(scenario: dict[str, Any]) -> set[str]:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 from grader.checks.support.fields import is_number
-from grader.rubric.yaml_lines import KeyPath, as_map, as_maps, as_texts
+from grader.rubric.yaml_lines import Fault, KeyPath, WrittenCriterion, as_map, as_maps, as_texts, set_in
 from grader.wording import closest
 
+Spot = tuple[float, float]
 LIKELY, SURE = 0.7, 0.85
 WHOLE_TURN = 6.3
 """In radians, rounded up."""
@@ -65,6 +68,8 @@ ROBOTS = {
 """What the robots of the robot world are like, where no parameter says otherwise."""
 FIELD_M = 11.09
 """How long the field of turtlesim is on each side."""
+AHEAD_M = 0.3
+"""By so much a laser may be nearer to a wall than the robot's centre."""
 OTHERS_SCAN = {"/base_scan": {"turtlebot3": "/scan"}, "/scan": {"stage": "/base_scan"}}
 """By a topic that one robot of the robot world has, that of the other robot."""
 
@@ -123,14 +128,6 @@ def parameter_faults(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
             yield (*at, "value"), f"{private} is {FORMS[private][0]}"
         elif not node and owner:
             yield (*at, "name"), f"{owner} reads private parameters: write /{owner}/{private}"
-
-
-def set_in(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
-    """Yield the parameters that a scenario sets, and where."""
-    yield from ((("params", n), one) for n, one in as_maps(scenario.get("params")))
-    for index, step in as_maps(scenario.get("steps")):
-        if "set_param" in step:
-            yield ("steps", index, "set_param"), as_map(step["set_param"])
 
 
 def _no_parameter(program: Program, private: str) -> str:
@@ -218,3 +215,100 @@ def _near_topic(topic: str, scenario: dict[str, Any]) -> str:
     robot = str(values.get("robot_world/robot", "turtlebot3"))
     renamed = "robot_world/scan_topic" in values
     return OTHERS_SCAN.get(topic, {}).get(robot, "") if not renamed else ""
+
+
+def start_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
+    """Yield that the robot touches a wall before it has moved, or is in a box."""
+    robot = robot_of(scenario)
+    lines, place, radius_m = _lines(robot), _start(robot), robot.get("radius")
+    if not lines or place is None or not is_number(radius_m):
+        return
+    away_m = min(_distance(place, *ends) for line in lines for ends in pairwise(line))
+    boxes = [line for line in _boxes(robot) if _is_inside(place, line)]
+    given = (at for at, one in set_in(scenario) if str(one.get("name")).endswith("/start"))
+    where = (*path, *next(given, ("start",)))
+    closed = [line for line in _lines(robot) if line[0] == line[-1] and line not in _boxes(robot)]
+    rooms = [line for line in closed if any(_is_inside(box[0], line) for box in _boxes(robot))]
+    if rooms and not any(_is_inside(place, line) for line in rooms):
+        yield where, f"the robot starts at {pair(place)}, outside of the room that the walls make"
+    elif boxes:
+        inside = f"in the box from {pair(boxes[0][0])} to {pair(boxes[0][2])}"
+        yield where, f"the robot starts at {pair(place)}, {inside}"
+    elif away_m < radius_m:
+        touches = f"{away_m:.2g} m from a wall, which it touches before it has moved"
+        yield where, f"the robot starts at {pair(place)}, {touches}"
+
+
+def room_faults(about: WrittenCriterion, most_s: float | None) -> Iterator[Fault]:
+    """Yield distances from walls that the robot does not have at its start, and walls and goals to which it cannot come
+    in a run of so many seconds."""
+    robot, given, scenario = robot_of(about.scenario), about.given, about.scenario
+    lines, place, radius_m = _lines(robot), _start(robot), robot.get("radius")
+    if not lines or place is None or not is_number(radius_m) or any(start_faults((), scenario)):
+        return
+    away_m = min(_distance(place, *ends) for line in lines for ends in pairwise(line))
+    if about.check == "stays-within" and given.get("topic") == TRUE_POSE:
+        is_always = not given.get("walls") and not given.get("from_s") and given.get("share", 1) == 1
+        for key, sign in (("min_m", 1), ("max_m", -1)):
+            if is_always and is_number(given.get(key)) and sign * away_m < sign * given[key]:
+                yield (*about.at, key), f"the robot starts {away_m:.2g} m from the nearest wall"
+    cause, fastest = as_map(given.get("cause")), robot.get("max_linear")
+    is_range = cause.get("topic") in OTHERS_SCAN and str(cause.get("field")).startswith("ranges[")
+    way_m = fastest * most_s if most_s is not None and is_number(fastest) else math.inf
+    most_m = cause.get("max") if about.check == "reacts" and is_range else None
+    if is_number(most_m) and away_m - way_m - AHEAD_M > most_m:
+        far = f"{away_m:.3g} m away, and {most_s:g} s at {fastest:g} m/s are {way_m:.3g} m"
+        yield (*about.at, "cause", "max"), f"the nearest wall is {far}: the cause never comes"
+    goal, tolerance_m = given.get("goal"), given.get("tolerance_m")
+    is_place = about.check == "ends-at" and given.get("topic") == TRUE_POSE and not given.get("relative")
+    if is_place and isinstance(goal, list) and _are_numbers(goal, 2) and is_number(tolerance_m):
+        spot = (goal[0], goal[1])
+        for line in lines if math.dist(place, spot) - 2 * tolerance_m <= way_m else ():  # said elsewhere
+            is_apart = line[0] == line[-1] and _is_inside(place, line) != _is_inside(spot, line)
+            if is_apart and min(_distance(spot, *ends) for ends in pairwise(line)) > tolerance_m:
+                fault = f"walls are between the start, {pair(place)}, and {pair(spot)}"
+                yield (*about.at, "goal"), fault
+                return
+
+
+def _start(robot: dict[str, Any]) -> Spot | None:
+    """Return where the robot starts; None where that is not known, or a map has walls too."""
+    start = robot.get("start")
+    is_known = isinstance(start, list) and FORMS["start"][1](start) and "map" not in robot
+    return (start[0], start[1]) if isinstance(start, list) and is_known else None
+
+
+def _lines(robot: dict[str, Any]) -> list[list[Spot]]:
+    """Return the walls and the sides of the boxes; none where one of the two is not as it has to be."""
+    walls = robot.get("walls", [])
+    if not FORMS["walls"][1](walls) or not FORMS["boxes"][1](robot.get("boxes", [])):
+        return []
+    return [[(x, y) for x, y in line] for line in walls if line] + _boxes(robot)
+
+
+def _boxes(robot: dict[str, Any]) -> list[list[Spot]]:
+    return [[(a, b), (c, b), (c, d), (a, d), (a, b)] for a, b, c, d in robot.get("boxes", [])]
+
+
+def _distance(spot: Spot, one: Spot, other: Spot) -> float:
+    """Return how far a spot is from the line between two others."""
+    dx, dy = other[0] - one[0], other[1] - one[1]
+    squared = dx * dx + dy * dy
+    along = ((spot[0] - one[0]) * dx + (spot[1] - one[1]) * dy) / squared if squared else 0.0
+    along = min(max(along, 0.0), 1.0)
+    return math.dist(spot, (one[0] + along * dx, one[1] + along * dy))
+
+
+def _is_inside(spot: Spot, line: Sequence[Spot]) -> bool:
+    """Return whether a closed line goes around a spot."""
+    x, y = spot
+    crossed = 0
+    for (x0, y0), (x1, y1) in pairwise(line):
+        if (y0 > y) != (y1 > y) and x < x0 + (y - y0) * (x1 - x0) / (y1 - y0):
+            crossed += 1
+    return crossed % 2 == 1
+
+
+def pair(spot: Spot) -> str:
+    """Return a place as it is written: `(1, 2.5)`."""
+    return f"({spot[0]:g}, {spot[1]:g})"

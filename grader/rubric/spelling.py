@@ -1,18 +1,31 @@
-"""Names in a rubric that one line alone has: those that may be a slip, and those that surely are one."""
+"""Names in a rubric that one line alone has, and topics, types and nodes that nothing else in it knows: those that may
+be a slip, and those that surely are one."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from grader.checks.support.topics import SYSTEM_TOPICS
+from grader.checks.registry import Check
+from grader.checks.support.topics import READ_TOO, SYSTEM_TOPICS
 from grader.installable import noetic_messages
 from grader.rubric.message_fields import type_judged, types_of
 from grader.rubric.simulators import TRUE_POSE
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, criteria_of, own_packages, texts_in
-from grader.wording import is_one_edit
+from grader.rubric.yaml_lines import (
+    Fault,
+    KeyPath,
+    WrittenCriterion,
+    WrittenRubric,
+    as_map,
+    as_maps,
+    as_texts,
+    parts_of,
+    set_in,
+    starts_of,
+)
+from grader.wording import closest, is_one_edit, join_words
 
 ONE_NAME = re.compile(
     r"/[A-Za-z][\w/]*|[\w./-]*\.(?:py|cpp|launch|ya?ml|csv|txt|bag|pgm|urdf|srv|msg|action|xml)"
@@ -41,95 +54,92 @@ FREE_TEXTS = {*FIELDS, "line", "definition", "answers"}
 """Keys of other texts in which a blank may be meant."""
 
 
-def _blank_ends(data: object) -> Iterator[Fault]:
+def _blank_ends(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield names with a blank before or after them, which no name has and nobody sees."""
-    for path, text in texts_in((), data):
+    for path, text in rubric.texts:
         is_free = {*PROSE, *WORDS, *FREE_TEXTS} & {*path} or path[:1] == ("made_up",)
         if text != text.strip() and text.strip() and not is_free and "\n" not in text:
             yield path, f'has a blank before or after it: write "{text.strip()}"'
 
 
-def names_seen_once(data: object, folder: Path) -> Iterator[Fault]:
+def names_seen_once(rubric: WrittenRubric, folder: Path) -> Iterator[Fault]:
     """Yield the names that one line alone has, and no file in the rubric's folder. Such a name may be right, or a slip
     that no other line shows."""
-    for path, text, near in _named_once(data, folder):
+    for path, text, near in _named_once(rubric, folder):
         if not near:
             yield path, f"nothing else in the rubric names {text}: is it spelt as in the handout?"
-    for path, word, near in _misspelt_words(data, code=False):
+    for path, word, near in _misspelt_words(rubric, code=False):
         yield (
             path,
             f'nothing else in the rubric has the word {word}: did you mean "{near}", as in the handout?',
         )
 
 
-def misspelt_names(data: object, folder: Path) -> Iterator[Fault]:
+def misspelt_names(rubric: WrittenRubric, folder: Path) -> Iterator[Fault]:
     """Yield those of them that are one letter off from a name that other lines have, and words of texts that are one
     letter off from one that the handout has in backticks; and names with a blank at an end."""
-    yield from _blank_ends(data)
-    for path, text, near in (*_named_once(data, folder), *_misspelt_words(data, code=True), *_package(data)):
+    yield from _blank_ends(rubric)
+    for path, text, near in (
+        *_named_once(rubric, folder),
+        *_misspelt_words(rubric, code=True),
+        *_package(rubric),
+    ):
         if near:
             fault = f'nothing else in the rubric names {text} (did you mean "{near}"?): '
             yield path, fault + "if it is right, say it in the handout too"
 
 
-def _package(data: object) -> Iterator[tuple[KeyPath, str, str]]:
+def _package(rubric: WrittenRubric) -> Iterator[tuple[KeyPath, str, str]]:
     """Yield the package's name where it is one letter off from the lab's id, or from a word of the handout or title."""
-    rubric = as_map(data)
-    package, prose = rubric.get("package"), f"{rubric.get('handout') or ''} {rubric.get('title')}"
-    known = dict.fromkeys([str(rubric.get("id")).replace("-", "_"), *re.findall(r"\w+", prose)])
-    typed = any(text.startswith(f"{package}/") for path, text in texts_in((), data) if path[-1] == "type")
+    package, prose = rubric.data.get("package"), f"{rubric.handout} {rubric.data.get('title')}"
+    known = dict.fromkeys([str(rubric.data.get("id")).replace("-", "_"), *re.findall(r"\w+", prose)])
+    typed = any(text.startswith(f"{package}/") for path, text in rubric.texts if path[-1] == "type")
     if isinstance(package, str) and not typed and not re.search(rf"\b{re.escape(package)}\b", prose):
         near = next((one for one in known if is_slip(package, one)), "")
         if near and package not in known:
             yield ("package",), package, near
 
 
-def _misspelt_words(data: object, *, code: bool) -> Iterator[tuple[KeyPath, str, str]]:
+def _misspelt_words(rubric: WrittenRubric, *, code: bool) -> Iterator[tuple[KeyPath, str, str]]:
     """Yield each word of a criterion's texts that no other line has, and the handout's word that is meant by it: one in
     backticks, or with `code=False` any other."""
-    texts, handout = list(texts_in((), data)), str(as_map(data).get("handout") or "")
+    handout = rubric.handout
     quoted = set(re.findall(_WORD, " ".join(re.findall(r"`([^`]+)`", handout))))
     known = quoted if code else set(re.findall(_WORD, handout)) - quoted
-    for path, text in texts:
+    for path, text in rubric.texts:
         if path[0] != "criteria" or _key(path) not in WORDS or text == path[-1]:
             continue
         for word in re.findall(rf"(?<![{{\w]){_WORD}(?![\w}}])", text):
             near = next((one for one in sorted(known) if is_slip(word, one)), "")
-            if near and _count(word, word, texts) == 1:
+            if near and _count(word, word, rubric.texts) == 1:
                 yield path, word, near
 
 
-def _named_once(data: object, folder: Path) -> Iterator[tuple[KeyPath, str, str]]:
+def _named_once(rubric: WrittenRubric, folder: Path) -> Iterator[tuple[KeyPath, str, str]]:
     """Yield each name that one line alone has, and the name that is meant by it, "" where none is known."""
-    rubric, texts = as_map(data), list(texts_in((), data))
+    texts, handout = rubric.texts, rubric.handout
     programs = {text.rpartition("/")[2] for path, text in texts if path[-1] == "program"}
     names = [(path, text, last) for path, text in texts if (last := _last_word(path, text, rubric))]
     names = [one for one in names if not PROSE & {*one[0]}]
     actions = {text for path, text in texts if path[-1] == "action"}
-    handout = str(rubric.get("handout"))
     frames = USUAL_FRAMES & {*re.findall(r"\w+", handout)} or USUAL_FRAMES
     poses = {POSES[program] for program in programs & POSES.keys()}
     known_ones = {*SYSTEM_TOPICS, *frames, *poses}
     words = {word for path, text in texts if not PROSE & {*path} for word in re.findall(r"\w+", text)}
+    topics = sorted(other for _, other, _ in names if other.startswith("/"))
     for path, text, last in names:
         if text.rpartition("/")[0] in actions:  # `/dock/cancel`
             continue
         if text in known_ones or (folder / text).is_file() or not programs.isdisjoint(text.split("/")):
             continue
         if _count(last, text, texts) == 1:
-            known = (
-                [other for _, other, _ in names if other.startswith("/")] if text.startswith("/") else words
-            )
-            word = text if text.startswith("/") else last
-            near = next(
-                (one for one in sorted(known) if is_slip(word, one) and _count(one, one, texts) > 1), ""
-            )
-            quoted = [one for one in re.findall(r"`[/~]?(\w+)`", handout) if is_slip(last, one)]
-            yield path, text, near or next(iter(quoted), "")
+            word, known = (text, topics) if text.startswith("/") else (last, sorted(words))
+            alike = [one for one in known if is_slip(word, one) and _count(one, one, texts) > 1]
+            alike += [one for one in re.findall(r"`[/~]?(\w+)`", handout) if is_slip(last, one)]
+            yield path, text, next(iter(alike), "")
         elif re.search(r"[/.]", text) and _count(text, text, texts) == 1:
-            if (whole := _in_namespace(path, text, names)) and not re.search(
-                rf"(?<![\w~]){text}(?!\w)", handout
-            ):
+            whole = _in_namespace(path, text, names)
+            if whole and not re.search(rf"(?<![\w~]){text}(?!\w)", handout):
                 yield path, text, whole
                 continue
             known = [other for _, other, _ in names if _is_slip_in_path(text, other, texts)]
@@ -174,15 +184,12 @@ def _is_slip_in_path(name: str, other: str, texts: list[tuple[KeyPath, str]]) ->
     return name.rpartition("/")[2] == other.rpartition("/")[2] or _count(other, other, texts) > 1
 
 
-def _last_word(path: KeyPath, text: str, rubric: dict[str, Any]) -> str:
+def _last_word(path: KeyPath, text: str, rubric: WrittenRubric) -> str:
     """Return the part of a name by which others would know it; "" for a text that is not a name of the student's."""
     if ONE_NAME.fullmatch(text) or (_key(path) in PLAIN_NAMES and text != path[-1]):
         return PurePosixPath(text).stem
-    if (
-        len(path) == 4
-        and path[-2:] == ("with", "value")
-        and str(_judged(path, rubric).get("field")).endswith("frame_id")
-    ):
+    is_value = len(path) == 4 and path[-2:] == ("with", "value")
+    if is_value and str(_judged(path, rubric).get("field")).endswith("frame_id"):
         return text
     is_field = FIELDS & {*path[2:-1]} and text == path[-1] and not _is_known_field(path, rubric)
     return text.rpartition(".")[2].partition("[")[0] if is_field or _is_own_field(path, rubric) else ""
@@ -193,9 +200,9 @@ def _key(path: KeyPath) -> object:
     return next((part for part in reversed(path) if not isinstance(part, int)), "")
 
 
-def _is_known_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
+def _is_known_field(path: KeyPath, rubric: WrittenRubric) -> bool:
     """Return whether a field is of a type that neither students nor the course write: that is looked up elsewhere."""
-    about: Any = rubric
+    about: Any = rubric.data
     kinds = list[str]()
     for key in path[:-1]:
         about = about[key]
@@ -203,15 +210,15 @@ def _is_known_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
             kinds.append(
                 type_judged(about, rubric) if path[0] == "criteria" else str(about.get("type") or "")
             )
-    return any(kind and kind.partition("/")[0] not in own_packages(rubric) for kind in kinds)
+    return any(kind and kind.partition("/")[0] not in rubric.own_packages for kind in kinds)
 
 
-def _judged(path: KeyPath, rubric: dict[str, Any]) -> dict[str, Any]:
+def _judged(path: KeyPath, rubric: WrittenRubric) -> dict[str, Any]:
     """Return what the criterion at a place asks for."""
-    return next((one.given for one in criteria_of(rubric) if one.place == path[:2]), {})
+    return next((one.given for one in rubric.criteria if one.place == path[:2]), {})
 
 
-def _is_own_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
+def _is_own_field(path: KeyPath, rubric: WrittenRubric) -> bool:
     """Return whether a field of a message type is meant that the student or the course defines, or one that no message
     of ROS's has, on a topic whose type is not said."""
     if len(path) != 4 or path[-2:] != ("with", "field"):
@@ -223,4 +230,168 @@ def _is_own_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
             field for types in noetic_messages().values() for fields in types.values() for field in fields
         }
         return not of_ros.issuperset(re.findall(r"[^\W\d]\w*", str(given.get("field"))))
-    return any(str(kind).partition("/")[0] in own_packages(rubric) for kind in kinds)
+    return any(str(kind).partition("/")[0] in rubric.own_packages for kind in kinds)
+
+
+LIKELY, SURE = 0.6, 0.85
+"""How alike two names have to be: to be suggested, and to be taken for one with a slip."""
+_DIGITS = re.compile(r"\d+")
+_TOPIC = re.compile(r"(?:^|:=)(/[\w/]*\w)")
+
+
+def unknown_names(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator[Fault]:
+    """Yield a fault for each of them."""
+    yield from _unknown_topics(rubric, checks)
+    yield from _unknown_causes(rubric, checks)
+    yield from _misspelt_nodes(rubric)
+    yield from _own_types(rubric)
+    yield from _misspelt_scripts(rubric)
+
+
+def _unknown_topics(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator[Fault]:
+    """Yield topics that a run waits for and that nothing else knows.
+
+    Programs, launch files and checks of the instructor's own may know others: then only a near miss is a fault.
+    """
+    named = {topic for criterion in rubric.criteria for topic in topics_in(criterion.given)}
+    named |= {topic for criterion in rubric.criteria for topic in READ_TOO.get(criterion.check, ())}
+    found = [checks.get(criterion.check) for criterion in rubric.criteria]
+    own = any(check is None or check.source or "evidence" in check.facts for check in found)
+    for name, scenario in rubric.scenarios.items():
+        until = as_map(scenario.get("until"))
+        known = {*named, *SYSTEM_TOPICS}
+        known |= {t for key, part in scenario.items() if key != "until" for t in topics_in(part)}
+        open_ = own or any(start.get("script") is None for start in starts_of(scenario))
+        for at, topic in _waited_for(until):
+            near = _near(topic, named, cutoff=SURE if open_ else LIKELY)
+            if topic.startswith("/") and topic not in known and (near or not open_):
+                meant = f' (did you mean "{near}"?)' if near else ""
+                yield ("scenarios", name, "until", *at), f"no criterion and no probe names {topic}{meant}"
+        steps = [step for _, step in as_maps(scenario.get("steps")) if "wait" not in step]
+        there = {*named, *topics_in(steps)}
+        for at, topic in _waits_in_steps(scenario):
+            near = "" if topic in there else _near(topic, named, cutoff=SURE)
+            if near:
+                yield ("scenarios", name, *at), f'no criterion names {topic} (did you mean "{near}"?)'
+
+
+def _unknown_causes(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator[Fault]:
+    """Yield causes on topics that nothing in the scenario sends on, and that no other criterion names."""
+    for criterion, others in with_other_topics(rubric):
+        check, name, scenario = checks.get(criterion.check), criterion.run, criterion.scenario
+        sent = {*SYSTEM_TOPICS, *topics_in(scenario), *_of_actions(scenario)}
+        open_ = any(start.get("script") is None for start in starts_of(scenario)) or "recording" in scenario
+        for one in check.references(criterion.given) if check else ():
+            at = one.path if isinstance(one.value, str) else (*one.path, "topic")
+            topic = one.value if isinstance(one.value, str) else as_map(one.value).get("topic")
+            if one.to not in {"cause", "heard"} or not isinstance(topic, str) or topic in sent | others:
+                continue
+            near = _near(topic, sent, cutoff=SURE if open_ else LIKELY)
+            if near or not open_:
+                meant = f' (did you mean "{near}"?)' if near else ""
+                fault = f"nothing in {name} sends on {topic}, and no other criterion names it{meant}"
+                yield (*criterion.at, *at), fault
+
+
+def _of_actions(scenario: dict[str, Any]) -> Iterator[str]:
+    """Yield the topics of the actions that the grader offers or asks: `/dock/goal`, `/dock/cancel`, …"""
+    offered = [one.get("action") for _, one in as_maps(scenario.get("serves"))]
+    asked = [as_map(step.get("action")).get("name") for _, step in as_maps(scenario.get("steps"))]
+    for name in filter(None, (*offered, *asked)):
+        yield from (f"{name}/{part}" for part in ("goal", "cancel", "status", "feedback", "result"))
+
+
+def _own_types(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield types of the student's package that are all but one whose file a criterion asks for."""
+    own, told = rubric.packages, {*re.findall(r"\w+", rubric.handout)}
+    defined = {
+        (str(c.data.get("package") or next(iter(own), "")), PurePosixPath(str(c.given.get("file"))).stem)
+        for c in rubric.criteria
+        if c.check == "definition"
+    }
+    names = {stem for _, stem in defined}
+    typed = [(criterion.at, criterion.given) for criterion in rubric.criteria]
+    for scenario, one in rubric.scenarios.items():
+        typed += [(("scenarios", scenario, *at), given) for at, _, given in parts_of(one)]
+    for path, given in typed:
+        kind = given.get("type")
+        package, _, name = kind.partition("/") if isinstance(kind, str) else ("", "", "")
+        # as a word of another case, the handout has it for the name that is meant
+        is_told = name in told and name.lower() not in {one.lower() for one in names}
+        near = "" if package not in own or name in names or is_told else closest(name, names, cutoff=SURE)
+        places = {judged for judged, stem in defined if stem == name}
+        if package in own and places and package not in places:
+            fault = f"a criterion looks for {name} in {join_words(sorted(places))}, and this is {kind}"
+            yield (*path, "type"), f"{fault}: give the criterion package: {package}"
+        if near:
+            fault = f'no criterion asks for {name} (did you mean "{package}/{near}"?)'
+            yield (*path, "type"), f"{fault}: if it is right, say it in the handout too"
+
+
+def _misspelt_scripts(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield scripts that nothing starts, and that are all but one that is started and that no criterion names."""
+    paths = {c.at: c.given.get("path") for c in rubric.criteria if c.check == "executable"}
+    named = {at: PurePosixPath(path).name for at, path in paths.items() if isinstance(path, str)}
+    scripts = values_of([start for _, start in rubric.starts()], "script")
+    started = {PurePosixPath(script).name for script in scripts}
+    for at, name in named.items():
+        near = "" if name in started else _near(name, started - {*named.values()}, cutoff=SURE)
+        if near:
+            yield (*at, "path"), f'no scenario starts {name} (did you mean "{near}"?)'
+
+
+def _misspelt_nodes(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield private parameters of a node whose name is all but one that a criterion asks for."""
+    asked: dict[str, set[str]] = {}
+    for criterion in rubric.criteria:
+        names = as_texts(criterion.given.get("names"))
+        asked.setdefault(criterion.run, set()).update(n.strip("/") for _, n in names)
+    for name, scenario in rubric.scenarios.items():
+        programs = values_of(starts_of(scenario), "program")
+        asked.setdefault(name, set()).update(program.rpartition("/")[2] for program in programs)
+        for at, one in set_in(scenario):
+            node, _, private = str(one.get("name", "")).strip("/").partition("/")
+            nodes = asked.get(name, set())
+            near = _near(node, nodes, cutoff=SURE) if private and node not in nodes else ""
+            if near:
+                fault = f'the node is called {near}, and not {node} (did you mean "/{near}/{private}"?)'
+                yield ("scenarios", name, *at, "name"), fault
+
+
+def _waits_in_steps(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    for index, step in as_maps(scenario.get("steps")):
+        topic = as_map(step.get("wait")).get("topic")
+        if isinstance(topic, str):
+            yield ("steps", index, "wait", "topic"), topic
+
+
+def _waited_for(until: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    for key in ("topics", "connected"):
+        yield from (((key, index), topic) for index, topic in as_texts(until.get(key)))
+    yield from ((("messages", topic), topic) for topic in as_map(until.get("messages")))
+
+
+def with_other_topics(rubric: WrittenRubric) -> Iterator[tuple[WrittenCriterion, set[str]]]:
+    """Yield each criterion, and the topics that the others name."""
+    named = [set(topics_in(criterion.given)) for criterion in rubric.criteria]
+    for place, criterion in enumerate(rubric.criteria):
+        yield criterion, set().union(*named[:place], *named[place + 1 :])
+
+
+def topics_in(value: object) -> Iterator[str]:
+    if isinstance(value, str):
+        yield from _TOPIC.findall(value)
+    elif isinstance(value, Mapping):
+        yield from (topic for key, item in value.items() for topic in (*topics_in(key), *topics_in(item)))
+    elif isinstance(value, list | tuple):
+        yield from (topic for item in value for topic in topics_in(item))
+
+
+def _near(topic: str, named: Iterable[str], *, cutoff: float) -> str:
+    """Return the topic most like it. `/turtle1/pose` and `/turtle2/pose` are two, and not one with a slip."""
+    plain = _DIGITS.sub("", topic)
+    return closest(topic, [name for name in named if _DIGITS.sub("", name) != plain], cutoff=cutoff)
+
+
+def values_of(starts: list[dict[str, Any]], key: str) -> list[str]:
+    return [start[key] for start in starts if isinstance(start.get(key), str)]

@@ -12,18 +12,9 @@ from typing import Any, NamedTuple
 from grader.checks.registry import Check
 from grader.rubric.definitions import slip_of
 from grader.rubric.scenario import ROSTEST_ENDING
-from grader.rubric.simulators import PROGRAMS, asked_topics, set_in
+from grader.rubric.simulators import PROGRAMS, asked_topics
 from grader.rubric.spelling import PROSE, is_slip
-from grader.rubric.yaml_lines import (
-    Fault,
-    KeyPath,
-    as_map,
-    as_maps,
-    as_texts,
-    criteria_of,
-    packages_in,
-    texts_in,
-)
+from grader.rubric.yaml_lines import Fault, KeyPath, WrittenRubric, as_maps, as_texts, starts_of, texts_in
 from grader.wording import did_you_mean, join_words
 
 KINDS_OF_FILES = ("script", "launch", "load")
@@ -33,28 +24,19 @@ NAMED_AS_PACKAGE = frozenset({"manifest", "cmake"})
 """Checks whose `name` is that of the package that they judge."""
 
 
-def started_faults(
-    rubric: dict[str, Any], scenarios: Mapping[str, dict[str, Any]], checks: Mapping[str, Check]
-) -> Iterator[Fault]:
+def started_faults(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator[Fault]:
     """Yield what of that can be seen in the rubric alone."""
-    yield from _nothing_of_students(rubric, scenarios, checks)
-    yield from _tests_without_run(rubric, scenarios)
-    yield from _other_packages(rubric, scenarios)
+    yield from _nothing_of_students(rubric, checks)
+    yield from _tests_without_run(rubric)
+    yield from _other_packages(rubric)
     yield from _without_program(rubric)
 
 
-def starts_of(scenario: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return what a scenario starts."""
-    return [start for _, start in as_maps(scenario.get("start"))]
-
-
-def _nothing_of_students(
-    rubric: dict[str, Any], scenarios: Mapping[str, dict[str, Any]], checks: Mapping[str, Check]
-) -> Iterator[Fault]:
+def _nothing_of_students(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator[Fault]:
     """Yield runs that start the grader's programs only, and by which a criterion judges the student's package."""
     of_runs = {name for name, check in checks.items() if check.needs_run}
-    judged = {criterion.run for criterion in criteria_of(rubric) if criterion.check in of_runs}
-    for name, scenario in scenarios.items():
+    judged = {criterion.run for criterion in rubric.criteria if criterion.check in of_runs}
+    for name, scenario in rubric.scenarios.items():
         starts = starts_of(scenario)
         programs = [str(start["program"]) for start in starts if start.get("program") is not None]
         is_open = any(program.endswith(OPEN_ENDINGS) for program in programs)
@@ -65,33 +47,25 @@ def _nothing_of_students(
             yield ("scenarios", name, "start"), fault
 
 
-def _tests_without_run(rubric: dict[str, Any], scenarios: Mapping[str, dict[str, Any]]) -> Iterator[Fault]:
+def _tests_without_run(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield criteria by tests that a scenario runs and that do not name it."""
-    runs = {
-        str(start["tests"]): name
-        for name, scenario in scenarios.items()
-        for start in starts_of(scenario)
-        if start.get("tests") is not None
-    }
-    for criterion in criteria_of(rubric):
+    runs = {str(one["tests"]): at[1] for at, one in rubric.starts() if one.get("tests") is not None}
+    for criterion in rubric.criteria:
         file = str(criterion.given.get("file"))
         if criterion.check == "pytest" and not criterion.has_run and file in runs:
             yield (*criterion.place, "scenario"), f"is missing: {runs[file]} runs {file}"
 
 
-def _other_packages(rubric: dict[str, Any], scenarios: Mapping[str, dict[str, Any]]) -> Iterator[Fault]:
+def _other_packages(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield files that are of another package elsewhere in the rubric, and names of packages that are not judged."""
-    packages = packages_in(rubric)
+    packages = rubric.packages
     first = packages[0] if packages else ""
     named: list[tuple[KeyPath, str, str, bool]] = []
-    for name, scenario in scenarios.items():
-        for index, start in as_maps(scenario.get("start")):
-            for key in KINDS_OF_FILES:
-                if isinstance(start.get(key), str):
-                    owner, is_given = str(start.get("package") or first), start.get("package") is not None
-                    at: KeyPath = ("scenarios", name, "start", index, key)
-                    named.append((at, _plain(start[key]), owner, is_given))
-    for criterion in criteria_of(rubric):
+    for at, start in rubric.starts():
+        owner, is_given = str(start.get("package") or first), start.get("package") is not None
+        files = [(key, start[key]) for key in KINDS_OF_FILES if isinstance(start.get(key), str)]
+        named += [((*at, key), _plain(file), owner, is_given) for key, file in files]
+    for criterion in rubric.criteria:
         given, package = criterion.given, criterion.data.get("package")
         owner, asked = str(package or first), given.get("name")
         if criterion.check == "executable" and isinstance(given.get("path"), str):
@@ -115,9 +89,9 @@ def _plain(path: str) -> str:
     return PurePosixPath(path).name
 
 
-def _without_program(rubric: dict[str, Any]) -> Iterator[Fault]:
+def _without_program(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield topics of the turtle simulator's and the robot world's that nothing in the run publishes."""
-    for criterion in criteria_of(rubric):
+    for criterion in rubric.criteria:
         starts = starts_of(criterion.scenario)
         programs = [str(start.get("program")) for start in starts if start.get("program") is not None]
         are_others = [one.endswith(OPEN_ENDINGS) or one.partition("/")[0] not in OWNERS for one in programs]
@@ -156,7 +130,7 @@ class Known(NamedTuple):
     """Names with a slash that the handout has."""
 
 
-def argument_faults(scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+def argument_faults(scenario: dict[str, Any], rubric: WrittenRubric) -> Iterator[tuple[KeyPath, str]]:
     """Yield the faults of one scenario's arguments."""
     known: Known | None = None
     for index, start in as_maps(scenario.get("start")):
@@ -168,21 +142,20 @@ def argument_faults(scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterato
                 yield ("start", index, "args", number), fault
 
 
-def argument_warnings(rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+def argument_warnings(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield private parameters that nothing else in the rubric names, and decimal numbers with a comma."""
-    known, handout = _known(rubric), str(rubric.get("handout") or "")
-    named = known.params if re.search(r"~\w", handout) else known.params | known.words
-    for scenario, one in as_map(rubric.get("scenarios")).items():
-        for index, start in as_maps(as_map(one).get("start")):
-            for number, text in as_texts(start.get("args")):
-                name, _, value = text.partition(":=")
-                at = ("scenarios", scenario, "start", index, "args", number)
-                if re.fullmatch(r"-?\d+,\d+", value):
-                    yield at, f"ROS reads {value} as text: a decimal number has a point, no comma"
-                elif start.get("script") and re.match(r"_(?!_)\w+:=", text) and name[1:] not in named:
-                    said = join_words([f"~{one}" for one in sorted(known.params)])
-                    fault = f"nothing else in the rubric names ~{name[1:]}"
-                    yield at, f"{fault}: it has {said}" if said else fault
+    known = _known(rubric)
+    named = known.params if re.search(r"~\w", rubric.handout) else known.params | known.words
+    for place, start in rubric.starts():
+        for number, text in as_texts(start.get("args")):
+            name, _, value = text.partition(":=")
+            at = (*place, "args", number)
+            if re.fullmatch(r"-?\d+,\d+", value):
+                yield at, f"ROS reads {value} as text: a decimal number has a point, no comma"
+            elif start.get("script") and re.match(r"_(?!_)\w+:=", text) and name[1:] not in named:
+                said = join_words([f"~{one}" for one in sorted(known.params)])
+                fault = f"nothing else in the rubric names ~{name[1:]}"
+                yield at, f"{fault}: it has {said}" if said else fault
 
 
 def _blanks(text: str) -> str:
@@ -221,11 +194,8 @@ def _of_launch(text: str, start: dict[str, Any], known: Known) -> str:
 
 def _fault(text: str, start: dict[str, Any], known: Known) -> str:
     name, mark, value = text.partition(":=")
-    if (
-        not mark
-        or start.get("launch") is not None
-        or str(start.get("program")).endswith((".launch", ".test"))
-    ):
+    is_launch = start.get("launch") is not None or str(start.get("program")).endswith((".launch", ".test"))
+    if not mark or is_launch:
         return ""
     if name.startswith("__"):
         return "" if name in SPECIAL else f"ROS has no {name}{did_you_mean(name, SPECIAL)}"
@@ -256,12 +226,8 @@ def _other_way(text: str, start: dict[str, Any], scenario: dict[str, Any], known
             f"what the node names comes before :=, and {old} is what the run asks for: write {value}:={name}"
         )
     spaces = [one.rpartition("/")[0] for one in here if one.endswith(f"/{value}") and one != new]
-    if (
-        not any("ns" in key for key in given)
-        and new not in known.topics
-        and len(spaces) == 1
-        and "/" not in value
-    ):
+    is_placed = any("ns" in key for key in given) or new in known.topics or "/" in value
+    if len(spaces) == 1 and not is_placed:
         return f"this is {new}, and the run asks for {spaces[0]}/{value}: add __ns:={spaces[0].strip('/')}"
     if space and name.startswith("/") and name[1:] in known.words and name not in known.said:
         return f"{name} is not in the namespace {space}: write {name.lstrip('/')}:={value}"
@@ -292,14 +258,13 @@ def _remap(name: str, value: str, start: dict[str, Any], known: Known) -> str:
     return "" if is_known else f"nothing else in the rubric names {name} or {value}"
 
 
-def _known(rubric: dict[str, Any]) -> Known:
-    scenarios = [as_map(one) for one in as_map(rubric.get("scenarios")).values()]
-    params = {str(one.get("name")) for scenario in scenarios for _, one in set_in(scenario)}
-    texts = [(path, text) for path, text in texts_in((), rubric) if "args" not in path]
+def _known(rubric: WrittenRubric) -> Known:
+    params = {str(one.get("name")) for _, one in rubric.params()}
+    texts = [(path, text) for path, text in rubric.texts if "args" not in path]
     topics = {text for path, text in texts if re.fullmatch(r"(/\w+)+", text) and not PROSE & {*path}} - params
     words = {word for path, text in texts if PROSE & {*path} for word in re.findall(r"\w+", text)}
     private = {name for path, text in texts if PROSE & {*path} for name in re.findall(r"~(\w+)", text)}
     params = private | {name.rpartition("/")[2] for name in params}
-    handout = str(rubric.get("handout") or "")
-    quoted, said = re.findall(r"`~?(\w+)`", handout), re.findall(r"(?<!\w)/\w[\w/]*", handout)
+    quoted = re.findall(r"`~?(\w+)`", rubric.handout)
+    said = re.findall(r"(?<!\w)/\w[\w/]*", rubric.handout)
     return Known(*map(frozenset, (topics, params, words, quoted, said)))

@@ -6,7 +6,7 @@ What all belongs to a new kind of step is at the beginning of `scenario.py`.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +18,22 @@ from grader.evidence.message_values import FIRST, OTHER_TEXTS, MessageType, Serv
 from grader.installable import noetic_messages
 from grader.model.message_definitions import NOT_FINITE
 from grader.ros_env import ros_packages
+from grader.rubric.durations import FASTEST_HZ, longest_s
 from grader.rubric.fault_words import model_faults
-from grader.rubric.scenario import STEP_S_MAX, Action, Step, Transform, Until
+from grader.rubric.scenario import STEP_S_MAX, Action, Play, Step, Transform
 from grader.rubric.spelling import is_slip
-from grader.rubric.started import starts_of
-from grader.rubric.yaml_lines import Fault, KeyPath, as_list, as_map, as_maps, as_texts, criteria_of, texts_in
+from grader.rubric.yaml_lines import (
+    Fault,
+    KeyPath,
+    WrittenRubric,
+    as_list,
+    as_map,
+    as_maps,
+    as_texts,
+    give_one,
+    given_steps,
+    starts_of,
+)
 from grader.wording import did_you_mean
 
 KINDS = tuple(Step.model_fields)
@@ -37,39 +48,26 @@ NAMED = {
     "set_param": ("name", "a parameter"),
 }
 """The key of a step that is a name of ROS's."""
-ROWS_PER_MESSAGE, ROWS_PER_S = 3, 100
-"""A node that writes more than this into a table is none of a lab's."""
+ROWS_PER_MESSAGE = 3
+"""A node that writes more rows than this for each message, and `FASTEST_HZ` a second, is none of a lab's."""
 WAITS = ("seconds", "topic", "node")
 MOMENTS = 20
 """At so many messages of a row a value that changes is looked at, the first and the last among them."""
 
 
-def given_steps(scenario: dict[str, Any], kind: str) -> list[dict[str, Any]]:
-    """Return what the scenario's steps of one kind (`publish`) say."""
-    return [as_map(step[kind]) for _, step in as_maps(scenario.get("steps")) if kind in step]
-
-
-def played_bags(rubric: dict[str, Any]) -> dict[KeyPath, dict[str, Any]]:
+def played_bags(rubric: WrittenRubric) -> dict[KeyPath, dict[str, Any]]:
     """Return what steps play, by the place in the rubric where the recording is named."""
-    return {
-        ("scenarios", name, "steps", index, "play", "bag"): as_map(step["play"])
-        for name, scenario in as_map(rubric.get("scenarios")).items()
-        for index, step in as_maps(as_map(scenario).get("steps"))
-        if "play" in step
-    }
+    return {(*at, "play", "bag"): as_map(step["play"]) for at, step in rubric.steps() if "play" in step}
 
 
-def topics_named(rubric: dict[str, Any], but: KeyPath) -> set[str]:
+def _topics_named(rubric: WrittenRubric, but: KeyPath) -> set[str]:
     """Return the names with a slash in a rubric, but for those in one of its parts."""
-    texts = [text for path, text in texts_in((), rubric) if path[: len(but)] != but]
+    texts = [text for path, text in rubric.texts if path[: len(but)] != but]
     return {name for text in texts for name in re.findall(r"(?<![\w.])/[A-Za-z][\w/]*\w", text)}
 
 
-def bag_faults(
-    path: KeyPath, file: Path, play: dict[str, Any], named: Collection[str], rubric: dict[str, Any]
-) -> Iterator[Fault]:
-    """Yield what is wrong with a recording that a step plays. `path` is the place of its name; the rest of the rubric
-    names the topics in `named`."""
+def bag_faults(path: KeyPath, file: Path, play: dict[str, Any], rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield what is wrong with a recording that a step plays. `path` is the place of its name."""
     from grader.evidence.reader import load_run  # noqa: PLC0415 - few rubrics play anything
 
     try:
@@ -77,27 +75,27 @@ def bag_faults(
     except EvidenceError as error:
         yield path, f"cannot be played: {error.message}"
         return
-    topics = {channel.topic for channel in channels}
-    times_ns = [time for channel in channels for time in channel.times_ns]
-    yield from _rows_faults(path, file.name, times_ns, rubric)
+    topics, named = {channel.topic for channel in channels}, _topics_named(rubric, path[:-1])
+    yield from _rows_faults(path, file.name, [time for one in channels for time in one.times_ns], rubric)
     for number, topic in as_texts(play.get("topics")):
         if topic not in topics:
             yield (*path[:-1], "topics", number), f"{file.name} has no {topic}{did_you_mean(topic, topics)}"
-    for topic in sorted(topics - {*named} - SYSTEM_TOPICS):
-        near = next((one for one in sorted({*named} - topics) if is_slip(topic, one)), "")
+    for topic in sorted(topics - named - SYSTEM_TOPICS):
+        near = next((one for one in sorted(named - topics) if is_slip(topic, one)), "")
         if near:
             yield path, f"{file.name} has {topic}, and the rubric names {near}: give the recording that topic"
 
 
-def _rows_faults(path: KeyPath, name: str, times_ns: list[int], rubric: dict[str, Any]) -> Iterator[Fault]:
+def _rows_faults(path: KeyPath, name: str, times_ns: list[int], rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield tables with more rows than can come of so many messages, or in that time."""
     lasts_s = (max(times_ns, default=0) - min(times_ns, default=0)) / 1e9
-    for criterion in criteria_of(rubric):
-        until, rows = as_map(criterion.scenario.get("until")), criterion.given.get("rows_at_least")
-        limit_s = until.get("limit_s", Until.model_fields["limit_s"].default)
-        if criterion.run != path[1] or not is_number(rows) or not is_number(limit_s):
+    for criterion in rubric.criteria:
+        played, rows = given_steps(criterion.scenario, "play"), criterion.given.get("rows_at_least")
+        speed = played[0].get("speed", Play.model_fields["speed"].default) if len(played) == 1 else None
+        if criterion.run != path[1] or not is_number(rows) or not is_number(speed) or speed <= 0:
             continue
-        if rows > ROWS_PER_MESSAGE * len(times_ns) + ROWS_PER_S * (lasts_s + limit_s):
+        most_s = longest_s(criterion.scenario, lasts_s / speed)
+        if most_s is not None and rows > ROWS_PER_MESSAGE * len(times_ns) + FASTEST_HZ * most_s:
             fault = f"{name} has {len(times_ns)} messages in {lasts_s:.3g} s: so many rows never come"
             yield (*criterion.at, "rows_at_least"), fault
 
@@ -110,7 +108,7 @@ def step_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
         at = (*path, "steps", index)
         given = [kind for kind in KINDS if step.get(kind) is not None]
         if len(given) != 1:
-            yield at, f"give one of {_one_of(KINDS)}: {_found_text(given)}"
+            yield at, give_one(KINDS, given)
         for kind in given:
             yield from _faults_of((*at, kind), kind, as_map(step[kind]), types)
     lasting_s = sum(_seconds(step) for _, step in as_maps(scenario.get("steps")))
@@ -169,14 +167,6 @@ def _cancelled_late(at: KeyPath, given: dict[str, Any]) -> Iterator[Fault]:
     if numbers and after_s >= limit_s:
         fault = f"{after_s:g} s is not before limit_s, {limit_s:g} s, after which the run goes on: nothing is cancelled"
         yield (*at, "cancel_after_s"), fault
-
-
-def _one_of(names: tuple[str, ...]) -> str:
-    return f"{', '.join(names[:-1])} and {names[-1]}"
-
-
-def _found_text(given: list[str]) -> str:
-    return f"{' and '.join(given)} are there" if given else "none is there"
 
 
 def _seconds(step: dict[str, Any]) -> float:
@@ -321,7 +311,7 @@ def _after_the_last(
 def _wait(at: KeyPath, wait: dict[str, Any]) -> Iterator[Fault]:
     given = [key for key in WAITS if wait.get(key) is not None]
     if len(given) != 1:
-        yield at, f"give one of {_one_of(WAITS)}: {_found_text(given)}"
+        yield at, give_one(WAITS, given)
     for key in ("messages", "new"):
         if key in wait and "topic" not in given:
             yield (*at, key), "is for a topic"
@@ -376,8 +366,7 @@ def served_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
 def _answers(at: KeyPath, served: dict[str, Any]) -> Iterator[Fault]:
     given = [key for key in ANSWERS if served.get(key) or served.get(key) == {}]
     if len(given) != 1:
-        found = f"{' and '.join(given)} are there" if given else "none is there"
-        yield at, f"give one of answer, answers and fails: {found}"
+        yield at, give_one(ANSWERS, given)
 
 
 def of_type(at: KeyPath, served: dict[str, Any]) -> Iterator[Fault]:

@@ -12,125 +12,107 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.support.fields import is_number
-from grader.rubric.definitions import services_in
-from grader.rubric.demand_warnings import Criteria, Scenarios, demand_warnings
-from grader.rubric.message_fields import POSES, VELOCITIES
-from grader.rubric.prose_warnings import SHIFTS, numbers_in, prose_warnings
-from grader.rubric.simulators import set_in, topics_of_programs
-from grader.rubric.started import argument_warnings, starts_of
-from grader.rubric.step_faults import given_steps
+from grader.rubric.prose_warnings import prose_warnings
+from grader.rubric.simulators import topics_of_programs
+from grader.rubric.started import argument_warnings
+from grader.rubric.step_faults import count_causes
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
     WrittenCriterion,
+    WrittenRubric,
     as_list,
     as_map,
     as_maps,
     as_texts,
-    criteria_of,
-    packages_in,
+    given_steps,
+    parts_of,
+    services_in,
+    set_in,
+    starts_of,
     texts_in,
 )
-from grader.wording import join_words, plural
+from grader.wording import plural
 
 SHORT = {"limit_s": 3.0, "first_message_s": 3.0, "quiet_s": 1.0, "alive_s": 0.5, "window_s": 2.0}
 """Conditions of `until` that a correct package may miss on a busy machine if they are shorter."""
 WAIT_S = 0.5
+"""The same of what a step waits for."""
+TOO_SHORT = "very short: on a busy machine a correct package may need more"
 LONG_S = 900.0
 """Nothing of a lab takes so long; in milliseconds it is less than a second."""
 SELDOM_S = 5.0
 """Nobody waits so long for the next message of a lab."""
 JUDGED = ("check", "scenario", "package", "with")
 """What makes a criterion judge something."""
+SHORTEST_S = {"reacts": 0.1, "action-result": 0.2, "stamps": 0.02}
+"""By check, the shortest time within which a correct node's answer comes on a busy machine."""
+STRICT, LAX = 0.02, 0.5
+"""Of a rate, the least tolerance that a busy machine keeps, and one with which half or twice the rate passes."""
+CLOSE_DEG = 0.5
+CLOSE_M = 0.02
+"""No student's robot stops as near to its goal as this."""
+EMPTY = "std_srvs/Empty"
 
 
-def warnings(data: object) -> Iterator[Fault]:
+def warnings(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield what may be a slip."""
-    rubric = as_map(data)
-    scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
-    criteria = criteria_of(rubric)
-    yield from _short_runs(scenarios)
-    yield from _short_waits(scenarios)
-    yield from _misnamed_processes(rubric, scenarios)
-    yield from _first_packages(rubric, scenarios)
+    yield from _short_times(rubric)
+    yield from _misnamed_processes(rubric)
+    yield from _first_packages(rubric)
     yield from _lone_quotes(rubric)
-    yield from _same_criteria(criteria)
-    yield from _without_requires(criteria)
-    yield from _required_of_runs(criteria)
-    yield from _patterns(criteria)
-    yield from _own_messages(criteria, scenarios)
-    yield from _of_the_build(criteria)
-    yield from _heavy_members(rubric, criteria)
-    yield from _other_rates(criteria)
-    yield from _not_private(scenarios, str(rubric.get("handout") or ""))
-    yield from _without_input(criteria, scenarios)
-    yield from demand_warnings(rubric, criteria, scenarios)
-    yield from _crossed_bounds(scenarios)
-    yield from _unasked_bits(criteria, scenarios)
+    yield from _same_criteria(rubric)
+    yield from _without_requires(rubric)
+    yield from _patterns(rubric)
+    yield from _of_the_build(rubric)
+    yield from _other_rates(rubric)
+    yield from _not_private(rubric)
+    yield from _ends_and_lives(rubric)
+    yield from _answers_waited_for(rubric)
+    yield from _more_values(rubric)
+    yield from _numbers_as_text(rubric)
+    yield from _silent_anyway(rubric)
+    yield from _launched_nodes(rubric)
+    for criterion in rubric.criteria:
+        yield from _hard(criterion)
+        yield from _easy(criterion)
+        if criterion.check == "connected":
+            yield from _process_for_node(criterion, rubric)
     yield from prose_warnings(rubric)
     yield from argument_warnings(rubric)
-    for criterion in criteria:
-        yield from _other_process(criterion, scenarios)
-        yield from _fewer_answers(criterion)
-        yield from _asked_for_nothing(criterion)
-        yield from _printed_elsewhere(criterion, scenarios)
+    for criterion in rubric.criteria:
+        yield from _other_process(criterion, rubric)
+        if criterion.check == "service-answers":
+            yield from _answers(criterion)
         yield from _cancelled_goal(criterion)
-        yield from _added_up(criterion)
         yield from _set_otherwise(criterion)
-        yield from _other_run(criterion, criteria)
+        yield from _other_run(criterion, rubric)
 
 
-def _short_runs(scenarios: Scenarios) -> Iterator[Fault]:
-    for name, scenario in scenarios.items():
-        for key, least_s in SHORT.items():
-            given_s = as_map(scenario.get("until")).get(key)
-            if is_number(given_s) and given_s < least_s:
-                fault = f"{given_s:g} s is very short: on a busy machine a correct package may need more"
-                yield ("scenarios", name, "until", key), fault
-            if is_number(given_s) and given_s > LONG_S:
-                fault = f"{given_s:g} s are {given_s / 60:.0f} minutes, which a package that never gets there takes"
-                yield ("scenarios", name, "until", key), fault
-        for index, step in as_maps(scenario.get("steps")):
-            rate_hz = as_map(step.get("publish")).get("rate_hz")
+def _short_times(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield times within which a correct package may not be done, times of many minutes, and messages that are rare."""
+    for name, scenario in rubric.scenarios.items():
+        until = as_map(scenario.get("until"))
+        times: list[tuple[KeyPath, object, float]] = [
+            (("until", key), until.get(key), least_s) for key, least_s in SHORT.items()
+        ]
+        for at, kind, one in parts_of(scenario):
+            if kind in {"wait", "call", "action"}:
+                times.append(((*at, "limit_s"), one.get("limit_s"), WAIT_S))
+            rate_hz = one.get("rate_hz") if at[-1] == "publish" else None
             if is_number(rate_hz) and 0 < rate_hz < 1 / SELDOM_S:
                 fault = f"is a message every {1 / rate_hz:g} s: rate_hz is messages a second"
-                yield ("scenarios", name, "steps", index, "publish", "rate_hz"), fault
+                yield ("scenarios", name, *at, "rate_hz"), fault
+        for at, given_s, least_s in times:
+            if is_number(given_s) and given_s < least_s:
+                yield ("scenarios", name, *at), f"{given_s:g} s is {TOO_SHORT}"
+            if is_number(given_s) and given_s > LONG_S and at[0] == "until":
+                fault = f"{given_s:g} s are {given_s / 60:.0f} minutes, which a package that never gets there takes"
+                yield ("scenarios", name, *at), fault
 
 
-def _short_waits(scenarios: Scenarios) -> Iterator[Fault]:
-    """Yield waits for what is there before them at no student's: a topic or node, an answer, a result."""
-    for name, scenario in scenarios.items():
-        waits: list[tuple[KeyPath, dict[str, Any]]] = [
-            (("steps", index, kind), as_map(step[kind]))
-            for index, step in as_maps(scenario.get("steps"))
-            for kind in ("wait", "call", "action")
-            if kind in step
-        ]
-        waits += [(("calls", index), call) for index, call in as_maps(scenario.get("calls"))]
-        for at, wait in waits:
-            limit_s = wait.get("limit_s")
-            if is_number(limit_s) and limit_s < WAIT_S:
-                fault = f"{limit_s:g} s is very short: on a busy machine a correct package may need more"
-                yield ("scenarios", name, *at, "limit_s"), fault
-
-
-BOUNDS = (("low", "high"), ("min", "max"), ("lower", "upper"), ("minimum", "maximum"))
-
-
-def _crossed_bounds(scenarios: Scenarios) -> Iterator[Fault]:
-    """Yield requests whose lower bound is above the upper one."""
-    for name, scenario in scenarios.items():
-        for at, part, one in services_in(scenario):
-            request = as_map(one.get(part)) if part == "request" else {}
-            for low, high in BOUNDS:
-                both = is_number(request.get(low)) and is_number(request.get(high))
-                if both and request[low] > request[high]:
-                    fault = f"is more than {high}, {request[high]:g}: is that meant?"
-                    yield ("scenarios", name, *at, part, low), fault
-
-
-def _lone_quotes(rubric: dict[str, Any]) -> Iterator[Fault]:
-    for path, text in texts_in((), rubric):
+def _lone_quotes(rubric: WrittenRubric) -> Iterator[Fault]:
+    for path, text in rubric.texts:
         for quote in ('"', "'"):
             if text.count(quote) == 1 and (text.startswith(quote) or text.endswith(quote)):
                 yield path, f"has one quotation mark, {quote}, without its partner"
@@ -139,34 +121,21 @@ def _lone_quotes(rubric: dict[str, Any]) -> Iterator[Fault]:
                 yield path, "has quotation marks in its quotation marks: a node has to publish them, too"
 
 
-def _of_the_build(criteria: Criteria) -> Iterator[Fault]:
+def _of_the_build(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield packages that are asked for at run time, and that only a build needs."""
-    for criterion in criteria:
+    for criterion in rubric.criteria:
         asked = criterion.given if criterion.check in {"manifest", "dependencies"} else {}
         for path, name in texts_in(criterion.at, asked):
             if name == "message_generation":
                 yield path, "is asked for at run time, and only the build needs it: write message_runtime"
 
 
-def _own_messages(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
-    """Yield waits for messages on a topic on which the grader sends later, and of which no criterion judges any."""
-    judged = [criterion.given.get("topic") for criterion in criteria]
-    for name, scenario in scenarios.items():
-        steps = as_maps(scenario.get("steps"))
-        for place, (index, step) in enumerate(steps):
-            topic = as_map(step.get("wait")).get("topic")
-            sent = [n for n, (_, one) in enumerate(steps) if as_map(one.get("publish")).get("topic") == topic]
-            if topic and sent and min(sent) > place and topic not in judged and "probes" not in scenario:
-                fault = "is the grader's own topic, on which it sends after this"
-                yield ("scenarios", name, "steps", index, "wait", "topic"), fault
-
-
 PATTERN = re.compile(r"\.[*+]|\\[dws]|^/.*/$|^\^.*\$$")
 
 
-def _patterns(criteria: Criteria) -> Iterator[Fault]:
+def _patterns(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield values of fields that look like a pattern: they are compared letter by letter."""
-    for criterion in criteria:
+    for criterion in rubric.criteria:
         for key in ("value", "values"):
             for at, text in texts_in((key,), criterion.given.get(key)):
                 is_one = criterion.check == "field-equals" and PATTERN.search(text)
@@ -174,81 +143,47 @@ def _patterns(criteria: Criteria) -> Iterator[Fault]:
                     yield (*criterion.at, *at), "is compared letter by letter: it is no pattern"
 
 
-def _required_of_runs(criteria: Criteria) -> Iterator[Fault]:
-    """Yield criteria of files that require one of a run: they are judged without it."""
-    of_runs = {criterion.id for criterion in criteria if criterion.has_run}
-    for criterion in criteria:
-        for number, name in as_texts(criterion.data.get("requires")):
-            if not criterion.has_run and name in of_runs and criterion.check != "manual":
-                fault = f"{name} judges a run, and {criterion.id} files, which no run changes"
-                yield (*criterion.place, "requires", number), fault
-
-
-FAR = 10
-
-
-def _heavy_members(rubric: dict[str, Any], criteria: Criteria) -> Iterator[Fault]:
-    """Yield criteria of a group that weigh more than all others of it together, many times."""
-    known = {criterion.id: criterion for criterion in criteria}
-    for name, group in as_map(rubric.get("groups")).items():
-        found = [known[one] for _, one in as_texts(as_map(group).get("criteria")) if one in known]
-        weights = [(one.place, one.data["points"]) for one in found if is_number(one.data.get("points"))]
-        total = sum(points for _, points in weights)
-        for place, points in weights:
-            if "points" in as_map(group) and points >= FAR * (total - points) > 0:
-                share = 100 * points / total
-                fault = f"points in a group are weights: this one is {share:.0f} % of {name}"
-                yield (*place, "points"), fault
-
-
 def _words(name: str) -> set[str]:
     return {word for word in re.split(r"[^a-z0-9]+", PurePosixPath(name).stem.lower()) if word}
 
 
-def _misnamed_processes(rubric: dict[str, Any], scenarios: Scenarios) -> Iterator[Fault]:
+def _misnamed_processes(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield processes with the name of another script of the rubric's."""
-    texts = [text for _, text in texts_in((), rubric)]
+    texts = [text for _, text in rubric.texts]
     scripts = {name for text in texts for name in re.findall(r"[\w./-]+\.py\b", text)}
-    for scenario, one in scenarios.items():
-        for index, start in as_maps(one.get("start")):
-            name, script = start.get("name"), start.get("script")
-            if not isinstance(name, str) or not isinstance(script, str) or _words(name) & _words(script):
-                continue
-            meant = sorted(other for other in scripts if _words(name) <= _words(other))
-            if meant:
-                fault = (
-                    f"the process is called {name}, and elsewhere the rubric has {meant[-1]}: is it that one?"
-                )
-                yield ("scenarios", scenario, "start", index, "script"), fault
+    for at, start in rubric.starts():
+        name, script = start.get("name"), start.get("script")
+        if not isinstance(name, str) or not isinstance(script, str) or _words(name) & _words(script):
+            continue
+        meant = sorted(other for other in scripts if _words(name) <= _words(other))
+        if meant:
+            fault = f"the process is called {name}, and elsewhere the rubric has {meant[-1]}: is it that one?"
+            yield (*at, "script"), fault
 
 
-def _first_packages(rubric: dict[str, Any], scenarios: Scenarios) -> Iterator[Fault]:
+def _first_packages(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield starts without a package, if others have one."""
-    packages = packages_in(rubric)
-    starts = [
-        (("scenarios", name, "start", index), start)
-        for name, one in scenarios.items()
-        for index, start in as_maps(one.get("start"))
-        if start.get("program") is None and start.get("tests") is None
-    ]
-    if len(packages) > 1 and any(start.get("package") is not None for _, start in starts):
-        fault = f"is started from {packages[0]}, the first package: if it is of another one, give package"
+    keys = ("program", "tests")
+    starts = [(at, one) for at, one in rubric.starts() if all(one.get(key) is None for key in keys)]
+    if len(rubric.packages) > 1 and any(start.get("package") is not None for _, start in starts):
+        first = rubric.packages[0]
+        fault = f"is started from {first}, the first package: if it is of another one, give package"
         yield from ((at, fault) for at, start in starts if start.get("package") is None)
 
 
-def _same_criteria(criteria: Criteria) -> Iterator[Fault]:
+def _same_criteria(rubric: WrittenRubric) -> Iterator[Fault]:
     first: dict[str, str] = {}
-    for criterion in criteria:
+    for criterion in rubric.criteria:
         judged = json.dumps([criterion.data.get(key) for key in JUDGED], sort_keys=True)
         other = first.setdefault(judged, criterion.id)
         if other != criterion.id and criterion.check != "manual":
             yield (*criterion.place, "check"), f"judges the same as {other}, with the same parameters"
 
 
-def _other_rates(criteria: Criteria) -> Iterator[Fault]:
+def _other_rates(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield rates of a topic for which an earlier criterion wants another one, in a run of the same processes."""
     before: dict[tuple[str, ...], tuple[str, float, dict[str, Any]]] = {}
-    for criterion in criteria:
+    for criterion in rubric.criteria:
         given, scenario = criterion.given, criterion.scenario
         rate_hz, cause = given.get("rate_hz"), as_map(given.get("cause"))
         if not is_number(rate_hz):
@@ -261,11 +196,10 @@ def _other_rates(criteria: Criteria) -> Iterator[Fault]:
             yield (*criterion.at, "rate_hz"), fault
 
 
-def _other_process(criterion: WrittenCriterion, scenarios: Scenarios) -> Iterator[Fault]:
+def _other_process(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield names that a node has to have, and that are those of another process."""
     process = criterion.given.get("process")
-    starts = [start for one in scenarios.values() for start in starts_of(one)]
-    others = {str(start.get("name")) for start in starts} - {str(process)}
+    others = {str(start.get("name")) for _, start in rubric.starts()} - {str(process)}
     own = [start for start in starts_of(criterion.scenario) if start.get("name") == process]
     for index, name in as_texts(criterion.given.get("names")):
         is_own = any(_words(name) & {*_words(str(process)), *_words(str(one.get("script")))} for one in own)
@@ -274,125 +208,43 @@ def _other_process(criterion: WrittenCriterion, scenarios: Scenarios) -> Iterato
             yield (*criterion.at, "names", index), fault
 
 
-def _requests(criterion: WrittenCriterion) -> list[object]:
-    """Return what the run asks of the service that a criterion is about."""
-    calls = [one for _, part, one in services_in(criterion.scenario) if part == "request"]
-    return [one.get("request") for one in calls if one.get("service") == criterion.given.get("service")]
-
-
-def _fewer_answers(criterion: WrittenCriterion) -> Iterator[Fault]:
-    """Yield fewer answers than there are calls: they are compared with the first of these."""
-    answers, made = len(as_list(criterion.given.get("expect"))), len(_requests(criterion))
-    if criterion.check == "service-answers" and 0 < answers < made:
-        calls = f"{criterion.run} calls {criterion.given.get('service')} {plural(made, 'time')}"
-        fault = f"{calls}, and here are {plural(answers, 'answer')}: they are compared with the first"
+def _answers(criterion: WrittenCriterion) -> Iterator[Fault]:
+    """Yield fewer answers than there are calls, which are compared with the first of these, and answers that any is."""
+    service, expect = criterion.given.get("service"), as_list(criterion.given.get("expect"))
+    named = [(part, one) for _, part, one in services_in(criterion.scenario) if one.get("service") == service]
+    made = sum(part == "request" for part, _ in named)
+    if 0 < len(expect) < made:
+        calls = f"{criterion.run} calls {service} {plural(made, 'time')}"
+        fault = f"{calls}, and here are {plural(len(expect), 'answer')}: they are compared with the first"
         yield (*criterion.at, "expect"), fault
+    if expect and not any(expect) and {str(one.get("type")) for _, one in named} - {EMPTY}:
+        yield (*criterion.at, "expect"), "is right for any answer: give the fields that it has to have"
 
 
-def _asked_for_nothing(criterion: WrittenCriterion) -> Iterator[Fault]:
-    """Yield numbers of a request that nothing in the run has, where others of the same field come from the run."""
-    at, expect = (*criterion.at, "expect"), criterion.given.get("expect")
-    parts = {key: part for key, part in criterion.scenario.items() if key not in {"until", "serves"}}
-    sent = {number for _, number in numbers_in((), parts)}
-    sent |= {float(text) for _, text in texts_in((), parts) if re.fullmatch(r"-?\d+(\.\d+)?", text)}
-    if criterion.check == "service-answers" and isinstance(expect, list):
-        yield from _answered_otherwise(at, [as_map(one) for one in expect], _requests(criterion))
-    if criterion.check == "calls" and isinstance(expect, dict):
-        yield from _asked_once_for_nothing(at, expect, sent, criterion.run)
-    if criterion.check != "calls" or not isinstance(expect, list):
-        return
-    for key in dict.fromkeys(key for one in expect for key in as_map(one)):
-        each = [(n, one[key]) for n, one in enumerate(expect) if is_number(as_map(one).get(key))]
-        alone = [(n, value) for n, value in each if value not in sent]
-        if len(alone) == 1 < len(each):
-            number, value = alone[0]
-            fault = (
-                f"nothing in {criterion.run} has {value:g}, and it has the other numbers that are asked for"
-            )
-            yield (*at, number, key), fault
-
-
-def _printed_elsewhere(criterion: WrittenCriterion, scenarios: Scenarios) -> Iterator[Fault]:
-    """Yield numbers to print that the grader answers in another run only."""
-    name, scenario = criterion.run, criterion.scenario
-    here = {number for _, number in numbers_in((), scenario)}
-    for key, number in numbers_in(("numbers",), criterion.given.get("numbers")):
-        others = [
-            other
-            for other, one in scenarios.items()
-            if other != name and number in {answer for _, answer in numbers_in((), one.get("serves"))}
-        ]
-        if others and number not in here and scenario.get("serves"):
-            yield (
-                (*criterion.at, *key),
-                f"{number:g} is what {others[0]} answers, and nothing in {name} has it",
-            )
-
-
-def _answered_otherwise(at: KeyPath, expect: list[dict[str, Any]], requests: list[object]) -> Iterator[Fault]:
-    """Yield the one number of a field of the answers that its request has with another sign or with a digit more, where
-    the requests have all others of that field."""
-    asked = [{number for _, number in numbers_in((), one)} for one in requests]
-    for key in dict.fromkeys(key for one in expect for key in one):
-        pairs = enumerate(zip(expect, asked, strict=False))
-        each = [(n, one[key], sent) for n, (one, sent) in pairs if is_number(one.get(key))]
-        alone = [(n, value, sent) for n, value, sent in each if value not in sent]
-        if len(alone) == 1 < len(each):
-            number, value, sent = alone[0]
-            near = next((value / by for by in SHIFTS if round(value / by, 9) in sent), None)
-            if near is not None:
-                yield (*at, number, key), f"nothing in its request is {value:g}, and {near:g} is"
-
-
-def _asked_once_for_nothing(
-    at: KeyPath, expect: dict[str, Any], sent: set[float], name: str
-) -> Iterator[Fault]:
-    """Yield the one number of a request that the run does not have, where a number with another sign or a digit more is
-    there."""
-    alone = [(key, value) for key, value in expect.items() if is_number(value) and value not in sent]
-    for key, value in alone:
-        near = next((value / by for by in SHIFTS if round(value / by, 9) in sent), None)
-        if near is not None and len(alone) == 1:
-            yield (*at, key), f"nothing in {name} has {value:g}, and it has {near:g}"
-
-
-def _not_private(scenarios: Scenarios, handout: str) -> Iterator[Fault]:
+def _not_private(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield parameters without a node's name before them that the handout calls private."""
-    for name, scenario in scenarios.items():
-        for at, one in set_in(scenario):
-            param = str(one.get("name"))
-            if param.count("/") == 1 and re.search(rf"~{re.escape(param[1:])}\b", handout):
-                fault = f"the handout has ~{param[1:]}, which is below the node's own name: /<node>{param}"
-                yield ("scenarios", name, *at, "name"), fault
-
-
-def _unasked_bits(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
-    """Yield scripts that no criterion asks to be executable, where one asks it of another script: the grader sets the
-    bit of each before it runs them."""
-    asked = {str(one.given.get("path")) for one in criteria if one.check == "executable"}
-    told = set(asked)
-    for name, scenario in scenarios.items():
-        for number, start in as_maps(scenario.get("start")):
-            script = str(start.get("script"))
-            if asked and script.endswith(".py") and script not in told:
-                told.add(script)
-                fault = f"no criterion asks whether {script} can be run, as one does of {min(asked)}"
-                yield ("scenarios", name, "start", number, "script"), fault
+    for at, one in rubric.params():
+        param = str(one.get("name"))
+        if param.count("/") == 1 and re.search(rf"~{re.escape(param[1:])}\b", rubric.handout):
+            fault = f"the handout has ~{param[1:]}, which is below the node's own name: /<node>{param}"
+            yield (*at, "name"), fault
 
 
 OF_NODES = frozenset({"node-lives", "node-name", "launch-runs", "launch-connects"})
 """Checks of whether the nodes of a run are there at all."""
 
 
-def _without_requires(criteria: Criteria) -> Iterator[Fault]:
+def _without_requires(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield criteria of a run that require no criterion of a run, where another one is about its node: what keeps the
     node from starting would be charged to whichever of them comes first."""
-    by_id = {criterion.id: criterion for criterion in criteria}
-    for criterion in criteria:
+    by_id = {criterion.id: criterion for criterion in rubric.criteria}
+    for criterion in rubric.criteria:
         process = criterion.given.get("process")
         if not criterion.has_run or criterion.check in {*OF_NODES, "manual"}:
             continue
-        of_nodes = [other for other in criteria if other.run == criterion.run and other.check in OF_NODES]
+        of_nodes = [
+            other for other in rubric.criteria if other.run == criterion.run and other.check in OF_NODES
+        ]
         nodes = [one for one in of_nodes if process is None or one.given.get("process", process) == process]
         if nodes and not any(one.has_run for one in _all_required(criterion, by_id)):
             root = nodes[0].id
@@ -410,34 +262,6 @@ def _all_required(
     return [by_id[name] for name in names if name in by_id]
 
 
-SENDS = ("publish", "transform", "play", "call", "action", "type")
-OF_ANSWERS = ("field-equals", "field-bounds", "reacts", "hears", "prints", "transform")
-"""Checks of what a node does with what it hears."""
-
-
-def _without_input(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
-    """Yield runs in which the grader sends nothing, where it sends something in every other run of the same
-    processes."""
-    for name, scenario in scenarios.items():
-        others = {
-            n: one for n, one in scenarios.items() if n != name and _processes(one) == _processes(scenario)
-        }
-        judged = any(one.run == name and one.check in OF_ANSWERS for one in criteria)
-        waits = any("wait" in step for _, step in as_maps(scenario.get("steps")))
-        if others and judged and waits and not _sends(scenario) and all(map(_sends, others.values())):
-            fault = (
-                f"nothing is sent in {name}, and in {join_words(others)} something is: is a step left out?"
-            )
-            yield ("scenarios", name, "steps"), fault
-
-
-def _sends(scenario: dict[str, Any]) -> bool:
-    """Return whether the grader, or a program beside the student's, sends the student's nodes anything."""
-    steps = any(given_steps(scenario, kind) for kind in SENDS)
-    programs = any(start.get("program") for start in starts_of(scenario))
-    return steps or programs or any(scenario.get(key) for key in ("probes", "calls", "serves", "params"))
-
-
 def _cancelled_goal(criterion: WrittenCriterion) -> Iterator[Fault]:
     """Yield goals that a step cancels and that should succeed."""
     given, sent = criterion.given, given_steps(criterion.scenario, "action")
@@ -451,16 +275,6 @@ def _cancelled_goal(criterion: WrittenCriterion) -> Iterator[Fault]:
         yield (*criterion.at, "status" if "status" in given else "goal"), fault
 
 
-def _added_up(criterion: WrittenCriterion) -> Iterator[Fault]:
-    """Yield places that are read of velocities, beside a program that says where the robot is."""
-    given, topics = criterion.given, topics_of_programs(criterion.scenario)
-    poses = [topic for topic, kind in topics.items() if kind in POSES and topic != "/odom"]
-    is_place = criterion.check in {"ends-at", "stays-within"} and given.get("relative") is not True
-    if is_place and poses and topics.get(str(given.get("topic"))) in VELOCITIES:
-        fault = f"velocities are added up from (0, 0): the place itself is on {join_words(poses)}"
-        yield (*criterion.at, "topic"), fault
-
-
 def _set_otherwise(criterion: WrittenCriterion) -> Iterator[Fault]:
     """Yield parameters that the scenario sets to one value, and that should have another one."""
     name, value = criterion.given.get("name"), criterion.given.get("value")
@@ -470,13 +284,13 @@ def _set_otherwise(criterion: WrittenCriterion) -> Iterator[Fault]:
         yield (*criterion.at, "value"), f"{criterion.run} sets {name} to {json.dumps(values[-1])}"
 
 
-def _other_run(criterion: WrittenCriterion, criteria: Criteria) -> Iterator[Fault]:
+def _other_run(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield topics that another run is about, with other processes, and that this one nowhere names."""
     given, here = criterion.given, criterion.scenario
     topic = given.get("topic") or next(iter(as_map(given.get("topics"))), None)
     if not isinstance(topic, str) or "start" not in here or _is_named(topic, here):
         return
-    for other in criteria:
+    for other in rubric.criteria:
         is_same = other.given.get("topic") == topic and other.run != criterion.run
         there = other.scenario
         if is_same and _is_named(topic, there) and _processes(there).isdisjoint(_processes(here)):
@@ -500,3 +314,177 @@ def _processes(scenario: dict[str, Any]) -> set[str]:
         for start in starts_of(scenario)
         if start.get("program") is None
     }
+
+
+def _hard(criterion: WrittenCriterion) -> Iterator[Fault]:
+    """Yield demands that a correct node may miss."""
+    at, check, given = criterion.at, criterion.check, criterion.given
+    within_s, least_s = given.get("within_s"), SHORTEST_S.get(check)
+    if is_number(within_s) and least_s is not None and within_s < least_s:
+        yield (*at, "within_s"), f"{within_s:g} s is {TOO_SHORT}"
+    tolerance, tolerance_m = given.get("tolerance"), given.get("tolerance_m")
+    if check == "rate" and is_number(tolerance) and tolerance < STRICT:
+        fault = f"{tolerance:g} is very strict: on a busy machine a correct package may miss it"
+        yield (*at, "tolerance"), fault
+    for key in ("heading_tolerance_deg", "tolerance_deg"):
+        if is_number(given.get(key)) and given[key] < CLOSE_DEG:
+            yield (*at, key), f"{given[key]:g} is very strict: it is in degrees"
+    if check in {"ends-at", "path"} and is_number(tolerance_m) and tolerance_m < CLOSE_M:
+        yield (*at, "tolerance_m"), f"{tolerance_m:g} m is very strict: no robot keeps it"
+
+
+def _easy(criterion: WrittenCriterion) -> Iterator[Fault]:
+    """Yield demands that a wrong node meets too."""
+    at, check, given = criterion.at, criterion.check, criterion.given
+    tolerance = given.get("tolerance")
+    if check == "rate" and is_number(tolerance) and tolerance >= LAX and is_number(given.get("rate_hz")):
+        rates = [given["rate_hz"] * (1 + sign * tolerance) for sign in (-1, 1)]
+        fault = f"all rates from {rates[0]:g} to {rates[1]:g} Hz pass: it is a share of the rate"
+        yield (*at, "tolerance"), fault
+    if check == "node-lives" and given.get("min_s") == 0:
+        yield (*at, "min_s"), "is 0 s: a node that ends at once passes"
+    if check == "action-result" and given.get("feedback") == 0:
+        fault = "asks for none: leave it out, or give how many messages of feedback have to come"
+        yield (*at, "feedback"), fault
+    for place, asked in criterion.conditions:
+        value, off = asked.get("value"), asked.get("tolerance")
+        if is_number(value) and is_number(off) and off >= abs(value) > 0 and "field" in asked:
+            fault = f"is as large as the value, {value:g}: a field that is always 0 passes"
+            yield (*place, "tolerance"), fault
+    if check == "field-bounds" and is_number(given.get("min")) and given.get("min") == given.get("max"):
+        yield (*at, "max"), f"is min, too: only {given['min']:g} is within these bounds"
+    if check == "stamps" and is_number(within_s := given.get("within_s")):
+        lasting_s = as_map(criterion.scenario.get("until")).get("window_s")
+        if is_number(lasting_s) and within_s >= lasting_s:
+            fault = f"the run's window is {lasting_s:g} s: the time of the first message passes for all"
+            yield (*at, "within_s"), fault
+
+
+def _silent_anyway(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield silence that is asked of a node, without a criterion that has to see it publish on this topic."""
+    known = {one.id: one for one in rubric.criteria}
+    for criterion in rubric.criteria:
+        topic = as_map(criterion.given.get("effect")).get("topic")
+        if criterion.check != "reacts" or criterion.given.get("never") is not True:
+            continue
+        if not any(_sees(one, topic) for one in _all_required(criterion, known)):
+            fault = f"a node that never publishes on {topic} passes: let it require a criterion that sees it publish"
+            yield (*criterion.at, "never"), f"{fault} there"
+
+
+def _sees(criterion: WrittenCriterion, topic: object) -> bool:
+    """Return whether a criterion wants messages of the student's on the topic."""
+    given = criterion.given
+    return topic in {given.get("topic"), as_map(given.get("effect")).get("topic")} and not given.get("never")
+
+
+def _ends_and_lives(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield runs that wait for the end of a process, while a criterion wants the same one to stay alive."""
+    lives: dict[str, str] = {}
+    for criterion in rubric.criteria:
+        if criterion.check == "node-lives":
+            process = criterion.given.get("process")
+            found = (start for start in starts_of(criterion.scenario) if start.get("name") == process)
+            lives.update({_what(start): criterion.id for start in found})
+    for name, scenario in rubric.scenarios.items():
+        starts = {str(start.get("name")): start for start in starts_of(scenario)}
+        for index, ended in as_texts(as_map(scenario.get("until")).get("ended")):
+            stopped = any(
+                step.get(kind) == ended
+                for _, step in as_maps(scenario.get("steps"))
+                for kind in ("stop", "kill")
+            )
+            if ended in starts and (of := lives.get(_what(starts[ended]))) and not stopped:
+                fault = f"{of} wants {ended} to stay alive, and this run waits for its end"
+                yield ("scenarios", name, "until", "ended", index), fault
+
+
+def _what(start: dict[str, Any]) -> str:
+    return json.dumps([start.get(key) for key in ("script", "launch", "package", "args")])
+
+
+PERIODIC = re.compile(r"\bHz\b|\b(?:a|per|each|every) (?:\w+ )?second\b|times", re.IGNORECASE)
+ANSWERED_TIMES = 2
+"""A node that answers each message may publish so many times as many, and what it publishes at its start."""
+
+
+def _answers_waited_for(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield counts of messages that come only if the node publishes many for each that it hears, where the handout has
+    no rate."""
+    if PERIODIC.search(rubric.handout):
+        return
+    for name, scenario in rubric.scenarios.items():
+        sent = _sent(scenario)
+        for topic, count in as_map(as_map(scenario.get("until")).get("messages")).items():
+            if sent and isinstance(count, int) and count > ANSWERED_TIMES * (sent + 1):
+                fault = f"{name} sends {plural(sent, 'message')}, and waits for {count}: is that meant?"
+                yield ("scenarios", name, "until", "messages", topic), fault
+
+
+def _more_values(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield more values than the run sends messages, where the node answers each with one, or has causes to change."""
+    paced = {one.given.get("topic") for one in rubric.criteria if "rate_hz" in one.given}
+    is_answer = re.search(r"\beach\b", rubric.handout) and not PERIODIC.search(rubric.handout)
+    for criterion in rubric.criteria:
+        sent, count = _sent(criterion.scenario), len(as_list(criterion.given.get("values")))
+        causes = count_causes(criterion.scenario)
+        if causes is not None and count - 1 > causes and criterion.given.get("topic") not in paced:
+            gives = f"the steps of {criterion.run} give the node {plural(causes, 'cause')} to change it"
+            yield (*criterion.at, "values"), f"are {count}, and {gives}: does it change by itself?"
+            continue
+        if sent and count == sent + 1 and is_answer:
+            fault = f"are {count}, and {criterion.run} sends {plural(sent, 'message')}"
+            yield (*criterion.at, "values"), fault
+
+
+def _process_for_node(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield ends of a connection that are named as a process of the scenario, and as no node that a criterion names."""
+    scripts = {start.get("name") for start in starts_of(criterion.scenario) if start.get("script")}
+    named = {name for one in rubric.criteria for _, name in as_texts(one.given.get("names"))}
+    for end in ("publisher", "subscriber"):
+        if (name := criterion.given.get(end)) in scripts - named:
+            fault = f"{name} is a process here: is a node of this name asked for? It is what counts"
+            yield (*criterion.at, end), fault
+
+
+def _sent(scenario: dict[str, Any]) -> int:
+    """Return how many messages the grader sends in a run; 0 where it sends none, or something else may."""
+    is_script = all(start.get("script") for start in starts_of(scenario))
+    if not is_script or given_steps(scenario, "play"):
+        return 0
+    number = 0
+    for one in (one for _, kind, one in parts_of(scenario) if kind == "publish"):
+        values = one.get("values")
+        if {"count", "duration_s", "background", "times", "text", "integers", "among"} & one.keys():
+            return 0
+        number += len(values) if isinstance(values, list) else 1
+    return number
+
+
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
+
+
+def _numbers_as_text(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield parameters that are set to a number in quotes."""
+    for at, one in rubric.params():
+        value = one.get("value")
+        if isinstance(value, str) and NUMBER.fullmatch(value):
+            fault = f'"{value}" in quotes is text: a node that reads a number needs {value}, without them'
+            yield (*at, "value"), fault
+
+
+def _launched_nodes(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield counts of nodes of a launch file that are more than the criterion about it names, and programs of the
+    rubric's among these that another run starts from another package."""
+    programs = [str(start.get("program")) for _, start in rubric.starts()]
+    owners = {PurePosixPath(program).stem: program.partition("/")[0] for program in programs}
+    for criterion in rubric.criteria:
+        nodes, scenario = as_map(criterion.given.get("nodes")), criterion.scenario
+        for node, package in nodes.items():
+            owner = owners.get(str(node).rpartition("/")[2])
+            if owner and isinstance(package, str) and package != owner:
+                yield (*criterion.at, "nodes", node), f"is of {owner} elsewhere in the rubric"
+        count = as_map(scenario.get("until")).get("nodes")
+        if nodes and isinstance(count, int) and count > len(nodes) and len(starts_of(scenario)) == 1:
+            fault = f"{criterion.id} names {plural(len(nodes), 'node')}: the run waits for more than these"
+            yield ("scenarios", criterion.run, "until", "nodes"), fault

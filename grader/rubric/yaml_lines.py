@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import date
@@ -180,15 +180,38 @@ def criteria_of(rubric: Mapping[str, Any]) -> list[WrittenCriterion]:
     ]
 
 
+class WrittenRubric:
+    """A rubric as it is written, with all faults that it may have."""
+
+    def __init__(self, data: object) -> None:
+        self.data = as_map(data)
+        self.scenarios = {name: as_map(one) for name, one in as_map(self.data.get("scenarios")).items()}
+        self.criteria = criteria_of(self.data)
+        self.handout = str(self.data.get("handout") or "")
+        self.packages = packages_in(self.data)
+        self.own_packages = {*self.packages, *(name for _, name in as_texts(self.data.get("packages")))}
+        self.texts = list(texts_in((), self.data))
+
+    def starts(self) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
+        """Yield what the scenarios start, each with its place."""
+        for name, scenario in self.scenarios.items():
+            yield from ((("scenarios", name, "start", n), one) for n, one in as_maps(scenario.get("start")))
+
+    def steps(self) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
+        """Yield the steps of the scenarios, each with its place."""
+        for name, scenario in self.scenarios.items():
+            yield from ((("scenarios", name, "steps", n), one) for n, one in as_maps(scenario.get("steps")))
+
+    def params(self) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
+        """Yield the parameters that the scenarios set, each with its place."""
+        for name, scenario in self.scenarios.items():
+            yield from ((("scenarios", name, *at), one) for at, one in set_in(scenario))
+
+
 def packages_in(rubric: dict[str, Any]) -> list[str]:
     """Return the packages that students hand in, as a rubric names them: one, or a list."""
     given = rubric.get("package")
     return [given] if isinstance(given, str) else [name for _, name in as_texts(given)]
-
-
-def own_packages(rubric: dict[str, Any]) -> set[str]:
-    """Return the packages that students hand in, and those that the course brings."""
-    return {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
 
 
 def texts_at(path: Path, name: str, key: str) -> tuple[str, ...]:
@@ -440,6 +463,12 @@ def _other_base(written: str) -> str:
     return "in minutes and seconds: write it without a colon, or in quotes" if ":" in written else ""
 
 
+def give_one(keys: Sequence[str], given: Sequence[str]) -> str:
+    """Return that one of the keys has to be given, and which are."""
+    found = f"{' and '.join(given)} are there" if given else "none is there"
+    return f"give one of {', '.join(keys[:-1])} and {keys[-1]}: {found}"
+
+
 def as_list(value: object) -> list[Any]:
     return value if isinstance(value, list) else []
 
@@ -472,3 +501,38 @@ def texts_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, str]]:
     elif isinstance(value, list):
         for index, inner in enumerate(value):
             yield from texts_in((*path, index), inner)
+
+
+def starts_of(scenario: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return what a scenario starts."""
+    return [start for _, start in as_maps(scenario.get("start"))]
+
+
+def given_steps(scenario: dict[str, Any], kind: str) -> list[dict[str, Any]]:
+    """Return what the scenario's steps of one kind (`publish`) say."""
+    return [as_map(step[kind]) for _, step in as_maps(scenario.get("steps")) if kind in step]
+
+
+def set_in(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
+    """Yield the parameters that a scenario sets, and where."""
+    yield from ((("params", n), one) for n, one in as_maps(scenario.get("params")))
+    for index, step in as_maps(scenario.get("steps")):
+        if "set_param" in step:
+            yield ("steps", index, "set_param"), as_map(step["set_param"])
+
+
+def parts_of(scenario: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str, dict[str, Any]]]:
+    """Yield what a scenario sends, calls, offers and does: where, its kind as a step has it (`publish` of a probe, and
+    `serve`), and what is written there."""
+    for key, kind in (("probes", "publish"), ("calls", "call"), ("serves", "serve")):
+        yield from (((key, n), kind, one) for n, one in as_maps(scenario.get(key)))
+    for n, step in as_maps(scenario.get("steps")):
+        yield from ((("steps", n, kind), kind, as_map(given)) for kind, given in step.items())
+
+
+def services_in(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, str, dict[str, Any]]]:
+    """Yield the services that a scenario calls or offers, where it says so, and the key of what it fills in."""
+    for at, kind, one in parts_of(scenario):
+        part = {"call": "request", "serve": "response"}.get(kind)
+        if part is not None and one.get("action") is None:
+            yield at, part, one

@@ -10,11 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.authoring.mutation.faulty_packages import mutants_text
-from grader.authoring.propose import Proposal
+from grader.authoring.propose import Proposal, assign_points
 from grader.authoring.rubric_draft import (
     Parts,
     answers_to,
-    assign_points,
     find_parts,
     heard_template,
     nice_rate,

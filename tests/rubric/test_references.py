@@ -11,6 +11,7 @@ from grader.ros_env import RosInstallation, RosPackages
 from grader.rubric import references
 from grader.rubric.load import load_rubric
 from grader.rubric.spelling import names_seen_once
+from grader.rubric.yaml_lines import WrittenRubric
 from tests.rubric.samples import faults, spoiled
 
 LAB = """\
@@ -510,11 +511,11 @@ def test_a_name_that_one_line_alone_has_is_warned_of(tmp_path: Path) -> None:
         "scenarios": {"a": run},
         "criteria": [{"with": names}, own, bounds],
     }
-    found = {str(path[-1]): why for path, why in names_seen_once(data, tmp_path)}
+    found = {str(path[-1]): why for path, why in names_seen_once(WrittenRubric(data), tmp_path)}
     assert sorted(found) == ["field", "file", "topic"]
     assert found["topic"] == "nothing else in the rubric names /stet: is it spelt as in the handout?"
     renamed = {**data, "scenarios": {"goal": run}}  # no map of fields
-    assert {str(path[-1]) for path, _ in names_seen_once(renamed, tmp_path)} == set(found)
+    assert {str(path[-1]) for path, _ in names_seen_once(WrittenRubric(renamed), tmp_path)} == set(found)
 
 
 def test_a_scenario_that_no_criterion_judges_is_refused(tmp_path: Path) -> None:

@@ -18,7 +18,6 @@ from grader.authoring.mutation.solution import Site, Solution, Tree, TreeFile
 from grader.authoring.rubric_draft import dump_flow
 from grader.errors import RubricError, UsageError
 from grader.model.mutants import (
-    AppendText,
     ChosenFile,
     Cost,
     MoveFiles,
@@ -27,7 +26,6 @@ from grader.model.mutants import (
     MutantsFile,
     PackageEdit,
     ReplaceText,
-    SetMode,
     SymbolicLink,
     WriteFile,
 )
@@ -247,9 +245,12 @@ def build_tree(solution: Solution, mutant: Mutant) -> Tree:
             solution = solution.then(_find_site(solution, edit.operator, edit).tree)
             continue
         (kind,) = edit.kinds
-        tree = dict(solution.tree)
+        tree, how = dict(solution.tree), getattr(edit, kind)
         try:
-            EDITS[kind](tree, getattr(edit, kind))
+            if kind in CHANGES:
+                tree[how.file] = CHANGES[kind](tree[how.file], how)
+            else:
+                EDITS[kind](tree, how)
         except KeyError as error:
             name = str(error.args[0])
             there = [path for path in solution.tree if PurePosixPath(path).name == PurePosixPath(name).name]
@@ -293,22 +294,6 @@ def _write(tree: Tree, edit: WriteFile) -> None:
     tree[edit.file] = TreeFile(data=edit.text.encode(), executable=executable)
 
 
-def _append(tree: Tree, edit: AppendText) -> None:
-    tree[edit.file] = replace(tree[edit.file], data=tree[edit.file].data + edit.text.encode())
-
-
-def _mode(tree: Tree, edit: SetMode) -> None:
-    tree[edit.file] = replace(tree[edit.file], executable=edit.executable)
-
-
-def _crlf(tree: Tree, edit: ChosenFile) -> None:
-    tree[edit.file] = replace(tree[edit.file], data=tree[edit.file].data.replace(b"\n", b"\r\n"))
-
-
-def _bom(tree: Tree, edit: ChosenFile) -> None:
-    tree[edit.file] = replace(tree[edit.file], data=b"\xef\xbb\xbf" + tree[edit.file].data)
-
-
 def _delete(tree: Tree, edit: ChosenFile) -> None:
     del tree[edit.file]
 
@@ -325,13 +310,16 @@ def _move(tree: Tree, edit: MoveFiles) -> None:
         tree[edit.new + name.removeprefix(edit.old)] = tree.pop(name)
 
 
+CHANGES: dict[str, Callable[[TreeFile, Any], TreeFile]] = {
+    "append": lambda file, edit: replace(file, data=file.data + edit.text.encode()),
+    "mode": lambda file, edit: replace(file, executable=edit.executable),
+    "crlf": lambda file, _: replace(file, data=file.data.replace(b"\n", b"\r\n")),
+    "bom": lambda file, _: replace(file, data=b"\xef\xbb\xbf" + file.data),
+}
+"""Edits that change one file, by what they make of it."""
 EDITS: dict[str, Callable[..., None]] = {
     "replace": _replace,
     "write": _write,
-    "append": _append,
-    "mode": _mode,
-    "crlf": _crlf,
-    "bom": _bom,
     "delete": _delete,
     "link": _link,
     "move": _move,

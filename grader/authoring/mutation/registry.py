@@ -60,10 +60,9 @@ class Operator:
 OPERATORS: dict[str, Operator] = {}
 
 
-def operator(
-    name: str, *, each: Finder, fits: str, params: type[Record] = NoParams
-) -> Callable[[Function], Function]:
-    """Put a function into `OPERATORS`. Its docstring says the student's mistake.
+def operator(*, each: Finder, fits: str, params: type[Record] = NoParams) -> Callable[[Function], Function]:
+    """Put a function into `OPERATORS`, as `bit-removed` if it is called `bit_removed`. Its docstring says the student's
+    mistake.
 
     `each` finds where the operator may fit: it yields a `CodePlace` and what is there. The function is called with
     what is there, and with the parameters if it has any. It returns the change, or nothing where it does not fit.
@@ -71,7 +70,7 @@ def operator(
     """
 
     def register(function: Function) -> Function:
-        mistake = inspect.getdoc(function)
+        name, mistake = function.__name__.replace("_", "-"), inspect.getdoc(function)
         if name in OPERATORS or not mistake:
             raise ValueError(f"operator {name}: {'twice' if name in OPERATORS else 'it has no docstring'}")
         OPERATORS[name] = Operator(

@@ -152,15 +152,19 @@ def test_at_least_15_operators_fit_each_lab(solutions):
         assert sum(bool(o.sites(solutions[lab])) for o in OPERATORS.values()) >= 15
 
 
-def silent():
+def new_one():
     return []
+
+
+def bit_removed():
+    """Removes it."""
 
 
 def test_an_operator_has_to_say_what_it_does():
     with pytest.raises(ValueError, match="twice"):
-        operator("bit-removed", each=lambda _: (), fits="every script")(silent)
+        operator(each=lambda _: (), fits="every script")(bit_removed)
     with pytest.raises(ValueError, match="no docstring"):
-        operator("new-one", each=lambda _: (), fits="every script")(silent)
+        operator(each=lambda _: (), fits="every script")(new_one)
     assert "new-one" not in OPERATORS
 
 

@@ -64,14 +64,14 @@ def _matches(pattern: re.Pattern[str], *endings: str) -> Finder:
     return find
 
 
-@operator("launch-type-without-py", each=_elements("node", "type"), fits="every node whose type ends in .py")
+@operator(each=_elements("node", "type"), fits="every node whose type ends in .py")
 def launch_type_without_py(document: Document, node: Element) -> list[TextEdit]:
     """Leaves .py away in a node's type."""
     kind = node.attributes["type"]
     return [document.set_attribute(node, "type", kind.removesuffix(".py"))] if kind.endswith(".py") else []
 
 
-@operator("launch-malformed", each=_documents, fits="every launch file with a node")
+@operator(each=_documents, fits="every launch file with a node")
 def launch_malformed(document: Document) -> list[TextEdit]:
     """Forgets to close a node's tag."""
     for node in document.elements("node"):
@@ -82,10 +82,7 @@ def launch_malformed(document: Document) -> list[TextEdit]:
 
 
 @operator(
-    "launch-remapped-apart",
-    each=_elements("node"),
-    params=RemapParams,
-    fits="every node of a launch file that starts two or more",
+    each=_elements("node"), params=RemapParams, fits="every node of a launch file that starts two or more"
 )
 def launch_remapped_apart(document: Document, node: Element, params: RemapParams) -> list[TextEdit]:
     """Remaps a topic for one node only, so that the nodes miss each other."""
@@ -97,37 +94,31 @@ def launch_remapped_apart(document: Document, node: Element, params: RemapParams
     return [TextEdit(node.inner, node.inner, remap)]
 
 
-@operator("launch-node-dropped", each=_elements("node"), fits="every node of a launch file")
+@operator(each=_elements("node"), fits="every node of a launch file")
 def launch_node_dropped(document: Document, node: Element) -> list[TextEdit]:
     """Does not start one of the nodes."""
     return [document.remove(node)]
 
 
-@operator(
-    "launch-name-missing", each=_elements("node", "name"), fits="every node of a launch file with a name"
-)
+@operator(each=_elements("node", "name"), fits="every node of a launch file with a name")
 def launch_name_missing(document: Document, node: Element) -> list[TextEdit]:
     """Gives a node no name."""
     return [document.remove_attribute(node, "name")]
 
 
-@operator(
-    "launch-name-changed", each=_elements("node", "name"), fits="every node of a launch file with a name"
-)
+@operator(each=_elements("node", "name"), fits="every node of a launch file with a name")
 def launch_name_changed(document: Document, node: Element) -> list[TextEdit]:
     """Gives a node another name in the launch file."""
     return [document.set_attribute(node, "name", f"my_{node.attributes['name']}")]
 
 
-@operator(
-    "launch-pkg-misspelt", each=_elements("node", "pkg"), fits="every node of a launch file with a package"
-)
+@operator(each=_elements("node", "pkg"), fits="every node of a launch file with a package")
 def launch_pkg_misspelt(document: Document, node: Element) -> list[TextEdit]:
     """Misspells the package of a node."""
     return [document.set_attribute(node, "pkg", misspelt_name(node.attributes["pkg"]))]
 
 
-@operator("launch-root-misspelt", each=_documents, fits="every launch file")
+@operator(each=_documents, fits="every launch file")
 def launch_root_misspelt(document: Document) -> list[TextEdit]:
     """Begins the launch file with another tag than <launch>."""
     root = document.root
@@ -137,46 +128,34 @@ def launch_root_misspelt(document: Document) -> list[TextEdit]:
     return [TextEdit(root.start + 1, root.start + 7, "lauch"), TextEdit(close + 2, close + 8, "lauch")]
 
 
-@operator(
-    "launch-param-altered",
-    each=_elements("param"),
-    fits="every parameter of a launch file with a number as its value",
-)
+@operator(each=_elements("param"), fits="every parameter of a launch file with a number as its value")
 def launch_param_altered(document: Document, param: Element) -> list[TextEdit]:
     """Sets a parameter to another value."""
     value = param.attributes.get("value", "").strip()
     return [document.set_attribute(param, "value", str(int(value) + 1))] if value.isdigit() else []
 
 
-@operator("launch-param-dropped", each=_elements("param"), fits="every parameter of a launch file")
+@operator(each=_elements("param"), fits="every parameter of a launch file")
 def launch_param_dropped(document: Document, param: Element) -> list[TextEdit]:
     """Does not set a parameter."""
     return [document.remove(param)]
 
 
 @operator(
-    "launch-load-dropped",
-    each=_elements("rosparam", "file", named=False),
-    fits="every <rosparam> of a launch file with a file",
+    each=_elements("rosparam", "file", named=False), fits="every <rosparam> of a launch file with a file"
 )
 def launch_load_dropped(document: Document, load: Element) -> list[TextEdit]:
     """Does not load the parameters' file."""
     return [document.remove(load)]
 
 
-@operator(
-    "url-changed",
-    each=_matches(URL, ".sh", ".launch"),
-    fits="every address in a launch file or a shell script",
-)
+@operator(each=_matches(URL, ".sh", ".launch"), fits="every address in a launch file or a shell script")
 def url_changed(_text: str, match: re.Match[str]) -> list[TextEdit]:
     """Opens another page."""
     return [TextEdit(*match.span(), "https://www.example.org/")]
 
 
-@operator(
-    "command-dropped", each=_matches(FIREFOX, ".sh"), fits="every shell script with a line that runs firefox"
-)
+@operator(each=_matches(FIREFOX, ".sh"), fits="every shell script with a line that runs firefox")
 def command_dropped(text: str, match: re.Match[str]) -> list[TextEdit]:
     """Leaves the shell script without the command that opens the page."""
     return [TextEdit(*whole_lines(text, *match.span()), "")]
@@ -238,26 +217,26 @@ def _yaml_keys(solution: Solution) -> Iterator[tuple[CodePlace, str, yaml.Scalar
             yield place, text, key, value
 
 
-@operator("yaml-tabs", each=_yaml_files, fits="every YAML file with an indented key in a line of its own")
+@operator(each=_yaml_files, fits="every YAML file with an indented key in a line of its own")
 def yaml_tabs(values: list[Leaf]) -> list[TextEdit]:
     """Indents the YAML file with a tab."""
     marks = [key.start_mark for name, key, _ in values if "/" in name and key.start_mark.column]
     return [TextEdit(mark.index - mark.column, mark.index, "\t") for mark in marks[:1]]
 
 
-@operator("yaml-malformed", each=_yaml_files, fits="every YAML file with a value in a line of its own")
+@operator(each=_yaml_files, fits="every YAML file with a value in a line of its own")
 def yaml_malformed(values: list[Leaf]) -> list[TextEdit]:
     """Leaves a quotation mark open in the YAML file."""
     return [TextEdit(v.start_mark.index, v.end_mark.index, f'"{v.value}') for _, _, v in values[:1]]
 
 
-@operator("yaml-key-missing", each=_yaml_keys, fits="every value of a YAML file that has a line of its own")
+@operator(each=_yaml_keys, fits="every value of a YAML file that has a line of its own")
 def yaml_key_missing(text: str, key: yaml.ScalarNode, value: yaml.ScalarNode) -> list[TextEdit]:
     """Forgets a key of the YAML file."""
     return [TextEdit(*whole_lines(text, key.start_mark.index, _line_end(text, value)), "")]
 
 
-@operator("yaml-key-misspelt", each=_yaml_keys, fits="every value of a YAML file that has a line of its own")
+@operator(each=_yaml_keys, fits="every value of a YAML file that has a line of its own")
 def yaml_key_misspelt(_text: str, key: yaml.ScalarNode, _value: yaml.ScalarNode) -> list[TextEdit]:
     """Misspells a key of the YAML file."""
     return [TextEdit(key.start_mark.index, key.end_mark.index, misspelt_name(str(key.value)))]
@@ -311,28 +290,20 @@ def _is_deeper(value: ast.AST) -> bool:
     return isinstance(value, ast.Call | ast.Subscript)
 
 
-@operator(
-    "parameter-not-read", each=_reads, fits="every expression that reads a value of the package's YAML files"
-)
+@operator(each=_reads, fits="every expression that reads a value of the package's YAML files")
 def parameter_not_read(script: Script, node: ast.expr, value: yaml.Node) -> list[TextEdit]:
     """Writes the value of the YAML file into the script, and does not read the parameter."""
     return [script.replace(node, repr(yaml.safe_load(yaml.serialize(value))))]
 
 
-@operator(
-    "parameter-misspelt",
-    each=_accesses("get_param"),
-    fits="every rospy.get_param() whose parameter is written out",
-)
+@operator(each=_accesses("get_param"), fits="every rospy.get_param() whose parameter is written out")
 def parameter_misspelt(script: Script, _call: ast.Call, name: ast.Constant) -> list[TextEdit]:
     """Misspells the parameter that it reads."""
     return [script.replace(name, repr(misspelt_name(str(name.value))))]
 
 
 @operator(
-    "parameter-not-set",
-    each=_accesses("set_param"),
-    fits="every statement rospy.set_param() whose parameter is written out",
+    each=_accesses("set_param"), fits="every statement rospy.set_param() whose parameter is written out"
 )
 def parameter_not_set(script: Script, call: ast.Call, _name: ast.Constant) -> list[TextEdit]:
     """Does not set the parameter."""
@@ -340,11 +311,7 @@ def parameter_not_set(script: Script, call: ast.Call, _name: ast.Constant) -> li
     return [script.replace(statement, "pass")] if isinstance(statement, ast.Expr) else []
 
 
-@operator(
-    "parameter-other-value",
-    each=_accesses("set_param"),
-    fits="every rospy.set_param() whose parameter is written out",
-)
+@operator(each=_accesses("set_param"), fits="every rospy.set_param() whose parameter is written out")
 def parameter_other_value(script: Script, call: ast.Call, _name: ast.Constant) -> list[TextEdit]:
     """Sets the parameter to another value."""
     value = argument(call, 1, "param_value")
@@ -352,9 +319,7 @@ def parameter_other_value(script: Script, call: ast.Call, _name: ast.Constant) -
 
 
 @operator(
-    "parameter-clobbered",
-    each=_accesses("set_param"),
-    fits="every rospy.set_param() of a parameter below another, written out",
+    each=_accesses("set_param"), fits="every rospy.set_param() of a parameter below another, written out"
 )
 def parameter_clobbered(script: Script, call: ast.Call, name: ast.Constant) -> list[TextEdit]:
     """Sets a whole branch of parameters where one was meant, so that its neighbours are gone."""
@@ -366,11 +331,7 @@ def parameter_clobbered(script: Script, call: ast.Call, name: ast.Constant) -> l
     return [TextEdit(start, end, f"{head!r}, {{{tail!r}: {script.source(value)}}}")]
 
 
-@operator(
-    "parameter-set-elsewhere",
-    each=_accesses("set_param"),
-    fits="every rospy.set_param() whose parameter is written out",
-)
+@operator(each=_accesses("set_param"), fits="every rospy.set_param() whose parameter is written out")
 def parameter_set_elsewhere(script: Script, _call: ast.Call, name: ast.Constant) -> list[TextEdit]:
     """Sets a parameter of another name."""
     return [script.replace(name, repr(misspelt_name(str(name.value))))]

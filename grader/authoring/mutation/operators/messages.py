@@ -53,7 +53,7 @@ def _calls(values: list[ast.expr]) -> list[ast.Call]:
     return list(dict.fromkeys(n for value in values for n in ast.walk(value) if isinstance(n, ast.Call)))
 
 
-@operator("message-altered", each=_messages, fits="every publisher whose messages are made from a text")
+@operator(each=_messages, fits="every publisher whose messages are made from a text")
 def message_altered(script: Script, values: list[ast.expr]) -> list[TextEdit]:
     """Misspells the message."""
     for text in (text for value in values for text in texts_in(value)):
@@ -63,16 +63,14 @@ def message_altered(script: Script, values: list[ast.expr]) -> list[TextEdit]:
     return []
 
 
-@operator("message-constant-time", each=_messages, fits="every publisher whose messages carry the time")
+@operator(each=_messages, fits="every publisher whose messages carry the time")
 def message_constant_time(script: Script, values: list[ast.expr]) -> list[TextEdit]:
     """Sends the same time again and again."""
     constants = SECONDS | TIMES
     return [script.replace(c, constants[s]) for c in _calls(values) if (s := script.source(c)) in constants]
 
 
-@operator(
-    "message-nanoseconds", each=_messages, fits="every publisher whose messages carry the time in seconds"
-)
+@operator(each=_messages, fits="every publisher whose messages carry the time in seconds")
 def message_nanoseconds(script: Script, values: list[ast.expr]) -> list[TextEdit]:
     """Sends the time in nanoseconds, not in seconds."""
     in_seconds = {*SECONDS, *(f"{time}.to_sec()" for time in TIMES)}
@@ -98,7 +96,7 @@ def _stamps(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.Assign]
                 yield script_place(script), script, line
 
 
-@operator("stamp-not-set", each=_stamps, fits="every line that sets one")
+@operator(each=_stamps, fits="every line that sets one")
 def stamp_not_set(script: Script, line: ast.Assign) -> list[TextEdit]:
     """Never sets the stamp of the header."""
     return [script.remove(line)]
@@ -116,9 +114,7 @@ def _frames(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.expr, a
 
 
 @operator(
-    "frames-swapped",
-    each=_frames,
-    fits="every transform whose `child_frame_id` is set in the line behind its `frame_id`",
+    each=_frames, fits="every transform whose `child_frame_id` is set in the line behind its `frame_id`"
 )
 def frames_swapped(script: Script, parent: ast.expr, child: ast.expr) -> list[TextEdit]:
     """Swaps parent and child of a transform."""
@@ -133,7 +129,7 @@ def _preempts(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.Call]
                 yield script_place(script), script, call
 
 
-@operator("preempt-not-heeded", each=_preempts, fits="every call of `is_preempt_requested()`")
+@operator(each=_preempts, fits="every call of `is_preempt_requested()`")
 def preempt_not_heeded(script: Script, call: ast.Call) -> list[TextEdit]:
     """Goes on with an action's goal that was cancelled."""
     return [script.replace(call, "False")]
@@ -150,9 +146,7 @@ def _fields(solution: Solution) -> Iterator[tuple[CodePlace, str, InterfaceField
 
 
 @operator(
-    "field-other-type",
-    each=_fields,
-    fits="every field of a `.msg`, `.srv` or `.action` file that is a number of a usual type",
+    each=_fields, fits="every field of a `.msg`, `.srv` or `.action` file that is a number of a usual type"
 )
 def field_other_type(text: str, field: InterfaceField) -> list[TextEdit]:
     """Gives a field of its own message another type."""
@@ -195,53 +189,37 @@ def _set(script: Script, constants: list[ast.Constant], number: int) -> list[Tex
     return [script.replace(c, str(number)) for c in {script.span(c): c for c in constants}.values()]
 
 
-@operator(
-    "counter-from-one", each=_counters, fits="every integer topic that is fed by a counter with a first value"
-)
+@operator(each=_counters, fits="every integer topic that is fed by a counter with a first value")
 def counter_from_one(script: Script, counter: Counter) -> list[TextEdit]:
     """Begins to count at 1."""
     return _set(script, counter.starts, 1)
 
 
-@operator(
-    "counter-skips", each=_counters, params=ByParams, fits="every integer topic that is fed by a counter"
-)
+@operator(each=_counters, params=ByParams, fits="every integer topic that is fed by a counter")
 def counter_skips(script: Script, counter: Counter, params: ByParams) -> list[TextEdit]:
     """Counts in steps that are too large."""
     return _add(script, counter.steps, params.by)
 
 
-@operator(
-    "reset-early",
-    each=_counters,
-    params=EarlyParams,
-    fits="every counter with a limit that is written as a number",
-)
+@operator(each=_counters, params=EarlyParams, fits="every counter with a limit that is written as a number")
 def reset_early(script: Script, counter: Counter, params: EarlyParams) -> list[TextEdit]:
     """Goes back to the beginning too early."""
     return _add(script, counter.limits, -params.by)
 
 
-@operator(
-    "reset-late",
-    each=_counters,
-    params=ByParams,
-    fits="every counter with a limit that is written as a number",
-)
+@operator(each=_counters, params=ByParams, fits="every counter with a limit that is written as a number")
 def reset_late(script: Script, counter: Counter, params: ByParams) -> list[TextEdit]:
     """Goes back to the beginning too late."""
     return _add(script, counter.limits, params.by)
 
 
-@operator("reset-to-one", each=_counters, fits="every counter that is set back, or taken modulo a number")
+@operator(each=_counters, fits="every counter that is set back, or taken modulo a number")
 def reset_to_one(script: Script, counter: Counter) -> list[TextEdit]:
     """Goes back to 1."""
     return _back_to(script, counter, 1)
 
 
-@operator(
-    "wrap-to-minus-128", each=_counters, fits="every counter that is set back, or taken modulo a number"
-)
+@operator(each=_counters, fits="every counter that is set back, or taken modulo a number")
 def wrap_to_minus_128(script: Script, counter: Counter) -> list[TextEdit]:
     """Goes on at -128, as an 8-bit integer of C does."""
     return _back_to(script, counter, -128)
@@ -256,9 +234,7 @@ def _back_to(script: Script, counter: Counter, number: int) -> list[TextEdit]:
     return edits
 
 
-@operator(
-    "never-reset", each=_counters, fits="every counter that is set back by an `if`, or taken modulo a number"
-)
+@operator(each=_counters, fits="every counter that is set back by an `if`, or taken modulo a number")
 def never_reset(script: Script, counter: Counter) -> list[TextEdit]:
     """Never goes back to the beginning."""
     edits = [script.replace(modulo, script.source(modulo.left)) for modulo in counter.modulos]
@@ -325,13 +301,13 @@ integer_callback = _callbacks(*INTEGER_TYPES)
 signed_callback = _callbacks(*(name for name in INTEGER_TYPES if not name.startswith("U")))
 
 
-@operator("listener-silent", each=any_callback, fits="every subscriber whose callback prints or logs")
+@operator(each=any_callback, fits="every subscriber whose callback prints or logs")
 def listener_silent(heard: Hearing) -> list[TextEdit]:
     """Prints nothing of what it hears."""
     return [heard.script.replace(statement, "pass") for statement in heard.said]
 
 
-@operator("listener-constant", each=any_callback, fits="every subscriber whose callback prints or logs")
+@operator(each=any_callback, fits="every subscriber whose callback prints or logs")
 def listener_constant(heard: Hearing) -> list[TextEdit]:
     """Prints that it heard something, and not what."""
     named = [(s, s.value.func) for s in heard.said if isinstance(s.value, ast.Call)]
@@ -341,11 +317,7 @@ def listener_constant(heard: Hearing) -> list[TextEdit]:
     ]
 
 
-@operator(
-    "listener-drops-zero",
-    each=integer_callback,
-    fits="every subscriber of integers whose callback prints or logs",
-)
+@operator(each=integer_callback, fits="every subscriber of integers whose callback prints or logs")
 def listener_drops_zero(heard: Hearing) -> list[TextEdit]:
     """Prints every number but 0."""
     return [
@@ -354,7 +326,6 @@ def listener_drops_zero(heard: Hearing) -> list[TextEdit]:
 
 
 @operator(
-    "listener-drops-sign",
     each=signed_callback,
     fits="every subscriber of integers that may be negative, whose callback reads the message's data",
 )
@@ -363,17 +334,13 @@ def listener_drops_sign(heard: Hearing) -> list[TextEdit]:
     return heard.replace_data(f"abs({heard.message}.data)")
 
 
-@operator(
-    "listener-off-by-one",
-    each=integer_callback,
-    fits="every subscriber of integers whose callback reads the message's data",
-)
+@operator(each=integer_callback, fits="every subscriber of integers whose callback reads the message's data")
 def listener_off_by_one(heard: Hearing) -> list[TextEdit]:
     """Prints each number plus one."""
     return heard.replace_data(f"({heard.message}.data + 1)")
 
 
-@operator("listener-drops-some", each=any_callback, fits="every subscriber whose callback prints or logs")
+@operator(each=any_callback, fits="every subscriber whose callback prints or logs")
 def listener_drops_some(heard: Hearing) -> list[TextEdit]:
     """Prints every second message only."""
     return every_second_time(
@@ -381,7 +348,7 @@ def listener_drops_some(heard: Hearing) -> list[TextEdit]:
     )
 
 
-@operator("listener-late", each=any_callback, fits="every subscriber whose callback prints or logs")
+@operator(each=any_callback, fits="every subscriber whose callback prints or logs")
 def listener_late(heard: Hearing) -> list[TextEdit]:
     """Prints each message only when the next one comes, so that the last is lost."""
     if not heard.said or not heard.script.has_lines(heard.callback.body[0]):
@@ -391,9 +358,7 @@ def listener_late(heard: Hearing) -> list[TextEdit]:
     return [heard.script.preamble("waiting = []"), heard.script.before(heard.callback.body[0], *lines)]
 
 
-@operator(
-    "callback-error", each=any_callback, fits="every subscriber whose callback reads the message's data"
-)
+@operator(each=any_callback, fits="every subscriber whose callback reads the message's data")
 def callback_error(heard: Hearing) -> list[TextEdit]:
     """Misspells the message's variable in the callback."""
     return heard.replace_data(f"the_{heard.message}.data")

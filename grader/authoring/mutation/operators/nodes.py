@@ -49,21 +49,21 @@ def _is_anonymous(call: ast.Call) -> bool:
     return keyword is not None and isinstance(keyword.value, ast.Constant) and bool(keyword.value.value)
 
 
-@operator("name-changed", each=_init_nodes, fits="every script with a node whose name is written out")
+@operator(each=_init_nodes, fits="every script with a node whose name is written out")
 def name_changed(script: Script, call: ast.Call) -> list[TextEdit]:
     """Gives the node another name."""
     name = text_literal(script, argument(call, 0, "name"))
     return [script.replace(name, repr(f"my_{name.value!s}"))] if name is not None else []
 
 
-@operator("not-anonymous", each=_init_nodes, fits="every script with an anonymous node")
+@operator(each=_init_nodes, fits="every script with an anonymous node")
 def not_anonymous(script: Script, call: ast.Call) -> list[TextEdit]:
     """Leaves out `anonymous=True`."""
     keyword = _anonymous(call)
     return [script.replace(keyword.value, "False")] if keyword is not None and _is_anonymous(call) else []
 
 
-@operator("made-anonymous", each=_init_nodes, fits="every script with a node that is not anonymous")
+@operator(each=_init_nodes, fits="every script with a node that is not anonymous")
 def made_anonymous(script: Script, call: ast.Call) -> list[TextEdit]:
     """Makes the node anonymous where its plain name is asked for."""
     keyword = _anonymous(call)
@@ -93,12 +93,7 @@ def _lives(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.While | 
             yield script_place(script, node), script, node
 
 
-@operator(
-    "node-ends-by-itself",
-    each=_lives,
-    params=EndsParams,
-    fits="every script with a loop until shutdown or a spin",
-)
+@operator(each=_lives, params=EndsParams, fits="every script with a loop until shutdown or a spin")
 def node_ends_by_itself(script: Script, life: ast.While | ast.Expr, params: EndsParams) -> list[TextEdit]:
     """Lets the node come to its end: a loop that is counted, or no rospy.spin()."""
     if isinstance(life, ast.Expr):
@@ -106,7 +101,7 @@ def node_ends_by_itself(script: Script, life: ast.While | ast.Expr, params: Ends
     return [TextEdit(script.span(life)[0], script.span(life.test)[1], f"for _ in range({params.turns})")]
 
 
-@operator("ctrl-c-swallowed", each=_lives, fits="every script with a loop until shutdown or a spin")
+@operator(each=_lives, fits="every script with a loop until shutdown or a spin")
 def ctrl_c_swallowed(script: Script, life: ast.While | ast.Expr) -> list[TextEdit]:
     """Catches every exception and goes on, so that Ctrl-C does not end the node."""
     unit = script.unit
@@ -122,7 +117,7 @@ def ctrl_c_swallowed(script: Script, life: ast.While | ast.Expr) -> list[TextEdi
     return [script.before(life, *lines), script.remove(life)]
 
 
-@operator("traceback-on-exit", each=_lives, fits="every script with a loop until shutdown or a spin")
+@operator(each=_lives, fits="every script with a loop until shutdown or a spin")
 def traceback_on_exit(script: Script, life: ast.While | ast.Expr) -> list[TextEdit]:
     """Uses an undefined variable once the node has been told to end."""
     wrong = "print('stopped after', turns_so_far)"
@@ -157,7 +152,7 @@ def _first_words(script: Script, call: ast.Call) -> str:
     return script.source(call.args[0])[:TEXT_LIMIT]
 
 
-@operator("log-level", each=_logs, params=LevelParams, fits="every call of rospy's logging")
+@operator(each=_logs, params=LevelParams, fits="every call of rospy's logging")
 def log_level(script: Script, _statement: ast.Expr, call: ast.Call, params: LevelParams) -> list[TextEdit]:
     """Logs at another level."""
     if last_name(call.func) not in LOGS or not isinstance(call.func, ast.Attribute):
@@ -165,14 +160,14 @@ def log_level(script: Script, _statement: ast.Expr, call: ast.Call, params: Leve
     return [script.replace(call.func, f"{script.source(call.func.value)}.{LEVELS[params.level]}")]
 
 
-@operator("log-text", each=_logs, fits="every line that prints or logs a text")
+@operator(each=_logs, fits="every line that prints or logs a text")
 def log_text(script: Script, _statement: ast.Expr, call: ast.Call) -> list[TextEdit]:
     """Misspells what it prints or logs."""
     texts = [t for a in call.args for t in texts_in(a)]
     return [script.replace(text, misspelt_literal(script.source(text))) for text in texts[:1]]
 
 
-@operator("print-instead-of-log", each=_logs, fits="every call of rospy's logging")
+@operator(each=_logs, fits="every call of rospy's logging")
 def print_instead_of_log(script: Script, _statement: ast.Expr, call: ast.Call) -> list[TextEdit]:
     """Prints where it should log."""
     if last_name(call.func) not in LOGS or call.keywords:
@@ -181,7 +176,7 @@ def print_instead_of_log(script: Script, _statement: ast.Expr, call: ast.Call) -
     return [script.replace(call, f"print({words} % ({', '.join(values)},))" if values else f"print({words})")]
 
 
-@operator("log-dropped", each=_logs, fits="every line that prints or logs")
+@operator(each=_logs, fits="every line that prints or logs")
 def log_dropped(script: Script, statement: ast.Expr, _call: ast.Call) -> list[TextEdit]:
     """Does not print or log this."""
     return [script.replace(statement, "pass")]
@@ -201,7 +196,7 @@ def _if_broken(script: Script, *edits: TextEdit) -> list[TextEdit]:
     return []
 
 
-@operator("python2-print", each=each_script, fits="every Python script that prints or logs something")
+@operator(each=each_script, fits="every Python script that prints or logs something")
 def python2_print(script: Script) -> list[TextEdit]:
     """Prints as Python 2 does."""
     for statement in speech(script):
@@ -211,7 +206,7 @@ def python2_print(script: Script) -> list[TextEdit]:
     return []
 
 
-@operator("tabs-and-spaces", each=each_script, fits="every Python script with a block of two lines")
+@operator(each=each_script, fits="every Python script with a block of two lines")
 def tabs_and_spaces(script: Script) -> list[TextEdit]:
     """Mixes tabs and spaces."""
     return next((edits for s in script.of(ast.stmt) if (edits := _with_other_indentation(script, s))), [])
@@ -230,7 +225,7 @@ def _with_other_indentation(script: Script, statement: ast.stmt) -> list[TextEdi
     return _if_broken(script, edit)
 
 
-@operator("typographic-quote", each=each_script, fits="every Python script with a text as an argument")
+@operator(each=each_script, fits="every Python script with a text as an argument")
 def typographic_quote(script: Script) -> list[TextEdit]:
     """Copies a text with its quotes from a PDF."""
     for text in (given for call in script.of(ast.Call) for given in call.args):
@@ -239,11 +234,7 @@ def typographic_quote(script: Script) -> list[TextEdit]:
     return []
 
 
-@operator(
-    "no-break-space",
-    each=each_script,
-    fits="every Python script with an assignment that has spaces around its sign",
-)
+@operator(each=each_script, fits="every Python script with an assignment that has spaces around its sign")
 def no_break_space(script: Script) -> list[TextEdit]:
     """Copies a line from a PDF, with a space that Python does not accept."""
     for statement in script.of(ast.Assign):
@@ -253,7 +244,7 @@ def no_break_space(script: Script) -> list[TextEdit]:
     return []
 
 
-@operator("syntax-error", each=each_script, fits="every Python script that has one of them")
+@operator(each=each_script, fits="every Python script that has one of them")
 def syntax_error(script: Script) -> list[TextEdit]:
     """Forgets the colon after `def`, `class` or `while`."""
     for node in script.of(ast.stmt):
@@ -263,14 +254,14 @@ def syntax_error(script: Script) -> list[TextEdit]:
     return []
 
 
-@operator("missing-module", each=each_script, fits="every Python script that imports rospy")
+@operator(each=each_script, fits="every Python script that imports rospy")
 def missing_module(script: Script) -> list[TextEdit]:
     """Imports messages of a package that does not exist."""
     imports = [n for n in script.of(ast.Import) if any(a.name == "rospy" for a in n.names)]
     return [script.after(statement, "from beginner_tutorials.msg import Num") for statement in imports[:1]]
 
 
-@operator("asks-for-input", each=each_script, fits="every Python script that makes a node")
+@operator(each=each_script, fits="every Python script that makes a node")
 def asks_for_input(script: Script) -> list[TextEdit]:
     """Waits for someone to press Enter before it makes its node."""
     for call in calls(script, "init_node"):

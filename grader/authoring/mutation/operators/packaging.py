@@ -55,7 +55,6 @@ def _comment_out(text: str, command: Command) -> list[TextEdit]:
 
 
 @operator(
-    "project-renamed",
     each=lambda s: ((p, s.name, c) for p, _, c in _calls("project")(s) if c.args),
     fits="every CMakeLists.txt with project()",
 )
@@ -65,21 +64,19 @@ def project_renamed(package: str, command: Command) -> list[TextEdit]:
     return [TextEdit(span.start, span.stop, f"my_{package}")]
 
 
-@operator("no-find-package", each=find_catkin, fits="every CMakeLists.txt with find_package(catkin …)")
+@operator(each=find_catkin, fits="every CMakeLists.txt with find_package(catkin …)")
 def no_find_package(text: str, command: Command) -> list[TextEdit]:
     """Leaves find_package(catkin …) commented out."""
     return _comment_out(text, command)
 
 
-@operator(
-    "no-catkin-package", each=_calls("catkin_package"), fits="every CMakeLists.txt with catkin_package()"
-)
+@operator(each=_calls("catkin_package"), fits="every CMakeLists.txt with catkin_package()")
 def no_catkin_package(text: str, command: Command) -> list[TextEdit]:
     """Does not call catkin_package()."""
     return [TextEdit(*whole_lines(text, command.span.start, command.span.stop), "")]
 
 
-@operator("unknown-component", each=find_catkin, fits="every CMakeLists.txt with find_package(catkin …)")
+@operator(each=find_catkin, fits="every CMakeLists.txt with find_package(catkin …)")
 def unknown_component(_text: str, command: Command) -> list[TextEdit]:
     """Asks catkin for dep1, as the help of catkin_create_pkg does."""
     has = any(argument.value == "COMPONENTS" for argument in command.args)
@@ -87,37 +84,33 @@ def unknown_component(_text: str, command: Command) -> list[TextEdit]:
     return [TextEdit(end, end, " dep1" if has else " COMPONENTS dep1")]
 
 
-@operator("cmake-malformed", each=_last_command, fits="every CMakeLists.txt with a command")
+@operator(each=_last_command, fits="every CMakeLists.txt with a command")
 def cmake_malformed(command: Command) -> list[TextEdit]:
     """Leaves a bracket open in CMakeLists.txt."""
     return [TextEdit(command.span.stop - 1, command.span.stop, "")]
 
 
-@operator("source-missing", each=_last_command, fits="every CMakeLists.txt with a command")
+@operator(each=_last_command, fits="every CMakeLists.txt with a command")
 def source_missing(command: Command) -> list[TextEdit]:
     """Builds a C++ program whose source is not in the package."""
     end = command.span.stop
     return [TextEdit(end, end, "\n\nadd_executable(my_node src/my_node.cpp)")]
 
 
-@operator("install-dropped", each=_find_installed, fits="every script that catkin_install_python() names")
+@operator(each=_find_installed, fits="every script that catkin_install_python() names")
 def install_dropped(text: str, command: Command, scripts: list[Token], script: Token) -> list[TextEdit]:
     """Does not name a script in catkin_install_python()."""
     span = script.span if len(scripts) > 1 else command.span
     return [TextEdit(*whole_lines(text, span.start, span.stop), "")]
 
 
-@operator("install-commented", each=install_calls, fits="every call of catkin_install_python()")
+@operator(each=install_calls, fits="every call of catkin_install_python()")
 def install_commented(text: str, command: Command) -> list[TextEdit]:
     """Leaves catkin_install_python() commented out."""
     return _comment_out(text, command)
 
 
-@operator(
-    "install-elsewhere",
-    each=install_calls,
-    fits="every call of catkin_install_python() into the package's programs",
-)
+@operator(each=install_calls, fits="every call of catkin_install_python() into the package's programs")
 def install_elsewhere(_text: str, command: Command) -> list[TextEdit]:
     """Installs the scripts where rosrun does not look."""
     spans = [argument.span for argument in command.args if argument.value == BIN]
@@ -155,19 +148,19 @@ def _package(solution: Solution) -> Iterator[tuple[CodePlace, Solution]]:
         yield CodePlace(path=MANIFEST, at={}), solution
 
 
-@operator("dependency-dropped", each=_dependencies, fits="every dependency of package.xml but catkin")
+@operator(each=_dependencies, fits="every dependency of package.xml but catkin")
 def dependency_dropped(manifest: Document, elements: list[Element]) -> list[TextEdit]:
     """Does not declare a package that the nodes need."""
     return [manifest.remove(element) for element in elements]
 
 
-@operator("manifest-renamed", each=_elements("name"), fits="every package.xml with a name")
+@operator(each=_elements("name"), fits="every package.xml with a name")
 def manifest_renamed(manifest: Document, element: Element) -> list[TextEdit]:
     """Gives package.xml another name than the rest of the package."""
     return [manifest.set_content(element, f"{manifest.content(element)}_pkg")]
 
 
-@operator("package-renamed", each=_package, fits="every package")
+@operator(each=_package, fits="every package")
 def package_renamed(solution: Solution) -> Tree:
     """Gives the package another name, in all of its files alike."""
     word = re.compile(rf"(?<![\w/.-]){re.escape(solution.name)}(?![\w.-])".encode())
@@ -177,22 +170,20 @@ def package_renamed(solution: Solution) -> Tree:
     return solution.tree
 
 
-@operator("manifest-malformed", each=_elements("description"), fits="every package.xml with a description")
+@operator(each=_elements("description"), fits="every package.xml with a description")
 def manifest_malformed(manifest: Document, element: Element) -> list[TextEdit]:
     """Forgets to close a tag in package.xml."""
     close = manifest.data.rfind(b"</", element.inner, element.end)
     return [TextEdit(close, element.end, "")] if close >= 0 else []
 
 
-@operator(
-    "buildtool-dropped", each=_elements("buildtool_depend"), fits="every package.xml with a buildtool_depend"
-)
+@operator(each=_elements("buildtool_depend"), fits="every package.xml with a buildtool_depend")
 def buildtool_dropped(manifest: Document, element: Element) -> list[TextEdit]:
     """Does not name catkin as the build tool."""
     return [manifest.remove(element)]
 
 
-@operator("email-left", each=_elements("maintainer"), fits="every maintainer with an address")
+@operator(each=_elements("maintainer"), fits="every maintainer with an address")
 def email_left(manifest: Document, element: Element) -> list[TextEdit]:
     """Leaves the maintainer's e-mail address as catkin_create_pkg wrote it."""
     known = "email" in element.attributes
@@ -217,40 +208,40 @@ def _contents(solution: Solution) -> Iterator[tuple[CodePlace, bytes]]:
         yield CodePlace(path=path, at={"script": path}, line=1), solution.entry(path).data
 
 
-@operator("bit-removed", each=_programs, fits="every executable file with a shebang")
+@operator(each=_programs, fits="every executable file with a shebang")
 def bit_removed(solution: Solution, path: str) -> Tree:
     """Never makes the script executable."""
     return solution.with_entry(path, replace(solution.entry(path), executable=False))
 
 
-@operator("file-missing", each=_files, fits="every script, launch file and YAML file")
+@operator(each=_files, fits="every script, launch file and YAML file")
 def file_missing(solution: Solution, path: str) -> Tree | None:
     """Forgets to hand in the file."""
     return solution.without(path) if path.endswith(TELLING) or path in solution.programs else None
 
 
-@operator("file-misnamed", each=_files, fits="every script, launch file and YAML file")
+@operator(each=_files, fits="every script, launch file and YAML file")
 def file_misnamed(solution: Solution, path: str) -> Tree | None:
     """Gives the file another name than the handout."""
     name = PurePosixPath(path)
     return solution.moved(path, str(name.with_stem(f"my_{name.stem}"))) if path.endswith(TELLING) else None
 
 
-@operator("script-elsewhere", each=_programs, fits="every script under src/ or scripts/")
+@operator(each=_programs, fits="every script under src/ or scripts/")
 def script_elsewhere(solution: Solution, path: str) -> Tree | None:
     """Puts the script into another folder than the handout says."""
     first, _, rest = path.partition("/")
     return solution.moved(path, f"{OTHER_FOLDER[first]}/{rest}") if rest and first in OTHER_FOLDER else None
 
 
-@operator("launch-elsewhere", each=_files, fits="every launch file that lies in a folder")
+@operator(each=_files, fits="every launch file that lies in a folder")
 def launch_elsewhere(solution: Solution, path: str) -> Tree | None:
     """Keeps the launch file beside package.xml, not in its folder."""
     inside = path.endswith(".launch") and "/" in path
     return solution.moved(path, PurePosixPath(path).name) if inside else None
 
 
-@operator("build-file-missing", each=_files, fits="a package with a CMakeLists.txt and a package.xml")
+@operator(each=_files, fits="a package with a CMakeLists.txt and a package.xml")
 def build_file_missing(solution: Solution, path: str) -> Tree | None:
     """Forgets to hand in CMakeLists.txt."""
     return solution.without(path) if path == CMAKE and MANIFEST in solution.files else None
@@ -264,43 +255,43 @@ def _first_line(data: bytes, change: Callable[[str], str]) -> bytes:
     return change(line.decode(errors="replace")).encode() + b"\n" + rest
 
 
-@operator("crlf", each=_contents, fits="every script whose lines end as on Linux")
+@operator(each=_contents, fits="every script whose lines end as on Linux")
 def crlf(data: bytes) -> bytes:
     """Saves the script with Windows line endings, so that its shebang names no program."""
     return data if b"\r\n" in data else data.replace(b"\n", b"\r\n")
 
 
-@operator("byte-order-mark", each=_contents, fits="every script")
+@operator(each=_contents, fits="every script")
 def byte_order_mark(data: bytes) -> bytes:
     """Saves the script with a byte order mark, so that the system does not see the shebang."""
     return b"\xef\xbb\xbf" + data
 
 
-@operator("utf-16", each=_contents, fits="every script")
+@operator(each=_contents, fits="every script")
 def utf_16(data: bytes) -> bytes:
     """Saves the script as UTF-16, as some editors of Windows do."""
     return data.decode("utf-8", "replace").encode("utf-16")
 
 
-@operator("no-shebang", each=_contents, fits="every script")
+@operator(each=_contents, fits="every script")
 def no_shebang(data: bytes) -> bytes:
     """Leaves out the shebang."""
     return data.partition(b"\n")[2]
 
 
-@operator("shebang-typo", each=_contents, fits="every script")
+@operator(each=_contents, fits="every script")
 def shebang_typo(data: bytes) -> bytes:
     """Names a program in the shebang that does not exist."""
     return _first_line(data, lambda line: line.replace("bin/", "bni/", 1))
 
 
-@operator("shebang-commented", each=_contents, fits="every script")
+@operator(each=_contents, fits="every script")
 def shebang_commented(data: bytes) -> bytes:
     """Puts a space into the shebang, which makes it a comment."""
     return _first_line(data, lambda line: line.replace("#!", "# !", 1))
 
 
-@operator("shebang-python2", each=_contents, fits="every Python script whose shebang ends in its interpreter")
+@operator(each=_contents, fits="every Python script whose shebang ends in its interpreter")
 def shebang_python2(data: bytes) -> bytes:
     """Asks for Python 2, which the machine does not have."""
     return _first_line(data, lambda line: PYTHON.sub("python2", line.rstrip()))

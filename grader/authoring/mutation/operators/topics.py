@@ -56,26 +56,20 @@ class OtherTypeParams(Record):
     to: str = ""
 
 
-@operator(
-    "topic-misspelt", each=each_endpoint, fits="every publisher and subscriber whose topic is written out"
-)
+@operator(each=each_endpoint, fits="every publisher and subscriber whose topic is written out")
 def topic_misspelt(script: Script, endpoint: Endpoint) -> list[TextEdit]:
     """Misspells the topic."""
     return [script.replace(endpoint.name, repr(misspelt_name(str(endpoint.name.value))))]
 
 
-@operator(
-    "topic-capital", each=each_endpoint, fits="every publisher and subscriber whose topic is written out"
-)
+@operator(each=each_endpoint, fits="every publisher and subscriber whose topic is written out")
 def topic_capital(script: Script, endpoint: Endpoint) -> list[TextEdit]:
     """Writes the topic with a capital letter."""
     head, slash, tail = str(endpoint.name.value).rpartition("/")
     return [script.replace(endpoint.name, repr(f"{head}{slash}{tail[:1].upper()}{tail[1:]}"))]
 
 
-@operator(
-    "private-topic", each=each_endpoint, fits="every publisher and subscriber whose topic is written out"
-)
+@operator(each=each_endpoint, fits="every publisher and subscriber whose topic is written out")
 def private_topic(script: Script, endpoint: Endpoint) -> list[TextEdit]:
     """Puts the topic into the node's private namespace."""
     name = str(endpoint.name.value).lstrip("/~")
@@ -92,7 +86,7 @@ def _node_first(script: Script, endpoint: Endpoint) -> list[TextEdit]:
     return [script.before(made, script.source(later[0])), script.remove(later[0])]
 
 
-@operator("publisher-dropped", each=each_publisher, fits="every publisher that is kept in a variable")
+@operator(each=each_publisher, fits="every publisher that is kept in a variable")
 def publisher_dropped(script: Script, publisher: Endpoint) -> list[TextEdit]:
     """Removes a publisher that should stay."""
     statements = [script.statement(call) for call in publish_calls(script, publisher)]
@@ -101,14 +95,13 @@ def publisher_dropped(script: Script, publisher: Endpoint) -> list[TextEdit]:
     return [script.remove(script.statement(publisher.call)), *(script.replace(s, "pass") for s in statements)]
 
 
-@operator("subscriber-dropped", each=each_subscriber, fits="every subscriber")
+@operator(each=each_subscriber, fits="every subscriber")
 def subscriber_dropped(script: Script, subscriber: Endpoint) -> list[TextEdit]:
     """Removes a subscriber that should stay."""
     return [script.remove(script.statement(subscriber.call))]
 
 
 @operator(
-    "other-type",
     each=each_endpoint,
     params=OtherTypeParams,
     fits="every publisher and subscriber of a number or a text of std_msgs",
@@ -161,11 +154,7 @@ def _import(script: Script, kind: ast.expr, to: str) -> list[TextEdit] | None:
     return None
 
 
-@operator(
-    "publish-half",
-    each=each_publisher,
-    fits="every publisher whose messages are sent by a statement of their own",
-)
+@operator(each=each_publisher, fits="every publisher whose messages are sent by a statement of their own")
 def publish_half(script: Script, publisher: Endpoint) -> list[TextEdit]:
     """Publishes this topic in every second turn only, its counter with it."""
     sent = [script.statement(call) for call in publish_calls(script, publisher)]
@@ -180,11 +169,7 @@ def _assigns(statement: ast.stmt, names: set[str]) -> bool:
     return any(isinstance(n, Assignment) and targets(n) & names for n in ast.walk(statement))
 
 
-@operator(
-    "published-twice",
-    each=each_publisher,
-    fits="every publisher whose messages are sent by a statement of their own",
-)
+@operator(each=each_publisher, fits="every publisher whose messages are sent by a statement of their own")
 def published_twice(script: Script, publisher: Endpoint) -> list[TextEdit]:
     """Publishes each message twice."""
     sent = [script.statement(call) for call in publish_calls(script, publisher)][:1]
@@ -301,19 +286,13 @@ def _calls_in(script: Script, statements: Sequence[ast.stmt]) -> Iterator[ast.Ca
                     waiting.append(called)
 
 
-@operator(
-    "other-rate",
-    each=_paces,
-    params=RateParams,
-    fits="every script with a rate, a timer, or a sleep in a loop",
-)
+@operator(each=_paces, params=RateParams, fits="every script with a rate, a timer, or a sleep in a loop")
 def other_rate(script: Script, pace: Pace, params: RateParams) -> list[TextEdit]:
     """Publishes at another rate."""
     return [script.replace(pace.node, pace.times(params.factor))]
 
 
 @operator(
-    "burst",
     each=_turns,
     params=BurstParams,
     fits="every script with a rate, a timer, or a sleep in a loop that publishes",
@@ -330,7 +309,7 @@ def _rate_sleeps(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.Ex
             yield script_place(script, statement), script, statement
 
 
-@operator("sleep-without-brackets", each=_rate_sleeps, fits="every script with a statement rate.sleep()")
+@operator(each=_rate_sleeps, fits="every script with a statement rate.sleep()")
 def sleep_without_brackets(script: Script, statement: ast.Expr) -> list[TextEdit]:
     """Names rate.sleep but does not call it, so that the loop floods its topics."""
     call = statement.value
