@@ -33,6 +33,11 @@ pytestmark = pytest.mark.usefixtures("without_processes")
         ),
         ("def f(req):\n    a = AddResponse()\n    a.sum = req.a\n    return a\n", None),
         ("def f(req):\n    a = AddResponse()\n    fill(a)\n    return a\n", None),
+        ("def f(req):\n    a = EmptyResponse()\n    return a\n", None),
+        (
+            "def f(req):\n    a = AddResponse()\n    def g():\n        a.sum = 1\n    g()\n    return a\n",
+            None,
+        ),
         (
             "def f(req):\n    a = AddResponse()\n    if req.a:\n        return AddResponse(1)\n    return a\n",
             None,
@@ -154,6 +159,8 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("wrong-value", 1, "`self.a >= 350 and self.a < 10` is true for no number") ]),
         ("if key != 'a' or key != 'b':\n    f(b)\n",
          [("wrong-value", 1, "`key != 'a' or key != 'b'` is true for every value")]),
+        ("if key != '`' or key != 'b':\n    f(b)\n",
+         [("wrong-value", 1, "`key != ''' or key != 'b'` is true for every value")]),
         ("if key == 1 and c and key == 2:\n    f(b)\n", [("wrong-value", 1, "write `or` in place of `and`")]),
         ("if key != 1 or key != 1.0 or key != True:\n    f(b)\n", []),
         ("if key != 'a' or other != 'b' or key != 'a':\n    f(b)\n", []),
@@ -584,6 +591,11 @@ def test_every_kind_is_described() -> None:
             "def f(msg):\n    String = String(msg.data)\n",
             ["on line 3, call the message `message`, as in `message = String(…)`"],
         ),
+        (
+            "from rospy import Rate\nprint(String)\ndef f():\n    Rate = Rate(10)\n",
+            ["on line 5, call the object `own_rate`, as in `own_rate = Rate(…)`"],
+        ),
+        ("from tqdm import tqdm\ntqdm = tqdm(9)\nprint(String)\n", []),
         ("string = String()\nString.data = 'a'\n", []),
         ("Int8 = Int8()\n", []),
     ],
@@ -601,6 +613,7 @@ def test_a_message_with_the_name_of_its_class(text: str, fixes: list[str], tmp_p
     [
         ("print(rows[n / 25])", ["on line 1, write `//` instead of `/` in the index"]),
         ("print(rows[n // 25], rows[int(n / 25)], n / rows[2])", []),
+        ("print(files[folder / 'map.yaml'], files[folder / f'{n}.yaml'])", []),
     ],
 )
 def test_an_index_that_is_a_float(line: str, fixes: list[str], tmp_path: Path) -> None:
@@ -619,6 +632,12 @@ def test_an_index_that_is_a_float(line: str, fixes: list[str], tmp_path: Path) -
         ("    if g.n < 0:\n        s.set_aborted(r)\n    else:\n        s.set_succeeded(r)\n", []),
         ("    if ok:\n        s.set_succeeded(r)\n    print('done')\n", []),
         ("    if stop:\n        s.set_preempted()\n        ok = False\n    if ok:\n        s.set_succeeded(r)\n", []),
+        ("    while not done:\n        if near(g):\n            done = True\n            s.set_succeeded()\n", []),
+        ("    while s.is_active():\n        if near(g):\n            s.set_succeeded()\n", []),
+        ("    if not ok:\n        s.set_aborted()\n    if ok:\n        s.set_succeeded()\n", []),
+        ("    if stop:\n        s.set_preempted()\n    if s.is_active():\n        s.set_succeeded()\n", []),
+        ("    while not over():\n        g = s.accept_new_goal()\n        if g:\n            s.set_succeeded()\n", []),
+        ("    for one in goals:\n        if near(one):\n            one.set_succeeded()\n", []),
     ],
 )  # fmt: skip
 def test_callbacks_that_go_on_after_their_goal(text: str, fixes: list[str], tmp_path: Path) -> None:
