@@ -274,6 +274,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("loop-left", 5, "put it inside a `while")]),
         ("def publish():\n    for n in range(9):\n        p.publish(n)\nrospy.init_node('a')\npublish()\n",
          [("loop-left", 2, "put it inside a `while")]),
+        ("class A(Thread):\n    pass\nclass B(A):\n    def run(self):\n        p.publish(0)\nB().start()\n", []),
     ],
 )  # fmt: skip
 def test_what_never_runs_is_known(tmp_path, text, found):

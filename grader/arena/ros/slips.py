@@ -146,8 +146,10 @@ def never_run(tree):
     classes = [n for n in walk(tree) if isinstance(n, ast.ClassDef)]
     of_class = {id(f): c.name for c in classes for f in c.body}
     plain = {c.name for c in classes} | {"object"}
-    # what a class of another module is the base of, that module may call
-    named |= {f.name for c in classes if {dotted(b) for b in c.bases} - plain for f in functions_of(c)}
+    for one in classes:  # what a class of another module is the base of, that module may call
+        if {dotted(base) for base in one.bases} - plain:
+            plain.discard(one.name)
+            named |= {f.name for f in functions_of(one)}
     for node in walk(tree):
         if isinstance(node, ast.FunctionDef) and node.name not in named and not node.decorator_list:
             if calls_in(node, *WORKS) and not node.name.startswith("__"):
