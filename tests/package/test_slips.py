@@ -234,6 +234,8 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         ("def f():\n    pass\nrospy.Subscriber('a', A, callback=f)\n",
          [("callback-values", 1, "`f` takes 0 arguments")]),
         ("def f(m):\n    pass\nrospy.Subscriber('a', A, f)\n", []),
+        ("def f(m):\n    pass\nrospy.Subscriber('a', A, f, 10)\n",
+         [("callback-values", 1, "takes 1 argument, but ROS passes it the message and its `callback_args`")]),
         ("def f(m, a):\n    pass\nrospy.Subscriber('a', A, f, 3)\n", []),
         ("def f(*a):\n    pass\nrospy.Timer(d, f)\n", []),
         ("def f(event):\n    pass\nrospy.Timer(d, f, True)\n", []),

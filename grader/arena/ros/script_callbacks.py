@@ -64,6 +64,7 @@ def callbacks(tree):
                     "on_shutdown": "nothing",
                     "signal": "the signal's number and a frame",
                 }.get(name, "the %s" % VALUES.get(name, "message"))
+                what += " and its `callback_args`" if name == "Subscriber" and values > 1 else ""
                 message, fix = wrong_callback(own, node, functions, isinstance(meant, ast.Attribute), values)
                 number = "1 argument" if least == 1 else "%d arguments" % least
                 message = message or "`%s` takes %s, but ROS passes it %s" % (own.name, number, what)
@@ -187,7 +188,7 @@ WITH_DATA = {
 ALWAYS, NEVER, UNKNOWN = "always", "never", "unknown"
 OTHERS_LIMIT, LINES_LIMIT = 10, 50
 """Callbacks of so many other topics are searched for what one keeps, and so much of each."""
-LEAVES = (ast.Return, ast.Raise)
+LEAVES, STORING = (ast.Return, ast.Raise), (ast.Assign, ast.AugAssign, ast.AnnAssign, ast.NamedExpr)
 
 
 def unprinted_messages(tree):
@@ -241,7 +242,7 @@ class Printing:
         self.nodes = sorted((n for n in nodes if hasattr(n, "lineno")), key=place)
         outer = {name for n in nodes if isinstance(n, (ast.Global, ast.Nonlocal)) for name in n.names}
         for n in self.nodes:
-            if isinstance(n, (ast.Assign, ast.AugAssign, ast.AnnAssign)) and n.value is not None:
+            if isinstance(n, STORING) and n.value is not None:
                 self.follow(n, outer)
         self.prints = [n for n in self.nodes if is_print(n)]
 
