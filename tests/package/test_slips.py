@@ -471,6 +471,14 @@ def test_a_condition_is_joined_with_another_where_that_changes_nothing_in_it(
     assert deaf.fix.startswith(fix)
 
 
+@pytest.mark.parametrize(("caught", "is_told"), [("KeyError(e)", True), ("A if b else C", False)])
+def test_an_exception_gets_the_name_that_is_used(caught: str, is_told: bool, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"try:\n    f()\nexcept {caught}:\n    print(e)\n")
+    fixes = {s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "e"}
+    assert ("on line 3, write `except KeyError as e:`" in fixes) == is_told
+    assert not any("..." in fix for fix in fixes)
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [
