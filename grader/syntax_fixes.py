@@ -234,7 +234,11 @@ _LAST_HABITS = (
     _Habit(r"\blambda\b[^:]*$", "a colon `:` is missing behind what the `lambda` takes"),
     _Habit(r"^\s*(global|nonlocal)\s+(?:\w+\s*,\s*)*\w+\s*=", "`{0}` gives a name no value",
            "write the name alone, and give it its value on the next line"),
-    _Habit(r"([-+*/%=<>]|\b(?:and|or|not|in))\s*(?:[)\]}:].*)?$", "a value is missing behind `{0}`"),
+    _Habit(r"(->|\*\*|//|[-+*/%=!<>]=|[-+*/%=<>]|\b(?:and|or|not|in))\s*(?:[)\]}:].*)?$",
+           "a value is missing behind `{0}`"),
+)  # fmt: skip
+"""What a line may have where nothing else is wrong with it."""
+_HEADLESS = (
     _Habit(r"^\s*elif\b", "there is no `if` that this `elif` belongs to",
            "begin it below the `i` of its `if`, right behind that block and above any `else:`"),
     _Habit(r"^\s*else\b", "there is no `if` that this `else` belongs to",
@@ -242,7 +246,7 @@ _LAST_HABITS = (
     _Habit(r"^\s*(except|finally)\b", "there is no `try:` for this `{0}`",
            "write `try:` above the lines that it is for"),
 )  # fmt: skip
-"""What a line may have where nothing else is wrong with it."""
+"""What a line lacks above it that is good Python by itself."""
 
 
 def parsed(source: str) -> ast.Module:
@@ -257,8 +261,9 @@ def parsed(source: str) -> ast.Module:
         return ast.parse(source)
 
 
-def reason_of_line(line: str) -> Reason:
-    """Return what is wrong with a line that does not parse, as far as the table knows it."""
+def reason_of_line(line: str, message: str = "") -> Reason:
+    """Return what is wrong with a line that does not parse, as far as the tables know it. By Python's `message`, that
+    can also be a comma that is missing on a later line."""
     code, comment, texts = _taken_apart(line[:LINE_CHARS_MAX])
     if known := _reason_in(_HABITS, code, comment):
         return known
@@ -272,7 +277,8 @@ def reason_of_line(line: str) -> Reason:
     if apart := next(_with_separator(code, texts), ""):
         sign = "%" if apart.count("%") > code.count("%") else ","
         return Reason(f"`{sign}` is missing between two values")
-    return _reason_in(_LAST_HABITS, code) or Reason()
+    last = () if "forgot a comma" in message else _HEADLESS if _parses(line) else _LAST_HABITS
+    return _reason_in(last, code) or Reason()
 
 
 def _reason_in(habits: tuple[_Habit, ...], code: str, comment: str = "") -> Reason | None:

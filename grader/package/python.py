@@ -311,7 +311,7 @@ def reason_of(
         return of_block
     if _NEVER_ENDED.search(message) and (twice := reason_of_doubled(text)).why:
         return twice
-    reason = reason_of_line(text) if vague else Reason()
+    reason = reason_of_line(text, message) if vague else Reason()
     if vague and opened is not None and not reason.why:
         reason = _never_closed(opened)
     if reason.why:

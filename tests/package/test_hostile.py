@@ -469,6 +469,12 @@ SCRIPT = "import rospy\nrospy.init_node('x')\npub = rospy.Publisher('c', String,
         "".join(f"def f{number}():\n    pub.publish(x)\n" for number in range(400)),
         SCRIPT + "while a:\n    pub.publish(b)\n" * 400,
         SCRIPT + "rospy.spin()\n" * 2000,
+        SCRIPT + "rospy.spin()\ndef f():\n" + "    if a:\n        g()\n" * 4000,
+        SCRIPT
+        + "".join(f"def f{n}(m):\n    global x{n}\n    x{n} = m.data\n" for n in range(1000))
+        + "".join(f"rospy.Subscriber('t{n}', String, f{n})\n" for n in range(1000))
+        + "def f0(m):\n    global x0\n    x0 = m.data\n"
+        + "    y = x0 + z\n" * 2000,
     ],
 )
 def test_lines_that_all_have_to_do_with_each_other(tmp_path, text) -> None:

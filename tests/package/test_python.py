@@ -39,6 +39,9 @@ CASES = {
         "there is no `if` that this `elif` belongs to",
     ),
     "else_deeper": ("if x:\n  y = 1\n  else:\n  y = 2\n", 3, "right behind that block"),
+    "else_colon": ("if x:\n  pass\nelse\n  pass\n", 3, "a colon `:` is missing"),
+    "elif_colon": ("if x:\n  pass\nelif z\n  pass\n", 3, "a colon `:` is missing"),
+    "no_value_equal": ("if x ==:\n  pass\n", 1, "a value is missing behind `==`"),
     "except_alone": ("x = 1\nexcept E:\n  pass\n", 2, "there is no `try:` for this `except`"),
     "pair": ("def f(x, (a, b)):\n  pass\n", 1, "write one name in its place, `pair`, and `a, b = pair`"),
     "lambda_pair": ("f = lambda (a, b): a\n", 1, "what a `lambda` takes"),
@@ -193,6 +196,9 @@ def test_foreign_lines_are_passed_over():
 
 def test_a_message_that_says_enough_has_no_cause():
     assert reason_of("invalid syntax", "x = a ? b").text == ""
+    assert reason_of("invalid syntax", "elif x 3:").text == ""
+    assert reason_of("invalid syntax", "except E e:").text == ""
+    assert "a comma" in reason_of("invalid syntax. Perhaps you forgot a comma?", "x = (a +").text
 
 
 @pytest.mark.parametrize(

@@ -549,6 +549,7 @@ def test_the_only_turn_to_a_side_gets_the_other_sign(tmp_path: Path, text: str, 
         ("time.sleep(0.1)  # a while\n", "rospy.sleep(0.1)"),
         ("start = self.time.time()\n", ""),
         ("start = rospy.get_time()\n", ""),
+        ("# time.sleep(1)\n", ""),
     ],
 )
 def test_the_clock_of_ros_takes_the_place_of_the_computers(tmp_path: Path, text: str, changed: str) -> None:
@@ -556,3 +557,12 @@ def test_the_clock_of_ros_takes_the_place_of_the_computers(tmp_path: Path, text:
     found = ros_clock(tmp_path, "drive.py")
     assert (found is None) == (not changed)
     assert found is None or changed in found.after
+
+
+def test_what_to_write_for_the_clock_of_ros_is_right_on_each_line(tmp_path: Path) -> None:
+    text = "import rospy\n# time.time()\nfrom time import sleep  # a while\nstart = time.time()\n"
+    (tmp_path / "drive.py").write_text(text)
+    found = ros_clock(tmp_path, "drive.py")
+    assert found is not None
+    assert found.message.startswith("line 3 of drive.py: time.sleep and time.time() keep to")
+    assert found.fix.startswith("on line 3, write `from rospy import sleep`; on line 4, measure time")

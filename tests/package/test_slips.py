@@ -33,6 +33,11 @@ pytestmark = pytest.mark.usefixtures("without_processes")
         ),
         ("def f(req):\n    a = AddResponse()\n    a.sum = req.a\n    return a\n", None),
         ("def f(req):\n    a = AddResponse()\n    fill(a)\n    return a\n", None),
+        ("def f(req):\n    a = EmptyResponse()\n    return a\n", None),
+        (
+            "def f(req):\n    a = AddResponse()\n    def g():\n        a.sum = 1\n    g()\n    return a\n",
+            None,
+        ),
         (
             "def f(req):\n    a = AddResponse()\n    if req.a:\n        return AddResponse(1)\n    return a\n",
             None,
@@ -154,6 +159,8 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("wrong-value", 1, "`self.a >= 350 and self.a < 10` is true for no number") ]),
         ("if key != 'a' or key != 'b':\n    f(b)\n",
          [("wrong-value", 1, "`key != 'a' or key != 'b'` is true for every value")]),
+        ("if key != '`' or key != 'b':\n    f(b)\n",
+         [("wrong-value", 1, "`key != ''' or key != 'b'` is true for every value")]),
         ("if key == 1 and c and key == 2:\n    f(b)\n", [("wrong-value", 1, "write `or` in place of `and`")]),
         ("if key != 1 or key != 1.0 or key != True:\n    f(b)\n", []),
         ("if key != 'a' or other != 'b' or key != 'a':\n    f(b)\n", []),
@@ -227,6 +234,8 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         ("def f():\n    pass\nrospy.Subscriber('a', A, callback=f)\n",
          [("callback-values", 1, "`f` takes 0 arguments")]),
         ("def f(m):\n    pass\nrospy.Subscriber('a', A, f)\n", []),
+        ("def f(m):\n    pass\nrospy.Subscriber('a', A, f, 10)\n",
+         [("callback-values", 1, "takes 1 argument, but ROS passes it the message and its `callback_args`")]),
         ("def f(m, a):\n    pass\nrospy.Subscriber('a', A, f, 3)\n", []),
         ("def f(*a):\n    pass\nrospy.Timer(d, f)\n", []),
         ("def f(event):\n    pass\nrospy.Timer(d, f, True)\n", []),
@@ -267,6 +276,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("loop-left", 5, "put it inside a `while")]),
         ("def publish():\n    for n in range(9):\n        p.publish(n)\nrospy.init_node('a')\npublish()\n",
          [("loop-left", 2, "put it inside a `while")]),
+        ("class A(Thread):\n    pass\nclass B(A):\n    def run(self):\n        p.publish(0)\nB().start()\n", []),
     ],
 )  # fmt: skip
 def test_what_never_runs_is_known(tmp_path, text, found):
@@ -461,6 +471,14 @@ def test_a_condition_is_joined_with_another_where_that_changes_nothing_in_it(
     assert deaf.fix.startswith(fix)
 
 
+@pytest.mark.parametrize(("caught", "is_told"), [("KeyError(e)", True), ("A if b else C", False)])
+def test_an_exception_gets_the_name_that_is_used(caught: str, is_told: bool, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"try:\n    f()\nexcept {caught}:\n    print(e)\n")
+    fixes = {s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "e"}
+    assert ("on line 3, write `except KeyError as e:`" in fixes) == is_told
+    assert not any("..." in fix for fix in fixes)
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [
@@ -584,6 +602,11 @@ def test_every_kind_is_described() -> None:
             "def f(msg):\n    String = String(msg.data)\n",
             ["on line 3, call the message `message`, as in `message = String(…)`"],
         ),
+        (
+            "from rospy import Rate\nprint(String)\ndef f():\n    Rate = Rate(10)\n",
+            ["on line 5, call the object `own_rate`, as in `own_rate = Rate(…)`"],
+        ),
+        ("from tqdm import tqdm\ntqdm = tqdm(9)\nprint(String)\n", []),
         ("string = String()\nString.data = 'a'\n", []),
         ("Int8 = Int8()\n", []),
     ],
@@ -601,6 +624,7 @@ def test_a_message_with_the_name_of_its_class(text: str, fixes: list[str], tmp_p
     [
         ("print(rows[n / 25])", ["on line 1, write `//` instead of `/` in the index"]),
         ("print(rows[n // 25], rows[int(n / 25)], n / rows[2])", []),
+        ("print(files[folder / 'map.yaml'], files[folder / f'{n}.yaml'])", []),
     ],
 )
 def test_an_index_that_is_a_float(line: str, fixes: list[str], tmp_path: Path) -> None:
@@ -619,6 +643,12 @@ def test_an_index_that_is_a_float(line: str, fixes: list[str], tmp_path: Path) -
         ("    if g.n < 0:\n        s.set_aborted(r)\n    else:\n        s.set_succeeded(r)\n", []),
         ("    if ok:\n        s.set_succeeded(r)\n    print('done')\n", []),
         ("    if stop:\n        s.set_preempted()\n        ok = False\n    if ok:\n        s.set_succeeded(r)\n", []),
+        ("    while not done:\n        if near(g):\n            done = True\n            s.set_succeeded()\n", []),
+        ("    while s.is_active():\n        if near(g):\n            s.set_succeeded()\n", []),
+        ("    if not ok:\n        s.set_aborted()\n    if ok:\n        s.set_succeeded()\n", []),
+        ("    if stop:\n        s.set_preempted()\n    if s.is_active():\n        s.set_succeeded()\n", []),
+        ("    while not over():\n        g = s.accept_new_goal()\n        if g:\n            s.set_succeeded()\n", []),
+        ("    for one in goals:\n        if near(one):\n            one.set_succeeded()\n", []),
     ],
 )  # fmt: skip
 def test_callbacks_that_go_on_after_their_goal(text: str, fixes: list[str], tmp_path: Path) -> None:

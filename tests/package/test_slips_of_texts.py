@@ -77,6 +77,7 @@ def test_a_callback_that_shows_some_or_something_else(body: str, message: str, t
         "    cb2(m)",
         "    for c in m.data:\n        print(c)",
         "    print(m.data, file=f)",
+        "    if (v := m.data) > 3:\n        print('big', v)\n    else:\n        print('small', v)",
     ],
 )
 def test_nothing_is_said_of_a_callback_that_prints_or_hands_on(body: str, tmp_path: Path) -> None:

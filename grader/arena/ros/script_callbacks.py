@@ -5,6 +5,7 @@ Nothing is executed. Python 3.8, standard library only.
 """
 
 import ast
+import itertools
 
 from script_names import argument, called_name, calls_in, dotted, functions_in, is_call, slip, text_of, walk
 
@@ -63,6 +64,7 @@ def callbacks(tree):
                     "on_shutdown": "nothing",
                     "signal": "the signal's number and a frame",
                 }.get(name, "the %s" % VALUES.get(name, "message"))
+                what += " and its `callback_args`" if name == "Subscriber" and values > 1 else ""
                 message, fix = wrong_callback(own, node, functions, isinstance(meant, ast.Attribute), values)
                 number = "1 argument" if least == 1 else "%d arguments" % least
                 message = message or "`%s` takes %s, but ROS passes it %s" % (own.name, number, what)
@@ -184,9 +186,9 @@ WITH_DATA = {
 }  # fmt: skip
 """Types of std_msgs whose value is in `data`."""
 ALWAYS, NEVER, UNKNOWN = "always", "never", "unknown"
-OTHERS_LIMIT = 10
-"""Callbacks of so many other topics are searched for what one keeps."""
-LEAVES = (ast.Return, ast.Raise)
+OTHERS_LIMIT, LINES_LIMIT = 10, 50
+"""Callbacks of so many other topics are searched for what one keeps, and so much of each."""
+LEAVES, STORING = (ast.Return, ast.Raise), (ast.Assign, ast.AugAssign, ast.AnnAssign, ast.NamedExpr)
 
 
 def unprinted_messages(tree):
@@ -215,6 +217,17 @@ def unprinted_messages(tree):
             yield slip(line, kind, message, fix=fix, name=text_of(topics[0]) if topics else "")
 
 
+def stored_and_printed(function):
+    """Yield each of the first lines that store or print, with the names in it."""
+    lines = (n for n in ast.walk(function) if isinstance(n, ast.Assign) or is_print(n))
+    for n in itertools.islice(lines, LINES_LIMIT):
+        yield n, names_in(n)
+
+
+def names_in(node):
+    return {dotted(one) for one in ast.walk(node) if isinstance(one, (ast.Name, ast.Attribute))}
+
+
 class Printing:
     """What a callback prints. `value` is how the message's value is written in it; `known` has for each name that holds
     something of the message where it got it, and whether that is something else than the value itself. Other functions
@@ -229,7 +242,7 @@ class Printing:
         self.nodes = sorted((n for n in nodes if hasattr(n, "lineno")), key=place)
         outer = {name for n in nodes if isinstance(n, (ast.Global, ast.Nonlocal)) for name in n.names}
         for n in self.nodes:
-            if isinstance(n, (ast.Assign, ast.AugAssign, ast.AnnAssign)) and n.value is not None:
+            if isinstance(n, STORING) and n.value is not None:
                 self.follow(n, outer)
         self.prints = [n for n in self.nodes if is_print(n)]
 
@@ -290,16 +303,18 @@ class Printing:
 
     def kept(self, tree):
         """What the callback keeps, and a loop elsewhere prints: what the variable holds by then."""
-        for loop in walk(tree):
-            for call in filter(is_print, ast.walk(loop) if isinstance(loop, ast.While) else ()):
-                names = {dotted(n) for n in ast.walk(call) if isinstance(n, (ast.Name, ast.Attribute))}
-                kept = names.intersection(self.shared)
-                if kept:
-                    message = (
-                        "line %d prints in a loop what `%s` holds by then, and not each message when it comes"
-                    )
-                    fix = "print `%s` in %s" % (self.value, self.name)
-                    return call.lineno, "printed-in-part", message % (call.lineno, min(kept)), fix
+        if not hasattr(tree, "prints_of_loops"):  # each callback asks for them
+            loops = [one for one in walk(tree) if isinstance(one, ast.While)]
+            calls = {id(call): call for loop in loops for call in filter(is_print, ast.walk(loop))}
+            tree.prints_of_loops = [(call, names_in(call)) for call in calls.values()]
+        for call, names in tree.prints_of_loops:
+            kept = names.intersection(self.shared)
+            if kept:
+                message = (
+                    "line %d prints in a loop what `%s` holds by then, and not each message when it comes"
+                )
+                fix = "print `%s` in %s" % (self.value, self.name)
+                return call.lineno, "printed-in-part", message % (call.lineno, min(kept)), fix
         return self.kept_for_another(tree)
 
     def kept_for_another(self, tree):
@@ -307,12 +322,11 @@ class Printing:
         if not hasattr(tree, "all_callbacks"):  # each callback asks for them
             taken = [argument(n, 2, "callback") for n in walk(tree) if called_name(n) == "Subscriber"]
             names = dict.fromkeys(dotted(one).rpartition(".")[2] for given in taken for one in given)
-            tree.all_callbacks = [self.functions[name] for name in names if name in self.functions]
-        for other in tree.all_callbacks[:OTHERS_LIMIT]:
+            found = [self.functions[name] for name in names if name in self.functions][:OTHERS_LIMIT]
+            tree.all_callbacks = [(one, list(stored_and_printed(one))) for one in found]
+        for other, told in tree.all_callbacks:
             held = set(self.shared)
-            told = ast.walk(other) if other is not self.own else ()
-            for n in [n for n in told if isinstance(n, ast.Assign) or is_print(n)]:
-                names = {dotted(one) for one in ast.walk(n) if isinstance(one, (ast.Name, ast.Attribute))}
+            for n, names in told if other is not self.own else ():
                 if isinstance(n, ast.Assign) and names & held:
                     held.update(map(dotted, n.targets))
                 if is_print(n) and names & held:

@@ -498,7 +498,7 @@ def why_unbound(node, tree, known):
 
 def unnamed_exception(node, tree):
     """Return why a name is not there that is called like an exception, in an `except …:` that does not name its own or
-    names it in another way (`except X(e):`, `except X.e:`), and what to do; "" for any other name."""
+    names it in another way (`except X(e):`, `except X.e:`), and what to do; None for any other name."""
     parents, one = parents_of(tree), node
     while one is not None and not isinstance(one, ast.ExceptHandler):
         one = parents.get(one)
@@ -508,6 +508,8 @@ def unnamed_exception(node, tree):
     if not in_clause and node.id not in EXCEPTION_NAMES:
         return None
     caught = dotted(getattr(one.type, "func", one.type))
+    if "..." in caught:
+        return None
     caught = caught[: -len(node.id) - 1] if caught.endswith("." + node.id) else caught
     message = "`%s` would be the exception, which line %d does not name" % (node.id, one.lineno)
     return message, "on line %d, write `except %s as %s:`" % (one.lineno, caught, node.id)

@@ -312,21 +312,24 @@ def hidden_classes(tree, imported):
     made = [
         n for n in made if dotted(n.value.func) in imported and dotted(n.value.func) in map(dotted, n.targets)
     ]
-    for node in made[:1]:
+    for node in [n for n in made if dotted(n.value.func)[:1].isupper()][:1]:
         name = dotted(node.value.func)
+        is_message = ".msg." in imported[name]
         classes = {id(n.func) for n in walk(tree) if isinstance(n, ast.Call)}
         classes |= {
             id(one) for n in walk(tree) if called_name(n) in NAMED for one in argument(n, 1, "data_class")
         }
         names = {n.id for n in walk(tree) if isinstance(n, ast.Name)}
-        other = next((one for one in ("msg", "message") if one not in names), "own_" + name.lower())
+        free = [one for one in ("msg", "message") if one not in names and is_message]
+        other, what = (free or ["own_" + name.lower()])[0], "message" if is_message else "object"
         meant = [n for n in walk(tree) if getattr(n, "id", "") == name and id(n) not in classes]
         lines = sorted({n.lineno for n in meant})
         where = ", ".join(map(str, lines[:-1])) + " and %d" % lines[-1] if lines[1:] else "%d" % lines[0]
-        message = "line %d calls a message `%s`, and hides the class of that name" % (node.lineno, name)
+        message = "line %d calls a%s `%s`, and hides the class of that name"
+        message %= (node.lineno, (" " if is_message else "n ") + what, name)
         given = "…" if node.value.args or node.value.keywords else ""
-        fix = "on line%s %s, call the message `%s`, as in `%s = %s(%s)`"
-        fix %= ("s" if lines[1:] else "", where, other, other, name, given)
+        fix = "on line%s %s, call the %s `%s`, as in `%s = %s(%s)`"
+        fix %= ("s" if lines[1:] else "", where, what, other, other, name, given)
         yield slip(node.lineno, "hides-class", message, fix=fix, name=name)
 
 

@@ -146,8 +146,10 @@ def never_run(tree):
     classes = [n for n in walk(tree) if isinstance(n, ast.ClassDef)]
     of_class = {id(f): c.name for c in classes for f in c.body}
     plain = {c.name for c in classes} | {"object"}
-    # what a class of another module is the base of, that module may call
-    named |= {f.name for c in classes if {dotted(b) for b in c.bases} - plain for f in functions_of(c)}
+    for one in classes:  # what a class of another module is the base of, that module may call
+        if {dotted(base) for base in one.bases} - plain:
+            plain.discard(one.name)
+            named |= {f.name for f in functions_of(one)}
     for node in walk(tree):
         if isinstance(node, ast.FunctionDef) and node.name not in named and not node.decorator_list:
             if calls_in(node, *WORKS) and not node.name.startswith("__"):
@@ -210,7 +212,7 @@ def wrong_values(tree):
                 message = "`%s` takes radians, and gets degrees" % called_name(node)
                 fix = "leave out `degrees(…)`: the angle is already in radians"
                 yield slip(node.lineno, "wrong-value", message, fix=fix, name="degrees")
-        elif isinstance(node, ast.Subscript) and isinstance(getattr(key_of(node), "op", None), ast.Div):
+        elif isinstance(node, ast.Subscript) and is_quotient(key_of(node)):
             message = "`/` makes a float, also of whole numbers, and an index is a whole number"
             fix = "on line %d, write `//` instead of `/` in the index" % node.lineno
             yield slip(node.lineno, "float-index", message, fix=fix, name=dotted(node.value))
@@ -231,6 +233,12 @@ def wrong_values(tree):
             yield slip(line, "wrong-value", message, fix=fix, name="empty")
 
 
+def is_quotient(node):
+    """Whether a value is divided; `folder / 'file'` is a path."""
+    texts = [n for n in ast.walk(node) if isinstance(n, ast.JoinedStr) or type(getattr(n, "value", 0)) is str]
+    return isinstance(getattr(node, "op", None), ast.Div) and not texts
+
+
 def unfilled_answer(function):
     """Return the variable, the class and the line of an answer that a callback makes without values, sets nothing of,
     and always returns; None where there is none."""
@@ -240,12 +248,17 @@ def unfilled_answer(function):
     returned = {dotted(n.value) for n in own if isinstance(n, ast.Return) and n.value is not None}
     variable = dotted(made[0].targets[0]) if len(made) == 1 else ""
     # its name stands where it is made and returned, and nowhere else: `answer.sum` would be one more
-    uses = [n for n in own if isinstance(n, ast.Name) and n.id == variable]
+    uses = [n for n in ast.walk(function) if isinstance(n, ast.Name) and n.id == variable]
     is_alone = returned == {variable} and len(uses) == 1 + sum(isinstance(n, ast.Return) for n in own)
-    return (variable, called_name(made[0].value), made[0].lineno) if variable and is_alone else None
+    name = called_name(made[0].value) if made else ""
+    return (variable, name, made[0].lineno) if is_alone and variable and name != "EmptyResponse" else None
 
 
 FINISHING = ("set_succeeded", "set_aborted", "set_preempted", "set_rejected")
+
+
+BELOW_LIMIT = 50
+"""So many statements below the end of a goal are looked at."""
 
 
 def finished_goals(tree):
@@ -255,10 +268,13 @@ def finished_goals(tree):
         if not isinstance(node, ast.If) or node.orelse or not is_call_alone(node.body[-1]):
             continue
         call, around = node.body[-1].value, parents.get(node)
+        if called_name(call) not in FINISHING:
+            continue
         block = getattr(around, "body", [])
-        below = block[block.index(node) + 1 :] if isinstance(block, list) and node in block else []
+        at = block.index(node) + 1 if isinstance(block, list) and node in block else len(block)
+        below = [one for one in block[at : at + BELOW_LIMIT] if not is_other_case(one, node)]
         more = any(calls_in(one, *FINISHING) or is_loop(one) for one in below)
-        if called_name(call) in FINISHING and (more or is_loop(around)):
+        if more or (is_loop(around) and not is_last_turn(around, node, call)):
             what = "loop" if is_loop(around) else "callback"
             message = "the goal is over with `%s(…)`, and the %s goes on" % (called_name(call), what)
             fix = "below line %d, write `return`" % node.body[-1].end_lineno
@@ -267,6 +283,26 @@ def finished_goals(tree):
 
 def is_loop(node):
     return isinstance(node, (ast.While, ast.For))
+
+
+def is_other_case(node, before):
+    """Whether an `if` asks for the opposite of one above it, or whether the goal is still active."""
+    if not isinstance(node, ast.If):
+        return False
+    opposite = isinstance(node.test, ast.UnaryOp) != isinstance(before.test, ast.UnaryOp)
+    asked = [ast.dump(getattr(one.test, "operand", one.test)) for one in (node, before) if opposite]
+    return bool(calls_in(node.test, "is_active")) or (opposite and asked[0] == asked[1])
+
+
+def is_last_turn(loop, node, call):
+    """Whether an `if` that ends a goal also ends the loop around it by what it sets, or the loop has one goal after the
+    other."""
+    if isinstance(loop, ast.For):
+        return dotted(loop.target) == dotted(call.func.value)
+    stored = {dotted(target) for n in node.body if isinstance(n, ast.Assign) for target in n.targets}
+    asked = {dotted(n) for n in ast.walk(loop.test) if isinstance(n, (ast.Name, ast.Attribute))}
+    takes = any(calls_in(one, "accept_new_goal") for one in loop.body[:BELOW_LIMIT])
+    return bool(takes or calls_in(loop.test, "is_active") or stored & asked)
 
 
 BELOW = (ast.Lt, ast.LtE)
@@ -308,7 +344,7 @@ def decided_by_values(condition, kind):
         is_plain = isinstance(one, ast.Compare) and len(one.ops) == 1 and isinstance(one.ops[0], kind)
         if is_plain and isinstance(one.comparators[0], ast.Constant) and "..." not in dotted(one.left):
             value = one.comparators[0].value  # 1 and 1.0 are one value
-            asked.setdefault(dotted(one.left), {})[value] = repr(value)[:TEXT_SHOWN]
+            asked.setdefault(dotted(one.left), {})[value] = repr(value)[:TEXT_SHOWN].replace("`", "'")
     for name, values in asked.items():
         if len(values) > 1:
             sign, word, other, holds = (

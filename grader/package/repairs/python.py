@@ -243,21 +243,25 @@ def ros_clock(folder: Path, file: str) -> Repair | None:
     where it does not."""
     files = Files(folder=folder.resolve())
     text = files.text(file) or ""
-    lines = text.split("\n")
-    after = (
-        [re.sub(OWN_CLOCK, lambda found: CLOCKS[found[0]], line) for line in lines]
-        if "import rospy" in text
-        else lines
-    )
+    lines = text.split("\n") if "import rospy" in text else []
+    codes = [line.partition("#")[0] for line in lines]
+    after = [
+        OWN_CLOCK.sub(lambda found: CLOCKS[found[0]], code) + line[len(code) :]
+        for code, line in zip(codes, lines, strict=True)
+    ]
     changed = [number for number, (a, b) in enumerate(zip(lines, after, strict=True), 1) if a != b]
-    where = f"{'lines' if len(changed) > 1 else 'line'} {numbers_text(changed)}"
-    words = {
-        found.rstrip("(").removeprefix("from ") for line in lines for found in re.findall(OWN_CLOCK, line)
-    }
-    keeps = "keep" if len(words) > 1 else "keeps"
-    message = f"line {changed[0]} of {file}: " if changed else ""
-    message += f"{join_words(sorted(words))} {keeps} to the computer's clock, and not to that of ROS"
-    fix = f"on {where}, measure time with `rospy.get_time()` and wait with `rospy.sleep(…)`"
+    if not changed:
+        return None
+    found = {one for code in codes for one in OWN_CLOCK.findall(code)}
+    words = sorted({one.rstrip("(").replace("from time import ", "time.") for one in found})
+    message = f"line {changed[0]} of {file}: {join_words(words)} {'keep' if len(words) > 1 else 'keeps'} "
+    message += "to the computer's clock, and not to that of ROS"
+    imports = [number for number in changed if lines[number - 1].startswith("from")]
+    fixes = [f"on line {number}, write `{after[number - 1].partition('#')[0].strip()}`" for number in imports]
+    if calls := [number for number in changed if number not in imports]:
+        where = f"{'lines' if len(calls) > 1 else 'line'} {numbers_text(calls)}"
+        fixes.append(f"on {where}, measure time with `rospy.get_time()` and wait with `rospy.sleep(…)`")
+    fix = "; ".join(fixes)
     files.change("ros-clock", file, "\n".join(after), message, fix)
     return next(iter(files.repairs), None)
 
