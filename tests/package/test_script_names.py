@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from grader.package.python import check_syntax
@@ -292,3 +294,56 @@ def test_an_argument_that_is_kept_as_a_text(tmp_path, case):
     text, fixes = ARGUMENTS[case]
     (tmp_path / "a.py").write_text(f"import sys, rospy\nvalues = []\n{text}")
     assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "argument-text"] == fixes
+
+
+@pytest.mark.parametrize(("caught", "is_told"), [("KeyError(e)", True), ("A if b else C", False)])
+def test_an_exception_gets_the_name_that_is_used(caught: str, is_told: bool, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"try:\n    f()\nexcept {caught}:\n    print(e)\n")
+    fixes = {s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "e"}
+    assert ("on line 3, write `except KeyError as e:`" in fixes) == is_told
+    assert not any("..." in fix for fix in fixes)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("counter = 0\nprint(conter)\n", ["write counter instead of conter"]),
+        ("def run(speed):\n    return sped\n", ["write speed instead of sped"]),
+        (
+            "class A:\n    def go(self):\n        self.rate = 1\n        rate.sleep()\n",
+            ["write self.rate instead of rate"],
+        ),
+        (
+            "class A:\n    def go(self):\n        pass\n    self.go()\n",
+            ["indent line 4 like the lines of the method above it, or delete it"],
+        ),
+        ("class A:\n    print('made')\n", []),
+        ("from a import *\ncounter = 0\nprint(conter)\n", []),
+        ("counter = 0\nprint(unlike)\n", []),
+        ("try:\n    pass\nexcept Exception as error:\n    print(error, __file__)\n", []),
+    ],
+)
+def test_a_name_that_is_not_there_and_one_that_is_spelt_alike(tmp_path, text, told):
+    (tmp_path / "a.py").write_text(text)
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind in ("misspelt", "outside-method")]
+    assert [s.fix for s in slips] == told
+
+
+@pytest.mark.parametrize(
+    ("code", "fixes"),
+    [
+        ("buffer.lookup_transform(odom, laser, rospy.Time(0))", ["'odom'", "'laser'"]),
+        ("base.child_frame_id = base_link", ["'base_link'"]),
+        ("rospy.Publisher(chatter, String, queue_size=1)", ["'chatter'"]),
+        ("rospy.init_node(talker)", ["'talker'"]),
+        ("def talk():\n    pass\nrospy.init_node(talker)", ["'talker'"]),
+        ("chatter = 'chatter'\nrospy.Publisher(chatter, String, queue_size=1)", []),
+        ("print(chatter)", []),
+    ],
+)
+def test_names_that_ros_is_given_without_quotes(tmp_path, code, fixes):
+    text = f"import rospy\nfrom std_msgs.msg import String\nbuffer = base = 1\n{code}\n"
+    (tmp_path / "a.py").write_text(text)
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if "without quotes" in s.message]
+    last = text.count("\n")
+    assert [s.fix for s in slips] == [f"on line {last}, write `{fix}`" for fix in fixes]

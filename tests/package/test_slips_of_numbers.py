@@ -230,3 +230,17 @@ def test_what_counts_up_adds_something(line: str, counts: bool, tmp_path: Path) 
     (tmp_path / "a.py").write_text(text, encoding="utf-8")
     kinds = [s.kind for s in check_syntax(tmp_path, ["a.py"]).slips]
     assert ("added-first" in kinds) is counts
+
+
+@pytest.mark.parametrize(
+    ("line", "fixes"),
+    [
+        ("print(rows[n / 25])", ["on line 1, write `//` instead of `/` in the index"]),
+        ("print(rows[n // 25], rows[int(n / 25)], n / rows[2])", []),
+        ("print(files[folder / 'map.yaml'], files[folder / f'{n}.yaml'])", []),
+    ],
+)
+def test_an_index_that_is_a_float(line: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"{line}\n", encoding="utf-8")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.fix for s in slips if s.kind == "float-index"] == fixes
