@@ -266,7 +266,7 @@ def _never(live: RunState, until: Until, given: Until, now_s: float) -> str:
 
 def has_goal(live: RunState) -> bool:
     """Return whether an action's server, which tells its status again and again, has a goal that has no result yet:
-    whoever waits for that neither works nor sends until then."""
+    a node that waits for it neither works nor sends until then."""
     counts = {topic: seen.count for topic, seen in live.topics.items() if seen.count}
     servers = [topic.removesuffix("/status") for topic in counts if topic.endswith("/status")]
     return any(counts.get(f"{name}/goal", 0) > counts.get(f"{name}/result", 0) for name in servers)
