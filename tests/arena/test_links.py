@@ -335,6 +335,12 @@ def test_whose_other_end_has_gone(two, port, of) -> None:
     assert ties(*two).half_closed(publisher.api) == (port == "data")
 
 
+def test_in_a_sandbox_a_process_that_is_in_no_tree_is_ending(two) -> None:
+    publisher, subscriber = two
+    owners = Owners(lambda: [("all", [publisher.process.pid])], whole=True)
+    assert Ties(owners, set()).joined(publisher.api, subscriber.api, "TCPROS") is False
+
+
 @pytest.mark.parametrize("ended", [0, 1])
 def test_who_has_ended_since_it_was_asked_is_not_connected(two, ended) -> None:
     two[ended].process.kill()

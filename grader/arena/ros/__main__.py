@@ -83,7 +83,8 @@ class Arena:
         from sockets import Owners  # noqa: PLC0415
 
         name = "/grader_{}" + config["suffix"]
-        guard, owners, own_ports = Guard(self._wire), Owners(self._trees), set()
+        guard, own_ports = Guard(self._wire), set()
+        owners = Owners(self._trees, whole=bool(self._stage))
         self._recorder = Recorder(
             self.loop, self._wire, name.format("recorder"), self._limits, guard=guard, own_ports=own_ports
         )

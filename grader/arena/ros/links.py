@@ -128,7 +128,7 @@ class Ties:
         self._joined = {}
         self._listening = collections.defaultdict(set)
         self._half_closed = set()
-        rows = sockets.streams() or ()
+        self._rows = rows = sockets.streams() or ()
         pids = owners.pids({row.inode for row in rows})
         self._streams = _Ends(pids, [row for row in rows if row.state == sockets.ESTABLISHED])
         self._datagrams = None
@@ -140,7 +140,7 @@ class Ties:
 
     def joined(self, publisher, subscriber, transport):
         """Whether two processes, one of each node (an address), hold the ends of a connection; None where the kernel
-        does not say whose sockets they are. A node that has ended since it was asked has none."""
+        does not say whose sockets they are. A node that has ended since it was asked, or is just ending, has none."""
         key = publisher, subscriber, transport == UDP
         if key not in self._joined:
             self._joined[key] = self._join(port_of(publisher), port_of(subscriber), udp=transport == UDP)
@@ -156,7 +156,8 @@ class Ties:
         ours, theirs = self._listening.get(publisher), self._listening.get(subscriber)
         if not ours or not theirs:
             unknown = [port for port, pids in ((publisher, ours), (subscriber, theirs)) if not pids]
-            return None if all(port is None or sockets.listening(port) for port in unknown) else False
+            alive = all(port is None or sockets.listening(port) for port in unknown)
+            return None if alive and not (self._rows and self._owners.whole) else False
         if not udp:
             return self._streams.meet(ours, theirs, {publisher, subscriber})
         if self._datagrams is None:

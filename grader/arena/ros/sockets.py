@@ -199,11 +199,13 @@ def _port(address):
 
 
 class Owners:
-    """`trees` gives, for each process of the run that lives, its name and the ids of all that runs below it. `tell` is
-    told, as `guard.limit` is, which process has more than is looked at."""
+    """`trees` gives, for each process of the run that lives, its name and the ids of all that runs below it: nothing of
+    the run is anywhere else, if they are `whole`, as in a sandbox. `tell` is told, as `guard.limit` is, which process
+    has more than is looked at."""
 
-    def __init__(self, trees):
+    def __init__(self, trees, *, whole=False):
         self._trees = trees
+        self.whole = whole
         self.tell = None
         self._known = {}
         self._asked = {}
