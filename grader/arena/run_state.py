@@ -123,8 +123,8 @@ class RunState:
     last_heard_s: float = 0.0
     last_line_s: float = 0.0
     new_line_s: float = 0.0
-    """When a process last printed a line that it had not printed before; `said` are those that it had."""
-    said: set[int] = field(default_factory=set)
+    """When a process last printed a line that it had not printed before; `lines_seen` are those that it had."""
+    lines_seen: set[int] = field(default_factory=set)
     answers_s: float = 0.0
     """Until then, the grader works on what nodes asked its services for."""
 
@@ -281,11 +281,11 @@ class RunState:
 
     def note_line(self, line: str, now_s: float, process: str = "") -> None:
         self.last_line_s = now_s
-        said = hash((process, LOG_TIME.sub("", line)))
-        if said not in self.said:
+        seen = hash((process, LOG_TIME.sub("", line)))
+        if seen not in self.lines_seen:
             self.new_line_s = now_s
-        if len(self.said) < LINES_MAX:
-            self.said.add(said)
+        if len(self.lines_seen) < LINES_MAX:
+            self.lines_seen.add(seen)
         if BAD_CALLBACK in line:
             self.raised_s[process] = now_s
         self.note_activity(now_s)

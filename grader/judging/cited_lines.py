@@ -307,8 +307,8 @@ FIELDS_SHOWN, MESSAGES_READ = 3, 5
 
 
 def lost_fields(lines: Sequence[str], slip: PythonSlip, wanted: str) -> str:
-    """Return which fields of the slip's type a script uses that the wanted one has not: of the messages that it makes,
-    or of the one that its callback gets. "" where it uses none."""
+    """Return what to write in place of the fields that a script uses and that only the slip's type has: fields of the
+    messages that it makes, or of the one that its callback gets. "" where it uses none."""
     texts = [line[:LINE_CHARS].partition("#")[0] for line in lines[:LINES_READ]]
     made = re.compile(rf"\s*([\w.]+) *= *(?:[\w.]+\.)?{re.escape(slip.message)}\(")
     names, first, last = [found[1] for text in texts if (found := made.match(text))], 0, len(texts)

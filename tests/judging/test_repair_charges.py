@@ -272,9 +272,6 @@ SLOW = {**GOOD_RUN, "topics": [{"topic": "/chatter", "count": 30}]}
 def test_logic_is_repaired_only_where_the_copy_passes() -> None:
     silent = {**GOOD_RUN, "topics": [{"topic": "/other", "count": 61}]}
     found = judged(silent, SLOW, SIGN)
-    assert (found["chatter"].status.value, found["rate"].status.value) == ("fail", "fail") or found[
-        "rate"
-    ].repaired is None
     assert found["rate"].repaired is None
     assert all(one.repaired is None for one in judged(SLOW, silent, SIGN).values()), "one fault for another"
     whole = judged(silent, GOOD_RUN, SIGN)

@@ -37,8 +37,8 @@ class Links:
         self._doubts = {}
 
     def of(self, apis):
-        """Return the connections between these nodes (addresses by names), all asked side by side, and whether all that
-        can answer have: a node that does not, in time, has none."""
+        """Return the connections between these nodes (addresses by names), all asked side by side, and whether each
+        that still listens has answered: a node that does not answer in time has no connection."""
         answers = self._ask(apis)
         ties = Ties(self._owners, {port_of(api) for api in apis.values()})
         found, doubts = [], []
@@ -155,9 +155,10 @@ class Ties:
     def _join(self, publisher, subscriber, *, udp):
         ours, theirs = self._listening.get(publisher), self._listening.get(subscriber)
         if not ours or not theirs:
+            if self._rows and self._owners.whole:
+                return False
             unknown = [port for port, pids in ((publisher, ours), (subscriber, theirs)) if not pids]
-            alive = all(port is None or sockets.listening(port) for port in unknown)
-            return None if alive and not (self._rows and self._owners.whole) else False
+            return None if all(port is None or sockets.listening(port) for port in unknown) else False
         if not udp:
             return self._streams.meet(ours, theirs, {publisher, subscriber})
         if self._datagrams is None:

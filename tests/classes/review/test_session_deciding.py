@@ -239,7 +239,10 @@ def test_the_batchs_own_times_stay(page, out, review) -> None:
     assert after["state"] == "complete"
 
 
-def test_a_result_of_another_rubric_waits_for_it(page, out) -> None:
+def test_a_result_of_another_rubric_waits_for_it(page, out, review) -> None:
+    assert review.background.wait(
+        WAIT_S
+    )  # it settles the class at its start, and would write the result as it was
     result = result_of(out, "ada")
     other = result.model_copy(update={"rubric": result.rubric.model_copy(update={"digest": "other"})})
     (out / "ada" / "result.json").write_text(other.model_dump_json(by_alias=True))
