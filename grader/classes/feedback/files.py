@@ -11,6 +11,7 @@ import io
 import re
 import tarfile
 import zipfile
+from abc import abstractmethod
 from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
@@ -76,9 +77,9 @@ class Archive(Sender):
         self._zip.writestr(about, self.content(feedback))
         return str(self.target)
 
+    @abstractmethod
     def member(self, feedback: Feedback) -> str:
         """Return the file's name in the zip. Raises NotSent."""
-        raise NotImplementedError
 
     def content(self, feedback: Feedback) -> bytes:
         """Return the file's bytes. Raises NotSent."""

@@ -12,6 +12,7 @@ import json
 import os
 import re
 import time
+from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -367,17 +368,17 @@ class Comments(Sender):
             hint=hints.get(error.status, ""),
         )
 
+    @abstractmethod
     def is_public(self, path: str) -> bool:
         """Return whether everybody can read the repository, or everybody with an account."""
-        raise NotImplementedError
 
+    @abstractmethod
     def repository(self, path: str) -> str:
         """Return the place of a repository below the API's address."""
-        raise NotImplementedError
 
+    @abstractmethod
     def address(self, one: dict[str, Any], path: str, below: str) -> str:
         """Return where people read a record of the API, which `below` names in a repository's pages."""
-        raise NotImplementedError
 
     def comment(self, path: str, commit: str, body: str) -> str:
         """Comment on a commit; return the comment's address."""

@@ -6,6 +6,7 @@ have it, and its row in `docs/how-to/feedback.md`.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
@@ -82,7 +83,7 @@ class SendSettings:
     told: Callable[[str], None] = lambda _: None
 
 
-class Sender:
+class Sender(ABC):
     """Sends by one form, inside of a `with` block. Files appear when the block ends without an exception.
 
     `together`: what is sent is one file, so that all of it is sent or nothing. `unsure` says what becomes of
@@ -104,17 +105,17 @@ class Sender:
     ) -> None:
         del kind, error, trace
 
+    @abstractmethod
     def place(self, feedback: Feedback) -> str:
         """Return where it will go. Raises NotSent if that is not known."""
-        raise NotImplementedError
 
     def show(self, feedback: Feedback) -> str:
         """Return what the student will read, for `--dry-run`."""
         return feedback.text
 
+    @abstractmethod
     def send(self, feedback: Feedback, *, look: bool = False) -> str:
         """Send it and return where it went. With `look`, it may have been sent before. Raises NotSent."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)
