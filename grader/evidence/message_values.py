@@ -11,8 +11,8 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, TypeGuard
 
-from grader.evidence.decode import Decoder, Encoder, FindText, definition, full_definition, full_name
-from grader.evidence.definitions import MAX_DEFINITION_BYTES, PRIMITIVES, Field, parse, sections_of
+from grader.evidence.decode import Decoder, Encoder, FindText, definition, full_definition
+from grader.evidence.definitions import MAX_DEFINITION_BYTES, PRIMITIVES, Field, full_name, parse, sections_of
 from grader.installable import noetic_messages
 from grader.model.message_definitions import DIVIDER, NOT_FINITE
 from grader.wording import did_you_mean, join_words
@@ -132,9 +132,7 @@ def action_texts(type_: str, text: str) -> dict[str, str]:
     """
     parts = DIVIDER.split(text)
     if len(parts) != len(ACTION_PARTS):
-        raise ValueError(
-            f"{type_}: an action has a goal, a result and a feedback with a line --- between them"
-        )
+        raise ValueError(f"{type_}: an action has a goal, a result and feedback with a line --- between them")
     name, found = type_.partition("/")[2], {}
     for (part, about), lines in zip(ACTION_PARTS.items(), parts, strict=True):
         found[f"{type_}{part}"] = lines + "\n"
@@ -293,8 +291,7 @@ def md5_of(type_: str, full: str) -> str:
 
 def _md5(type_: str, parts: Mapping[str, tuple[str, ...]], known: dict[str, str]) -> str:
     if type_ not in known:
-        text = _md5_text(type_, parts, known)
-        known[type_] = hashlib.md5(text.encode(), usedforsecurity=False).hexdigest()
+        known[type_] = hashlib.md5(_md5_text(type_, parts, known).encode(), usedforsecurity=False).hexdigest()
     return known[type_]
 
 

@@ -69,7 +69,13 @@ def load_run(source: Path | BinaryIO, budget: MemoryBudget | None = None) -> Run
     if not isinstance(source, Path):
         name = Path(str(getattr(source, "name", "evidence.mcap"))).name
         return _load(name, BytesIO(source.read(MAX_FILE_BYTES + 1)), budget)
-    with _readable(source), source.open("rb") as file:
+    with _named_errors(source):
+        about = source.stat()
+        if not S_ISREG(about.st_mode):
+            raise EvidenceError(f"{source}: not a file")
+        if about.st_size > MAX_FILE_BYTES:
+            raise EvidenceError(f"{source}: larger than {MAX_FILE_BYTES >> 20} MiB")
+    with _named_errors(source), source.open("rb") as file:
         head = file.read(len(SQLITE_MAGIC))
         file.seek(0)
         if head.startswith(BAG_MAGIC):
@@ -154,7 +160,6 @@ def _load(name: str, stream: BinaryIO, budget: MemoryBudget, *, shown: str = "")
 
 
 def _damage(stream: BinaryIO) -> tuple[str, str]:
-    """Return what is wrong with the file, and what to do."""
     stream.seek(0)
     head = stream.read(32)
     stream.seek(-min(stream.seek(0, os.SEEK_END), len(MAGIC)), os.SEEK_END)
@@ -175,13 +180,8 @@ def _first(error: ValidationError) -> str:
 
 
 @contextmanager
-def _readable(path: Path) -> Iterator[None]:
+def _named_errors(path: Path) -> Iterator[None]:
     try:
-        about = path.stat()
-        if not S_ISREG(about.st_mode):
-            raise EvidenceError(f"{path}: not a file")
-        if about.st_size > MAX_FILE_BYTES:
-            raise EvidenceError(f"{path}: larger than {MAX_FILE_BYTES >> 20} MiB")
         yield
     except OSError as error:
         raise EvidenceError(f"{path}: {error.strerror or type(error).__name__}") from error
@@ -198,9 +198,7 @@ def _files(paths: Iterable[Path]) -> list[Path]:
         for file in inside:
             found.setdefault(_identity(file), file)
     if not found:
-        raise EvidenceError(
-            "no evidence given", hint="name evidence files or a folder of a graded submission"
-        )
+        raise EvidenceError("no evidence given", hint="name evidence files, or a graded submission's folder")
     return list(found.values())
 
 
@@ -213,7 +211,7 @@ def _identity(file: Path) -> object:
 
 
 def _recordings(folder: Path) -> list[Path]:
-    with _listable(folder):
+    with _named_errors(folder):
         listed = {place: _names(place) for place in (folder, folder / "evidence")}
         for place, names in list(listed.items()):
             listed |= {place / name: _names(place / name) for name in names if OTHER_RUNS.fullmatch(name)}
@@ -231,14 +229,6 @@ def _names(folder: Path) -> list[str]:
 
 def _is_recording(name: str) -> bool:
     return not name.startswith(".") and os.path.splitext(name)[1] in SUFFIXES  # noqa: PTH122 - as above
-
-
-@contextmanager
-def _listable(folder: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise EvidenceError(f"{folder}: {error.strerror or type(error).__name__}") from error
 
 
 class _RunBuilder:
@@ -379,7 +369,6 @@ class _RunBuilder:
         )
 
     def _ros2_channel(self, number: int, channel: mcap.Channel) -> Channel:
-        """Return the channel with its messages as ROS 1's."""
         from grader.evidence.ros2 import as_ros1  # noqa: PLC0415 - few submissions hold one
 
         return as_ros1(self._ros_channel(number, channel), channel.metadata.get("offered_qos_profiles", ""))
