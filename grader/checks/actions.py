@@ -274,7 +274,6 @@ def _feedback(run: Run, goal: Goal, params: ActionResultParams) -> int:
 
 
 def _not_sent(package: PackageFacts, run: Run, goals: Sequence[Goal], params: ActionResultParams) -> Verdict:
-    """Return why a goal was not sent."""
     notes = [e.detail for _, e in run.actors if e.action == "note" and e.topic == params.action]
     if notes and any(one.path.endswith(".action") for one in package.interfaces):
         why = shown(notes[0].partition(": ")[2] or notes[0])

@@ -306,8 +306,7 @@ def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
     broken = list(_broken_programs(package, run, started))
     measured = f"{verdict.measured}; programs: {join_words(_name(p) for p in started) or 'none'}"
     if not broken:
-        message = f"{verdict.message}{_how_they_went(started)}"
-        return passed(message, expected=expected, measured=measured)
+        return passed(f"{verdict.message}{_how_they_went(started)}", expected=expected, measured=measured)
     first = broken[0]
     calls = (made[b.program].call for b in broken if b.program in made)
     cited = tuple(call.place for call in calls)
@@ -322,7 +321,6 @@ def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
 
 
 def _built_programs(package: PackageFacts) -> Iterator[Executable]:
-    """Yield the programs that are made of sources."""
     for one in programs(package):
         if len(one.call.args) > 1 and not NO_PROGRAM & set(one.call.args[1:3]):
             yield one
@@ -371,9 +369,7 @@ def _broken_programs(package: PackageFacts, run: Run, programs: list[Life]) -> I
             hint = end.hint if end.hint != RUN_IT else told or INVALID_MEMORY_HINT
             yield Broken(_name(one), f"{end.cause}{quoted}", hint, one)
         elif unloaded or code in CANNOT_START:
-            yield Broken(
-                _name(one), f"it cannot be started (exit code {code}){quoted}", LINK_LIBRARIES_HINT, one
-            )
+            yield Broken(_name(one), f"it cannot start (exit code {code}){quoted}", LINK_LIBRARIES_HINT, one)
 
 
 def _gave_way(run: Run, one: Life) -> bool:

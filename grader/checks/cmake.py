@@ -291,8 +291,7 @@ def _not_installed(facts: CMakeFacts, lacks: dict[str, Lack]) -> Verdict:
 def _reasons(lacks: dict[str, Lack]) -> Iterator[str]:
     """Yield each reason once, with the scripts that it is true of."""
     for why in dict.fromkeys(lack.why for lack in lacks.values()):
-        scripts = [name for name, lack in lacks.items() if lack.why == why]
-        yield why.replace("{}", join_words(scripts))
+        yield why.replace("{}", join_words([name for name, lack in lacks.items() if lack.why == why]))
 
 
 def _fixes(lacks: dict[str, Lack]) -> Iterator[str]:

@@ -217,9 +217,7 @@ def _unseen(one: Life, package: PackageFacts, run: Run, params: PrintsParams, ne
     started = {PurePosixPath(word).name for word in one.start.argv}
     refused = any("cannot launch node of type" in line.line for _, line in run.lines(one.name))
     if refused and run.graph and not nodes_of(run, one.name):
-        return unjudged(
-            f"{never}: none of the launch file's nodes came up", hint="read what roslaunch prints"
-        )
+        return unjudged(f"{never}: no node of the launch file came up", hint="read what roslaunch prints")
     files = [file for file in package.launch_files if PurePosixPath(file.path).name in started]
     for node in (node for file in files for node in file.brings if node.output != "screen"):
         script = own_script(package, node)
@@ -287,9 +285,7 @@ def _unserved(
         hint = f"offer {lacking} in a node that runs beside it, or ask for the service that is offered"
         return unjudged(f"{never}: it asks for {lacking}, which no node offers", hint=hint)
     asked_early = [name for name, is_there in asked.items() if not is_there]
-    early = next(
-        (n for n in asked_early if any(f"service [{n}] unavailable" in line.text for line in own)), ""
-    )
+    early = next((n for n in asked_early if any(f"service [{n}] unavailable" in one.text for one in own)), "")
     if early in offered:
         hint = f"wait for it before the call: `rospy.wait_for_service('{early}')`"
         return failed(f"{never}: it calls {early} before a node offers it", hint=hint).if_repeated()
@@ -357,8 +353,7 @@ def callbacks_clean(package: PackageFacts, run: Run, params: CallbacksCleanParam
     ended = next((one for one in asked if one.ended_early and one.end and one.end.exit_code != 0), None)
     if ended is not None and (len(found) <= 1 or found[0][0] != ended):
         end = explain_end(ended, run, package)
-        message = f"{ended.name} ended by itself after {ended.lasted}: {end.cause}"
-        verdict = end.verdict(unjudged, message)
+        verdict = end.verdict(unjudged, f"{ended.name} ended by itself after {ended.lasted}: {end.cause}")
     elif found:
         end = explain_traceback(found[0][1], package)
         verdict = end.verdict(failed, f"a callback of {found[0][0].name} fails: {end.cause}")
@@ -524,8 +519,7 @@ def _near(run: Run, lines: Iterable[Logged], params: LogsParams) -> Verdict | No
 
 def _likeness(text: str, wanted: str) -> float:
     plain = " ".join((split_log_line(text) or ("", text))[1].casefold().split())
-    matcher = SequenceMatcher(None, plain, " ".join(wanted.casefold().split()), autojunk=False)
-    return matcher.ratio()
+    return SequenceMatcher(None, plain, " ".join(wanted.casefold().split()), autojunk=False).ratio()
 
 
 def _nothing(

@@ -232,8 +232,7 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
     lowest, highest = significant(min(count.values)), significant(max(count.values))
     measured = f"{plural(len(count.values), 'value')}, {lowest} to {highest}, {turn}"
     at = (seen.from_ns, seen.to_ns) if seen else (count.times_ns[0], count.times_ns[-1])
-    cited = (cite(run, params.topic, *at),)
-    return verdict.about(expected=expected, measured=measured, citations=cited)
+    return verdict.about(expected=expected, measured=measured, citations=(cite(run, params.topic, *at),))
 
 
 def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:

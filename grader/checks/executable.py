@@ -160,8 +160,7 @@ def _cite_shebang(file: SourceFile) -> FileCitation:
     text = f"#!{file.shebang.text}" if file.shebang else ""
     if file.shebang is None or file.shebang.found is not False or file.shebang.interpreter not in text:
         return FileCitation(file=file.path, line=1)
-    column = text.rindex(file.shebang.interpreter) + 1
-    return FileCitation(file=file.path, line=1, column=column, source=text)
+    return FileCitation(file=file.path, line=1, column=text.rindex(file.shebang.interpreter) + 1, source=text)
 
 
 def has_wrapper(package: PackageFacts, build: Run, path: str) -> bool:
@@ -248,8 +247,7 @@ def _rosrun_answer(build: Run, path: str) -> str:
     names = {f"rosrun {path}", f"rosrun {PurePosixPath(path).name}"}
     said = (c.line for _, c in build.console if c.process in names and c.line.strip())
     lines = [line for line in said if "parsing manifest" not in line]
-    telling = (line for words in TELLING for line in lines if words in line)
-    answer = next(telling, lines[-1] if lines else "")
+    answer = next((line for words in TELLING for line in lines if words in line), lines[-1] if lines else "")
     return f"; rosrun answers: {shown(answer.replace(HOME, '~'))}" if answer else ""
 
 

@@ -85,9 +85,7 @@ class FileLeftParams(Record):
         if self.topics and not self.file.endswith(RECORDINGS):
             raise ValueError("topics are for a file that ends in .bag or .mcap")
         if self.topics and self._is_table:
-            raise ValueError(
-                "give topics (of a recording), or columns, rows_at_least and bounds (of a table)"
-            )
+            raise ValueError("give topics (of a recording), or columns, rows_at_least, bounds (of a table)")
         if unknown := [name for name in self.bounds if name not in self.columns]:
             raise ValueError(f"bounds: {join_words(unknown)} is not among the columns")
         return self
@@ -212,8 +210,7 @@ def _recording(file: LeftFile, topics: dict[str, TopicLeft], run: Run) -> Verdic
     try:
         channels = file.recording().channels
     except EvidenceError as error:
-        hint = error.hint or "close the recording: end rosbag record with Ctrl-C"
-        return failed(error.message, hint=hint)
+        return failed(error.message, hint=error.hint or "close the recording: end rosbag record with Ctrl-C")
     for topic, wanted in topics.items():
         found = [channel for channel in channels if channel.topic == topic]
         if wrong := _wrong_topic(file.path, topic, wanted, found, run):

@@ -22,7 +22,7 @@ from grader.model.message_definitions import (
 from grader.model.package import Fault, Interface, InterfaceField, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed
-from grader.wording import closest, join_words, numbers_text, plural
+from grader.wording import closest, join_words, on_lines, plural
 
 FAULTS_SHOWN = 3
 FILE_PATTERN = r"^(msg/\w+\.msg|srv/\w+\.srv|action/\w+\.action)$"
@@ -187,7 +187,7 @@ def _unreadable(found: Interface, fault: Fault, wanted: list[InterfaceField]) ->
         lacking = [f"`{one.type} {one.name}`" for one in wanted if one.part == last]
         if ends:
             line = ends[0]
-            fix = f"write a line `---` below {'line' if len(ends) == 1 else 'lines'} {numbers_text(ends)}"
+            fix = f"write a line `---` below {on_lines(ends)}"
         elif lacking and there and last not in (parts[one.name] for one in there):
             fix = f"at the end of the file, write a line `---`, and {join_words(lacking)} below it"
     return _Fault(shown(fault.message), line, fix)

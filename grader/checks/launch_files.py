@@ -150,8 +150,7 @@ def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdic
         message = (
             f"{file.path} has no <node> for {name}: line {built[0].line} starts {built[0].type}, which is C++"
         )
-        cited = (built[0].place,)
-        return failed(message, hint="; ".join(built_fixes(package, file, name)), citations=cited)
+        return failed(message, hint="; ".join(built_fixes(package, file, name)), citations=(built[0].place,))
     if slip and any(
         node.line == slip.line for node in built
     ):  # what the program is shows once roslaunch starts it
@@ -174,7 +173,6 @@ def _program(file: LaunchFile, program: str) -> Verdict | None:
 
 
 def _slip_for(package: PackageFacts, node: LaunchNode, name: str) -> Slip | None:
-    """The slip in a node that is meant to run this script."""
     slip = node_slip(package, node)
     if slip is None and node.type == name and node.pkg != package.name:
         why = f'pkg="{node.pkg}" is not the package of {name}'
@@ -196,7 +194,6 @@ def _is_meant(node: LaunchNode, name: str) -> bool:
 
 
 def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
-    """No node is even meant for it."""
     message = f"{file.path} has no <node> for {name}"
     if test := next((t for t in file.tests if t.type == name), None):
         cited = (test.place,)
@@ -352,7 +349,6 @@ def _is_shell(source: SourceFile) -> bool:
 
 
 def _script(package: PackageFacts, build: Run, file: LaunchFile, params: OpensParams) -> Verdict | None:
-    """The shell script is named by the launch file, and can be run as handed in."""
     shells = _shells(package, file)
     if not shells:
         return _no_shell(package, file, params)
@@ -380,7 +376,6 @@ def _no_shell(package: PackageFacts, file: LaunchFile, params: OpensParams) -> V
 def _page(
     package: PackageFacts, build: Run, file: LaunchFile, run: Run, params: OpensParams
 ) -> Verdict | None:
-    """The page was opened, in the program that was asked for."""
     pages = _pages(run)
     mine = [p for p in pages if _is_program(p.program, params)]
     if _url(mine, params):
@@ -391,14 +386,10 @@ def _page(
         message = f"the page is opened in {join_words(p.program for p in pages)}, not in {params.program}"
         return failed(message, hint=hint, citations=cited)
     if mine:
-        message = (
-            f"{params.program} is asked to open {join_words(map(_arguments, mine))}, not {params.urls[0]}"
-        )
+        message = f"{params.program} is given {join_words(map(_arguments, mine))}, not {params.urls[0]}"
         if blank := _blanks(run, mine):
             where = f"{PurePosixPath(blank['file']).name}, line {blank['line']}"
-            message += (
-                f": in {where}, the shell takes {blank['name']} for a command, because a space follows it"
-            )
+            message += f": in {where}, the shell takes {blank['name']} for a command, as a space follows it"
             hint = f"write {blank['name']}=… in {where}, without spaces around the `=`"
         elif slip := _misspelt_address(package, build, file, params):
             hint = f"{slip.file}: {slip.fix}"
@@ -491,7 +482,6 @@ def _blanks(run: Run, pages: list[Page]) -> re.Match[str] | None:
 
 
 def _words(package: PackageFacts, file: LaunchFile, run: Run) -> str:
-    """Return what the script or roslaunch said instead."""
     shell = re.compile(
         r"command not found|No such file|[Ss]yntax error|not found$|bad interpreter|cannot launch node"
     )
@@ -516,7 +506,6 @@ def _is_program(name: str, params: OpensParams) -> bool:
 
 
 def _url(pages: list[Page] | tuple[Page, ...], params: OpensParams) -> str:
-    """The first argument that is one of the addresses."""
     wanted = {_plain(url) for url in params.urls}
     return next((a for p in pages for a in p.arguments if _plain(a) in wanted), "")
 

@@ -253,8 +253,7 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
     expected = f"{params.launch} brings up {join_words(what) or 'its nodes'} under the file's names{over}"
     file = read_launch(package, params.launch, (*params.scripts, *params.programs))
     if isinstance(file, Verdict):
-        unjudged_too = {"unjudged": bool(params.scripts)}
-        return file.about(expected=expected).model_copy(update=unjudged_too)
+        return file.about(expected=expected).model_copy(update={"unjudged": bool(params.scripts)})
     share, right = _right_parts(package, file, run, params)
     verdict = (
         not_run(run)
@@ -510,9 +509,7 @@ def _ended_soon(run: Run, nodes: Iterable[LaunchNode], topic: str) -> list[Launc
 def _ended_by_itself(package: PackageFacts, file: LaunchFile, ended: Sequence[LaunchNode]) -> Verdict:
     """Return that nodes ended too soon to be connected, and the loop that let them, where one is seen."""
     alone = "itself" if len(ended) == 1 else "themselves"
-    message = (
-        f"{join_words(n.full_name for n in ended)} came up, and ended by {alone} before others could connect"
-    )
+    message = f"{join_words(n.full_name for n in ended)} came up and ended by {alone} before others connected"
     scripts = {one.path for n in ended if (one := own_script(package, n)) is not None}
     left = next((s for s in package.slips if s.kind == "loop-left" and s.file in scripts), None)
     if left is not None:

@@ -256,7 +256,6 @@ def _taken_off(message: str, slip: PythonSlip) -> Verdict:
 def _unregistered(
     package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe]
 ) -> Verdict | None:
-    """The node took its subscriber off the topic: nothing that came from some message on was printed."""
     slip = run_slip(package, run, "unregistered")
     if slip is None or list(missing) != list(probes[-len(missing) :]):
         return None
@@ -300,9 +299,7 @@ def _judge_error(package: PackageFacts, run: Run) -> Verdict | None:
     if end := explain_early_end(package, run):
         return end.verdict(failed, f"the node ended before it had printed everything: {end.cause}")
     if twice := run_slip(package, run, "defined-twice"):
-        return failed(
-            f"a callback is never called: {twice.message}", hint=twice.fix, citations=(twice.place,)
-        )
+        return failed(f"a callback never runs: {twice.message}", hint=twice.fix, citations=(twice.place,))
     if end := explain_error(package, run):
         return end.verdict(failed, f"an error stops the node from printing: {end.cause}")
     if slip := run_slip(package, run, "callback-called", "callback-missing"):
@@ -333,7 +330,6 @@ def _some_numbers(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequ
 
 
 def _only_again(probes: Sequence[Probe], missing: Sequence[Probe]) -> Verdict | None:
-    """All that is missing is what came a second time."""
     printed = {str(p.value) for p in probes if p not in missing}
     if not all(str(p.value) in printed for p in missing):
         return None
@@ -344,7 +340,6 @@ def _only_again(probes: Sequence[Probe], missing: Sequence[Probe]) -> Verdict | 
 def _subscribed_again(
     package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe]
 ) -> Verdict | None:
-    """Some were lost while a loop made another Subscriber in each turn."""
     slip = run_slip(package, run, "subscribed-again")
     if slip is None:
         return None
@@ -355,7 +350,6 @@ def _subscribed_again(
 def _waiting(
     package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe]
 ) -> Verdict | None:
-    """What came while the callback was busy with an earlier message."""
     slip = run_slip(package, run, "callback-waits")
     if slip is None or len(missing) == len(probes):
         return None

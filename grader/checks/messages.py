@@ -99,8 +99,7 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
     )
     measured = f"{in_one_line(heard[0].data[0])!r} to {in_one_line(heard[0].data[-1])!r} ({plural(count, 'message')})"
     span = cite(run, params.topic, min(c.times_ns[0] for c in heard), max(c.times_ns[-1] for c in heard))
-    citations = verdict.citations or (span,)
-    return verdict.about(expected=expected, measured=measured, citations=citations)
+    return verdict.about(expected=expected, measured=measured, citations=verdict.citations or (span,))
 
 
 def _no_text(package: PackageFacts, run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdict:
@@ -225,7 +224,6 @@ def _judge_counting(
 
 
 def _watched_ns(run: Run, heard: Sequence[Channel]) -> int:
-    """Return how long its messages could have come."""
     return (observed_until_ns(run) or run.end_ns) - min(c.times_ns[0] for c in heard)
 
 
@@ -495,7 +493,6 @@ def _in_order(
 
 
 def _said_again(found: Sequence[Reading], params: FieldEqualsParams) -> Verdict | None:
-    """Messages that repeat the one before, where one may come only when the value changes."""
     again = [one for before, one in pairwise(found) if one.values == before.values]
     if params.repeats or not again:
         return None
@@ -543,9 +540,7 @@ def _other_value(
         message, hint = f"{message}; none came after {topics}", f"publish again in the callback of {topics}"
     elif params.when == "last" and (number := _was_right(found, why, params)):
         message += f", and was right in message {number} of {len(found)}"
-        hint = (
-            f"change {params.field} where it has to change, and keep the rest as it was in the message before"
-        )
+        hint = f"change {params.field} where it has to change, and keep the rest as in the message before"
     elif params.when == "last" and (topic := _repeated(found, run, params)):
         message += f": each value is the one that came on {topic}"
         hint = "keep what was there before from callback to callback: `self.… = 0` in `__init__`, `+=` in the callback"

@@ -13,7 +13,7 @@ from grader.checks.support.text import near_names, shown
 from grader.model.package import MANIFEST, Dependency, Manifest, PackageFacts, meant_manifest
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
-from grader.wording import is_word_of, join_words, numbers_text, plural
+from grader.wording import is_word_of, join_words, on_lines, plural
 
 OTHERS = {
     "launch": ("launcher", "launchers", "launchfile", "launchfiles", "launch_files"),
@@ -329,14 +329,12 @@ def _rename(package: PackageFacts, found: Manifest, name: str) -> str:
         for c in calls
         if c.name == "project" and c.args[:1] != (name,)
     ]
-    lines: dict[str, dict[str, None]] = {}
+    lines: dict[str, dict[int, None]] = {}
     for launch in package.launch_files:
         for node in launch.nodes:
             if node.pkg == found.name:
-                lines.setdefault(node.file or launch.path, {})[str(node.line)] = None
-    places += [
-        f'pkg="{name}" in {file}, line{"s" * (len(own) > 1)} {join_words(own)}' for file, own in lines.items()
-    ]
+                lines.setdefault(node.file or launch.path, {})[node.line] = None
+    places += [f'pkg="{name}" in {file}, {on_lines(own)}' for file, own in lines.items()]
     such = f"$(find {found.name})"
     such += f" or `from {found.name}.msg import …`" if package.interfaces else ""
     has_cpp = any(PurePosixPath(file.path).suffix == ".cpp" for file in package.files)
@@ -375,7 +373,7 @@ def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
     hints = [_respell(n, d, deps) for n, deps in slips.items() for d in deps]
     names_too = {d.name for d in misspelt}
     if also := sorted(d.line for d in found.dependencies if d.name in names_too and d not in misspelt):
-        hints.append(f"do the same on line{'s' if len(also) > 1 else ''} {numbers_text(also)}")
+        hints.append(f"do the same on {on_lines(also)}")
     if absent := [n for n in missing if n not in slips]:
         hints.append(f"add {' '.join(f'<{tag}>{n}</{tag}>' for n in absent)} below line {last}")
     verdict = failed(

@@ -299,9 +299,7 @@ def _between(effects: Sequence[Reading], span: tuple[int, int], run: Run, params
     if to_s is None:
         return []
     from_s, until_s = to_s(span[0]) + params.within_s, to_s(span[1]) - ORDER_S
-    return [
-        one.time_ns for one in effects if from_s < to_s(one.time_ns) < until_s and params.effect.holds(one)
-    ]
+    return [e.time_ns for e in effects if from_s < to_s(e.time_ns) < until_s and params.effect.holds(e)]
 
 
 def _unless_late(

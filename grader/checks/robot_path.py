@@ -222,9 +222,7 @@ def drives_too_little(path: Sequence[Pose], region: Region, least_m: float) -> V
         mean_m_s = long_m / max(path[-1].time_s - path[0].time_s, STOPS_S)
         message, hint = f"{message}, and it drives all the time, at {mean_m_s:.2f} m/s", "drive faster"
     if turns and isinstance(region, Band) and region.max_m is not None:
-        message += (
-            f", {metres(region.nearest_m(path[-1].point))} from the nearest wall; why is not established"
-        )
+        message += f", {metres(region.nearest_m(path[-1].point))} from the nearest wall; why is not known"
         hint = "print in each branch which one it is, and look at the condition that stays true there"
     elif stood > MOSTLY and (isinstance(region, Band) or not turns):
         message += f", and it stands, or turns on the spot, for {stood:.0%} of the time"
@@ -392,9 +390,7 @@ def _wrong_start(path: Sequence[Pose], way: Way, course: Course) -> Words | None
     if course.reached:
         return None
     apart = metres(math.dist(path[0].point, way.points[0]))
-    return Words(
-        f"it starts at {spot(path[0].point)}, {apart} from {way.name(0)}", "bring it to the start first"
-    )
+    return Words(f"it starts at {spot(path[0].point)}, {apart} from {way.name(0)}", "bring it to the start")
 
 
 def _wrong_turn(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
@@ -556,9 +552,7 @@ def _ends_short(path: Sequence[Pose], way: Way, course: Course) -> Words:
     if every:
         return Words(message, "publish a zero velocity once you are at the last point")
     if course.reached > 1 and math.dist(path[-1].point, way.points[goal - 1]) <= way.tolerance_m:
-        hint = (
-            "go on from there: count the stretches that the handout asks for, and keep the node alive for all"
-        )
+        hint = "go on from there: count the stretches of the handout, and keep the node alive for all"
         return Words(message, hint)
     return Words(message, "drive longer, or keep the node alive until it gets there")
 

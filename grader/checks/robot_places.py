@@ -348,9 +348,7 @@ def _never_moves(
     if not sent or any(command.speed or command.turn for command in sent):
         return why_still(unjudged(message, hint=DRIVE), run)
     message += f": {plural(len(sent), 'velocity', 'velocities')} came, and {'all are' if len(sent) > 1 else 'it is'} 0"
-    hint = (
-        "look at the condition that stops it: the distance is math.hypot(dx, dy), which is never less than 0"
-    )
+    hint = "look at the condition that stops it: the distance is math.hypot(dx, dy), which is never below 0"
     return unjudged(message, hint=hint)
 
 
@@ -374,8 +372,7 @@ def _fell_silent(
     if end := explain_early_end(package, run):
         return end.verdict(failed, f"{message}: the node ended ({end.cause})")
     hint = f"publish on {params.topic} for as long as the node runs, not only for a while"
-    cited = named_at(package, run, "publisher", params.topic)
-    return failed(message, hint=hint, citations=cited)
+    return failed(message, hint=hint, citations=named_at(package, run, "publisher", params.topic))
 
 
 def _answers_late(verdict: Verdict, run: Run) -> Verdict:
@@ -529,8 +526,7 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
                 f"the smallest of its ranges is then {seen}", f"{verdict.hint}; {LOOK_AT}"
             )
         elif isinstance(region, Band) and (around := circles(path, out)) > 1:
-            why = f"it drives in circles there, {around:.1f} times around"
-            verdict = verdict.explained(why, CIRCLES)
+            verdict = verdict.explained(f"it drives in circles there, {around:.1f} times around", CIRCLES)
     elif long_m < params.least_m:
         verdict = drives_too_little(path, region, params.least_m)
     else:

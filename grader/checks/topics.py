@@ -119,7 +119,6 @@ def _cite_channels(run: Run, channels: tuple[Channel, ...]) -> tuple[Citation, .
 
 
 def _other_definition(channel: Channel, params: TopicTypeParams) -> Verdict | None:
-    """Return the verdict where the publisher's type has the right name and other fields."""
     wanted = params.definition
     differs = other_fields(params.type, channel.definition, wanted) if wanted is not None else ""
     if not differs:
@@ -183,8 +182,7 @@ def _judge_unexpected(
     meant = near_names(first, missing)
     named = join_words(f"{t} ({published[t]})" if published[t] else t for t in unexpected)
     message = f"{_publisher(run, first)} publishes on {named}, which the lab does not ask for"
-    hint = f"did you mean {meant[0]}?" if meant else f"remove the {publisher(first)}"
-    return failed(message, hint=hint)
+    return failed(message, hint=f"did you mean {meant[0]}?" if meant else f"remove the {publisher(first)}")
 
 
 def _publisher(run: Run, topic: str) -> str:
@@ -298,7 +296,6 @@ def _fits(run: Run, node: str, wanted: str) -> bool:
 
 
 def _apart(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdict:
-    """Return why no two nodes are connected: one is missing, or not on the topic, or the types differ."""
     lacking = [end for end in ENDS if not _on(run, params.topic, end, params)]
     for end in lacking:
         if verdict := _judge_misnamed(run, end, params):
@@ -317,7 +314,6 @@ def _apart(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdict:
 
 
 def _judge_misnamed(run: Run, end: End, params: ConnectedParams) -> Verdict | None:
-    """The node is there under another name."""
     wanted, there = (
         params.name(end),
         [n for n in dict.fromkeys(n for _, event in run.graph for n in event.nodes) if not is_grader_node(n)],
@@ -342,7 +338,6 @@ def _not_on_topic(run: Run, end: End, params: ConnectedParams) -> Verdict:
 
 
 def _on(run: Run, topic: str, end: End, params: ConnectedParams) -> tuple[str, ...]:
-    """Return the nodes that fit this end and were ever on the topic."""
     return nodes_on(run, topic, end, lambda node: _fits(run, node, params.name(end)))
 
 

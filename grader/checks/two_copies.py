@@ -108,8 +108,7 @@ def copies(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
     names = dict.fromkeys((*trio.first_nodes, *trio.second_nodes))
     graph = cite(run, "/grader/graph")
     measured = verdict.measured or f"names of the copies: {join_words(names) or 'none'}"
-    citations = verdict.citations or (graph,)
-    return verdict.about(expected=expected, measured=measured, citations=citations)
+    return verdict.about(expected=expected, measured=measured, citations=verdict.citations or (graph,))
 
 
 def _trio(package: PackageFacts, run: Run, params: CopiesParams) -> Trio | Verdict:
@@ -232,7 +231,6 @@ def _other_words(params: CopiesParams) -> Verdict:
 def _judge_both(
     first: Counter[str], second: Counter[str], printed: Counter[str], trio: Trio, params: CopiesParams
 ) -> Verdict | None:
-    """A pass where both were heard."""
     counts = heard_of(first, second, printed), heard_of(second, first, printed)
     if not all(counts):
         return None
@@ -271,8 +269,6 @@ def _unheard(
         message = f"{names[0]} and {names[1]} send the same texts, and not all of them are printed twice"
         return unjudged(message, hint=f"put the time into each message: {GET_TIME}")
     lost = names[0] if counts[1] else names[1]
-    message = (
-        f"{names[0]} and {names[1]} run at the same time, but {params.listener} prints nothing of {lost}"
-    )
+    message = f"{names[0]} and {names[1]} run together, but {params.listener} prints nothing of {lost}"
     hint = f"subscribe with a callback and {SPIN}; a subscriber hears every publisher of its topic"
     return unjudged(message, hint=hint)

@@ -27,7 +27,7 @@ from grader.model.package import LaunchFile, PackageFacts
 from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation, Status, Verdict, cited_lines
 from grader.rubric.model import Criterion, Rubric
-from grader.wording import numbers_text, significant
+from grader.wording import on_lines, significant
 
 POINTS_MAX = 3
 _NO_FIELD = re.compile(r"has no attribute '(?P<field>\w+)'.*? \((?P<file>[\w./-]+), line (?P<line>\d+)\)")
@@ -213,7 +213,5 @@ def name_other_lines(verdict: Verdict, facts: Facts) -> Verdict:
     others = [n for n, line in enumerate(lines, 1) if n != number and same and same.search(line[:LINE_CHARS])]
     if not others:
         return verdict
-    where = f"line{'s' if len(others) > 1 else ''} {numbers_text(others)}"
-    return verdict.model_copy(
-        update={"hint": f"{verdict.hint}, and correct `{found['field']}` on {where} too"}
-    )
+    hint = f"{verdict.hint}, and correct `{found['field']}` on {on_lines(others)} too"
+    return verdict.model_copy(update={"hint": hint})

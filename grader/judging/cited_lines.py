@@ -30,7 +30,7 @@ from grader.model.python_slip import PythonSlip
 from grader.model.repair import Repair
 from grader.model.verdict import Citation, FileCitation, Status, Verdict
 from grader.rubric.model import Criterion
-from grader.wording import join_words, lines_text, numbers_text
+from grader.wording import join_words, lines_text, on_lines
 
 LINE_CHARS = 200
 """A longer line stays out of the result."""
@@ -194,7 +194,7 @@ def cite_find(verdict: Verdict, criterion: Criterion, package: PackageFacts | No
         lines = [n for n, text in enumerate(build.file_lines(file.path)[:LINES_READ], 1) if name.search(text)]
         if lines:
             of_file = "" if asked is not None else f" of {file.path}"
-            where = f"line{'s' * (len(lines) > 1)} {join_words(map(str, lines))}{of_file}"
+            where = f"{on_lines(lines)}{of_file}"
             hint = f"write the package's exact name on {where}, push {absent} if it is your own, or remove it"
             cited = tuple(FileCitation(file=file.path, line=n) for n in lines)
             return verdict.model_copy(update={"hint": hint, "citations": cited})
@@ -329,12 +329,12 @@ def lost_fields(lines: Sequence[str], slip: PythonSlip, wanted: str) -> str:
         return ""
     alone = slip.kind == "publisher-type" and sum("Publisher(" in text for text in texts) == 1
     sent = [n for n, text in enumerate(texts, 1) if alone and _sends_several(text)]
-    lines_sent = f"line{'s' if len(sent) > 1 else ''} {numbers_text(sent)} of {slip.file}"
-    single = f"publish one value on {lines_sent}, as {wanted} has only `data`" if sent else ""
+    sent_on = f"{on_lines(sent)} of {slip.file}"
+    single = f"publish one value on {sent_on}, as {wanted} has only `data`" if sent else ""
     if not either or not fields:
         return single
     numbers = [number for number, found in taken if found]
-    where = f"line{'s' if len(numbers) > 1 else ''} {numbers_text(numbers)} of {slip.file}"
+    where = f"{on_lines(numbers)} of {slip.file}"
     value = {"String": "a text", "Bool": "True or False"}.get(wanted, "a number")
     use = "use `data`" if slip.kind == "subscriber-type" else f"put {value} into `data`"
     own = texts[first:last] if wanted == "String" else []
@@ -344,9 +344,7 @@ def lost_fields(lines: Sequence[str], slip: PythonSlip, wanted: str) -> str:
         rf"\b(?:{either})\.\w+ *(?:[-+*/]=|[-*/<>]|\+ *\d|[!=]=)|[-*/<>] *(?:{either})\."
     )
     if sums := [n for n, line in enumerate(own, first + 1) if with_number.search(line)]:
-        text += (
-            f"; leave out the calculation with it on line{'s' if len(sums) > 1 else ''} {numbers_text(sums)}"
-        )
+        text += f"; leave out the calculation with it on {on_lines(sums)}"
     fields = [f"`{one}`" for one in fields]
     named = join_words(fields, most=FIELDS_SHOWN)
     return f"{use}, the only field of {wanted}, in place of {named} on {where}{text}{single and f', and {single}'}"

@@ -93,7 +93,6 @@ class Facts:
         return Evidence(found, scenario=criterion.scenario, package=package)
 
     def _not_here(self, name: str) -> Verdict:
-        """Return the verdict where one of several packages was not handed in."""
         known = (self.package, *self.others.values())
         found = join_words(one.name for one in known if one is not None)
         return unjudged(
@@ -129,13 +128,10 @@ class Facts:
         if outcome.outcome == "host":
             why = f": {outcome.detail}" if outcome.detail else ""
             message = f"the run {scenario!r} failed on the grading machine{why}"
-            return inconclusive(
-                message, hint="`grader doctor` shows what this machine lacks; then grade again"
-            )
+            return inconclusive(message, hint="`grader doctor` shows what it lacks; then grade again")
         return self._without_program(run, scenario) or run
 
     def _without_program(self, run: Run, scenario: str) -> Verdict | None:
-        """Return the verdict where a program that the rubric starts beside the student's failed."""
         known = self.rubric.scenarios.get(scenario)
         programs = (
             {start.name: start.program for start in known.start if start.program and not start.is_rostest}
@@ -273,9 +269,7 @@ def _launch_names(package: PackageFacts) -> set[str]:
 
 
 def _not_in_messages(run: Run) -> Verdict:
-    message = (
-        f"{run.evidence} holds messages, but nothing about the processes and nodes that this criterion judges"
-    )
+    message = f"{run.evidence} holds messages, but nothing of the processes and nodes that are judged"
     return inconclusive(message, hint="hand in the package too, so that its nodes can be run")
 
 
@@ -323,8 +317,7 @@ def with_recordings(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:
 def _run_named(name: str, scenario: Scenario, foreign: list[Run]) -> Run | None:
     by_name = [run for run in foreign if run.scenario == name]
     pattern = PurePosixPath(scenario.recording or "").name
-    fitting = [run for run in foreign if fnmatchcase(run.evidence.casefold(), pattern.casefold())]
-    found = by_name or fitting
+    found = by_name or [run for run in foreign if fnmatchcase(run.evidence.casefold(), pattern.casefold())]
     return found[0] if len(found) == 1 else None
 
 

@@ -214,7 +214,6 @@ def _with_cited_lines(verdict: Verdict, criterion: Criterion, facts: Facts, used
 
 
 def _in_order(rubric: Rubric) -> Iterable[str]:
-    """Return the ids of the criteria, each after those that it requires."""
     return TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order()
 
 
@@ -281,8 +280,16 @@ EXPLANATIONS = (
     explain_by_unread_parameter,
     explain_by_misplaced_parameter,
     explain_by_wrong_value,
-    explain_by_waiting_callback,
 )
+
+
+def explain_loss(check: Check, package: PackageFacts | None, run: object, verdict: Verdict) -> Verdict:
+    """Return a lost mark with what explains it in the run as a whole."""
+    if package is None or not isinstance(run, Run):
+        return verdict
+    for explain in EXPLANATIONS if verdict.status.is_lost else ():
+        verdict = explain(check, package, run, verdict)
+    return explain_by_waiting_callback(check, package, run, verdict)  # that may take back an excuse
 
 
 def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> Verdict:
@@ -304,8 +311,7 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
         )
         if not isinstance(asked, Verdict):
             package, run = facts.package_of(criterion), asked.get("run")
-            for explain in EXPLANATIONS:
-                found = explain(check, package, run, found)
+            found = explain_loss(check, package, run, found)
             own = facts.rubric.starts_of(criterion)
             started = {event.name for _, event in run.processes} if isinstance(run, Run) else set()
             all_of_run = facts.rubric.starts_of(criterion.model_copy(update={"parameters": {}}))

@@ -45,7 +45,7 @@ from grader.model.python_slip import PythonSlip
 from grader.model.repair import Repair
 from grader.model.verdict import Verdict, cited_lines
 from grader.rubric.model import Criterion, Rubric
-from grader.wording import join_words, numbers_text, significant
+from grader.wording import join_words, on_lines, significant
 
 NAMES_SHOWN = 3
 ASKS = re.compile(r"[^#'\"]*\b(?:raw_)?input\s*\(")
@@ -236,12 +236,8 @@ class Later:
         asked = self._asked() - told
         for file in sorted({path for path, _ in asked}):
             lines = sorted(number for path, number in asked if path == file)
-            where = (
-                f"line {lines[0]} of {file} asks"
-                if len(lines) == 1
-                else f"lines {numbers_text(lines)} of {file} ask"
-            )
-            yield Fix(f"write a value in the code where {where} for input")
+            asks = "asks" if len(lines) == 1 else "ask"
+            yield Fix(f"write a value in the code where {on_lines(lines)} of {file} {asks} for input")
         yield from self._left_over()
 
     def _left_over(self) -> Iterator[Fix]:
@@ -329,8 +325,8 @@ class Later:
             and len({(one.file, one.message) for one in numbers}) == 1
             and is_other_rate(numbers[0], hz)
         ):
-            word, ask = ("lines", "ask") if len(numbers) > 1 else ("line", "asks")
-            where = f"{word} {numbers_text(sorted(one.line for one in numbers))} of {numbers[0].file}"
+            ask = "ask" if len(numbers) > 1 else "asks"
+            where = f"{on_lines(sorted(one.line for one in numbers))} of {numbers[0].file}"
             yield Fix(f"make it {significant(hz)} Hz on {where}, which {ask} for {numbers[0].message} Hz")
         for slip in self._of("not-called"):
             if "sleep" in slip.name:
@@ -500,8 +496,7 @@ class Later:
             told = f"/{slip.message} on" in self._verdict.message and OF_DATA.fullmatch(name)
             others = self._making(slip) if told else ()
             if others:
-                where = f"line{'s' if len(others) > 1 else ''} {numbers_text(others)} of {slip.file}"
-                yield Fix(f"write {name} instead of {slip.message} on {where}")
+                yield Fix(f"write {name} instead of {slip.message} on {on_lines(others)} of {slip.file}")
                 yield from self._fields(name, slip)
 
     def _making(self, slip: PythonSlip) -> list[int]:
@@ -520,7 +515,7 @@ class Later:
 
     def _retype(self, verb: str, wanted: str, slip: PythonSlip) -> Iterator[Fix]:
         others, (package, _, name) = self._making(slip), wanted.partition("/")
-        notes = [f"made on line{'s' if len(others) > 1 else ''} {numbers_text(others)}"] if others else []
+        notes = [f"made on {on_lines(others)}"] if others else []
         known = re.compile(rf"[^#]*\bimport\b.*(\b{name}\b|\*)")
         if not any(known.match(line[:LINE_CHARS]) for line in self._lines(slip.file) or ["import *"]):
             notes.append(f"with `from {package}.msg import {name}` at the top")

@@ -356,7 +356,6 @@ def is_first_line_added(repair: Repair, rubric: Rubric, repairs: Iterable[Repair
 
 
 def _started_files(scenario: Scenario) -> set[str]:
-    """Return the names of the files that the scenario starts."""
     return {PurePosixPath(path).name for s in scenario.start for path in (s.script, s.launch) if path}
 
 

@@ -126,7 +126,6 @@ def _apply(
 
 
 def _is(earlier: AppliedOverride, override: Override) -> bool:
-    """Return whether it is the same decision."""
     return all(getattr(earlier, name) == getattr(override, name) for name in Override.model_fields)
 
 

@@ -40,7 +40,7 @@ from grader.model.package import (
     meant_command,
 )
 from grader.model.verdict import FileCitation
-from grader.wording import is_word_of, join_words, numbers_text, there_is
+from grader.wording import is_word_of, join_words, on_lines, there_is
 
 ALWAYS_THERE = ("catkin", "rospy", "roscpp", "std_msgs")
 ONE_EDIT = 0.88
@@ -259,10 +259,7 @@ def _calls_of_targets(package: PackageFacts, made: Sequence[CMakeCall], absent: 
     """Return how the targets that are built of nothing but absent files are left out: all of their calls."""
     targets = {c.args[0] for c in made if c.args and set(_sources(c)) and set(_sources(c)) <= set(absent)}
     lines = {c.line for c in cmake_calls(package, *OF_TARGETS) if c.args and c.args[0] in targets}
-    words = "line" if len(lines) == 1 else "lines"
-    return (
-        f"delete what is built from them: the calls on {words} {numbers_text(sorted(lines))}" if lines else ""
-    )
+    return f"delete what is built from them: the calls on {on_lines(sorted(lines))}" if lines else ""
 
 
 def _sources(call: CMakeCall) -> list[str]:

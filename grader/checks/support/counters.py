@@ -399,9 +399,7 @@ def _judge_death(count: Count, run: Run, package: PackageFacts, params: WrapPara
         high = next((one for one in limits if int(one.message) > params.maximum), None)
         first = next((one for one in limits if one.fix), None)
         if first is not None:
-            why = (
-                f"{message}; line {first.line} calculates the `%` before the `+`, so the counter never wraps"
-            )
+            why = f"{message}; line {first.line} computes the `%` before the `+`, so the counter never wraps"
             return failed(
                 why, hint=f"on line {first.line}, {first.fix}", citations=(first.place, *end.citations)
             )
@@ -433,9 +431,7 @@ def _silent(count: Count, run: Run, package: PackageFacts, params: WrapParams) -
         return None
     found = [t for one in lives(run) for t in process_tracebacks(run, one.name)]
     cause = f": {explain_traceback(found[-1], package).cause}" if found else ""
-    message = (
-        f"the node stops publishing after {significant(count.values[-1])}, although it keeps running{cause}"
-    )
+    message = f"the node stops publishing after {significant(count.values[-1])}, but keeps running{cause}"
     verdict = failed(message, hint=params.reset_hint) if len(count.values) > 1 else unjudged(message)
     return verdict if found else verdict.if_repeated()
 

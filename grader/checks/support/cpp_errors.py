@@ -92,17 +92,13 @@ def _no_message(found: re.Match[str], _package: PackageFacts, lines: Sequence[st
     if kind.endswith("*"):
         why = f"{where}a callback takes a plain pointer, `{kind}`, and ROS has none to give it"
         return Explained(why, f"write `const {bare}::ConstPtr&` as the type of what the callback takes")
-    return Explained(
-        f"{where}`{kind}` is not the type of a message", "write the type of the topic's messages"
-    )
+    return Explained(f"{where}`{kind}` is no message type", "write the type of the topic's messages")
 
 
 def _no_placeholder(name: str) -> Explained:
     """The Boost of ROS Noetic knows `_1` by itself, and later ones do not."""
     why = f"{name} in boost::bind(…) is unknown to this grading machine's Boost, which is newer than ROS Noetic's"
-    hint = (
-        f"{ON_THE_MACHINE}build it with ROS Noetic's own Boost; boost::placeholders::{name} works with both"
-    )
+    hint = f"{ON_THE_MACHINE}build it with ROS Noetic's Boost; boost::placeholders::{name} works with both"
     return Explained(why, hint, of_machine=True)
 
 

@@ -62,7 +62,7 @@ from grader.model.package import Fault, PackageFacts, SourceFile
 from grader.model.python_slip import PythonSlip
 from grader.model.verdict import Citations, FileCitation, Span, Verdict, machine_lacks
 from grader.syntax_fixes import COMMENTED_OUT, corrected, without_brace
-from grader.wording import join_words, plural
+from grader.wording import join_words, on_lines, plural
 
 OTHER_NAMES_SHOWN = 3
 """Names of the same script that are not defined either."""
@@ -222,8 +222,7 @@ def _not_run(life: Life, run: Run, package: PackageFacts) -> Ending | None:
     is_node = bool(nodes_of(run, life.name))  # also by a name that no line of it says
     if script is not None and not is_node and (other := _real_copy(script, package)):
         cause = f"its script ran to the end: it makes no node, but {other}, which has the same name, does"
-        hint = without_git(move_hint(package, other, script.path), package)
-        return Ending(cause, hint, by_itself=True)
+        return Ending(cause, without_git(move_hint(package, other, script.path), package), by_itself=True)
     if script is not None and script.shebang_fault == "empty-file":
         return Ending("its file is empty", f"write the node in {script.path}", by_itself=True)
     kinds = ("main-guard", "not-called", "never-called", "loop-left", "commented-out", "no-init")
@@ -259,10 +258,11 @@ def _in_comments(slips: Sequence[PythonSlip]) -> dict[str, str]:
     kinds = {one.kind for one in slips}
     gone = (s for s in slips if s.kind == "commented-out" and "`#`" in s.fix)
     lines = sorted({s.line for s in gone if MAKES_NODES.get(s.name.rpartition(" ")[2], s.kind) not in kinds})
-    listed = f"lines {join_words(map(str, lines))}"
-    if len(lines) < 2:
-        return {}
-    return {"message": f"{listed} are commented out", "fix": f"remove the `#` from {listed}"}
+    told = {
+        "message": f"{on_lines(lines)} are commented out",
+        "fix": f"remove the `#` from {on_lines(lines)}",
+    }
+    return told if len(lines) > 1 else {}
 
 
 def explain_error(
@@ -281,13 +281,10 @@ def explain_error(
     return explain_traceback(found[-1], package) if found else None
 
 
-def explain_by_exception(
-    check: Check, package: PackageFacts | None, run: object, verdict: Verdict
-) -> Verdict:
+def explain_by_exception(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a lost mark with the exception that a callback raised, which rospy prints and outlives. One when nothing
     was due need not be why."""
-    unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
-    if not unexplained or package is None or not isinstance(run, Run) or early_end(run):
+    if not check.of_callbacks or verdict.cause or early_end(run):
         return verdict
     end = explain_error(package, run, during=verdict.due)
     if end is None:
@@ -466,8 +463,7 @@ def _asks_for_input(
     fixes = [s.fix for s in package.slips if s.kind == "input" and place and s.file == place.file and s.fix]
     instead = ""
     if len(asking) > 1:
-        lines = join_words(map(str, asking))
-        instead = f"write values in the code in place of each `input()`: lines {lines}"
+        instead = f"write values in the code in place of each `input()`: {on_lines(asking)}"
     elif fixes and fixes[0].startswith("publish …"):
         instead = fixes[0].replace("…", VALUE_SLOT, 1)
     elif number := _NUMBER_ASKED.search(source):

@@ -272,9 +272,7 @@ def unit_slip(got: object, wanted: object) -> str:
             return f" ({significant(factor)} times too large, as {small} in place of {large} are)"
         if math.isclose(got * factor, wanted, rel_tol=SLIP):
             return f" ({significant(factor)} times too small, as {large} in place of {small} are)"
-    return next(
-        (f" ({what})" for other, what in others.items() if math.isclose(got, other, rel_tol=SLIP)), ""
-    )
+    return next((f" ({what})" for n, what in others.items() if math.isclose(got, n, rel_tol=SLIP)), "")
 
 
 def has_hole(value: object) -> bool:

@@ -301,8 +301,7 @@ def track(
         return Track(fault="hold values that are not numbers, or that no robot could follow")
     if poses:
         return Track(tuple(poses))
-    end_s = seconds(observed_until_ns(run) or run.end_ns)
-    return Track(tuple(driven(commands, hold_s, end_s)))
+    return Track(tuple(driven(commands, hold_s, seconds(observed_until_ns(run) or run.end_ns))))
 
 
 def _publishers(run: Run, topic: str, fields: PoseFields | None) -> list[Channel]:

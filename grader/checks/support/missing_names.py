@@ -378,8 +378,7 @@ def _other_field(owner: str, known: tuple[str, ...], wrong: str, source: str) ->
     """Return what a message has in place of a field that it has not, and that is like none of its own."""
     inner = re.search(rf"\.{wrong}\.({'|'.join(known)})\b", source)
     if inner:  # `feedback.feedback.count`: this is the inner part already
-        hint = f"write `.{inner[1]}` instead of `.{wrong}.{inner[1]}`"
-        return f"it is the {owner} already", hint
+        return f"it is the {owner} already", f"write `.{inner[1]}` instead of `.{wrong}.{inner[1]}`"
     if len(known) == 1:
         return f"{owner} has only {known[0]}", _line_with(source, wrong, known[0])
     way = [

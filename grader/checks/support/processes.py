@@ -22,7 +22,7 @@ from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, unjudged
-from grader.wording import join_words, seconds, shorten
+from grader.wording import join_words, on_lines, seconds, shorten
 
 NO_SCRIPT_HINT = "add the script to the package, and push it"
 LOGGERS = ("/get_loggers", "/set_logger_level")
@@ -194,7 +194,7 @@ def copied_topic(
         if name == (topic.strip("/") or name):
             places.setdefault((slip.file, name), []).append(slip.line)
     found = ((file, sorted(set(lines))) for (file, _), lines in places.items())
-    return next((f"lines {join_words(map(str, n))} of {file}" for file, n in found if len(n) > 1), "")
+    return next((f"{on_lines(n)} of {file}" for file, n in found if len(n) > 1), "")
 
 
 def by_copies(package: PackageFacts, run: Run, topic: str, of_node: Callable[..., Verdict]) -> Verdict | None:
@@ -220,8 +220,7 @@ def run_scripts(run: Run) -> set[str | None]:
 
 def early_end(run: Run) -> Life | None:
     """Return the first process of the student's that ended before the grader stopped it."""
-    early = [one for one in lives(run) if one.ended_early]
-    return min(early, key=lambda one: one.end_ns or 0, default=None)
+    return min([one for one in lives(run) if one.ended_early], key=lambda one: one.end_ns or 0, default=None)
 
 
 def first_interrupt_ns(run: Run) -> int | None:

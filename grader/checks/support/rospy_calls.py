@@ -13,7 +13,7 @@ from grader.checks.support.text import shown
 from grader.installable import noetic_messages
 from grader.model.package import PackageFacts
 from grader.syntax_fixes import parsed
-from grader.wording import join_words
+from grader.wording import join_words, on_lines
 
 Meaning = tuple[str, str]
 """The cause, and what to do."""
@@ -387,8 +387,8 @@ def of_typed_text(found: Traceback, file: str, package: PackageFacts) -> tuple[s
     read = [line for line, name in bases if re.search(rf"(?<![\w.]){re.escape(name)}\b", source)]
     if not read:
         return None
-    where = f"line{'s' if len(read) > 1 else ''} {join_words(map(str, read))}"
-    return "input() gives a text in Python 3", f"on {where}, write `float(input(…))` in place of `input(…)`"
+    hint = f"on {on_lines(read)}, write `float(input(…))` in place of `input(…)`"
+    return "input() gives a text in Python 3", hint
 
 
 def _time_and_number(time: ast.expr, source: str) -> tuple[str, str] | None:

@@ -157,9 +157,7 @@ def unfilled(text: str) -> str:
     if found is None:
         return ""
     if found["name"]:
-        return (
-            f"write an `f` before the opening quote of that text: without it, `{shown(found[0])}` is no value"
-        )
+        return f"write an `f` before the quote of that text: without it, `{shown(found[0])}` is no value"
     if found[0] == "{}":
         return "write `.format(…)` behind that text, with a value for each `{}`"
     return f"give that text a value for its `{shown(found[0])}`: {both('`% value` behind it', 'the next argument')}"
