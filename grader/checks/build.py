@@ -327,8 +327,7 @@ def _built_programs(package: PackageFacts) -> Iterator[Executable]:
 
 
 def _not_started(package: PackageFacts, made: dict[str, Executable]) -> Verdict:
-    """No program came out where `rosrun` looks: catkin sets that place in `catkin_package()`, and a property of the
-    target another one."""
+    """No program came out where `rosrun` looks: `catkin_package()` sets that place, a target's property another one."""
     away = next((one for one in made.values() if is_elsewhere(one, package)), None)
     if away is not None:
         call = away.named or away.call

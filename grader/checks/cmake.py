@@ -118,8 +118,7 @@ def _misspelt(facts: CMakeFacts, name: str) -> CMakeCall | None:
 
 
 class Wrong(NamedTuple):
-    """What is wrong, how to fix it, and in which line; or the command that is `uncalled`, and the call below which it
-    goes."""
+    """What is wrong, its fix and its line; or the command that is `uncalled`, and the call below which it goes."""
 
     why: str
     fix: str

@@ -212,8 +212,7 @@ def _not_printed(
 
 
 def _unseen(one: Life, package: PackageFacts, run: Run, params: PrintsParams, never: str) -> Verdict | None:
-    """Return the loss where a launch file brings nothing up, or a node of it prints the text, and roslaunch writes that
-    to a file."""
+    """Return the loss where a launch file brings nothing up, or sends what a node prints to a file."""
     started = {PurePosixPath(word).name for word in one.start.argv}
     refused = any("cannot launch node of type" in line.line for _, line in run.lines(one.name))
     if refused and run.graph and not nodes_of(run, one.name):

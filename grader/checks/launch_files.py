@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from difflib import get_close_matches
 from itertools import chain, count
 from pathlib import PurePosixPath
@@ -10,6 +11,7 @@ from typing import NamedTuple
 
 from grader.checks.executable import ExecutableParams, executable
 from grader.checks.registry import LaunchName, ProgramName, check
+from grader.checks.support.cpp_errors import CPP_SUFFIXES
 from grader.checks.support.launch import (
     console_lines,
     died,
@@ -124,8 +126,7 @@ def _with_next(verdict: Verdict, package: PackageFacts, params: LaunchXmlParams)
 
 
 def _lacking(package: PackageFacts, file: LaunchFile, params: LaunchXmlParams) -> Verdict | None:
-    """Return why roslaunch starts nothing, and why nodes are not there; None where all are. Those that are there earn
-    their share."""
+    """Return why roslaunch starts nothing, or nodes are not there; those that are there earn their share."""
     refused = next(refusals(package, file), None)
     found = {PurePosixPath(script).name: missing_node(package, file, script) for script in params.scripts}
     found |= {program: _program(file, program) for program in params.programs}
@@ -178,13 +179,10 @@ def _slip_for(package: PackageFacts, node: LaunchNode, name: str) -> Slip | None
         why = f'pkg="{node.pkg}" is not the package of {name}'
         return Slip(node.file, node.line, why, f'write pkg="{package.name}"')
     written = PurePosixPath(node.type or "")
-    if slip is None and written.suffix in SOURCES and written.stem == PurePosixPath(name).stem:
+    if slip is None and written.suffix in CPP_SUFFIXES and written.stem == PurePosixPath(name).stem:
         why = f'type="{written}" is a C++ source file, which cannot be started'
         return Slip(node.file, node.line, why, f'write type="{name}"')
     return slip
-
-
-SOURCES = (".cpp", ".cc", ".cxx", ".c")
 
 
 def _is_meant(node: LaunchNode, name: str) -> bool:
@@ -195,42 +193,34 @@ def _is_meant(node: LaunchNode, name: str) -> bool:
 
 def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
     message = f"{file.path} has no <node> for {name}"
-    if test := next((t for t in file.tests if t.type == name), None):
-        cited = (test.place,)
-        message = f"{message}: only rostest starts a <test>"
-        return failed(
-            message, hint=f"write {_node_tag(file, pkg, name)} in place of the <test>", citations=cited
-        )
-    commented = (line for kind, line in file.commented if kind in {name, PurePosixPath(name).stem})
-    if line := next(commented, None):
-        cited = (FileCitation(file=file.path, line=line),)
-        message = f"{message}: the one on line {line} is in a comment, which roslaunch skips"
-        kind = "" if (name, line) in file.commented else f', and write type="{name}" in it'
-        return failed(message, hint=f"{out_of_comment(line)}{kind}", citations=cited)
-    stem = PurePosixPath(name).stem
-    if off := next((one for one in file.switched_off if PurePosixPath(one[0]).stem == stem), None):
-        cited = (FileCitation(file=file.path, line=off[1]),)
-        message = f"{message}: {off[2]} on line {off[1]} leaves the one that is there out"
-        return failed(message, hint="; then ".join(later_fixes(file, name)), citations=cited)
-    swapped = next(
-        (n for n in file.nodes if n.pkg in {name, PurePosixPath(name).stem} and n.type == pkg), None
-    )
-    if swapped is not None:
-        cited = (FileCitation(file=file.path, line=swapped.line),)
-        message = f"{message}: on line {swapped.line}, pkg and type are swapped"
-        return failed(
-            message, hint=f'write pkg="{pkg}" type="{name}" on line {swapped.line}', citations=cited
-        )
-    unknown = (u for u in file.unknown_tags if near_names("node", [u[0]]) or u[0].lower() == "node")
-    for tag, line in unknown:
-        cited = (FileCitation(file=file.path, line=line),)
-        message = f"{message}: roslaunch skips the tag <{tag}> on line {line}"
-        hint = "the tag is <node …>, in lower case"
-        if tag == "node":
-            message = f"{message}, which stands inside of another <node>"
-            hint = f"end the <node> above line {line} before it begins: with `/>`, or with </node> above line {line}"
-        return failed(message, hint=hint, citations=cited)
+    for place, why, hint in _in_its_place(file, pkg, name):
+        cited = place if isinstance(place, FileCitation) else FileCitation(file=file.path, line=place)
+        return failed(f"{message}: {why}", hint=hint, citations=(cited,))
     return failed(message, hint=f"below <launch>, add {_node_tag(file, pkg, name)}")
+
+
+def _in_its_place(file: LaunchFile, pkg: str, name: str) -> Iterator[tuple[FileCitation | int, str, str]]:
+    """Yield the place of what may be meant to be the node, what is wrong with it, and how to fix that."""
+    stem = PurePosixPath(name).stem
+    for test in (t for t in file.tests if t.type == name):
+        fix = f"write {_node_tag(file, pkg, name)} in place of the <test>"
+        yield test.place, "only rostest starts a <test>", fix
+    for line in (line for kind, line in file.commented if kind in {name, stem}):
+        typed = "" if (name, line) in file.commented else f', and write type="{name}" in it'
+        why = f"the one on line {line} is in a comment, which roslaunch skips"
+        yield line, why, f"{out_of_comment(line)}{typed}"
+    for _, line, said in (one for one in file.switched_off if PurePosixPath(one[0]).stem == stem):
+        fix = "; then ".join(later_fixes(file, name))
+        yield line, f"{said} on line {line} leaves the one that is there out", fix
+    for line in (n.line for n in file.nodes if n.pkg in {name, stem} and n.type == pkg):
+        fix = f'write pkg="{pkg}" type="{name}" on line {line}'
+        yield line, f"on line {line}, pkg and type are swapped", fix
+    for tag, line in (u for u in file.unknown_tags if near_names("node", [u[0]]) or u[0].lower() == "node"):
+        why, fix = f"roslaunch skips the tag <{tag}> on line {line}", "the tag is <node …>, in lower case"
+        if tag == "node":
+            why += ", which stands inside of another <node>"
+            fix = f"end the <node> above line {line} before it begins: with `/>`, or with </node> above line {line}"
+        yield line, why, fix
 
 
 def _node_tag(file: LaunchFile, pkg: str, name: str) -> str:

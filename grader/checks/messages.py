@@ -555,8 +555,7 @@ def _other_value(
 
 
 def _was_right(found: Sequence[Reading], why: str, params: FieldEqualsParams) -> int:
-    """Return the number of an earlier message that had the right value in the place of a list that is wrong now; 0
-    where none had."""
+    """Return the number of an earlier message that was right where a list is wrong now; 0 where none was."""
     place = why.partition(": ")[0]
     if not place.startswith("["):
         return 0

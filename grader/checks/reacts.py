@@ -51,8 +51,7 @@ messages: what it publishes may be a little older than what it has just heard.""
 
 
 class Condition(Record):
-    """The messages that count: any on the topic, or those whose `field` is from `min` to `max`, or
-    `value`."""
+    """The messages that count: any on the topic, or those whose `field` is from `min` to `max`, or `value`."""
 
     topic: GlobalName
     """The topic, with its slash: `/chatter`."""

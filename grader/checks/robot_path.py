@@ -370,19 +370,16 @@ def what_is_wrong(path: Sequence[Pose], way: Way, course: Course, *, mirror: boo
 
 
 def _explain_mirrored(path: Sequence[Pose], way: Way) -> Words | None:
-    for sign_x, sign_y, message, hint in (
-        (
-            1,
-            -1,
-            "the path is mirrored: it turns right instead of left",
-            "a positive angular.z turns to the left",
-        ),
-        (-1, -1, "the path is driven backwards", "a positive linear.x drives forward"),
-        (-1, 1, "the path is driven backwards and mirrored", "a positive linear.x drives forward"),
+    mirrored = "mirrored: it turns right instead of left"
+    for x, y, how in (
+        (1, -1, mirrored),
+        (-1, -1, "driven backwards"),
+        (-1, 1, "driven backwards and mirrored"),
     ):
-        other = [p._replace(x=sign_x * p.x, y=sign_y * p.y) for p in path]
+        other = [p._replace(x=x * p.x, y=y * p.y) for p in path]
         if followed(other, way.points, way.tolerance_m).done:
-            return Words(message, hint)
+            right = "angular.z turns to the left" if how is mirrored else "linear.x drives forward"
+            return Words(f"the path is {how}", f"a positive {right}")
     return None
 
 

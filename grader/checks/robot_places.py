@@ -337,8 +337,7 @@ def _told(run: Run, asked: Stretch) -> list[Command]:
 def _never_moves(
     message: str, judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtParams
 ) -> Verdict:
-    """Return the loss of a robot that stays where it is: it turns there, is told to stop, is in front of something, or
-    is told nothing."""
+    """Return the loss of a robot that stays where it is: it turns, is told to stop, is blocked, or is told nothing."""
     if turned_rad(judged, STILL_S) > TURNING_RAD:
         verdict = unjudged(f"{message}, and turns on the spot", hint=_steer(run, params))
         return _with_side(verdict, judged, asked, run, params)

@@ -311,8 +311,7 @@ def _rename_hint(wanted: str, found: str, node: str) -> str:
 
 
 def handler_traceback(run: Run, service: str, call: Exchange) -> Traceback | None:
-    """Return the first traceback of the service's node since a call; of one that was given up, before the next one,
-    whose own it may be."""
+    """Return the first traceback of the service's node since a call; of one that was given up, before the next call."""
     offer = offers(run).get(service)
     one = life_of(run, offer.node) if offer else None
     if one is None:

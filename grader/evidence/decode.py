@@ -83,8 +83,7 @@ class Encoder:
         self._type, self._types = type, plan.types
 
     def encode(self, value: Mapping[str, Any]) -> bytes:
-        """Return the message's bytes; fields that `value` leaves out are zero. Raises ValueError where it does
-        not fit."""
+        """Return the message's bytes; fields left out are zero. Raises ValueError where the value does not fit."""
         try:
             return b"".join(self._fields(self._type, value))
         except (struct.error, OverflowError) as error:

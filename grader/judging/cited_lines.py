@@ -153,8 +153,7 @@ def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: R
 
 
 def _without_comment_signs(hint: str, found: Mapping[str, tuple[int, int]]) -> str:
-    """Return the hint, with the lines of these calls; of the template's catkin_package(…), which has examples in it, no
-    line is left."""
+    """Return the hint with the lines of these calls; the template's catkin_package(…) goes as a whole."""
     rest = dict(found)
     if CATKIN_PACKAGE_ADDED.search(hint) and len(set(rest.get("catkin_package", ()))) > 1:
         where = lines_text(*rest.pop("catkin_package"))
@@ -181,8 +180,7 @@ def _cite_install(verdict: Verdict, package: PackageFacts, build: Run, called: s
 
 
 def cite_find(verdict: Verdict, criterion: Criterion, package: PackageFacts | None, build: Run) -> Verdict:
-    """Return the verdict; one on a package that roslaunch does not find cites the lines of the launch file that name
-    it."""
+    """Return the verdict; one on a package that roslaunch does not find cites the launch file's lines that name it."""
     absent = verdict.sought_name("package")
     if package is None or not absent or not verdict.status.is_lost:
         return verdict

@@ -15,6 +15,7 @@ from grader.checks.build import run_hint
 from grader.checks.reacts import ReactsParams
 from grader.checks.registry import Check, Evidence
 from grader.checks.support.build_errors import unreadable_file
+from grader.checks.support.cpp_errors import CPP_SUFFIXES
 from grader.checks.support.exit_causes import syntax_hint
 from grader.checks.support.launch_slips import own_script, read_launch
 from grader.checks.support.processes import ended_programs, failed_program, plain_type
@@ -201,8 +202,7 @@ class Facts:
         return any(not file or file in {PurePosixPath(t).name for t in texts_in(asked)} for asked in asking)
 
     def _unparsed_scripts(self, criterion: Criterion) -> Verdict | None:
-        """Return why Python parses none of the scripts that the criterion names, or, where it names none, that its run
-        starts."""
+        """Return why Python parses none of the scripts that the criterion names, or else that its run starts."""
         known = self.rubric.scenarios.get(criterion.scenario or "")
         required = (one for one in self.rubric.criteria if one.id in criterion.requires)
         if known is None or any(one.scenario == criterion.scenario for one in required):
@@ -342,9 +342,6 @@ def scripts_of(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> s
     return {file.path for path in named if (file := find_script(package, path)) is not None}
 
 
-SOURCES = {".c", ".cc", ".cpp", ".cxx"}
-
-
 def names_started(criterion: Criterion, rubric: Rubric) -> set[str]:
     """Return the names of the programs that the criterion's scenario starts."""
     scenario = rubric.scenarios.get(criterion.scenario or "")
@@ -363,7 +360,7 @@ def sources_of(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> s
     ]
     words = {word.rpartition("/")[2] for one in made for word in one.call.args}
     paths = [PurePosixPath(file.path) for file in package.files]
-    return {str(path) for path in paths if path.suffix in SOURCES and path.name in words}
+    return {str(path) for path in paths if path.suffix in CPP_SUFFIXES and path.name in words}
 
 
 def language_of(verdict: Verdict, criterion: Criterion, facts: Facts) -> Language | None:
@@ -416,7 +413,7 @@ def _written_in(package: PackageFacts, path: str) -> Language:
     if file is not None and file.python:
         return "python"
     built = any(name.stem == one.target or one.is_called(name.name) for one in programs(package))
-    return "cpp" if built or name.suffix in SOURCES else "python"
+    return "cpp" if built or name.suffix in CPP_SUFFIXES else "python"
 
 
 RATE_SHARE = 0.05

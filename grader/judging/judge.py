@@ -263,8 +263,7 @@ def _seen_elsewhere(
 
 
 def _with_made_up(rubric: Rubric, criterion: Criterion, verdict: Verdict) -> Verdict:
-    """Return a verdict on what is wrong with where the values come from that the criterion asks for; what has another
-    cause needs no values."""
+    """Return a verdict on what is wrong, without another cause, with where the values come from that are asked for."""
     if verdict.status not in {Status.FAIL, Status.PARTIAL} or verdict.unjudged or verdict.cause:
         return verdict
     hint = tell_made_up(rubric, criterion, verdict.hint, verdict.measured)
@@ -336,8 +335,7 @@ def _without_git(verdict: Verdict, package: PackageFacts | None) -> Verdict:
 
 
 def _with_package_name(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdict:
-    """Return a verdict on another package than the main one with its name, and files as they lie from the main one's
-    folder."""
+    """Return a verdict on another package than the main one with its name, and its files seen from the main one."""
     main, package = facts.package, facts.package_of(criterion)
     if main is None or package is None or package is main:
         return verdict
@@ -484,8 +482,7 @@ class _Judging:
             self.results[name] = EarlyVerdict(criterion=result, final=final)
 
     def _facts(self, asked: set[str]) -> Facts:
-        """Return the facts; `asked` collects what was looked at that the build makes more precise, or that only a build
-        gives."""
+        """Return the facts; `asked` collects what was looked at that the build refines, or that only a build gives."""
         main, others = views_of(self._rubric, self._package)
         runs = {PACKAGE_RUN: cast("Run", _Watched(UNBUILT, asked))}
         return Facts(

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from grader.checks.messages import code_of
 from grader.checks.support.console_output import probes_on
+from grader.checks.support.cpp_errors import CPP_SUFFIXES
 from grader.checks.support.exit_causes import MAIN, syntax_hint
 from grader.checks.support.launch import NOT_STARTED, refusal, unset_arg_fixes
 from grader.checks.support.launch_connections import find_renaming
@@ -38,7 +39,7 @@ from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.installable import NOTHING_TO_DO, PYTHON_2
 from grader.judging.cited_lines import LINE_CHARS, LINES_READ, LOOPS, OF_DATA, PLACES, loop_spins, lost_fields
-from grader.judging.facts import SOURCES, Facts, is_other_rate, names_started, scripts_of, sources_of
+from grader.judging.facts import Facts, is_other_rate, names_started, scripts_of, sources_of
 from grader.judging.repeats_and_repairs import text_as_handed_in
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
@@ -209,7 +210,7 @@ class Later:
         return self._build.file_lines(path) if self._build is not None else ()
 
     def _texts_of_cpp(self) -> Iterator[PythonSlip]:
-        for path in sorted(path for path in self._paths if PurePosixPath(path).suffix in SOURCES):
+        for path in sorted(path for path in self._paths if PurePosixPath(path).suffix in CPP_SUFFIXES):
             lines = self._lines(path)[:LINES_READ]
             for kind, line, text in texts_of_cpp(text[:LINE_CHARS] for text in lines):
                 yield PythonSlip(file=path, line=line, kind=kind, message=text)
@@ -262,8 +263,8 @@ class Later:
         """Sources of C++ that are not there: CMake asks for them only once it has found all packages."""
         calls = cmake_calls(self._package, "add_executable", "add_library")
         words = (word for call in calls for word in call.args[1:])
-        named = dict.fromkeys(word for word in words if PurePosixPath(word).suffix in SOURCES)
-        there = [one.path for one in self._package.files if PurePosixPath(one.path).suffix in SOURCES]
+        named = dict.fromkeys(word for word in words if PurePosixPath(word).suffix in CPP_SUFFIXES)
+        there = [one.path for one in self._package.files if PurePosixPath(one.path).suffix in CPP_SUFFIXES]
         for path in (one for one in named if "$" not in one and self._package.file(one) is None):
             near = near_names(path, there)
             fix = (
@@ -554,7 +555,7 @@ class Later:
             if not could_say(text, sample):
                 yield Fix(f"publish `{code}`", (f"`{code}`",))
         elif not could_say(text, sample):
-            words = in_words(template) if said[0].file.endswith(tuple(SOURCES)) else code
+            words = in_words(template) if said[0].file.endswith(CPP_SUFFIXES) else code
             yield Fix(f"publish `{words}` on {_line(said[0])}, not '{in_source(text)}'")
         elif SECONDS in template and self._of("no-clock"):
             yield Fix(f"publish the time on {_line(said[0])}, `{code}`: the script only counts")

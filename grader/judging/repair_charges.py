@@ -98,8 +98,7 @@ def charge_repairs(
 
 
 def _may_ask_for(found: Verdict, repair: Repair) -> bool:
-    """Return whether a criterion can be lost by what was repaired: by what keeps a script from being started only where
-    that script is named."""
+    """Return whether what was repaired can lose a criterion; what keeps a script from starting, where it is named."""
     return repair.kind not in DONE_BEFORE_RUNS or PurePosixPath(repair.file).name in found.message
 
 

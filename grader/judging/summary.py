@@ -181,8 +181,7 @@ def criteria_text(results: Sequence[CriterionResult], *, ascii_only: bool = Fals
 def judged_text(
     rubric: Rubric, judged: Iterable[tuple[str, Sequence[CriterionResult] | str]], *, ascii_only: bool = False
 ) -> str:
-    """Return several submissions as JSON, each with its points and criteria, or with the error that kept it from
-    them."""
+    """Return several submissions as JSON, each with its points and criteria, or with the error in their place."""
     return json_text([_about(rubric, name, found) for name, found in judged], ascii_only=ascii_only)
 
 

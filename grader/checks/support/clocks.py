@@ -209,8 +209,7 @@ class Lateness(NamedTuple):
         return (self.busy or 0.0) >= FULL
 
     def reason(self, max_ms: float, p95_ms: float = math.inf) -> str:
-        """Return what was the matter with the machine, `busy` or `late itself, by up to 80 ms`; "" where it was late by
-        less than this."""
+        """Return what the machine was, `busy` or `late itself, by up to 80 ms`; "" where it was less late than this."""
         if self.full:
             return "busy"
         late = self.max_ms >= max_ms or self.p95_ms >= p95_ms

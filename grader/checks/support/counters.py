@@ -150,8 +150,7 @@ class Wrong(NamedTuple):
 
 
 def wrong_steps(count: Count, run: Run, *, maximum: int, rate_hz: float) -> Wrong:
-    """Return the wrong ones of `steps_to_judge`. Where the counter falls by more than one, it may have started again:
-    that is no such step."""
+    """Return the wrong ones of `steps_to_judge`; a fall by more than one may be a new start, and is none."""
     wrong = tuple(s for s in steps_to_judge(count, maximum) if s.change in {0, -1} or s.change > 1)
     skips = tuple(s for s in wrong if s.change > 1)
     usual = count.usual_step()

@@ -360,8 +360,7 @@ def commands_of(channel: Channel) -> list[tuple[int, Command]]:
 
 
 def other_axis(channel: Channel) -> str:
-    """Return the other axis (`angular.x`) around which velocities on a topic turn, where angular.z is always 0; ""
-    where they do not."""
+    """Return the axis other than z (`angular.x`) around which velocities on a topic turn; "" where there is none."""
     values = channel.values if "Twist" in channel.type else ()
     twists = [one.get("twist", one) for one in values if isinstance(one, Mapping)]
     turns = [one["angular"] for one in twists if isinstance(one.get("angular"), Mapping)]

@@ -123,8 +123,7 @@ class Absence(NamedTuple):
     """What the pattern's group names."""
 
     def verdict(self, message: str, *, judged: bool = False) -> Verdict:
-        """Return the verdict: nothing to judge in the launch file where the machine is at fault, or a script that is
-        not `judged` too."""
+        """Return the verdict: unjudged where the machine is at fault, or a script that is not `judged` too."""
         kind = machine_lacks if self.of_machine else unjudged if self.of_script and not judged else failed
         verdict = kind(message, hint=self.hint, citations=self.citations)
         verdict = verdict.model_copy(update={"unbuilt": self.unbuilt})

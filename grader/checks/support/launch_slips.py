@@ -146,8 +146,7 @@ def _absent(package: PackageFacts, launch: str, wanted: set[str]) -> Verdict:
 
 
 def starts_built(package: PackageFacts, file: LaunchFile, script: str) -> list[LaunchNode]:
-    """Return the nodes that start a program which CMake builds, and which is called as the script is without its
-    `.py`."""
+    """Return the nodes that start a program that CMake builds, called as the script is without its `.py`."""
     stem = PurePosixPath(script).stem
     is_built = stem != script and any(one.is_called(stem) for one in programs(package))
     off = {line for _, line, _ in file.switched_off}
@@ -235,8 +234,7 @@ def at_its_lines(slip: Slip, slips: Sequence[Slip]) -> Slip:
 
 
 def later_fixes(file: LaunchFile, script: str) -> Iterator[str]:
-    """Yield what lets the file start a script that is meant in it: an `if` or `unless` that leaves its node out, and
-    its whole name as `type`."""
+    """Yield what lets the file start a script: an `if` or `unless` that leaves its node out, and its name as `type`."""
     name = PurePosixPath(script).name
     stem = PurePosixPath(name).stem
     off = [one for one in file.switched_off if PurePosixPath(one[0]).stem == stem][:1]

@@ -161,8 +161,7 @@ def slips_of(package: PackageFacts, run: Run, callerid: str, *kinds: SlipKind) -
 
 
 def named_at(package: PackageFacts, run: Run, kind: SlipKind, name: str) -> tuple[FileCitation, ...]:
-    """Return the line of the run's scripts whose call names this node, topic or parameter; nothing where none does, or
-    several do."""
+    """Return the one line of the run's scripts whose call names this node, topic or parameter."""
     found = {slip.place for slip in slips_that_name(package, run, kind, name) if not slip.fix}
     return tuple(found) if len(found) == 1 else ()
 
@@ -186,8 +185,7 @@ def run_slips(package: PackageFacts, run: Run, *kinds: SlipKind) -> list[PythonS
 def copied_topic(
     package: PackageFacts, run: Run, kind: Literal["publisher", "subscriber"], topic: str = ""
 ) -> str:
-    """Return the lines of one running script that name the same topic, this one if any is given: one is copied and not
-    changed; "" for none."""
+    """Return the lines of one running script that name the same topic, as where one is copied; "" for none."""
     places: dict[tuple[str, str], list[int]] = {}
     for slip in run_slips(package, run, kind):
         name = slip.message.strip("/")
@@ -283,8 +281,7 @@ TypeName = Annotated[str, Field(pattern=r"^[A-Za-z]\w*/[A-Za-z]\w*$")]
 
 
 def nodes_of(run: Run, process: str) -> tuple[str, ...]:
-    """Return the nodes of one process; all of the student's where `process` is empty, or the graph names no
-    processes."""
+    """Return the nodes of one process; all of the student's where it is empty, or the graph names no processes."""
     return run.student_nodes(process) if process and are_noted(run) else run.student_nodes()
 
 

@@ -151,8 +151,7 @@ _PLACES = re.compile(
 
 
 def unfilled(text: str) -> str:
-    """Return what to write where a text came out with the places for its values, and not with the values; "" for any
-    other text."""
+    """Return what to write where a text came out with the places for its values; "" for any other text."""
     found = _PLACES.search(text)
     if found is None:
         return ""
@@ -266,8 +265,7 @@ _CPP_PRINTS = re.compile(
 
 
 def could_say(said: str, wanted: str) -> bool:
-    """Return whether the text of a source can come out as `wanted`, without regard to capitals and blanks. Gaps may be
-    filled with anything."""
+    """Return whether the text of a source, its gaps filled, can be `wanted`, whatever its capitals and blanks."""
     text = " ".join(wanted.split()).casefold()
     first, *inner = [" ".join(part.split(" ")).casefold() for part in _GAP.split(" ".join(said.split()))]
     if not inner:

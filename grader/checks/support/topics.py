@@ -55,8 +55,7 @@ from grader.wording import join_words, plural
 SYSTEM_TOPICS = frozenset({"/rosout", "/rosout_agg", "/clock"})
 End = Literal["publishers", "subscribers"]
 Sender = Literal["student", "program", "anyone"]
-"""Whose messages a check judges: the student's nodes', those of programs that the scenario starts beside them (a
-simulator), or both."""
+"""Whose messages a check judges: the student's nodes', those of the programs beside them, or both."""
 READ_TOO = {"logs": ("/rosout",), "hears": ("/rosout",), "transform": ("/tf", "/tf_static")}
 """Topics that a check reads, and that its parameters do not name."""
 TAKEN = {Status.FAIL, Status.PARTIAL}
@@ -179,8 +178,7 @@ def _judge_misnamed(
 
 
 def _namespaced_node(package: PackageFacts, run: Run, topic: str) -> LaunchNode | None:
-    """Return the launch file's node in whose namespace the topic is, where the run is a launch file's and the node's
-    names are remapped."""
+    """Return the launch file's remapped node in whose namespace the topic is, where the run is a launch file's."""
     if not lives(run) or any(run_scripts(run)):
         return None
     nodes = [n for f in package.launch_files for n in f.brings if n.remaps and topic.startswith(n.namespace)]
