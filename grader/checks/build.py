@@ -257,12 +257,10 @@ def _lost_scripts(package: PackageFacts, scripts: Sequence[str]) -> Verdict | No
     near = [there[n] for s in lost for n in near_names(PurePosixPath(s).name, there)]
     seen = f"; {there_is(dict.fromkeys(near))}" if near else ""
     push = ", then git add, commit and push" if handed_in_with_git(package) else ""
-    return unjudged(
-        f"catkin_make succeeded, but there is no {join_words(lost, 'or')} to run{seen}",
-        expected=EXPECTED,
-        measured=f"rosrun finds no {join_words((PurePosixPath(s).name for s in lost), 'or')}",
-        hint=f"add {join_words(lost)} to the package{push}",
-    )
+    message = f"catkin_make succeeded, but there is no {join_words(lost, 'or')} to run{seen}"
+    measured = f"rosrun finds no {join_words((PurePosixPath(s).name for s in lost), 'or')}"
+    hint = f"add {join_words(lost)} to the package{push}"
+    return unjudged(message, expected=EXPECTED, measured=measured, hint=hint)
 
 
 class Broken(NamedTuple):
@@ -311,13 +309,8 @@ def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
     calls = (made[b.program].call for b in broken if b.program in made)
     cited = tuple(call.place for call in calls)
     start = cite(run, "/grader/process", first.life.start_ns, first.life.end_ns)
-    return failed(
-        f"{verdict.message}, but {'; '.join(f'{b.program} does not run: {b.why}' for b in broken)}",
-        expected=expected,
-        measured=measured,
-        hint=first.hint,
-        citations=(*cited, start),
-    )
+    message = f"{verdict.message}, but {'; '.join(f'{b.program} does not run: {b.why}' for b in broken)}"
+    return failed(message, expected=expected, measured=measured, hint=first.hint, citations=(*cited, start))
 
 
 def _built_programs(package: PackageFacts) -> Iterator[Executable]:

@@ -103,11 +103,9 @@ def calls(package: PackageFacts, run: Run, params: CallsParams) -> Verdict:
             _never(package, run, params) if not made else _fault(package, run, params, *missing), run
         )
     )
-    return verdict.about(
-        expected=params.words,
-        measured=join_words(_text(r) for r in made) or verdict.measured or "no call",
-        citations=(cite(run, "/grader/actor", *_span(made)),),
-    )
+    measured = join_words(_text(r) for r in made) or verdict.measured or "no call"
+    cited = (cite(run, "/grader/actor", *_span(made)),)
+    return verdict.about(expected=params.words, measured=measured, citations=cited)
 
 
 def requests(run: Run, service: str) -> tuple[Request, ...]:

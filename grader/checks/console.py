@@ -89,9 +89,8 @@ class PrintsParams(Record):
     def _has_places(self) -> PrintsParams:
         places = self.text.count(PLACE)
         if self.numbers and len(self.numbers) != places:
-            raise ValueError(
-                f"numbers: {len(self.numbers)}, and {PLACE} {plural(places, 'time')} in the text"
-            )
+            message = f"numbers: {len(self.numbers)}, and {PLACE} {plural(places, 'time')} in the text"
+            raise ValueError(message)
         return self
 
     @property
@@ -140,11 +139,9 @@ def prints(package: PackageFacts, run: Run, params: PrintsParams) -> Verdict:
     else:
         verdict = _other_end(one, params) or passed(f"it prints {shown(right.text)!r}")
     span = (right.at_ns, right.at_ns) if right else (one.start_ns, one.end_ns)
-    return verdict.about(
-        expected=expected,
-        measured=verdict.measured or plural(len(lines), "line"),
-        citations=verdict.citations or (cite(run, "/grader/console", *span),),
-    )
+    measured = verdict.measured or plural(len(lines), "line")
+    cited = verdict.citations or (cite(run, "/grader/console", *span),)
+    return verdict.about(expected=expected, measured=measured, citations=cited)
 
 
 def _read(run: Run, process: str) -> tuple[list[Line], list[Line]]:
@@ -421,11 +418,10 @@ def logs(package: PackageFacts, run: Run, params: LogsParams) -> Verdict:
     seen = join_words(f"{shown(t)!r}" for t in dict.fromkeys(one.text for one in lines[:3]))
     more = ", …" if len(lines) > 3 else ""
     at_ns = right.at_ns if right else None
-    return verdict.about(
-        expected=f"{params.text!r} logged at level {level}",
-        measured=f"{plural(len(lines), 'log message')}{': ' if seen else ''}{seen}{more}",
-        citations=verdict.citations or (cite(run, "/rosout", at_ns, at_ns),),
-    )
+    expected = f"{params.text!r} logged at level {level}"
+    measured = f"{plural(len(lines), 'log message')}{': ' if seen else ''}{seen}{more}"
+    cited = verdict.citations or (cite(run, "/rosout", at_ns, at_ns),)
+    return verdict.about(expected=expected, measured=measured, citations=cited)
 
 
 def _has(text: str, params: LogsParams) -> bool:

@@ -151,9 +151,8 @@ def file_left(package: PackageFacts, run: Run, params: FileLeftParams) -> Verdic
         `rosbag info <file>` shows what a bag holds.
     """
     if run.metadata.get("sandbox", "").startswith("none"):
-        verdict = inconclusive(
-            "files are only kept from runs in a sandbox", hint="grade on a machine that has bubblewrap"
-        )
+        told = "files are only kept from runs in a sandbox"
+        verdict = inconclusive(told, hint="grade on a machine that has bubblewrap")
         return verdict.about(expected=params.words)
     files = [file for file in run.left_files if params.process in {"", file.process}]
     found = sorted((f for f in files if params.fits(f.path)), key=lambda f: (f.data is None, -f.size_bytes))

@@ -120,9 +120,8 @@ def _with_next(verdict: Verdict, package: PackageFacts, params: LaunchXmlParams)
     message = f"{verdict.message}; with that repaired, {'; '.join(f'line {s.line}: {s.why}' for s in slips)}"
     hint = "; then ".join((verdict.hint, *dict.fromkeys(f"on line {s.line} {s.fix}" for s in slips)))
     cited = tuple(s.place for s in slips)
-    return verdict.model_copy(
-        update={"message": message, "hint": hint, "citations": (*verdict.citations, *cited)}
-    )
+    update = {"message": message, "hint": hint, "citations": (*verdict.citations, *cited)}
+    return verdict.model_copy(update=update)
 
 
 def _lacking(package: PackageFacts, file: LaunchFile, params: LaunchXmlParams) -> Verdict | None:

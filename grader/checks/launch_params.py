@@ -91,11 +91,9 @@ def launch_loads(package: PackageFacts, build: Run, run: Run, params: LaunchLoad
     )
     found = without_system_params(params_on_server(run, by=lambda caller: caller not in run.student_nodes()))
     place = FileCitation(file=file.path, line=_line(file, params))
-    return verdict.about(
-        expected=expected,
-        measured=f"on the server: {join_words(found) or 'nothing'}",
-        citations=verdict.citations or (place, cite(run, "/grader/param")),
-    )
+    measured = f"on the server: {join_words(found) or 'nothing'}"
+    cited = verdict.citations or (place, cite(run, "/grader/param"))
+    return verdict.about(expected=expected, measured=measured, citations=cited)
 
 
 def _judge_loaded(

@@ -107,11 +107,8 @@ def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParam
     up = [name for name in params.nodes if f"/{name.lstrip('/')}" in nodes] if params.nodes else nodes[:2]
     share = len(up) / (len(params.nodes) or 2) / 2 + (0.5 if found else 0.0)
     verdict = verdict.in_part(share if up else 0.0, _came_up(up, connected=bool(found)))
-    return verdict.about(
-        expected=expected,
-        measured=_listed_nodes(run),
-        citations=verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/graph")),
-    )
+    cited = verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/graph"))
+    return verdict.about(expected=expected, measured=_listed_nodes(run), citations=cited)
 
 
 def _came_up(names: Sequence[str], *, connected: bool = False) -> str:

@@ -356,9 +356,8 @@ def _by_callback(
     verdict = _some_numbers(probes, missing, lines) or _only_again(probes, missing)
     verdict = verdict or _by_number(probes, missing, lines, None)
     form = f", as '{in_words(params.template)}'" if params.template != VALUE and "print" in slip.fix else ""
-    return verdict.explained(
-        f"in {slip.file}, {slip.message}", f"in {slip.file}, {slip.fix}{form}", (slip.place,)
-    )
+    hint = f"in {slip.file}, {slip.fix}{form}"
+    return verdict.explained(f"in {slip.file}, {slip.message}", hint, (slip.place,))
 
 
 def _by_number(

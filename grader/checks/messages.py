@@ -315,11 +315,9 @@ def field_bounds(package: PackageFacts, run: Run, params: FieldBoundsParams) -> 
     else:
         verdict = passed(f"{params.field} of {params.topic} is {params.words} in {_share(found, outside)}")
     share = f" in {params.share:.0%} of the messages" if params.share < 1 else ""
-    return verdict.about(
-        expected=f"{params.field} of {params.topic} {params.words}{share}",
-        measured=verdict.measured or _range(usable),
-        citations=(_span(run, outside or found, params),),
-    )
+    expected = f"{params.field} of {params.topic} {params.words}{share}"
+    cited = (_span(run, outside or found, params),)
+    return verdict.about(expected=expected, measured=verdict.measured or _range(usable), citations=cited)
 
 
 def _span(run: Run, readings: Sequence[Reading], params: FieldParams) -> EvidenceCitation:
@@ -448,11 +446,9 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
     else:
         count = f"all of {plural(len(found), 'message')}" if params.when == "every" else which
         verdict = passed(f"{params.field} of {params.topic} is {params.words} in {count}")
-    return verdict.about(
-        expected=f"{params.field} of {params.topic} {params.words} in {which}",
-        measured=verdict.measured or _values(asked),
-        citations=(_span(run, wrong or asked, params),),
-    )
+    expected = f"{params.field} of {params.topic} {params.words} in {which}"
+    cited = (_span(run, wrong or asked, params),)
+    return verdict.about(expected=expected, measured=verdict.measured or _values(asked), citations=cited)
 
 
 def _in_order(

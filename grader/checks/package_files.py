@@ -222,35 +222,30 @@ def _judge_manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
 
 def _of_ros_2(found: Manifest, params: ManifestParams) -> Verdict:
     made = " ".join((params.name, *params.dependencies))
-    return failed(
-        f"{found.file} is for a ROS 2 package (its build type is {found.build_type})",
-        measured=f"name {found.name}, build type {found.build_type}",
-        hint=f"make a package for ROS 1: `catkin_create_pkg {made}`",
-        citations=(FileCitation(file=found.file, line=found.name_line),),
-    )
+    message = f"{found.file} is for a ROS 2 package (its build type is {found.build_type})"
+    measured = f"name {found.name}, build type {found.build_type}"
+    hint = f"make a package for ROS 1: `catkin_create_pkg {made}`"
+    cited = (FileCitation(file=found.file, line=found.name_line),)
+    return failed(message, measured=measured, hint=hint, citations=cited)
 
 
 def _judge_misnamed(package: PackageFacts, found: Manifest, name: str) -> Verdict | None:
     if found.name == name:
         return None
     slip = " (a typo in the name)" if near_names(name, [found.name]) else ""
-    return failed(
-        f"{found.file} names the package {found.name!r} instead of {name!r}{slip}",
-        measured=f"name {found.name}",
-        hint=_rename(package, found, name),
-        citations=(FileCitation(file=found.file, line=found.name_line),),
-    )
+    message = f"{found.file} names the package {found.name!r} instead of {name!r}{slip}"
+    cited = (FileCitation(file=found.file, line=found.name_line),)
+    return failed(message, measured=f"name {found.name}", hint=_rename(package, found, name), citations=cited)
 
 
 def _unbuilt(found: Manifest) -> Verdict | None:
     if _builds_with_catkin(found):
         return None
-    return failed(
-        f"{found.file} does not name catkin as its build tool",
-        measured=f"build tool {found.build_type or 'none'}, no dependency on catkin",
-        hint=f"add <buildtool_depend>catkin</buildtool_depend> below line {_last_line(found)}",
-        citations=(FileCitation(file=found.file, line=_last_line(found)),),
-    )
+    message = f"{found.file} does not name catkin as its build tool"
+    measured = f"build tool {found.build_type or 'none'}, no dependency on catkin"
+    hint = f"add <buildtool_depend>catkin</buildtool_depend> below line {_last_line(found)}"
+    cited = (FileCitation(file=found.file, line=_last_line(found)),)
+    return failed(message, measured=measured, hint=hint, citations=cited)
 
 
 @check("dependencies", params=DependenciesParams, run_anyway=True)
@@ -376,12 +371,9 @@ def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
         hints.append(f"do the same on {on_lines(also)}")
     if absent := [n for n in missing if n not in slips]:
         hints.append(f"add {' '.join(f'<{tag}>{n}</{tag}>' for n in absent)} below line {last}")
-    verdict = failed(
-        f"{found.file} does not declare {join_words(missing)} as a run-time dependency{slip or only}",
-        measured=_declared_text(found),
-        hint="; ".join(hints),
-        citations=lines or (FileCitation(file=found.file, line=last),),
-    )
+    message = f"{found.file} does not declare {join_words(missing)} as a run-time dependency{slip or only}"
+    cited = lines or (FileCitation(file=found.file, line=last),)
+    verdict = failed(message, measured=_declared_text(found), hint="; ".join(hints), citations=cited)
     return verdict.seeking("dependency", missing[0]) if len(missing) == 1 else verdict
 
 
@@ -440,12 +432,8 @@ def _unreadable(package: PackageFacts, name: str) -> Verdict:
     if lacks_tag and package.name != name:
         other = f"; it names the package {package.name!r} instead of {name!r}"
         hint = f"{hint}; write <name>{name}</name>, and project({name}) in CMakeLists.txt"
-    return failed(
-        f"{fault.file}{line} cannot be read: {fault.explanation}{other}",
-        measured=fault.message,
-        hint=hint,
-        citations=(fault.place,),
-    )
+    message = f"{fault.file}{line} cannot be read: {fault.explanation}{other}"
+    return failed(message, measured=fault.message, hint=hint, citations=(fault.place,))
 
 
 def _builds_with_catkin(found: Manifest) -> bool:

@@ -344,11 +344,9 @@ def param_value(package: PackageFacts, build: Run, run: Run, params: ParamValueP
         else _given_before(package, build, params, got) or _judge_value(package, build, got, params)
     )
     cited = cite(run, "/grader/param")
-    return verdict.about(
-        expected=f"{params.name}: {shown(value_text(params.value))}",
-        measured=verdict.measured or ("not set" if got is MISSING else shown(value_text(got))),
-        citations=(cited,),
-    )
+    expected = f"{params.name}: {shown(value_text(params.value))}"
+    measured = verdict.measured or ("not set" if got is MISSING else shown(value_text(got)))
+    return verdict.about(expected=expected, measured=measured, citations=(cited,))
 
 
 def _given_before(package: PackageFacts, build: Run, params: ParamValueParams, got: object) -> Verdict | None:

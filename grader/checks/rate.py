@@ -285,11 +285,8 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     # There is a `sleep()` already, behind the loop or in a comment: the slip says what to do with it.
     if slips and slips[0].kind in {"sleep-outside", "commented-out"}:
         hint = slips[0].fix
-    return failed(
-        f"{params.topic} runs at about {about} Hz instead of {hz} Hz: the loop does not sleep{where}",
-        hint=hint,
-        citations=tuple(s.place for s in slips[:3]),
-    )
+    message = f"{params.topic} runs at about {about} Hz instead of {hz} Hz: the loop does not sleep{where}"
+    return failed(message, hint=hint, citations=tuple(s.place for s in slips[:3]))
 
 
 def _asked_flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> PythonSlip | None:

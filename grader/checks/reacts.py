@@ -323,11 +323,9 @@ def _judge_silence(package: PackageFacts, run: Run, params: ReactsParams) -> Ver
         or _silent_without_reason(package, run, causes, spans, params)
         or _kept_silent(own, params)
     )
-    return verdict.about(
-        expected=f"{params.effect.absence} {_silent_words(params)}",
-        measured=verdict.measured or "none",
-        citations=(cite(run, params.effect.topic if effects else "/grader/graph"),),
-    )
+    expected = f"{params.effect.absence} {_silent_words(params)}"
+    cited = (cite(run, params.effect.topic if effects else "/grader/graph"),)
+    return verdict.about(expected=expected, measured=verdict.measured or "none", citations=cited)
 
 
 def _kept_silent(own: Sequence[Channel], params: ReactsParams) -> Verdict:
@@ -455,10 +453,8 @@ def _other_answer(
         return None
     field = params.effect.field
     hint = f"in the callback of {params.trigger.topic}, look at what you publish on {params.effect.topic}: "
-    return (
-        f"{field} is {value_text(came.values[0])} then",
-        f"{hint}{field} has to be {value_text(params.effect.value)}",
-    )
+    fix = f"{hint}{field} has to be {value_text(params.effect.value)}"
+    return f"{field} is {value_text(came.values[0])} then", fix
 
 
 def _judge_unanswered(

@@ -133,11 +133,9 @@ def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
     else:
         verdict = unreadable(found, params.topic) or _judge_track(found, run, params)
         verdict = tell_end(verdict, package, run)
-    return verdict.about(
-        expected=f"a way through {join_words(map(spot, params.points))}, within {metres(params.tolerance_m)}",
-        measured=verdict.measured or "no path",
-        citations=(cite(run, params.topic),),
-    )
+    expected = f"a way through {join_words(map(spot, params.points))}, within {metres(params.tolerance_m)}"
+    measured = verdict.measured or "no path"
+    return verdict.about(expected=expected, measured=measured, citations=(cite(run, params.topic),))
 
 
 def tell_end(verdict: Verdict, package: PackageFacts, run: Run) -> Verdict:
@@ -146,9 +144,8 @@ def tell_end(verdict: Verdict, package: PackageFacts, run: Run) -> Verdict:
     for channel in run.student_channels() if verdict.status is Status.FAIL else ():
         if axis := other_axis(channel):
             why = f"velocities on {channel.topic} set {axis}, and their angular.z is always 0"
-            verdict = verdict.explained(
-                why, f"set angular.z in place of {axis}: a robot on wheels turns by that alone"
-            )
+            hint = f"set angular.z in place of {axis}: a robot on wheels turns by that alone"
+            verdict = verdict.explained(why, hint)
     if end is None or end.by_itself or end.cause in verdict.message:
         return verdict
     kind = unjudged if verdict.unjudged else failed
@@ -303,10 +300,9 @@ def _let_go(run: Run, params: PathParams) -> Words | None:
         held = driven(commands, None, commands[-1].time_s + STOPS_AFTER_S)
         if followed(relative(held), params.way.points, params.tolerance_m).done:
             again = f"{longest_s:.1f} s pass before the next message on {channel.topic}"
-            return Words(
-                f"the robot stops by itself: {again}, and a velocity holds for {significant(params.hold_s or 0)} s",
-                "publish the velocity again and again, ten times a second, for as long as it should drive or turn",
-            )
+            why = f"the robot stops by itself: {again}, and a velocity holds for {significant(params.hold_s or 0)} s"
+            hint = "publish the velocity again and again, ten times a second, for as long as it should drive or turn"
+            return Words(why, hint)
     return None
 
 
@@ -521,9 +517,8 @@ def _too_far(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
     if not beyond_m:
         return None
     message = f"it drives {metres(beyond_m)} past {way.name(corner)}, {_after(path, path[first])}"
-    return Words(
-        message, f"turn sooner: {significant(way.tolerance_m)} m are allowed; distance is speed times time"
-    )
+    hint = f"turn sooner: {significant(way.tolerance_m)} m are allowed; distance is speed times time"
+    return Words(message, hint)
 
 
 def _too_early(path: Sequence[Pose], way: Way, course: Course) -> Words | None:

@@ -186,11 +186,8 @@ def ends_at(package: PackageFacts, run: Run, params: EndsAtParams) -> Verdict:
         verdict = _answers_late(tell_end(verdict, package, run), run)
         verdict = _excused_end(verdict, judged, run, params) if judged else verdict
     assert verdict is not None  # noqa: S101 - one of them always is
-    return verdict.about(
-        expected=params.words,
-        measured=verdict.measured or "no position",
-        citations=(cite(run, params.topic),),
-    )
+    measured = verdict.measured or "no position"
+    return verdict.about(expected=params.words, measured=measured, citations=(cite(run, params.topic),))
 
 
 def path_to_judge(found: Track, asked: Stretch, params: EndsAtParams) -> list[Pose]:
@@ -481,11 +478,9 @@ def stays_within(package: PackageFacts, run: Run, params: StaysWithinParams) -> 
         verdict = _answers_late(verdict, run)
     assert verdict is not None  # noqa: S101 - one of them always is
     share = f" for {params.share:.0%} of the time" if params.share < 1 else ""
-    return verdict.about(
-        expected=f"{region.words}{share}",
-        measured=verdict.measured or "no position",
-        citations=(cite(run, params.topic),),
-    )
+    measured = verdict.measured or "no position"
+    cited = (cite(run, params.topic),)
+    return verdict.about(expected=f"{region.words}{share}", measured=measured, citations=cited)
 
 
 def placed(found: Track, params: StaysWithinParams) -> list[Pose]:
@@ -521,9 +516,8 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
             verdict = verdict.explained(f"it turns to the {wrong[0]} there, {wrong[1]}", wrong[2])
             verdict = verdict.lost_by("steers-wrong", wrong[0])
         elif isinstance(region, Band) and (seen := _seen_near(path, out, region, run)):
-            verdict = verdict.explained(
-                f"the smallest of its ranges is then {seen}", f"{verdict.hint}; {LOOK_AT}"
-            )
+            why = f"the smallest of its ranges is then {seen}"
+            verdict = verdict.explained(why, f"{verdict.hint}; {LOOK_AT}")
         elif isinstance(region, Band) and (around := circles(path, out)) > 1:
             verdict = verdict.explained(f"it drives in circles there, {around:.1f} times around", CIRCLES)
     elif long_m < params.least_m:

@@ -85,11 +85,8 @@ def service(package: PackageFacts, run: Run, params: ServiceParams) -> Verdict:
         else _judge_service(offer, package, run, params)
     )
     cited = cite(run, "/grader/graph")
-    return verdict.about(
-        expected=f"{params.service} of type {params.type}",
-        measured=verdict.measured or described(found),
-        citations=(cited,),
-    )
+    expected = f"{params.service} of type {params.type}"
+    return verdict.about(expected=expected, measured=verdict.measured or described(found), citations=(cited,))
 
 
 @check("service-answers", params=ServiceAnswersParams, of_callbacks=True)
@@ -129,11 +126,9 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
         or passed(f"{params.service} answers {plural(len(pairs), 'call')} as it should")
     )
     call = wrong[0] if wrong else next(reversed(made), None)
-    return verdict.about(
-        expected=join_words(f"call {n}: {fields_text(w)}" for n, w in enumerate(params.expect, 1)),
-        measured=verdict.measured or _measured_text(call),
-        citations=(_citation(call, run),),
-    )
+    expected = join_words(f"call {n}: {fields_text(w)}" for n, w in enumerate(params.expect, 1))
+    measured = verdict.measured or _measured_text(call)
+    return verdict.about(expected=expected, measured=measured, citations=(_citation(call, run),))
 
 
 def _judge_service(offer: Offer, package: PackageFacts, run: Run, params: ServiceParams) -> Verdict:

@@ -167,11 +167,9 @@ def only_topics(package: PackageFacts, run: Run, params: OnlyTopicsParams) -> Ve
     else:
         missing = None if published else no_node(package, run, "no topic was published")
         verdict = missing or passed("no topic besides those of the lab is published")
-    return verdict.about(
-        expected=f"no topic besides {join_words(params.topics)}" if params.topics else "no topic at all",
-        measured=verdict.measured or join_words(published) or "no topic",
-        citations=(cite(run, "/grader/graph"),),
-    )
+    expected = f"no topic besides {join_words(params.topics)}" if params.topics else "no topic at all"
+    measured = verdict.measured or join_words(published) or "no topic"
+    return verdict.about(expected=expected, measured=measured, citations=(cite(run, "/grader/graph"),))
 
 
 def _judge_unexpected(
@@ -229,11 +227,8 @@ def latched(package: PackageFacts, run: Run, params: LatchedParams) -> Verdict:
         verdict = passed(f"{join_words(c.callerid for c in channels)} latches {params.topic}")
     kinds = join_words(f"{'latched' if c.latching else 'not latched'} by {c.callerid}" for c in channels)
     topic = params.topic if channels else "/grader/graph"
-    return verdict.about(
-        expected=f"a latched publisher on {params.topic}",
-        measured=verdict.measured or kinds,
-        citations=(cite(run, topic),),
-    )
+    expected = f"a latched publisher on {params.topic}"
+    return verdict.about(expected=expected, measured=verdict.measured or kinds, citations=(cite(run, topic),))
 
 
 ENDS: tuple[End, End] = ("publishers", "subscribers")
@@ -281,11 +276,9 @@ def connected(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdi
     else:
         verdict = _apart(package, run, params)
     over = {c.topic: None for _, e in run.graph for c in e.connections if run.is_student_node(c.publisher)}
-    return verdict.about(
-        expected=f"{ends[0]} connected to {ends[1]} over {params.topic}",
-        measured=verdict.measured or (f"connections over {join_words(over)}" if over else "no connection"),
-        citations=(cite(run, "/grader/graph"),),
-    )
+    expected = f"{ends[0]} connected to {ends[1]} over {params.topic}"
+    measured = verdict.measured or (f"connections over {join_words(over)}" if over else "no connection")
+    return verdict.about(expected=expected, measured=measured, citations=(cite(run, "/grader/graph"),))
 
 
 def _fits(run: Run, node: str, wanted: str) -> bool:

@@ -124,11 +124,9 @@ def transform(package: PackageFacts, run: Run, params: TransformParams) -> Verdi
         or passed(f"{params.name} is right in {plural(len(seen), 'message')}")
     )
     topics = dict.fromkeys(one.topic for one in own) or (TOPICS[1] if params.static else TOPICS[0],)
-    return verdict.about(
-        expected=_expected_text(params),
-        measured=verdict.measured or _measured_text(seen, own),
-        citations=tuple(cite(run, topic) for topic in topics),
-    )
+    measured = verdict.measured or _measured_text(seen, own)
+    cited = tuple(cite(run, topic) for topic in topics)
+    return verdict.about(expected=_expected_text(params), measured=measured, citations=cited)
 
 
 def _seen_transforms(run: Run, own: Sequence[Sent], params: TransformParams) -> list[Seen]:

@@ -149,13 +149,10 @@ def _taken_over(package: PackageFacts, run: Run, trio: Trio, params: CopiesParam
         down = "the first takes it back, and both are shut down"
     message = f"both copies are called {name}, and ROS allows each name once: {down}"
     base = name.strip("/")
-    return partial(
-        params.taken_over_score,
-        message,
-        hint=f"write {init(base, anonymous=True)}, so that each copy has its own name",
-        measured=f"one name for two copies: {name}",
-        citations=(*named_at(package, run, "node-name", base), cite(run, "/grader/graph")),
-    )
+    hint = f"write {init(base, anonymous=True)}, so that each copy has its own name"
+    measured = f"one name for two copies: {name}"
+    lines, graph = named_at(package, run, "node-name", base), cite(run, "/grader/graph")
+    return partial(params.taken_over_score, message, hint=hint, measured=measured, citations=(*lines, graph))
 
 
 def _not_both_alive(package: PackageFacts, run: Run, trio: Trio) -> Verdict | None:
@@ -238,10 +235,8 @@ def _judge_both(
     heard = f"{counts[0]} of {plural(first.total(), 'message')} and {counts[1]} of {second.total()}"
     if first.total() + second.total() > LOOKED_AT:
         heard = f"at least {heard}"
-    return passed(
-        f"{names} run at the same time, and {params.listener} prints messages of both",
-        measured=f"{names}; printed: {heard}",
-    )
+    message = f"{names} run at the same time, and {params.listener} prints messages of both"
+    return passed(message, measured=f"{names}; printed: {heard}")
 
 
 def _unheard(

@@ -259,9 +259,8 @@ def _items(field: Field, value: object) -> list[Any]:
 def _repeat(field: Field, value: Mapping[str, Any]) -> list[Any]:
     """Return the items of `{repeat: .inf, count: 360, except: {"150-210": 0.3}}`; both ends of a span belong to it."""
     if "repeat" not in value or not set(value) <= {"repeat", "count", "except"}:
-        raise ValueError(
-            f'{field.name} is an array: write a list, or {{repeat: 0, count: 3, except: {{"1": 5}}}}'
-        )
+        message = f'{field.name} is an array: write a list, or {{repeat: 0, count: 3, except: {{"1": 5}}}}'
+        raise ValueError(message)
     count = value.get("count", field.size)
     if not isinstance(count, int) or isinstance(count, bool) or not 0 <= count <= ITEMS_MAX:
         raise ValueError(f"count must be a whole number of 0 to {ITEMS_MAX}, not {count!r}")

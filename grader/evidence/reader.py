@@ -116,10 +116,8 @@ def load_evidence(paths: Sequence[Path]) -> dict[str, Run]:
         if run.foreign and not any(channel.messages for channel in run.channels):
             raise EvidenceError(f"{path}: holds no messages", hint="record while the nodes run")
         if run.scenario in runs:
-            raise EvidenceError(
-                f"{origin[run.scenario]} and {path} both hold the scenario {run.scenario!r}",
-                hint="give the evidence of one submission at a time",
-            )
+            message = f"{origin[run.scenario]} and {path} both hold the scenario {run.scenario!r}"
+            raise EvidenceError(message, hint="give the evidence of one submission at a time")
         runs[run.scenario], origin[run.scenario] = run, path
     return runs
 
@@ -127,9 +125,8 @@ def load_evidence(paths: Sequence[Path]) -> dict[str, Run]:
 def package_facts(run: Run) -> PackageFacts:
     """Return the package facts that the run carries (`package.mcap` does). Raises EvidenceError without any."""
     if run.package_json is None:
-        raise EvidenceError(
-            f"{run.evidence}: holds no package facts", hint="give package.mcap of the same recording"
-        )
+        message = f"{run.evidence}: holds no package facts"
+        raise EvidenceError(message, hint="give package.mcap of the same recording")
     try:
         return PackageFacts.read_json(run.package_json)
     except ValidationError as error:
@@ -147,9 +144,8 @@ def _load(name: str, stream: BinaryIO, budget: MemoryBudget, *, shown: str = "")
     try:
         return _RunBuilder(name, budget, shown).read(stream)
     except ValidationError as error:
-        raise EvidenceError(
-            f"{shown}: a record of the grader's own cannot be read: {_first(error)}"
-        ) from error
+        message = f"{shown}: a record of the grader's own cannot be read: {_first(error)}"
+        raise EvidenceError(message) from error
     except BudgetExceeded as error:
         raise EvidenceError(f"{shown}: {error}", hint=LESS) from error
     except ContainerError as error:
@@ -192,9 +188,8 @@ def _files(paths: Iterable[Path]) -> list[Path]:
     for path in paths:
         inside = _recordings(path) if path.is_dir() else [path]
         if not inside:
-            raise EvidenceError(
-                f"{path}: no evidence (*.mcap, *.bag, *.db3) in this folder or in evidence/ below it"
-            )
+            message = f"{path}: no evidence (*.mcap, *.bag, *.db3) in this folder or in evidence/ below it"
+            raise EvidenceError(message)
         for file in inside:
             found.setdefault(_identity(file), file)
     if not found:
@@ -320,10 +315,8 @@ class _RunBuilder:
         if newer := EVIDENCE.newer(f"{EVIDENCE.name}/{version}"):
             raise EvidenceError(f"{self._shown}: {newer}", hint=UPDATE)
         if version not in READ:
-            raise EvidenceError(
-                f"{self._shown}: evidence of format {version!r}, which no grader wrote",
-                hint="record it again, or copy it again",
-            )
+            message = f"{self._shown}: evidence of format {version!r}, which no grader wrote"
+            raise EvidenceError(message, hint="record it again, or copy it again")
         try:
             scenario, clock = self._metadata["scenario"], self._metadata["clock"]
             return {"scenario": scenario, "clock": clock, "warp": float(self._metadata["warp"])}
@@ -339,9 +332,8 @@ class _RunBuilder:
         for channel in self._channels.values():
             schema, wanted = self._schemas.get(channel.schema_id), SCHEMAS.get(channel.message_encoding)
             if wanted and (schema is None or schema.encoding != wanted):
-                raise EvidenceError(
-                    f"{self._shown}: {_one_line(channel.topic)} has no message definition ({wanted})"
-                )
+                message = f"{self._shown}: {_one_line(channel.topic)} has no message definition ({wanted})"
+                raise EvidenceError(message)
 
     def _ros_channels(self) -> tuple[Channel, ...]:
         foreign = self._metadata is None

@@ -96,12 +96,9 @@ class Facts:
     def _not_here(self, name: str) -> Verdict:
         known = (self.package, *self.others.values())
         found = join_words(one.name for one in known if one is not None)
-        return unjudged(
-            f"package {name} is missing; packages found: {found}",
-            expected=f"a package {name}",
-            measured=f"no package {name}",
-            hint=f"hand in {name} too, beside {self.rubric.package}: its folder, with the package.xml that names it",
-        )
+        message = f"package {name} is missing; packages found: {found}"
+        hint = f"hand in {name} too, beside {self.rubric.package}: its folder, with the package.xml that names it"
+        return unjudged(message, expected=f"a package {name}", measured=f"no package {name}", hint=hint)
 
     def _no_package(self) -> Verdict:
         if not any(run.foreign for run in self.runs.values()):
@@ -329,9 +326,8 @@ def unread_recording(run: Run) -> Verdict | None:
         hint = "record with `rosbag record`, end it with Ctrl-C, and hand the file in"
         return unjudged(message, measured="no recording", hint=hint)
     if RECORDING_PROBLEM in run.metadata:
-        return inconclusive(
-            run.metadata[RECORDING_PROBLEM], hint="hand in one recording that `rosbag info` can read"
-        )
+        fix = "hand in one recording that `rosbag info` can read"
+        return inconclusive(run.metadata[RECORDING_PROBLEM], hint=fix)
     return None
 
 

@@ -298,9 +298,8 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
     check = checks.get(criterion.check)
     if check is None:
         message = f"this grader has no check {criterion.check!r}"
-        return Verdict(
-            status=Status.ERROR, score=0.0, message=message, hint="`grader rubric validate` finds this"
-        )
+        hint = "`grader rubric validate` finds this"
+        return Verdict(status=Status.ERROR, score=0.0, message=message, hint=hint)
     try:
         asked = facts.of(check, criterion, check.params.model_validate(criterion.parameters))
         found = (

@@ -399,9 +399,8 @@ def _judge_death(count: Count, run: Run, package: PackageFacts, params: WrapPara
         first = next((one for one in limits if one.fix), None)
         if first is not None:
             why = f"{message}; line {first.line} computes the `%` before the `+`, so the counter never wraps"
-            return failed(
-                why, hint=f"on line {first.line}, {first.fix}", citations=(first.place, *end.citations)
-            )
+            fix = f"on line {first.line}, {first.fix}"
+            return failed(why, hint=fix, citations=(first.place, *end.citations))
         if high is not None and last == params.maximum:
             hint = _limit_hint(high, params)
             return failed(f"{message}; line {high.line} compares the counter with {high.message}", hint=hint)
@@ -441,9 +440,8 @@ def _too_few(count: Count, good: list[Step], run: Run, params: WrapParams) -> Ve
     wrong = any(s.change in {0, -1} or s.change > 1 for s in count.steps)
     outcome = run.outcome.outcome if run.outcome else None
     if good and outcome == "complete" and all(s.change in {0, 1} or s in good for s in count.steps):
-        return passed(
-            f"after {significant(good[0].before)} comes {params.minimum}; values repeat, so only {seen}"
-        )
+        told = f"after {significant(good[0].before)} comes {params.minimum}; values repeat, so only {seen}"
+        return passed(told)
     if count.is_flood(run, params.rate_hz) or wrong:
         message = f"{params.wraps} resets were not seen: {seen}, which do not count up one by one"
         return unjudged(message, hint="first make the counter go up by one at its rate")

@@ -90,23 +90,18 @@ def _explain_subscription(found: re.Match[str], _package: PackageFacts, _lines: 
     why = "subscribe(…) does not take this callback"
     if "lambda" in given or "bind" in given.lower():
         kind = "a lambda" if "lambda" in given else "what bind(…) makes"
-        return Explained(
-            f"{why}: {kind} does not tell it the message's type",
-            "write the type behind subscribe: nh.subscribe<std_msgs::String>(…), with your own type",
-        )
+        hint = "write the type behind subscribe: nh.subscribe<std_msgs::String>(…), with your own type"
+        return Explained(f"{why}: {kind} does not tell it the message's type", hint)
     if method := re.search(r"\((\w+)::\*\)", given):
-        return Explained(
-            f"{why}: a method of {method[1]} needs its object",
-            f"give the object behind the method: `this` in a method of {method[1]}, elsewhere the address of one",
-        )
+        fix = f"give the object behind the method: `this` in a method of {method[1]}, elsewhere the address of one"
+        return Explained(f"{why}: a method of {method[1]} needs its object", fix)
     return Explained(found.string, FIRST_ERROR_HINT)
 
 
 def _no_address(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     method = re.sub(r"\(.*", "", found[1]).split()[-1]
-    return Explained(
-        found.string, f"write &{method} where you give it to another function, without brackets behind it"
-    )
+    hint = f"write &{method} where you give it to another function, without brackets behind it"
+    return Explained(found.string, hint)
 
 
 def _no_type(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
