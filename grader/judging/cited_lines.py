@@ -24,7 +24,7 @@ from grader.checks.support.scripts import (
     lines_that_transform,
 )
 from grader.evidence.run import Run
-from grader.judging.facts import Facts, names_started, scripts_of, sources_of
+from grader.judging.facts import Facts, names_started, scripts_of, sources_of, starts_of
 from grader.model.package import CMAKE, PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.repair import Repair
@@ -49,25 +49,31 @@ def cite_source(
     """Return the verdict; one on what a node says, sends or asks with the line of the script that does so, if it is
     plain which one that is. `repairs` are those of the copy that was judged."""
     package = facts.package_of(criterion)
-    placed = any(isinstance(one, FileCitation) for one in verdict.citations)
     lost = verdict.status in {Status.PARTIAL, Status.FAIL} and not verdict.unjudged
-    if placed or not lost or package is None or package is not facts.package:
+    if _is_placed(verdict) or not lost or package is None or package is not facts.package:
         return verdict
     paths = scripts_of(criterion, facts.rubric, package) | sources_of(criterion, facts.rubric, package)
     started = names_started(criterion, facts.rubric)
     renamed = (one for one in repairs if one.kind == "file-name")
     paths |= {one.before for one in renamed if PurePosixPath(one.after).name in started}
-    lines = [
-        SourceLine(path, number, text)
-        for path in sorted(paths)
-        for number, text in enumerate(build.file_lines(path)[:LINES_READ], 1)
-        if len(text) <= LINE_CHARS and not text.lstrip().startswith(("#", "//"))
-    ]
+    lines = [one for one in _read(build, paths) if not one.text.lstrip().startswith(("#", "//"))]
     found = _lines_to_blame(verdict, criterion, lines)
     if len(found) != 1:
         return verdict
     place = FileCitation(file=found[0].file, line=found[0].number)
     return verdict.model_copy(update={"citations": (place, *verdict.citations)})
+
+
+def _is_placed(verdict: Verdict) -> bool:
+    """Return whether a line of a file is cited already."""
+    return any(isinstance(one, FileCitation) for one in verdict.citations)
+
+
+def _read(build: Run, paths: Iterable[str]) -> Iterator[SourceLine]:
+    for path in sorted(paths):
+        for number, text in enumerate(build.file_lines(path)[:LINES_READ], 1):
+            if len(text) <= LINE_CHARS:
+                yield SourceLine(path, number, text)
 
 
 def _lines_to_blame(verdict: Verdict, criterion: Criterion, lines: list[SourceLine]) -> list[SourceLine]:
@@ -105,19 +111,13 @@ def _published_of(found: list[SourceLine], lines: list[SourceLine], criterion: C
 def cite_quoted(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run) -> Verdict:
     """Return the verdict; one on a name that a script has in quotes in place of another one cites its lines."""
     package, names = facts.package_of(criterion), verdict.sought_names("quoted")
-    placed = any(isinstance(one, FileCitation) for one in verdict.citations)
-    if package is None or package is not facts.package or not names or placed or not verdict.status.is_lost:
+    lost = verdict.status.is_lost and not _is_placed(verdict)
+    if package is None or package is not facts.package or not names or not lost:
         return verdict
     quoted = re.compile(rf"""(["'])(?:{"|".join(map(re.escape, names))})\1""")
-    paths = sorted(
-        scripts_of(criterion, facts.rubric, package) | sources_of(criterion, facts.rubric, package)
-    )
-    places = [
-        FileCitation(file=path, line=number)
-        for path in paths
-        for number, text in enumerate(build.file_lines(path)[:LINES_READ], 1)
-        if len(text) <= LINE_CHARS and quoted.search(text)
-    ]
+    paths = scripts_of(criterion, facts.rubric, package) | sources_of(criterion, facts.rubric, package)
+    lines = [one for one in _read(build, paths) if quoted.search(one.text)]
+    places = [FileCitation(file=one.file, line=one.number) for one in lines]
     if not 0 < len(places) <= QUOTED_MAX:
         return verdict
     where = join_words(f"line {one.line} of {one.file}" for one in places)
@@ -201,21 +201,19 @@ def cite_find(verdict: Verdict, criterion: Criterion, package: PackageFacts | No
 
 def cite_unused_argument(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run) -> Verdict:
     """Return the verdict; one of a run that gives a launch file an argument cites the `<arg>` that nothing uses."""
-    package, scenario = facts.package_of(criterion), facts.rubric.scenarios.get(criterion.scenario or "")
-    placed = any(isinstance(one, FileCitation) for one in verdict.citations)
-    if not verdict.status.is_lost or verdict.unjudged or placed or package is None or scenario is None:
+    package = facts.package_of(criterion)
+    if not verdict.status.is_lost or verdict.unjudged or _is_placed(verdict) or package is None:
         return verdict
-    for start in scenario.start:
+    for start in starts_of(criterion, facts.rubric):
         file = find_launch(package, start.launch or "")
-        for name in (arg.partition(":=")[0] for arg in start.args if file is not None):
-            line = (
-                _unused_argument(name, build.file_lines(file.path)[:LINES_READ]) if file is not None else None
-            )
-            if file is not None and line is not None:
+        if file is None:
+            continue
+        for name in (arg.partition(":=")[0] for arg in start.args):
+            line = _unused_argument(name, build.file_lines(file.path)[:LINES_READ])
+            if line is not None:
                 message = f"{verdict.message}; nothing in {file.path} uses its argument {name}"
-                hint = "; ".join(
-                    filter(None, (f"write `$(arg {name})` where its value belongs", verdict.hint))
-                )
+                fix = f"write `$(arg {name})` where its value belongs"
+                hint = f"{fix}; {verdict.hint}" if verdict.hint else fix
                 cited = (FileCitation(file=file.path, line=line), *verdict.citations)
                 return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
     return verdict
@@ -259,7 +257,7 @@ def cite_name(verdict: Verdict, build: Run) -> Verdict:
 
 def show_lines(verdict: Verdict, build: Run) -> Verdict:
     """Return a verdict whose cited lines have their text; one that loses nothing, or cites none, stays as it is."""
-    if not verdict.status.is_lost or not any(isinstance(c, FileCitation) for c in verdict.citations):
+    if not verdict.status.is_lost or not _is_placed(verdict):
         return verdict
     cited = tuple(_with_text(citation, build) for citation in verdict.citations)
     return verdict.model_copy(update={"citations": cited})

@@ -331,26 +331,27 @@ def unread_recording(run: Run) -> Verdict | None:
     return None
 
 
+def starts_of(criterion: Criterion, rubric: Rubric) -> tuple[Start, ...]:
+    """Return what the criterion's scenario starts."""
+    scenario = rubric.scenarios.get(criterion.scenario or "")
+    return scenario.start if scenario is not None else ()
+
+
 def scripts_of(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> set[str]:
     """Return the paths of the scripts that the criterion's scenario starts."""
-    scenario = rubric.scenarios.get(criterion.scenario or "")
-    named = [start.script for start in scenario.start if start.script] if scenario is not None else []
+    named = [start.script for start in starts_of(criterion, rubric) if start.script]
     return {file.path for path in named if (file := find_script(package, path)) is not None}
 
 
 def names_started(criterion: Criterion, rubric: Rubric) -> set[str]:
     """Return the names of the programs that the criterion's scenario starts."""
-    scenario = rubric.scenarios.get(criterion.scenario or "")
-    started = scenario.start if scenario is not None else ()
-    return {PurePosixPath(one.script).name for one in started if one.script}
+    return {PurePosixPath(one.script).name for one in starts_of(criterion, rubric) if one.script}
 
 
 def sources_of(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> set[str]:
     """Return the paths of the C++ sources of the programs that the criterion's scenario starts."""
-    scenario = rubric.scenarios.get(criterion.scenario or "")
-    started = scenario.start if scenario is not None else ()
     names = names_started(criterion, rubric)
-    every = any(one.built for one in started)
+    every = any(one.built for one in starts_of(criterion, rubric))
     made = [
         one for one in programs(package) if every or one.target in names or any(map(one.is_called, names))
     ]

@@ -15,6 +15,7 @@ from typing import Literal
 
 from grader import __version__
 from grader.evidence.run import Run
+from grader.judging.facts import starts_of
 from grader.model.package import PackageFacts
 from grader.model.result import (
     CriterionResult,
@@ -284,8 +285,7 @@ def _is_named(path: str, names: Collection[str]) -> bool:
 
 def _programs(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> Iterator[str]:
     """Yield the names of the student's programs in the criterion's run: of its process, where it judges one."""
-    scenario = rubric.scenarios.get(criterion.scenario or "")
-    starts = scenario.start if scenario is not None else ()
+    starts = starts_of(criterion, rubric)
     process = criterion.parameters.get("process")
     for start in [one for one in starts if one.name == process] or starts:
         if start.script is not None:
