@@ -172,6 +172,12 @@ def numbers_text(numbers: Iterable[int]) -> str:
 PAIR = 2
 
 
+def on_lines(numbers: Iterable[int]) -> str:
+    """Return `line 3`, or `lines 3, 5 to 8 and 10`, of numbers in their order."""
+    known = list(numbers)
+    return f"line{'s' * (len(known) > 1)} {numbers_text(known)}"
+
+
 def lines_text(first: int, last: int) -> str:
     """Return `line 3`, or `lines 3 to 5`, of lines from 0."""
     return f"line {first + 1}" if last == first else f"lines {first + 1} to {last + 1}"

@@ -57,8 +57,7 @@ class ActionResultParams(Record):
 
     @property
     def after_cancel_s(self) -> float | None:
-        """How long after a goal is cancelled its result still matters, to tell a late one from none; None: as long as
-        the step waits."""
+        """How long after a cancel the result still matters, to tell a late one from none; None: as the step waits."""
         if self.of_feedback_alone:
             return 0.0
         return None if self.within_s is None else max(2 * self.within_s, self.within_s + CANCELLED_MORE_S)
@@ -182,9 +181,8 @@ def _no_result(package: PackageFacts, run: Run, goal: Goal, params: ActionResult
     kind = published_topics(run).get(f"{params.action}/result", "").removesuffix("ActionResult")
     asked = plain_type(goal.end.type or "") if goal.end else ""
     if kind and asked and kind != asked:
-        return unjudged(
-            f"{params.action} is of type {kind}, not {asked}", hint=f"make it a server of {asked}Action"
-        )
+        told = f"{params.action} is of type {kind}, not {asked}"
+        return unjudged(told, hint=f"make it a server of {asked}Action")
     if end := explain_early_end(package, run):
         return end.verdict(failed, f"{said}: the node ended before ({end.cause})")
     if end := explain_error(package, run):
@@ -213,10 +211,8 @@ def _other_end(package: PackageFacts, run: Run, goal: Goal, params: ActionResult
     if status == "ABORTED" and (end := explain_error(package, run)):
         return end.verdict(failed, f"{message}: {end.cause}")
     if params.status == "PREEMPTED" and goal.cancelled_ns is None:
-        verdict = failed(
-            f"{message}: it was over before it could be cancelled",
-            hint="let it take as long as the handout says",
-        )
+        told = f"{message}: it was over before it could be cancelled"
+        verdict = failed(told, hint="let it take as long as the handout says")
         return _excused(verdict.if_repeated(), run, goal)
     unset = any("did not set the goal to a terminal status" in line.line for _, line in run.console)
     if status == "ABORTED" and unset:
@@ -274,7 +270,6 @@ def _feedback(run: Run, goal: Goal, params: ActionResultParams) -> int:
 
 
 def _not_sent(package: PackageFacts, run: Run, goals: Sequence[Goal], params: ActionResultParams) -> Verdict:
-    """Return why a goal was not sent."""
     notes = [e.detail for _, e in run.actors if e.action == "note" and e.topic == params.action]
     if notes and any(one.path.endswith(".action") for one in package.interfaces):
         why = shown(notes[0].partition(": ")[2] or notes[0])

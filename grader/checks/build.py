@@ -257,12 +257,10 @@ def _lost_scripts(package: PackageFacts, scripts: Sequence[str]) -> Verdict | No
     near = [there[n] for s in lost for n in near_names(PurePosixPath(s).name, there)]
     seen = f"; {there_is(dict.fromkeys(near))}" if near else ""
     push = ", then git add, commit and push" if handed_in_with_git(package) else ""
-    return unjudged(
-        f"catkin_make succeeded, but there is no {join_words(lost, 'or')} to run{seen}",
-        expected=EXPECTED,
-        measured=f"rosrun finds no {join_words((PurePosixPath(s).name for s in lost), 'or')}",
-        hint=f"add {join_words(lost)} to the package{push}",
-    )
+    message = f"catkin_make succeeded, but there is no {join_words(lost, 'or')} to run{seen}"
+    measured = f"rosrun finds no {join_words((PurePosixPath(s).name for s in lost), 'or')}"
+    hint = f"add {join_words(lost)} to the package{push}"
+    return unjudged(message, expected=EXPECTED, measured=measured, hint=hint)
 
 
 class Broken(NamedTuple):
@@ -306,31 +304,23 @@ def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
     broken = list(_broken_programs(package, run, started))
     measured = f"{verdict.measured}; programs: {join_words(_name(p) for p in started) or 'none'}"
     if not broken:
-        message = f"{verdict.message}{_how_they_went(started)}"
-        return passed(message, expected=expected, measured=measured)
+        return passed(f"{verdict.message}{_how_they_went(started)}", expected=expected, measured=measured)
     first = broken[0]
     calls = (made[b.program].call for b in broken if b.program in made)
     cited = tuple(call.place for call in calls)
     start = cite(run, "/grader/process", first.life.start_ns, first.life.end_ns)
-    return failed(
-        f"{verdict.message}, but {'; '.join(f'{b.program} does not run: {b.why}' for b in broken)}",
-        expected=expected,
-        measured=measured,
-        hint=first.hint,
-        citations=(*cited, start),
-    )
+    message = f"{verdict.message}, but {'; '.join(f'{b.program} does not run: {b.why}' for b in broken)}"
+    return failed(message, expected=expected, measured=measured, hint=first.hint, citations=(*cited, start))
 
 
 def _built_programs(package: PackageFacts) -> Iterator[Executable]:
-    """Yield the programs that are made of sources."""
     for one in programs(package):
         if len(one.call.args) > 1 and not NO_PROGRAM & set(one.call.args[1:3]):
             yield one
 
 
 def _not_started(package: PackageFacts, made: dict[str, Executable]) -> Verdict:
-    """No program came out where `rosrun` looks: catkin sets that place in `catkin_package()`, and a property of the
-    target another one."""
+    """No program came out where `rosrun` looks: `catkin_package()` sets that place, a target's property another one."""
     away = next((one for one in made.values() if is_elsewhere(one, package)), None)
     if away is not None:
         call = away.named or away.call
@@ -371,9 +361,7 @@ def _broken_programs(package: PackageFacts, run: Run, programs: list[Life]) -> I
             hint = end.hint if end.hint != RUN_IT else told or INVALID_MEMORY_HINT
             yield Broken(_name(one), f"{end.cause}{quoted}", hint, one)
         elif unloaded or code in CANNOT_START:
-            yield Broken(
-                _name(one), f"it cannot be started (exit code {code}){quoted}", LINK_LIBRARIES_HINT, one
-            )
+            yield Broken(_name(one), f"it cannot start (exit code {code}){quoted}", LINK_LIBRARIES_HINT, one)
 
 
 def _gave_way(run: Run, one: Life) -> bool:

@@ -45,9 +45,7 @@ class CallsParams(Record):
     @model_validator(mode="after")
     def _some_number(self) -> CallsParams:
         if self.at_most is not None and self.at_most < len(self.wanted):
-            raise ValueError(
-                f"at_most is {self.at_most}, and {plural(len(self.wanted), 'call')} are asked for"
-            )
+            raise ValueError(f"at_most is {self.at_most}, and {plural(len(self.wanted), 'call')} are wanted")
         return self
 
     @property
@@ -105,11 +103,9 @@ def calls(package: PackageFacts, run: Run, params: CallsParams) -> Verdict:
             _never(package, run, params) if not made else _fault(package, run, params, *missing), run
         )
     )
-    return verdict.about(
-        expected=params.words,
-        measured=join_words(_text(r) for r in made) or verdict.measured or "no call",
-        citations=(cite(run, "/grader/actor", *_span(made)),),
-    )
+    measured = join_words(_text(r) for r in made) or verdict.measured or "no call"
+    cited = (cite(run, "/grader/actor", *_span(made)),)
+    return verdict.about(expected=params.words, measured=measured, citations=cited)
 
 
 def requests(run: Run, service: str) -> tuple[Request, ...]:
@@ -150,9 +146,7 @@ def _differences(one: Request, wanted: dict[str, Any], params: CallsParams) -> I
 def _too_many(made: Sequence[Request], params: CallsParams) -> Verdict | None:
     if params.at_most is None or len(made) <= params.at_most:
         return None
-    message = (
-        f"{params.service} is called {plural(len(made), 'time')}, and the handout allows {params.at_most}"
-    )
+    message = f"{params.service} is called {plural(len(made), 'time')}; the handout allows {params.at_most}"
     return failed(message, hint="count the calls, and stop after the last one that is asked for")
 
 
@@ -166,8 +160,7 @@ def _too_soon(made: Sequence[Request], run: Run, params: CallsParams) -> Verdict
     if not soon:
         return None
     message = f"{params.service} is called again after {min(soon):.2f} s, not {significant(params.apart_s)} s"
-    hint = f"wait before the next call: rospy.sleep({significant(params.apart_s)})"
-    return failed(message, hint=hint)
+    return failed(message, hint=f"wait before the next call: rospy.sleep({significant(params.apart_s)})")
 
 
 def _fault(
@@ -185,9 +178,7 @@ def _fault(
     what = f"{params.service} is called {plural(came, 'time')}, but there was no other call{with_fields}"
     if end := end or error:
         return end.verdict(failed, f"{what}: {end.cause}")
-    return failed(
-        what, hint=f"{plural(len(params.wanted), 'call')} are expected: call it again"
-    ).if_repeated()
+    return failed(what, hint=f"{plural(len(params.wanted), 'call')} are needed: call it again").if_repeated()
 
 
 def _in_another_order(params: CallsParams, wanted: dict[str, Any], made: Sequence[Request]) -> Verdict | None:
@@ -228,9 +219,7 @@ def _swapped(one: Request, wanted: dict[str, Any], params: CallsParams) -> list[
     ]
     asked = [wanted[key] for key in wrong]
     for key in wrong:
-        fits = (
-            n for n, value in enumerate(asked) if not any(differences(fields[key], value, params.tolerance))
-        )
+        fits = (n for n, one in enumerate(asked) if not any(differences(fields[key], one, params.tolerance)))
         number = next(fits, None)
         if number is None:
             return []
@@ -288,9 +277,7 @@ def _judge_refusal(run: Run, service: str) -> Verdict | None:
         if note.detail.startswith(MISFIT):
             kind = (note.type or "").partition("/")[2]
             hint = f"give srv/{kind}.srv the names and types of the handout, and build again"
-            return unjudged(
-                f"{service} cannot be offered as the handout asks: {shown(note.detail)}", hint=hint
-            )
+            return unjudged(f"{service} cannot be offered as the lab asks: {shown(note.detail)}", hint=hint)
         if note.detail.startswith(OTHER_TYPE) and run.is_student_node(note.actor):
             theirs, why = note.type or "another type", note.detail.partition(": ")[2]
             hint = "call it with the handout's type"

@@ -118,8 +118,7 @@ def _misspelt(facts: CMakeFacts, name: str) -> CMakeCall | None:
 
 
 class Wrong(NamedTuple):
-    """What is wrong, how to fix it, and in which line; or the command that is `uncalled`, and the call below which it
-    goes."""
+    """What is wrong, its fix and its line; or the command that is `uncalled`, and the call below which it goes."""
 
     why: str
     fix: str
@@ -148,9 +147,8 @@ def _of_workspace(package: PackageFacts, facts: CMakeFacts, wanted: str) -> Wron
     found = f"find_package(catkin REQUIRED{f' COMPONENTS {needs}' if needs else ''})"
     why = f"it is the file that catkin_init_workspace makes for the folder src/ of a workspace: line {made.line}"
     lines = f"cmake_minimum_required(VERSION 3.0.2), project({wanted}), {found} and catkin_package()"
-    return Wrong(
-        f"{why} calls catkin_workspace()", f"write these lines in place of all of it: {lines}", made.line
-    )
+    hint = f"write these lines in place of all of it: {lines}"
+    return Wrong(f"{why} calls catkin_workspace()", hint, made.line)
 
 
 def _wrong(package: PackageFacts, facts: CMakeFacts, names: tuple[str, str]) -> Iterator[Wrong]:
@@ -271,9 +269,8 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
     cited = tuple(dict.fromkeys([*(lack.line for lack in lacks.values() if lack.line), *calls]))
     right = [script for script in params.scripts if script not in lacks]
     found = _not_installed(facts, lacks).in_part(len(right) / len(params.scripts), join_words(right))
-    return found.about(
-        expected=expected, measured=measured, citations=cited or (FileCitation(file=facts.file),)
-    )
+    places = cited or (FileCitation(file=facts.file),)
+    return found.about(expected=expected, measured=measured, citations=places)
 
 
 def _not_installed(facts: CMakeFacts, lacks: dict[str, Lack]) -> Verdict:
@@ -291,8 +288,7 @@ def _not_installed(facts: CMakeFacts, lacks: dict[str, Lack]) -> Verdict:
 def _reasons(lacks: dict[str, Lack]) -> Iterator[str]:
     """Yield each reason once, with the scripts that it is true of."""
     for why in dict.fromkeys(lack.why for lack in lacks.values()):
-        scripts = [name for name, lack in lacks.items() if lack.why == why]
-        yield why.replace("{}", join_words(scripts))
+        yield why.replace("{}", join_words([name for name, lack in lacks.items() if lack.why == why]))
 
 
 def _fixes(lacks: dict[str, Lack]) -> Iterator[str]:
@@ -353,9 +349,8 @@ def _why_unnamed(
     if hits:
         other = f"install({hits[0].kind} …)"
         why = f"line {hits[0].call.line}: {other} names {{}}, where catkin_install_python(PROGRAMS …) should"
-        return Lack(
-            why, f"replace {other} with catkin_install_python(PROGRAMS … DESTINATION {BIN})", _line(hits[0])
-        )
+        hint = f"replace {other} with catkin_install_python(PROGRAMS … DESTINATION {BIN})"
+        return Lack(why, hint, _line(hits[0]))
     of_python = [one for one in all_named if one.call.name == PYTHON]
     names = {
         PurePosixPath(one.path).name: one

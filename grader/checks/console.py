@@ -89,9 +89,8 @@ class PrintsParams(Record):
     def _has_places(self) -> PrintsParams:
         places = self.text.count(PLACE)
         if self.numbers and len(self.numbers) != places:
-            raise ValueError(
-                f"numbers: {len(self.numbers)}, and {PLACE} {plural(places, 'time')} in the text"
-            )
+            message = f"numbers: {len(self.numbers)}, and {PLACE} {plural(places, 'time')} in the text"
+            raise ValueError(message)
         return self
 
     @property
@@ -140,11 +139,9 @@ def prints(package: PackageFacts, run: Run, params: PrintsParams) -> Verdict:
     else:
         verdict = _other_end(one, params) or passed(f"it prints {shown(right.text)!r}")
     span = (right.at_ns, right.at_ns) if right else (one.start_ns, one.end_ns)
-    return verdict.about(
-        expected=expected,
-        measured=verdict.measured or plural(len(lines), "line"),
-        citations=verdict.citations or (cite(run, "/grader/console", *span),),
-    )
+    measured = verdict.measured or plural(len(lines), "line")
+    cited = verdict.citations or (cite(run, "/grader/console", *span),)
+    return verdict.about(expected=expected, measured=measured, citations=cited)
 
 
 def _read(run: Run, process: str) -> tuple[list[Line], list[Line]]:
@@ -212,14 +209,11 @@ def _not_printed(
 
 
 def _unseen(one: Life, package: PackageFacts, run: Run, params: PrintsParams, never: str) -> Verdict | None:
-    """Return the loss where a launch file brings nothing up, or a node of it prints the text, and roslaunch writes that
-    to a file."""
+    """Return the loss where a launch file brings nothing up, or sends what a node prints to a file."""
     started = {PurePosixPath(word).name for word in one.start.argv}
     refused = any("cannot launch node of type" in line.line for _, line in run.lines(one.name))
     if refused and run.graph and not nodes_of(run, one.name):
-        return unjudged(
-            f"{never}: none of the launch file's nodes came up", hint="read what roslaunch prints"
-        )
+        return unjudged(f"{never}: no node of the launch file came up", hint="read what roslaunch prints")
     files = [file for file in package.launch_files if PurePosixPath(file.path).name in started]
     for node in (node for file in files for node in file.brings if node.output != "screen"):
         script = own_script(package, node)
@@ -287,9 +281,7 @@ def _unserved(
         hint = f"offer {lacking} in a node that runs beside it, or ask for the service that is offered"
         return unjudged(f"{never}: it asks for {lacking}, which no node offers", hint=hint)
     asked_early = [name for name, is_there in asked.items() if not is_there]
-    early = next(
-        (n for n in asked_early if any(f"service [{n}] unavailable" in line.text for line in own)), ""
-    )
+    early = next((n for n in asked_early if any(f"service [{n}] unavailable" in one.text for one in own)), "")
     if early in offered:
         hint = f"wait for it before the call: `rospy.wait_for_service('{early}')`"
         return failed(f"{never}: it calls {early} before a node offers it", hint=hint).if_repeated()
@@ -357,8 +349,7 @@ def callbacks_clean(package: PackageFacts, run: Run, params: CallbacksCleanParam
     ended = next((one for one in asked if one.ended_early and one.end and one.end.exit_code != 0), None)
     if ended is not None and (len(found) <= 1 or found[0][0] != ended):
         end = explain_end(ended, run, package)
-        message = f"{ended.name} ended by itself after {ended.lasted}: {end.cause}"
-        verdict = end.verdict(unjudged, message)
+        verdict = end.verdict(unjudged, f"{ended.name} ended by itself after {ended.lasted}: {end.cause}")
     elif found:
         end = explain_traceback(found[0][1], package)
         verdict = end.verdict(failed, f"a callback of {found[0][0].name} fails: {end.cause}")
@@ -427,11 +418,10 @@ def logs(package: PackageFacts, run: Run, params: LogsParams) -> Verdict:
     seen = join_words(f"{shown(t)!r}" for t in dict.fromkeys(one.text for one in lines[:3]))
     more = ", …" if len(lines) > 3 else ""
     at_ns = right.at_ns if right else None
-    return verdict.about(
-        expected=f"{params.text!r} logged at level {level}",
-        measured=f"{plural(len(lines), 'log message')}{': ' if seen else ''}{seen}{more}",
-        citations=verdict.citations or (cite(run, "/rosout", at_ns, at_ns),),
-    )
+    expected = f"{params.text!r} logged at level {level}"
+    measured = f"{plural(len(lines), 'log message')}{': ' if seen else ''}{seen}{more}"
+    cited = verdict.citations or (cite(run, "/rosout", at_ns, at_ns),)
+    return verdict.about(expected=expected, measured=measured, citations=cited)
 
 
 def _has(text: str, params: LogsParams) -> bool:
@@ -524,8 +514,7 @@ def _near(run: Run, lines: Iterable[Logged], params: LogsParams) -> Verdict | No
 
 def _likeness(text: str, wanted: str) -> float:
     plain = " ".join((split_log_line(text) or ("", text))[1].casefold().split())
-    matcher = SequenceMatcher(None, plain, " ".join(wanted.casefold().split()), autojunk=False)
-    return matcher.ratio()
+    return SequenceMatcher(None, plain, " ".join(wanted.casefold().split()), autojunk=False).ratio()
 
 
 def _nothing(

@@ -93,11 +93,8 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
     first = found[0]
     verdict = _cite_start(judge_start(first, run, params), first, run, package, params)
     verdict = verdict if verdict.status is Status.PASS else _of_clock(verdict, first, run, package, params)
-    return verdict.about(
-        expected=expected,
-        measured=first_values(first.values),
-        citations=(cite(run, params.topic, first.times_ns[0], first.times_ns[0]),),
-    )
+    cited = (cite(run, params.topic, first.times_ns[0], first.times_ns[0]),)
+    return verdict.about(expected=expected, measured=first_values(first.values), citations=cited)
 
 
 def _cite_start(
@@ -188,11 +185,9 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
         verdict = cite_slip(verdict, count, run, package, "published-in-part")
     verdict = cite_slip(verdict, count, run, package, "no-effect", "set-in-loop")
     at = wrong[0] if wrong else Step(0, 0, 0, count.times_ns[0], count.times_ns[-1], 0, 0)
-    return verdict.about(
-        expected=expected,
-        measured=f"{plural(right, 'step')} of +1, {len(wrong)} others; {first_values(count.values)}",
-        citations=(cite(run, params.topic, at.from_ns, at.to_ns),),
-    )
+    measured = f"{plural(right, 'step')} of +1, {len(wrong)} others; {first_values(count.values)}"
+    cited = (cite(run, params.topic, at.from_ns, at.to_ns),)
+    return verdict.about(expected=expected, measured=measured, citations=cited)
 
 
 @check("counter-wrap", params=WrapParams, messages_only=True, heeds_losses=True)
@@ -232,8 +227,7 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
     lowest, highest = significant(min(count.values)), significant(max(count.values))
     measured = f"{plural(len(count.values), 'value')}, {lowest} to {highest}, {turn}"
     at = (seen.from_ns, seen.to_ns) if seen else (count.times_ns[0], count.times_ns[-1])
-    cited = (cite(run, params.topic, *at),)
-    return verdict.about(expected=expected, measured=measured, citations=cited)
+    return verdict.about(expected=expected, measured=measured, citations=(cite(run, params.topic, *at),))
 
 
 def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:

@@ -78,9 +78,8 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
     else:
         verdict = _dangling(found) if found.link_problem else _judge_file(package, build, found, params)
     whole = ", all of it valid Python" if found is not None and syntax_fault(found) else ""
-    return verdict.about(
-        expected=f"{params.path}, executable, beginning with {_asked_first_line(found)}{whole}"
-    )
+    expected = f"{params.path}, executable, beginning with {_asked_first_line(found)}{whole}"
+    return verdict.about(expected=expected)
 
 
 def _asked_first_line(found: SourceFile | None) -> str:
@@ -112,11 +111,8 @@ def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: Ex
         verdict = passed(f"{found.path} is executable and names {_interpreter(found)}", hint=hint)
     elif has_wrapper(package, build, found.path):
         advice = f", though the file itself {obstacles[0].why}" if obstacles else ""
-        verdict = passed(
-            f"catkin_install_python makes {found.path} a program that rosrun starts{advice}",
-            measured=f"{found.path}: made a program by catkin_install_python",
-            hint=hint,
-        )
+        told = f"catkin_install_python makes {found.path} a program that rosrun starts{advice}"
+        verdict = passed(told, measured=f"{found.path}: made a program by catkin_install_python", hint=hint)
     elif obstacles and (unmade := _unmade_wrapper(package, build, found.path)):
         verdict = _judge_unmade(what, found.path, unmade)
     elif obstacles and _asks_for_wrapper(package, found.path):  # and no build was tried
@@ -129,9 +125,8 @@ def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: Ex
         verdict = verdict if found.shebang_fault == "empty-file" else verdict.lost_by(kind, found.path)
     else:
         message = f"whether {found.path} is executable cannot be told: the submission has no file modes"
-        verdict = inconclusive(
-            message, hint="hand in a git repository or a .tar.gz: both keep which files are executable"
-        )
+        fix = "hand in a git repository or a .tar.gz: both keep which files are executable"
+        verdict = inconclusive(message, hint=fix)
     measured = verdict.measured or f"{found.path}: {_mode(found)}, {_first_line(found)}"
     only_mode = bool(obstacles) and not of_first_line
     place = FileCitation(file=found.path) if only_mode else _cite_shebang(found)
@@ -160,8 +155,7 @@ def _cite_shebang(file: SourceFile) -> FileCitation:
     text = f"#!{file.shebang.text}" if file.shebang else ""
     if file.shebang is None or file.shebang.found is not False or file.shebang.interpreter not in text:
         return FileCitation(file=file.path, line=1)
-    column = text.rindex(file.shebang.interpreter) + 1
-    return FileCitation(file=file.path, line=1, column=column, source=text)
+    return FileCitation(file=file.path, line=1, column=text.rindex(file.shebang.interpreter) + 1, source=text)
 
 
 def has_wrapper(package: PackageFacts, build: Run, path: str) -> bool:
@@ -248,8 +242,7 @@ def _rosrun_answer(build: Run, path: str) -> str:
     names = {f"rosrun {path}", f"rosrun {PurePosixPath(path).name}"}
     said = (c.line for _, c in build.console if c.process in names and c.line.strip())
     lines = [line for line in said if "parsing manifest" not in line]
-    telling = (line for words in TELLING for line in lines if words in line)
-    answer = next(telling, lines[-1] if lines else "")
+    answer = next((line for words in TELLING for line in lines if words in line), lines[-1] if lines else "")
     return f"; rosrun answers: {shown(answer.replace(HOME, '~'))}" if answer else ""
 
 

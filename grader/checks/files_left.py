@@ -85,9 +85,7 @@ class FileLeftParams(Record):
         if self.topics and not self.file.endswith(RECORDINGS):
             raise ValueError("topics are for a file that ends in .bag or .mcap")
         if self.topics and self._is_table:
-            raise ValueError(
-                "give topics (of a recording), or columns, rows_at_least and bounds (of a table)"
-            )
+            raise ValueError("give topics (of a recording), or columns, rows_at_least, bounds (of a table)")
         if unknown := [name for name in self.bounds if name not in self.columns]:
             raise ValueError(f"bounds: {join_words(unknown)} is not among the columns")
         return self
@@ -153,9 +151,8 @@ def file_left(package: PackageFacts, run: Run, params: FileLeftParams) -> Verdic
         `rosbag info <file>` shows what a bag holds.
     """
     if run.metadata.get("sandbox", "").startswith("none"):
-        verdict = inconclusive(
-            "files are only kept from runs in a sandbox", hint="grade on a machine that has bubblewrap"
-        )
+        told = "files are only kept from runs in a sandbox"
+        verdict = inconclusive(told, hint="grade on a machine that has bubblewrap")
         return verdict.about(expected=params.words)
     files = [file for file in run.left_files if params.process in {"", file.process}]
     found = sorted((f for f in files if params.fits(f.path)), key=lambda f: (f.data is None, -f.size_bytes))
@@ -212,8 +209,7 @@ def _recording(file: LeftFile, topics: dict[str, TopicLeft], run: Run) -> Verdic
     try:
         channels = file.recording().channels
     except EvidenceError as error:
-        hint = error.hint or "close the recording: end rosbag record with Ctrl-C"
-        return failed(error.message, hint=hint)
+        return failed(error.message, hint=error.hint or "close the recording: end rosbag record with Ctrl-C")
     for topic, wanted in topics.items():
         found = [channel for channel in channels if channel.topic == topic]
         if wrong := _wrong_topic(file.path, topic, wanted, found, run):

@@ -22,7 +22,7 @@ from grader.model.message_definitions import (
 from grader.model.package import Fault, Interface, InterfaceField, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed
-from grader.wording import closest, join_words, numbers_text, plural
+from grader.wording import closest, join_words, on_lines, plural
 
 FAULTS_SHOWN = 3
 FILE_PATTERN = r"^(msg/\w+\.msg|srv/\w+\.srv|action/\w+\.action)$"
@@ -107,19 +107,15 @@ def definition(package: PackageFacts, params: DefinitionParams) -> Verdict:
     if faults:
         more = f"; and {len(faults) - FAULTS_SHOWN} more" if len(faults) > FAULTS_SHOWN else ""
         said = "; ".join(fault.message for fault in faults[:FAULTS_SHOWN])
-        verdict = failed(
-            f"{f'{params.file}: ' if found else ''}{said}{more}",
-            hint="; ".join(_fixes(faults[:FAULTS_SHOWN])),
-        )
+        message = f"{f'{params.file}: ' if found else ''}{said}{more}"
+        verdict = failed(message, hint="; ".join(_fixes(faults[:FAULTS_SHOWN])))
     else:
         verdict = passed(f"{params.file} defines {_words(wanted)}")
     lines = dict.fromkeys(fault.line for fault in faults) or {None: None}
     there = found.path if found else "CMakeLists.txt"
-    return verdict.about(
-        expected=_words(wanted),
-        measured=_words(found.fields) if found and found.fields else "no field" if found else "no such file",
-        citations=tuple(FileCitation(file=there, line=line) for line in lines) if found else (),
-    )
+    measured = _words(found.fields) if found and found.fields else "no field" if found else "no such file"
+    cited = tuple(FileCitation(file=there, line=line) for line in lines) if found else ()
+    return verdict.about(expected=_words(wanted), measured=measured, citations=cited)
 
 
 def _fixes(faults: list[_Fault]) -> Iterator[str]:
@@ -187,7 +183,7 @@ def _unreadable(found: Interface, fault: Fault, wanted: list[InterfaceField]) ->
         lacking = [f"`{one.type} {one.name}`" for one in wanted if one.part == last]
         if ends:
             line = ends[0]
-            fix = f"write a line `---` below {'line' if len(ends) == 1 else 'lines'} {numbers_text(ends)}"
+            fix = f"write a line `---` below {on_lines(ends)}"
         elif lacking and there and last not in (parts[one.name] for one in there):
             fix = f"at the end of the file, write a line `---`, and {join_words(lacking)} below it"
     return _Fault(shown(fault.message), line, fix)
@@ -223,9 +219,8 @@ def _differs(
         yield _Fault(message, found.line, f"write `{line}`")
     elif wanted.value is not None and not _equal(wanted.value, found.value or ""):
         message = f"{name} is {shown(found.value or '')} (line {found.line}), not {wanted.value}"
-        yield _Fault(
-            message, found.line, f"write `{found.type} {line}`" if not wanted.type else f"write `{line}`"
-        )
+        fix = f"write `{found.type} {line}`" if not wanted.type else f"write `{line}`"
+        yield _Fault(message, found.line, fix)
 
 
 def _type_for(value: str) -> str:

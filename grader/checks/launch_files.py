@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from difflib import get_close_matches
 from itertools import chain, count
 from pathlib import PurePosixPath
@@ -10,6 +11,7 @@ from typing import NamedTuple
 
 from grader.checks.executable import ExecutableParams, executable
 from grader.checks.registry import LaunchName, ProgramName, check
+from grader.checks.support.cpp_errors import CPP_SUFFIXES
 from grader.checks.support.launch import (
     console_lines,
     died,
@@ -118,14 +120,12 @@ def _with_next(verdict: Verdict, package: PackageFacts, params: LaunchXmlParams)
     message = f"{verdict.message}; with that repaired, {'; '.join(f'line {s.line}: {s.why}' for s in slips)}"
     hint = "; then ".join((verdict.hint, *dict.fromkeys(f"on line {s.line} {s.fix}" for s in slips)))
     cited = tuple(s.place for s in slips)
-    return verdict.model_copy(
-        update={"message": message, "hint": hint, "citations": (*verdict.citations, *cited)}
-    )
+    update = {"message": message, "hint": hint, "citations": (*verdict.citations, *cited)}
+    return verdict.model_copy(update=update)
 
 
 def _lacking(package: PackageFacts, file: LaunchFile, params: LaunchXmlParams) -> Verdict | None:
-    """Return why roslaunch starts nothing, and why nodes are not there; None where all are. Those that are there earn
-    their share."""
+    """Return why roslaunch starts nothing, or nodes are not there; those that are there earn their share."""
     refused = next(refusals(package, file), None)
     found = {PurePosixPath(script).name: missing_node(package, file, script) for script in params.scripts}
     found |= {program: _program(file, program) for program in params.programs}
@@ -150,8 +150,7 @@ def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdic
         message = (
             f"{file.path} has no <node> for {name}: line {built[0].line} starts {built[0].type}, which is C++"
         )
-        cited = (built[0].place,)
-        return failed(message, hint="; ".join(built_fixes(package, file, name)), citations=cited)
+        return failed(message, hint="; ".join(built_fixes(package, file, name)), citations=(built[0].place,))
     if slip and any(
         node.line == slip.line for node in built
     ):  # what the program is shows once roslaunch starts it
@@ -174,19 +173,15 @@ def _program(file: LaunchFile, program: str) -> Verdict | None:
 
 
 def _slip_for(package: PackageFacts, node: LaunchNode, name: str) -> Slip | None:
-    """The slip in a node that is meant to run this script."""
     slip = node_slip(package, node)
     if slip is None and node.type == name and node.pkg != package.name:
         why = f'pkg="{node.pkg}" is not the package of {name}'
         return Slip(node.file, node.line, why, f'write pkg="{package.name}"')
     written = PurePosixPath(node.type or "")
-    if slip is None and written.suffix in SOURCES and written.stem == PurePosixPath(name).stem:
+    if slip is None and written.suffix in CPP_SUFFIXES and written.stem == PurePosixPath(name).stem:
         why = f'type="{written}" is a C++ source file, which cannot be started'
         return Slip(node.file, node.line, why, f'write type="{name}"')
     return slip
-
-
-SOURCES = (".cpp", ".cc", ".cxx", ".c")
 
 
 def _is_meant(node: LaunchNode, name: str) -> bool:
@@ -196,44 +191,35 @@ def _is_meant(node: LaunchNode, name: str) -> bool:
 
 
 def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
-    """No node is even meant for it."""
     message = f"{file.path} has no <node> for {name}"
-    if test := next((t for t in file.tests if t.type == name), None):
-        cited = (test.place,)
-        message = f"{message}: only rostest starts a <test>"
-        return failed(
-            message, hint=f"write {_node_tag(file, pkg, name)} in place of the <test>", citations=cited
-        )
-    commented = (line for kind, line in file.commented if kind in {name, PurePosixPath(name).stem})
-    if line := next(commented, None):
-        cited = (FileCitation(file=file.path, line=line),)
-        message = f"{message}: the one on line {line} is in a comment, which roslaunch skips"
-        kind = "" if (name, line) in file.commented else f', and write type="{name}" in it'
-        return failed(message, hint=f"{out_of_comment(line)}{kind}", citations=cited)
-    stem = PurePosixPath(name).stem
-    if off := next((one for one in file.switched_off if PurePosixPath(one[0]).stem == stem), None):
-        cited = (FileCitation(file=file.path, line=off[1]),)
-        message = f"{message}: {off[2]} on line {off[1]} leaves the one that is there out"
-        return failed(message, hint="; then ".join(later_fixes(file, name)), citations=cited)
-    swapped = next(
-        (n for n in file.nodes if n.pkg in {name, PurePosixPath(name).stem} and n.type == pkg), None
-    )
-    if swapped is not None:
-        cited = (FileCitation(file=file.path, line=swapped.line),)
-        message = f"{message}: on line {swapped.line}, pkg and type are swapped"
-        return failed(
-            message, hint=f'write pkg="{pkg}" type="{name}" on line {swapped.line}', citations=cited
-        )
-    unknown = (u for u in file.unknown_tags if near_names("node", [u[0]]) or u[0].lower() == "node")
-    for tag, line in unknown:
-        cited = (FileCitation(file=file.path, line=line),)
-        message = f"{message}: roslaunch skips the tag <{tag}> on line {line}"
-        hint = "the tag is <node …>, in lower case"
-        if tag == "node":
-            message = f"{message}, which stands inside of another <node>"
-            hint = f"end the <node> above line {line} before it begins: with `/>`, or with </node> above line {line}"
-        return failed(message, hint=hint, citations=cited)
+    for place, why, hint in _in_its_place(file, pkg, name):
+        cited = place if isinstance(place, FileCitation) else FileCitation(file=file.path, line=place)
+        return failed(f"{message}: {why}", hint=hint, citations=(cited,))
     return failed(message, hint=f"below <launch>, add {_node_tag(file, pkg, name)}")
+
+
+def _in_its_place(file: LaunchFile, pkg: str, name: str) -> Iterator[tuple[FileCitation | int, str, str]]:
+    """Yield the place of what may be meant to be the node, what is wrong with it, and how to fix that."""
+    stem = PurePosixPath(name).stem
+    for test in (t for t in file.tests if t.type == name):
+        fix = f"write {_node_tag(file, pkg, name)} in place of the <test>"
+        yield test.place, "only rostest starts a <test>", fix
+    for line in (line for kind, line in file.commented if kind in {name, stem}):
+        typed = "" if (name, line) in file.commented else f', and write type="{name}" in it'
+        why = f"the one on line {line} is in a comment, which roslaunch skips"
+        yield line, why, f"{out_of_comment(line)}{typed}"
+    for _, line, said in (one for one in file.switched_off if PurePosixPath(one[0]).stem == stem):
+        fix = "; then ".join(later_fixes(file, name))
+        yield line, f"{said} on line {line} leaves the one that is there out", fix
+    for line in (n.line for n in file.nodes if n.pkg in {name, stem} and n.type == pkg):
+        fix = f'write pkg="{pkg}" type="{name}" on line {line}'
+        yield line, f"on line {line}, pkg and type are swapped", fix
+    for tag, line in (u for u in file.unknown_tags if near_names("node", [u[0]]) or u[0].lower() == "node"):
+        why, fix = f"roslaunch skips the tag <{tag}> on line {line}", "the tag is <node …>, in lower case"
+        if tag == "node":
+            why += ", which stands inside of another <node>"
+            fix = f"end the <node> above line {line} before it begins: with `/>`, or with </node> above line {line}"
+        yield line, why, fix
 
 
 def _node_tag(file: LaunchFile, pkg: str, name: str) -> str:
@@ -352,7 +338,6 @@ def _is_shell(source: SourceFile) -> bool:
 
 
 def _script(package: PackageFacts, build: Run, file: LaunchFile, params: OpensParams) -> Verdict | None:
-    """The shell script is named by the launch file, and can be run as handed in."""
     shells = _shells(package, file)
     if not shells:
         return _no_shell(package, file, params)
@@ -380,7 +365,6 @@ def _no_shell(package: PackageFacts, file: LaunchFile, params: OpensParams) -> V
 def _page(
     package: PackageFacts, build: Run, file: LaunchFile, run: Run, params: OpensParams
 ) -> Verdict | None:
-    """The page was opened, in the program that was asked for."""
     pages = _pages(run)
     mine = [p for p in pages if _is_program(p.program, params)]
     if _url(mine, params):
@@ -391,14 +375,10 @@ def _page(
         message = f"the page is opened in {join_words(p.program for p in pages)}, not in {params.program}"
         return failed(message, hint=hint, citations=cited)
     if mine:
-        message = (
-            f"{params.program} is asked to open {join_words(map(_arguments, mine))}, not {params.urls[0]}"
-        )
+        message = f"{params.program} is given {join_words(map(_arguments, mine))}, not {params.urls[0]}"
         if blank := _blanks(run, mine):
             where = f"{PurePosixPath(blank['file']).name}, line {blank['line']}"
-            message += (
-                f": in {where}, the shell takes {blank['name']} for a command, because a space follows it"
-            )
+            message += f": in {where}, the shell takes {blank['name']} for a command, as a space follows it"
             hint = f"write {blank['name']}=… in {where}, without spaces around the `=`"
         elif slip := _misspelt_address(package, build, file, params):
             hint = f"{slip.file}: {slip.fix}"
@@ -491,7 +471,6 @@ def _blanks(run: Run, pages: list[Page]) -> re.Match[str] | None:
 
 
 def _words(package: PackageFacts, file: LaunchFile, run: Run) -> str:
-    """Return what the script or roslaunch said instead."""
     shell = re.compile(
         r"command not found|No such file|[Ss]yntax error|not found$|bad interpreter|cannot launch node"
     )
@@ -516,7 +495,6 @@ def _is_program(name: str, params: OpensParams) -> bool:
 
 
 def _url(pages: list[Page] | tuple[Page, ...], params: OpensParams) -> str:
-    """The first argument that is one of the addresses."""
     wanted = {_plain(url) for url in params.urls}
     return next((a for p in pages for a in p.arguments if _plain(a) in wanted), "")
 

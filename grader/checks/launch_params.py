@@ -37,7 +37,7 @@ from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchLoad, LaunchNode, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
-from grader.wording import join_words, significant, there_is
+from grader.wording import join_words, on_lines, significant, there_is
 
 OUTSIDE = 'write <rosparam file="$(find {})/{}"/> outside the <node>, without ns'
 Wanted = Mapping[str, int | float | str]
@@ -91,11 +91,9 @@ def launch_loads(package: PackageFacts, build: Run, run: Run, params: LaunchLoad
     )
     found = without_system_params(params_on_server(run, by=lambda caller: caller not in run.student_nodes()))
     place = FileCitation(file=file.path, line=_line(file, params))
-    return verdict.about(
-        expected=expected,
-        measured=f"on the server: {join_words(found) or 'nothing'}",
-        citations=verdict.citations or (place, cite(run, "/grader/param")),
-    )
+    measured = f"on the server: {join_words(found) or 'nothing'}"
+    cited = verdict.citations or (place, cite(run, "/grader/param"))
+    return verdict.about(expected=expected, measured=measured, citations=cited)
 
 
 def _judge_loaded(
@@ -207,7 +205,6 @@ def _not_loaded(
 def _loaded_otherwise(
     package: PackageFacts, run: Run, params: LaunchLoadsParams, loads: list[LaunchLoad], missing: str
 ) -> Verdict:
-    """The launch file loads the file: into a namespace, too late, or with other names in it."""
     found = params_on_server(run)
     for load in loads:
         moved = load.namespace.rstrip("/") + missing
@@ -296,9 +293,7 @@ def _of_node(run: Run, file: LaunchFile, node: str, wanted: Wanted) -> Verdict |
     if _is_there(before, places, wanted):
         return None
     if _is_there(params_on_server(run, by=lambda caller: caller != node), places, wanted):
-        message = (
-            f"{join_words(wanted)} are set only after {node} has started, and it reads them as it starts"
-        )
+        message = f"{join_words(wanted)} are set after {node} has started, and it reads them as it starts"
         verdict = failed(message, hint="set them with <param> inside the <node>: roslaunch does that first")
     else:
         verdict = _wrong_value(file, before, places, wanted) or _elsewhere(before, node, wanted)
@@ -307,14 +302,12 @@ def _of_node(run: Run, file: LaunchFile, node: str, wanted: Wanted) -> Verdict |
 
 
 def _is_there(found: Mapping[str, Any], places: Iterable[str], wanted: Wanted) -> bool:
-    """Return whether all that is wanted is in one of the places."""
     return any(all(_fits(found.get(p + name), value) for name, value in wanted.items()) for p in places)
 
 
 def _wrong_value(
     file: LaunchFile, before: Mapping[str, Any], places: tuple[str, str], wanted: Wanted
 ) -> Verdict | None:
-    """There where the node looks, with another value."""
     place = next((p for p in places if any(p + name in before for name in wanted)), None)
     if place is None:
         return None
@@ -327,8 +320,8 @@ def _wrong_value(
         names = [param.name for param in file.params]
         again = [p for p in file.params if names.count(p.name) > 1 and p.name.rpartition("/")[2] in wanted]
         if len(again) > 1:
-            lines = join_words(str(p.line) for p in again)
-            hint = f"lines {lines} give the same name: write {join_words(missing)} for the others"
+            lines = on_lines(p.line for p in again)
+            hint = f"{lines} give the same name: write {join_words(missing)} for the others"
         cited = tuple(p.place for p in again)
         return failed(message, hint=hint, citations=cited)
     others = [name for name, value in wanted.items() if not _fits(before[place + name], value)]
@@ -347,14 +340,11 @@ def _wrong_value(
     )
     hint = f"{join_words(wanted)} have to be {right}"
     if len(read) == len(others) and all(p.value != str(wanted[key]) for key, p in read.items()):
-        hint = "; ".join(
-            f'on line {p.line}, write value="{wanted[key]}" for {key}' for key, p in read.items()
-        )
+        hint = "; ".join(f'on line {p.line}, write value="{wanted[k]}" for {k}' for k, p in read.items())
     return failed(message, hint=hint, citations=cited)
 
 
 def _elsewhere(before: Mapping[str, Any], node: str, wanted: Wanted) -> Verdict:
-    """Somewhere else on the server, or nowhere."""
     first = next(iter(wanted))
     hint = f'write <param name="{first}" value="{wanted[first]}"/> inside the <node> itself, and the others'
     found = next((name for name in before if name.rpartition("/")[2] in wanted), None)

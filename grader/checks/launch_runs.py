@@ -107,11 +107,8 @@ def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParam
     up = [name for name in params.nodes if f"/{name.lstrip('/')}" in nodes] if params.nodes else nodes[:2]
     share = len(up) / (len(params.nodes) or 2) / 2 + (0.5 if found else 0.0)
     verdict = verdict.in_part(share if up else 0.0, _came_up(up, connected=bool(found)))
-    return verdict.about(
-        expected=expected,
-        measured=_listed_nodes(run),
-        citations=verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/graph")),
-    )
+    cited = verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/graph"))
+    return verdict.about(expected=expected, measured=_listed_nodes(run), citations=cited)
 
 
 def _came_up(names: Sequence[str], *, connected: bool = False) -> str:
@@ -253,8 +250,7 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
     expected = f"{params.launch} brings up {join_words(what) or 'its nodes'} under the file's names{over}"
     file = read_launch(package, params.launch, (*params.scripts, *params.programs))
     if isinstance(file, Verdict):
-        unjudged_too = {"unjudged": bool(params.scripts)}
-        return file.about(expected=expected).model_copy(update=unjudged_too)
+        return file.about(expected=expected).model_copy(update={"unjudged": bool(params.scripts)})
     share, right = _right_parts(package, file, run, params)
     verdict = (
         not_run(run)
@@ -510,9 +506,7 @@ def _ended_soon(run: Run, nodes: Iterable[LaunchNode], topic: str) -> list[Launc
 def _ended_by_itself(package: PackageFacts, file: LaunchFile, ended: Sequence[LaunchNode]) -> Verdict:
     """Return that nodes ended too soon to be connected, and the loop that let them, where one is seen."""
     alone = "itself" if len(ended) == 1 else "themselves"
-    message = (
-        f"{join_words(n.full_name for n in ended)} came up, and ended by {alone} before others could connect"
-    )
+    message = f"{join_words(n.full_name for n in ended)} came up and ended by {alone} before others connected"
     scripts = {one.path for n in ended if (one := own_script(package, n)) is not None}
     left = next((s for s in package.slips if s.kind == "loop-left" and s.file in scripts), None)
     if left is not None:

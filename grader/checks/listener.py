@@ -123,8 +123,7 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
 def _other_words(
     probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line], params: HearsParams
 ) -> Verdict | None:
-    """All that is missing is printed, with other words around it: half of its points. None where something is not
-    there at all."""
+    """All that is missing is printed in other words: half of its points. None where something is not there at all."""
     if params.template == VALUE or not all(text_places(missing, lines, VALUE)):
         return None
     said = [line.text for line in lines if _without_blanks(missing[0].value) in _without_blanks(line.text)]
@@ -245,22 +244,26 @@ def _never_subscribed(package: PackageFacts, run: Run, topic: str, subscribed: S
     return verdict.about(said=" ".join(meant))
 
 
-def _taken_off(message: str, slip: PythonSlip) -> Verdict:
-    return failed(
-        f"{message}: {slip.message} ({slip.file})",
-        hint=f"in {slip.file}, {slip.fix}",
-        citations=(slip.place,),
-    )
+def _taken_off(message: str, slip: PythonSlip, more: str = "") -> Verdict:
+    """Return the loss by the line that a slip names; `more` is why its fix helps."""
+    hint = f"in {slip.file}, {slip.fix}{more}"
+    return failed(f"{message}: {slip.message} ({slip.file})", hint=hint, citations=(slip.place,))
 
 
-def _unregistered(
+def _by_subscriber(
     package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe]
 ) -> Verdict | None:
-    """The node took its subscriber off the topic: nothing that came from some message on was printed."""
+    """A loop made another Subscriber in each turn, the only one was taken off, or its callback was still busy."""
+    lost = f"{len(missing)} of {plural(len(probes), 'message')} not printed"
+    if slip := run_slip(package, run, "subscribed-again"):
+        return _taken_off(lost, slip)
     slip = run_slip(package, run, "unregistered")
-    if slip is None or list(missing) != list(probes[-len(missing) :]):
+    if slip is not None and list(missing) == list(probes[-len(missing) :]):
+        return _taken_off(lost, slip)
+    slip = run_slip(package, run, "callback-waits")
+    if slip is None or len(missing) == len(probes):
         return None
-    return _taken_off(f"{len(missing)} of {plural(len(probes), 'message')} not printed", slip)
+    return _taken_off(f"{lost} in time", slip, ": no further message is read until the callback ends")
 
 
 def _judge_missing(
@@ -275,9 +278,7 @@ def _judge_missing(
     verdict = (
         _other_words(probes, missing, lines, params)
         or _judge_error(package, run)
-        or _subscribed_again(package, run, probes, missing)
-        or _unregistered(package, run, probes, missing)
-        or _waiting(package, run, probes, missing)
+        or _by_subscriber(package, run, probes, missing)
         or _by_callback(package, run, probes, missing, params)
         or _some_numbers(probes, missing, lines)
         or _only_again(probes, missing)
@@ -300,9 +301,7 @@ def _judge_error(package: PackageFacts, run: Run) -> Verdict | None:
     if end := explain_early_end(package, run):
         return end.verdict(failed, f"the node ended before it had printed everything: {end.cause}")
     if twice := run_slip(package, run, "defined-twice"):
-        return failed(
-            f"a callback is never called: {twice.message}", hint=twice.fix, citations=(twice.place,)
-        )
+        return failed(f"a callback never runs: {twice.message}", hint=twice.fix, citations=(twice.place,))
     if end := explain_error(package, run):
         return end.verdict(failed, f"an error stops the node from printing: {end.cause}")
     if slip := run_slip(package, run, "callback-called", "callback-missing"):
@@ -333,35 +332,11 @@ def _some_numbers(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequ
 
 
 def _only_again(probes: Sequence[Probe], missing: Sequence[Probe]) -> Verdict | None:
-    """All that is missing is what came a second time."""
     printed = {str(p.value) for p in probes if p not in missing}
     if not all(str(p.value) in printed for p in missing):
         return None
     message = f"{missing[0].value!r} came twice but was printed only once"
     return failed(message, hint="print every message in the callback, even one that came before")
-
-
-def _subscribed_again(
-    package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe]
-) -> Verdict | None:
-    """Some were lost while a loop made another Subscriber in each turn."""
-    slip = run_slip(package, run, "subscribed-again")
-    if slip is None:
-        return None
-    message = f"{len(missing)} of {plural(len(probes), 'message')} not printed: {slip.message}"
-    return failed(message, hint=slip.fix, citations=(slip.place,))
-
-
-def _waiting(
-    package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe]
-) -> Verdict | None:
-    """What came while the callback was busy with an earlier message."""
-    slip = run_slip(package, run, "callback-waits")
-    if slip is None or len(missing) == len(probes):
-        return None
-    message = f"{len(missing)} of {plural(len(probes), 'message')} not printed in time: {slip.message}"
-    hint = f"in {slip.file}, {slip.fix}: no further message is read until the callback ends"
-    return failed(message, hint=hint, citations=(slip.place,))
 
 
 def _by_callback(
@@ -381,9 +356,8 @@ def _by_callback(
     verdict = _some_numbers(probes, missing, lines) or _only_again(probes, missing)
     verdict = verdict or _by_number(probes, missing, lines, None)
     form = f", as '{in_words(params.template)}'" if params.template != VALUE and "print" in slip.fix else ""
-    return verdict.explained(
-        f"in {slip.file}, {slip.message}", f"in {slip.file}, {slip.fix}{form}", (slip.place,)
-    )
+    hint = f"in {slip.file}, {slip.fix}{form}"
+    return verdict.explained(f"in {slip.file}, {slip.message}", hint, (slip.place,))
 
 
 def _by_number(

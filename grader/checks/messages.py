@@ -99,8 +99,7 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
     )
     measured = f"{in_one_line(heard[0].data[0])!r} to {in_one_line(heard[0].data[-1])!r} ({plural(count, 'message')})"
     span = cite(run, params.topic, min(c.times_ns[0] for c in heard), max(c.times_ns[-1] for c in heard))
-    citations = verdict.citations or (span,)
-    return verdict.about(expected=expected, measured=measured, citations=citations)
+    return verdict.about(expected=expected, measured=measured, citations=verdict.citations or (span,))
 
 
 def _no_text(package: PackageFacts, run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdict:
@@ -225,7 +224,6 @@ def _judge_counting(
 
 
 def _watched_ns(run: Run, heard: Sequence[Channel]) -> int:
-    """Return how long its messages could have come."""
     return (observed_until_ns(run) or run.end_ns) - min(c.times_ns[0] for c in heard)
 
 
@@ -317,11 +315,9 @@ def field_bounds(package: PackageFacts, run: Run, params: FieldBoundsParams) -> 
     else:
         verdict = passed(f"{params.field} of {params.topic} is {params.words} in {_share(found, outside)}")
     share = f" in {params.share:.0%} of the messages" if params.share < 1 else ""
-    return verdict.about(
-        expected=f"{params.field} of {params.topic} {params.words}{share}",
-        measured=verdict.measured or _range(usable),
-        citations=(_span(run, outside or found, params),),
-    )
+    expected = f"{params.field} of {params.topic} {params.words}{share}"
+    cited = (_span(run, outside or found, params),)
+    return verdict.about(expected=expected, measured=verdict.measured or _range(usable), citations=cited)
 
 
 def _span(run: Run, readings: Sequence[Reading], params: FieldParams) -> EvidenceCitation:
@@ -450,11 +446,9 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
     else:
         count = f"all of {plural(len(found), 'message')}" if params.when == "every" else which
         verdict = passed(f"{params.field} of {params.topic} is {params.words} in {count}")
-    return verdict.about(
-        expected=f"{params.field} of {params.topic} {params.words} in {which}",
-        measured=verdict.measured or _values(asked),
-        citations=(_span(run, wrong or asked, params),),
-    )
+    expected = f"{params.field} of {params.topic} {params.words} in {which}"
+    cited = (_span(run, wrong or asked, params),)
+    return verdict.about(expected=expected, measured=verdict.measured or _values(asked), citations=cited)
 
 
 def _in_order(
@@ -495,7 +489,6 @@ def _in_order(
 
 
 def _said_again(found: Sequence[Reading], params: FieldEqualsParams) -> Verdict | None:
-    """Messages that repeat the one before, where one may come only when the value changes."""
     again = [one for before, one in pairwise(found) if one.values == before.values]
     if params.repeats or not again:
         return None
@@ -543,9 +536,7 @@ def _other_value(
         message, hint = f"{message}; none came after {topics}", f"publish again in the callback of {topics}"
     elif params.when == "last" and (number := _was_right(found, why, params)):
         message += f", and was right in message {number} of {len(found)}"
-        hint = (
-            f"change {params.field} where it has to change, and keep the rest as it was in the message before"
-        )
+        hint = f"change {params.field} where it has to change, and keep the rest as in the message before"
     elif params.when == "last" and (topic := _repeated(found, run, params)):
         message += f": each value is the one that came on {topic}"
         hint = "keep what was there before from callback to callback: `self.… = 0` in `__init__`, `+=` in the callback"
@@ -560,8 +551,7 @@ def _other_value(
 
 
 def _was_right(found: Sequence[Reading], why: str, params: FieldEqualsParams) -> int:
-    """Return the number of an earlier message that had the right value in the place of a list that is wrong now; 0
-    where none had."""
+    """Return the number of an earlier message that was right where a list is wrong now; 0 where none was."""
     place = why.partition(": ")[0]
     if not place.startswith("["):
         return 0

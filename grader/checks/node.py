@@ -39,7 +39,7 @@ from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
-from grader.wording import join_words, numbers_text, plural, seconds
+from grader.wording import join_words, on_lines, plural, seconds
 
 IN_A_LOOP = f"loop with `{LOOP}`" + both(" and catch rospy.ROSInterruptException around it", "")
 
@@ -172,8 +172,8 @@ def _judge_misnamed(
         elsewhere = is_other_name(*given[:2])
         hint, cited = (_rename_hint(slips[0], nodes, params), cited) if elsewhere else (hint, ())
     if len(cited) > 1:
-        lines = join_words(str(one.line) for one in cited)
-        hint = f"{hint}, on lines {lines} alike: a second call with other arguments ends the node"
+        lines = on_lines(one.line or 0 for one in cited)
+        hint = f"{hint}, on {lines} alike: a second call with other arguments ends the node"
     return failed(wrong_name(*given), hint=hint, citations=cited)
 
 
@@ -220,7 +220,6 @@ def _short_watch(one: Life, up_ns: int, params: NodeLivesParams) -> Verdict | No
 
 
 def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
-    """Return how its end after Ctrl-C was wrong, None where it was not."""
     stopped_by = one.end.stopped_by if one.end else None
     if stopped_by in {"TERM", "KILL"}:
         message = f"{_script(one)} did not end on Ctrl-C and had to be stopped with SIG{stopped_by}"
@@ -253,7 +252,7 @@ def _asleep(one: Life, package: PackageFacts) -> Verdict | None:
     if slow is not None and float(slow.message) < LONG_SLEEP_HZ:
         who, pause = f"line {slow.line} lets", seconds(round(1e9 / float(slow.message)))
     elif turn_s >= LONG_TURN_S:  # by the computer's clock, none of them ends sooner
-        who, pause = f"lines {numbers_text(sorted(s.line for s in pauses))} let", seconds(round(turn_s * 1e9))
+        who, pause = f"{on_lines(sorted(s.line for s in pauses))} let", seconds(round(turn_s * 1e9))
     else:
         return None
     slept = f"{who} it sleep for {pause} at a time, also after Ctrl-C, so its end is not counted"

@@ -13,7 +13,7 @@ from grader.checks.support.text import near_names, shown
 from grader.model.package import MANIFEST, Dependency, Manifest, PackageFacts, meant_manifest
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
-from grader.wording import is_word_of, join_words, numbers_text, plural
+from grader.wording import is_word_of, join_words, on_lines, plural
 
 OTHERS = {
     "launch": ("launcher", "launchers", "launchfile", "launchfiles", "launch_files"),
@@ -222,35 +222,30 @@ def _judge_manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
 
 def _of_ros_2(found: Manifest, params: ManifestParams) -> Verdict:
     made = " ".join((params.name, *params.dependencies))
-    return failed(
-        f"{found.file} is for a ROS 2 package (its build type is {found.build_type})",
-        measured=f"name {found.name}, build type {found.build_type}",
-        hint=f"make a package for ROS 1: `catkin_create_pkg {made}`",
-        citations=(FileCitation(file=found.file, line=found.name_line),),
-    )
+    message = f"{found.file} is for a ROS 2 package (its build type is {found.build_type})"
+    measured = f"name {found.name}, build type {found.build_type}"
+    hint = f"make a package for ROS 1: `catkin_create_pkg {made}`"
+    cited = (FileCitation(file=found.file, line=found.name_line),)
+    return failed(message, measured=measured, hint=hint, citations=cited)
 
 
 def _judge_misnamed(package: PackageFacts, found: Manifest, name: str) -> Verdict | None:
     if found.name == name:
         return None
     slip = " (a typo in the name)" if near_names(name, [found.name]) else ""
-    return failed(
-        f"{found.file} names the package {found.name!r} instead of {name!r}{slip}",
-        measured=f"name {found.name}",
-        hint=_rename(package, found, name),
-        citations=(FileCitation(file=found.file, line=found.name_line),),
-    )
+    message = f"{found.file} names the package {found.name!r} instead of {name!r}{slip}"
+    cited = (FileCitation(file=found.file, line=found.name_line),)
+    return failed(message, measured=f"name {found.name}", hint=_rename(package, found, name), citations=cited)
 
 
 def _unbuilt(found: Manifest) -> Verdict | None:
     if _builds_with_catkin(found):
         return None
-    return failed(
-        f"{found.file} does not name catkin as its build tool",
-        measured=f"build tool {found.build_type or 'none'}, no dependency on catkin",
-        hint=f"add <buildtool_depend>catkin</buildtool_depend> below line {_last_line(found)}",
-        citations=(FileCitation(file=found.file, line=_last_line(found)),),
-    )
+    message = f"{found.file} does not name catkin as its build tool"
+    measured = f"build tool {found.build_type or 'none'}, no dependency on catkin"
+    hint = f"add <buildtool_depend>catkin</buildtool_depend> below line {_last_line(found)}"
+    cited = (FileCitation(file=found.file, line=_last_line(found)),)
+    return failed(message, measured=measured, hint=hint, citations=cited)
 
 
 @check("dependencies", params=DependenciesParams, run_anyway=True)
@@ -329,14 +324,12 @@ def _rename(package: PackageFacts, found: Manifest, name: str) -> str:
         for c in calls
         if c.name == "project" and c.args[:1] != (name,)
     ]
-    lines: dict[str, dict[str, None]] = {}
+    lines: dict[str, dict[int, None]] = {}
     for launch in package.launch_files:
         for node in launch.nodes:
             if node.pkg == found.name:
-                lines.setdefault(node.file or launch.path, {})[str(node.line)] = None
-    places += [
-        f'pkg="{name}" in {file}, line{"s" * (len(own) > 1)} {join_words(own)}' for file, own in lines.items()
-    ]
+                lines.setdefault(node.file or launch.path, {})[node.line] = None
+    places += [f'pkg="{name}" in {file}, {on_lines(own)}' for file, own in lines.items()]
     such = f"$(find {found.name})"
     such += f" or `from {found.name}.msg import …`" if package.interfaces else ""
     has_cpp = any(PurePosixPath(file.path).suffix == ".cpp" for file in package.files)
@@ -375,15 +368,12 @@ def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
     hints = [_respell(n, d, deps) for n, deps in slips.items() for d in deps]
     names_too = {d.name for d in misspelt}
     if also := sorted(d.line for d in found.dependencies if d.name in names_too and d not in misspelt):
-        hints.append(f"do the same on line{'s' if len(also) > 1 else ''} {numbers_text(also)}")
+        hints.append(f"do the same on {on_lines(also)}")
     if absent := [n for n in missing if n not in slips]:
         hints.append(f"add {' '.join(f'<{tag}>{n}</{tag}>' for n in absent)} below line {last}")
-    verdict = failed(
-        f"{found.file} does not declare {join_words(missing)} as a run-time dependency{slip or only}",
-        measured=_declared_text(found),
-        hint="; ".join(hints),
-        citations=lines or (FileCitation(file=found.file, line=last),),
-    )
+    message = f"{found.file} does not declare {join_words(missing)} as a run-time dependency{slip or only}"
+    cited = lines or (FileCitation(file=found.file, line=last),)
+    verdict = failed(message, measured=_declared_text(found), hint="; ".join(hints), citations=cited)
     return verdict.seeking("dependency", missing[0]) if len(missing) == 1 else verdict
 
 
@@ -442,12 +432,8 @@ def _unreadable(package: PackageFacts, name: str) -> Verdict:
     if lacks_tag and package.name != name:
         other = f"; it names the package {package.name!r} instead of {name!r}"
         hint = f"{hint}; write <name>{name}</name>, and project({name}) in CMakeLists.txt"
-    return failed(
-        f"{fault.file}{line} cannot be read: {fault.explanation}{other}",
-        measured=fault.message,
-        hint=hint,
-        citations=(fault.place,),
-    )
+    message = f"{fault.file}{line} cannot be read: {fault.explanation}{other}"
+    return failed(message, measured=fault.message, hint=hint, citations=(fault.place,))
 
 
 def _builds_with_catkin(found: Manifest) -> bool:

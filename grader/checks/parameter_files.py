@@ -88,13 +88,11 @@ def params_loaded(package: PackageFacts, build: Run, run: Run, params: ParamsLoa
 def _names_missing(
     found: dict[str, object], wanted: list[str], path: str, package: PackageFacts, build: Run
 ) -> Verdict | None:
-    """Return the loss where names of the lab are not on the server once the file is loaded."""
     missing = [name for name in wanted if found.get(name) in (None, {})]
     there = [name for name in wanted if name not in missing]
     if not missing:
         return None
-    lost = _missing(found, missing, path, package, build)
-    return lost.in_part(len(there) / len(wanted), join_words(there))
+    return _missing(found, missing, path, package, build).in_part(len(there) / len(wanted), join_words(there))
 
 
 def _loaded(wanted: list[str], asked: str, path: str, build: Run) -> Verdict:
@@ -120,7 +118,6 @@ def _no_file(package: PackageFacts, build: Run, path: str, wanted: list[str]) ->
 
 
 def _error(run: Run, one: Life, path: str, build: Run) -> Verdict | None:
-    """Return what rosparam said where it failed."""
     code = one.end.exit_code if one.end else None
     if code == 0:
         return None
@@ -136,8 +133,7 @@ def _error(run: Run, one: Life, path: str, build: Run) -> Verdict | None:
         cited = (FileCitation(file=path, line=words.line),)
         return failed(f"{path} does not load: {words.why}", hint=words.hint, citations=cited)
     said = f": {shown(lines[-1])}" if lines else ""
-    hint = f"rosparam load {path} shows the line"
-    return failed(f"{path} does not load{said}", hint=hint)
+    return failed(f"{path} does not load{said}", hint=f"rosparam load {path} shows the line")
 
 
 def _parts(keys: tuple[Key, ...]) -> set[str]:
@@ -223,9 +219,7 @@ def _in_its_place(found: dict[str, object], name: str, path: str) -> Verdict | N
         value = found[above]
         if isinstance(value, list):
             why = f"{above} is a list, so there is no {name}"
-            return failed(
-                f"{path} loads, but {why}", hint="remove the `-`: write the names one below the other"
-            )
+            return failed(f"{path} loads, but {why}", hint="remove the `-`: write each name on its own line")
         if isinstance(value, str) and f"{last}:" in value:
             why = f"{above} is the text {shown(value)!r}, so there is no {name}"
             return failed(f"{path} loads, but {why}", hint=f"write a space after each colon: `{last}: …`")

@@ -133,16 +133,12 @@ def _not_printed(
     strange = [n for n in missing if n not in known or not known[n].in_file]
     if strange:
         file = params.file or "the student's file"
-        message = (
-            f"{names} {_are(missing)} not printed, and {join_words(strange)} {_are(strange)} not in {file}"
-        )
+        message = f"{names} {_are(missing)} not printed; {join_words(strange)} {_are(strange)} not in {file}"
         return unjudged(message, hint=f"fix the names in {file} first")
     lines = printed_lines(run)
     copied = (n for n in missing if any(is_printed(v, lines) for v in _in_file(build, params.file, n)))
     if (hard := next(copied, None)) is not None:
-        message = (
-            f"{hard} is printed with the value in {params.file}, not with the one on the parameter server"
-        )
+        message = f"{hard} is printed with the value in {params.file}, not with that on the parameter server"
         hint = f"read it with {get_param(hard)}, not from the file or the script"
         return _share_printed(params, missing, message, hint)
     texts = [line.text.strip() for line in lines if line.text.strip()]
@@ -348,11 +344,9 @@ def param_value(package: PackageFacts, build: Run, run: Run, params: ParamValueP
         else _given_before(package, build, params, got) or _judge_value(package, build, got, params)
     )
     cited = cite(run, "/grader/param")
-    return verdict.about(
-        expected=f"{params.name}: {shown(value_text(params.value))}",
-        measured=verdict.measured or ("not set" if got is MISSING else shown(value_text(got))),
-        citations=(cited,),
-    )
+    expected = f"{params.name}: {shown(value_text(params.value))}"
+    measured = verdict.measured or ("not set" if got is MISSING else shown(value_text(got)))
+    return verdict.about(expected=expected, measured=measured, citations=(cited,))
 
 
 def _given_before(package: PackageFacts, build: Run, params: ParamValueParams, got: object) -> Verdict | None:

@@ -212,8 +212,7 @@ def _excuse_lateness(
     """The verdict, unless the machine was late itself: a rate that a script asks for is none of the machine's."""
     if uneven is None or _asked_number(found, run, package, params) is not None:
         return uneven
-    why = partial(_why_late, found, params=params)
-    return excused(uneven, run, found.times_ns[0], found.until_ns, why)
+    return excused(uneven, run, found.times_ns[0], found.until_ns, partial(_why_late, found, params=params))
 
 
 def rhythms_to_judge(run: Run, params: RateParams, channels: Sequence[Channel]) -> list[Rhythm]:
@@ -286,11 +285,8 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     # There is a `sleep()` already, behind the loop or in a comment: the slip says what to do with it.
     if slips and slips[0].kind in {"sleep-outside", "commented-out"}:
         hint = slips[0].fix
-    return failed(
-        f"{params.topic} runs at about {about} Hz instead of {hz} Hz: the loop does not sleep{where}",
-        hint=hint,
-        citations=tuple(s.place for s in slips[:3]),
-    )
+    message = f"{params.topic} runs at about {about} Hz instead of {hz} Hz: the loop does not sleep{where}"
+    return failed(message, hint=hint, citations=tuple(s.place for s in slips[:3]))
 
 
 def _asked_flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> PythonSlip | None:
@@ -454,9 +450,7 @@ def _by_number(
 def _with_line(verdict: Verdict, slip: PythonSlip, params: RateParams) -> Verdict:
     """Return the verdict with the line that asks for another rate."""
     where = f"{slip.file}, line {slip.line}"
-    said = (
-        f": {slip.name}(…) is given two numbers: {slip.fix}" if slip.fix else f" asks for {slip.message} Hz"
-    )
+    said = f": {slip.name}(…) gets two numbers: {slip.fix}" if slip.fix else f" asks for {slip.message} Hz"
     hz, period_s = significant(params.rate_hz), significant(1 / params.rate_hz)
     right = f"{slip.name}({period_s})" if slip.name else loop_rate(hz)
     return verdict.explained(f"{where}{said}", f"make it {hz} Hz in {where}: use {right}", (slip.place,))
@@ -511,8 +505,7 @@ def _by_parameter(
         if value is None:
             told = f"which nothing sets in this run: the default in {where} counts"
             hint = f"make {significant(params.rate_hz)} the default in {where}, or {hint}"
-        why = f"the node takes its rate from {slip.message}, {told}"
-        return verdict.explained(why, hint, (place.place,))
+        return verdict.explained(f"the node takes its rate from {slip.message}, {told}", hint, (place.place,))
     return verdict
 
 

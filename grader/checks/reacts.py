@@ -51,8 +51,7 @@ messages: what it publishes may be a little older than what it has just heard.""
 
 
 class Condition(Record):
-    """The messages that count: any on the topic, or those whose `field` is from `min` to `max`, or
-    `value`."""
+    """The messages that count: any on the topic, or those whose `field` is from `min` to `max`, or `value`."""
 
     topic: GlobalName
     """The topic, with its slash: `/chatter`."""
@@ -299,9 +298,7 @@ def _between(effects: Sequence[Reading], span: tuple[int, int], run: Run, params
     if to_s is None:
         return []
     from_s, until_s = to_s(span[0]) + params.within_s, to_s(span[1]) - ORDER_S
-    return [
-        one.time_ns for one in effects if from_s < to_s(one.time_ns) < until_s and params.effect.holds(one)
-    ]
+    return [e.time_ns for e in effects if from_s < to_s(e.time_ns) < until_s and params.effect.holds(e)]
 
 
 def _unless_late(
@@ -326,11 +323,9 @@ def _judge_silence(package: PackageFacts, run: Run, params: ReactsParams) -> Ver
         or _silent_without_reason(package, run, causes, spans, params)
         or _kept_silent(own, params)
     )
-    return verdict.about(
-        expected=f"{params.effect.absence} {_silent_words(params)}",
-        measured=verdict.measured or "none",
-        citations=(cite(run, params.effect.topic if effects else "/grader/graph"),),
-    )
+    expected = f"{params.effect.absence} {_silent_words(params)}"
+    cited = (cite(run, params.effect.topic if effects else "/grader/graph"),)
+    return verdict.about(expected=expected, measured=verdict.measured or "none", citations=cited)
 
 
 def _kept_silent(own: Sequence[Channel], params: ReactsParams) -> Verdict:
@@ -458,10 +453,8 @@ def _other_answer(
         return None
     field = params.effect.field
     hint = f"in the callback of {params.trigger.topic}, look at what you publish on {params.effect.topic}: "
-    return (
-        f"{field} is {value_text(came.values[0])} then",
-        f"{hint}{field} has to be {value_text(params.effect.value)}",
-    )
+    fix = f"{hint}{field} has to be {value_text(params.effect.value)}"
+    return f"{field} is {value_text(came.values[0])} then", fix
 
 
 def _judge_unanswered(

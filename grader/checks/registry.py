@@ -163,16 +163,12 @@ def collecting(source: str) -> Iterator[Collection]:
 
 
 def check(
-    name: str,
-    *,
-    params: type[Record] = NoParams,
-    messages_only: bool = False,
-    heeds_losses: bool = False,
-    run_anyway: bool = False,
-    of_callbacks: bool = False,
-    of_lives: bool = False,
+    name: str, *, params: type[Record] = NoParams, **marks: bool
 ) -> Callable[[Callable[..., Verdict]], Callable[..., Verdict]]:
-    """Register a function under a name. Raises ValueError for a name that is taken or a fact that no one has."""
+    """Register a function under a name, with `marks` of `Check` that are true of it (`messages_only=True`).
+
+    Raises ValueError for a name that is taken or a fact that no one has, TypeError for a mark that there is not.
+    """
 
     def register(function: Callable[..., Verdict]) -> Callable[..., Verdict]:
         own = _COLLECTION.get()
@@ -191,12 +187,8 @@ def check(
             facts=tuple(inspect.signature(function).parameters),
             title=title,
             sections=sections,
-            messages_only=messages_only,
-            heeds_losses=heeds_losses,
-            run_anyway=run_anyway,
-            of_callbacks=of_callbacks,
-            of_lives=of_lives,
             source=own.source if own else "",
+            **marks,
         )
         return function
 

@@ -133,11 +133,9 @@ def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
     else:
         verdict = unreadable(found, params.topic) or _judge_track(found, run, params)
         verdict = tell_end(verdict, package, run)
-    return verdict.about(
-        expected=f"a way through {join_words(map(spot, params.points))}, within {metres(params.tolerance_m)}",
-        measured=verdict.measured or "no path",
-        citations=(cite(run, params.topic),),
-    )
+    expected = f"a way through {join_words(map(spot, params.points))}, within {metres(params.tolerance_m)}"
+    measured = verdict.measured or "no path"
+    return verdict.about(expected=expected, measured=measured, citations=(cite(run, params.topic),))
 
 
 def tell_end(verdict: Verdict, package: PackageFacts, run: Run) -> Verdict:
@@ -146,9 +144,8 @@ def tell_end(verdict: Verdict, package: PackageFacts, run: Run) -> Verdict:
     for channel in run.student_channels() if verdict.status is Status.FAIL else ():
         if axis := other_axis(channel):
             why = f"velocities on {channel.topic} set {axis}, and their angular.z is always 0"
-            verdict = verdict.explained(
-                why, f"set angular.z in place of {axis}: a robot on wheels turns by that alone"
-            )
+            hint = f"set angular.z in place of {axis}: a robot on wheels turns by that alone"
+            verdict = verdict.explained(why, hint)
     if end is None or end.by_itself or end.cause in verdict.message:
         return verdict
     kind = unjudged if verdict.unjudged else failed
@@ -222,9 +219,7 @@ def drives_too_little(path: Sequence[Pose], region: Region, least_m: float) -> V
         mean_m_s = long_m / max(path[-1].time_s - path[0].time_s, STOPS_S)
         message, hint = f"{message}, and it drives all the time, at {mean_m_s:.2f} m/s", "drive faster"
     if turns and isinstance(region, Band) and region.max_m is not None:
-        message += (
-            f", {metres(region.nearest_m(path[-1].point))} from the nearest wall; why is not established"
-        )
+        message += f", {metres(region.nearest_m(path[-1].point))} from the nearest wall; why is not known"
         hint = "print in each branch which one it is, and look at the condition that stays true there"
     elif stood > MOSTLY and (isinstance(region, Band) or not turns):
         message += f", and it stands, or turns on the spot, for {stood:.0%} of the time"
@@ -305,10 +300,9 @@ def _let_go(run: Run, params: PathParams) -> Words | None:
         held = driven(commands, None, commands[-1].time_s + STOPS_AFTER_S)
         if followed(relative(held), params.way.points, params.tolerance_m).done:
             again = f"{longest_s:.1f} s pass before the next message on {channel.topic}"
-            return Words(
-                f"the robot stops by itself: {again}, and a velocity holds for {significant(params.hold_s or 0)} s",
-                "publish the velocity again and again, ten times a second, for as long as it should drive or turn",
-            )
+            why = f"the robot stops by itself: {again}, and a velocity holds for {significant(params.hold_s or 0)} s"
+            hint = "publish the velocity again and again, ten times a second, for as long as it should drive or turn"
+            return Words(why, hint)
     return None
 
 
@@ -372,19 +366,16 @@ def what_is_wrong(path: Sequence[Pose], way: Way, course: Course, *, mirror: boo
 
 
 def _explain_mirrored(path: Sequence[Pose], way: Way) -> Words | None:
-    for sign_x, sign_y, message, hint in (
-        (
-            1,
-            -1,
-            "the path is mirrored: it turns right instead of left",
-            "a positive angular.z turns to the left",
-        ),
-        (-1, -1, "the path is driven backwards", "a positive linear.x drives forward"),
-        (-1, 1, "the path is driven backwards and mirrored", "a positive linear.x drives forward"),
+    mirrored = "mirrored: it turns right instead of left"
+    for x, y, how in (
+        (1, -1, mirrored),
+        (-1, -1, "driven backwards"),
+        (-1, 1, "driven backwards and mirrored"),
     ):
-        other = [p._replace(x=sign_x * p.x, y=sign_y * p.y) for p in path]
+        other = [p._replace(x=x * p.x, y=y * p.y) for p in path]
         if followed(other, way.points, way.tolerance_m).done:
-            return Words(message, hint)
+            right = "angular.z turns to the left" if how is mirrored else "linear.x drives forward"
+            return Words(f"the path is {how}", f"a positive {right}")
     return None
 
 
@@ -392,9 +383,7 @@ def _wrong_start(path: Sequence[Pose], way: Way, course: Course) -> Words | None
     if course.reached:
         return None
     apart = metres(math.dist(path[0].point, way.points[0]))
-    return Words(
-        f"it starts at {spot(path[0].point)}, {apart} from {way.name(0)}", "bring it to the start first"
-    )
+    return Words(f"it starts at {spot(path[0].point)}, {apart} from {way.name(0)}", "bring it to the start")
 
 
 def _wrong_turn(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
@@ -528,9 +517,8 @@ def _too_far(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
     if not beyond_m:
         return None
     message = f"it drives {metres(beyond_m)} past {way.name(corner)}, {_after(path, path[first])}"
-    return Words(
-        message, f"turn sooner: {significant(way.tolerance_m)} m are allowed; distance is speed times time"
-    )
+    hint = f"turn sooner: {significant(way.tolerance_m)} m are allowed; distance is speed times time"
+    return Words(message, hint)
 
 
 def _too_early(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
@@ -556,9 +544,7 @@ def _ends_short(path: Sequence[Pose], way: Way, course: Course) -> Words:
     if every:
         return Words(message, "publish a zero velocity once you are at the last point")
     if course.reached > 1 and math.dist(path[-1].point, way.points[goal - 1]) <= way.tolerance_m:
-        hint = (
-            "go on from there: count the stretches that the handout asks for, and keep the node alive for all"
-        )
+        hint = "go on from there: count the stretches of the handout, and keep the node alive for all"
         return Words(message, hint)
     return Words(message, "drive longer, or keep the node alive until it gets there")
 

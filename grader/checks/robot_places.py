@@ -186,11 +186,8 @@ def ends_at(package: PackageFacts, run: Run, params: EndsAtParams) -> Verdict:
         verdict = _answers_late(tell_end(verdict, package, run), run)
         verdict = _excused_end(verdict, judged, run, params) if judged else verdict
     assert verdict is not None  # noqa: S101 - one of them always is
-    return verdict.about(
-        expected=params.words,
-        measured=verdict.measured or "no position",
-        citations=(cite(run, params.topic),),
-    )
+    measured = verdict.measured or "no position"
+    return verdict.about(expected=params.words, measured=measured, citations=(cite(run, params.topic),))
 
 
 def path_to_judge(found: Track, asked: Stretch, params: EndsAtParams) -> list[Pose]:
@@ -337,8 +334,7 @@ def _told(run: Run, asked: Stretch) -> list[Command]:
 def _never_moves(
     message: str, judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtParams
 ) -> Verdict:
-    """Return the loss of a robot that stays where it is: it turns there, is told to stop, is in front of something, or
-    is told nothing."""
+    """Return the loss of a robot that stays where it is: it turns, is told to stop, is blocked, or is told nothing."""
     if turned_rad(judged, STILL_S) > TURNING_RAD:
         verdict = unjudged(f"{message}, and turns on the spot", hint=_steer(run, params))
         return _with_side(verdict, judged, asked, run, params)
@@ -348,9 +344,7 @@ def _never_moves(
     if not sent or any(command.speed or command.turn for command in sent):
         return why_still(unjudged(message, hint=DRIVE), run)
     message += f": {plural(len(sent), 'velocity', 'velocities')} came, and {'all are' if len(sent) > 1 else 'it is'} 0"
-    hint = (
-        "look at the condition that stops it: the distance is math.hypot(dx, dy), which is never less than 0"
-    )
+    hint = "look at the condition that stops it: the distance is math.hypot(dx, dy), which is never below 0"
     return unjudged(message, hint=hint)
 
 
@@ -374,8 +368,7 @@ def _fell_silent(
     if end := explain_early_end(package, run):
         return end.verdict(failed, f"{message}: the node ended ({end.cause})")
     hint = f"publish on {params.topic} for as long as the node runs, not only for a while"
-    cited = named_at(package, run, "publisher", params.topic)
-    return failed(message, hint=hint, citations=cited)
+    return failed(message, hint=hint, citations=named_at(package, run, "publisher", params.topic))
 
 
 def _answers_late(verdict: Verdict, run: Run) -> Verdict:
@@ -485,11 +478,9 @@ def stays_within(package: PackageFacts, run: Run, params: StaysWithinParams) -> 
         verdict = _answers_late(verdict, run)
     assert verdict is not None  # noqa: S101 - one of them always is
     share = f" for {params.share:.0%} of the time" if params.share < 1 else ""
-    return verdict.about(
-        expected=f"{region.words}{share}",
-        measured=verdict.measured or "no position",
-        citations=(cite(run, params.topic),),
-    )
+    measured = verdict.measured or "no position"
+    cited = (cite(run, params.topic),)
+    return verdict.about(expected=f"{region.words}{share}", measured=measured, citations=cited)
 
 
 def placed(found: Track, params: StaysWithinParams) -> list[Pose]:
@@ -525,12 +516,10 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
             verdict = verdict.explained(f"it turns to the {wrong[0]} there, {wrong[1]}", wrong[2])
             verdict = verdict.lost_by("steers-wrong", wrong[0])
         elif isinstance(region, Band) and (seen := _seen_near(path, out, region, run)):
-            verdict = verdict.explained(
-                f"the smallest of its ranges is then {seen}", f"{verdict.hint}; {LOOK_AT}"
-            )
+            why = f"the smallest of its ranges is then {seen}"
+            verdict = verdict.explained(why, f"{verdict.hint}; {LOOK_AT}")
         elif isinstance(region, Band) and (around := circles(path, out)) > 1:
-            why = f"it drives in circles there, {around:.1f} times around"
-            verdict = verdict.explained(why, CIRCLES)
+            verdict = verdict.explained(f"it drives in circles there, {around:.1f} times around", CIRCLES)
     elif long_m < params.least_m:
         verdict = drives_too_little(path, region, params.least_m)
     else:

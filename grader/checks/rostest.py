@@ -98,11 +98,9 @@ def rostest(package: PackageFacts, run: Run, params: RostestParams) -> Verdict:
     counts = (
         f"{sum(c.outcome == 'passed' for c in found.cases)} of {plural(len(found.cases), 'testcase')} passed"
     )
-    return verdict.about(
-        expected=f"the tests of {params.test or params.process} pass",
-        measured=verdict.measured or counts,
-        citations=(cite(run, "/grader/console", started[0], run.end_ns),),
-    )
+    expected = f"the tests of {params.test or params.process} pass"
+    cited = (cite(run, "/grader/console", started[0], run.end_ns),)
+    return verdict.about(expected=expected, measured=verdict.measured or counts, citations=cited)
 
 
 def _results(run: Run, params: RostestParams) -> Results:

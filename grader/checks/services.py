@@ -85,11 +85,8 @@ def service(package: PackageFacts, run: Run, params: ServiceParams) -> Verdict:
         else _judge_service(offer, package, run, params)
     )
     cited = cite(run, "/grader/graph")
-    return verdict.about(
-        expected=f"{params.service} of type {params.type}",
-        measured=verdict.measured or described(found),
-        citations=(cited,),
-    )
+    expected = f"{params.service} of type {params.type}"
+    return verdict.about(expected=expected, measured=verdict.measured or described(found), citations=(cited,))
 
 
 @check("service-answers", params=ServiceAnswersParams, of_callbacks=True)
@@ -129,11 +126,9 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
         or passed(f"{params.service} answers {plural(len(pairs), 'call')} as it should")
     )
     call = wrong[0] if wrong else next(reversed(made), None)
-    return verdict.about(
-        expected=join_words(f"call {n}: {fields_text(w)}" for n, w in enumerate(params.expect, 1)),
-        measured=verdict.measured or _measured_text(call),
-        citations=(_citation(call, run),),
-    )
+    expected = join_words(f"call {n}: {fields_text(w)}" for n, w in enumerate(params.expect, 1))
+    measured = verdict.measured or _measured_text(call)
+    return verdict.about(expected=expected, measured=measured, citations=(_citation(call, run),))
 
 
 def _judge_service(offer: Offer, package: PackageFacts, run: Run, params: ServiceParams) -> Verdict:
@@ -202,8 +197,7 @@ def _judge_uncalled(
     one = life_of(run, offer.node)
     if one is not None and one.ended_early:
         end = explain_end(one, run, package)
-        message = f"{one.name} ended before {params.service} could be called: {end.cause}"
-        return end.verdict(unjudged, message)
+        return end.verdict(unjudged, f"{one.name} ended before {params.service} could be called: {end.cause}")
     if back := _taken_back(run, params.service, offer.node):
         return back
     return grade_again(f"{params.service} was called {plural(len(made), 'time')} of {len(params.expect)}")
@@ -312,8 +306,7 @@ def _rename_hint(wanted: str, found: str, node: str) -> str:
 
 
 def handler_traceback(run: Run, service: str, call: Exchange) -> Traceback | None:
-    """Return the first traceback of the service's node since a call; of one that was given up, before the next one,
-    whose own it may be."""
+    """Return the first traceback of the service's node since a call; of one that was given up, before the next call."""
     offer = offers(run).get(service)
     one = life_of(run, offer.node) if offer else None
     if one is None:
@@ -334,9 +327,7 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
     kind = one.type.partition("/")[2]
     if one.detail.startswith(MISFIT):
         message = f"{service} cannot be called with {fields_text(one.request)}: {shown(one.detail)}"
-        hint = (
-            f"give srv/{kind}.srv the names and types of the handout, the request above ---, and build again"
-        )
+        hint = f"give srv/{kind}.srv the handout's names and types, the request above ---, and build again"
         return _undivided(package, kind, one) or failed(message, hint=hint)
     if "returned None" in one.detail:
         hint = f"end the callback with return {kind}Response(…)"
@@ -344,9 +335,7 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
         return verdict.model_copy(update={"wrong": "nothing"})
     if "returned invalid value" in one.detail or "wrong number of values" in one.detail:
         message = f"{asked} fails: its callback returns something that is not a {kind}Response ({shown(one.detail)})"
-        return failed(
-            message, hint=f"end the callback with return {kind}Response(…), passing its fields by name"
-        )
+        return failed(message, hint=f"end the callback with return {kind}Response(…), its fields by name")
     owner = life_of(run, offers(run)[service].node)
     if owner is not None and owner.ended_early:
         end = explain_end(owner, run, package)
@@ -363,9 +352,7 @@ def _undivided(package: PackageFacts, kind: str, one: Exchange) -> Verdict | Non
     if own is None or own.fault is None or own.fault.kind != "OtherParts":
         return None
     lines = [field.line for field in own.fields if field.name in one.request]
-    below = (
-        f"below line {max(lines)}" if lines else "between the fields of the request and those of the response"
-    )
+    below = f"below line {max(lines)}" if lines else "between the request's fields and the response's"
     place = FileCitation(file=own.path, line=max(lines, default=None))
     return failed(f"{own.path}: {own.fault.message}", hint=f"write a line `---` {below}", citations=(place,))
 

@@ -92,11 +92,11 @@ def stamps(package: PackageFacts, run: Run, params: StampsParams) -> Verdict:
     )
     span = (found[0].time_ns, found[-1].time_ns) if found else (None, None)
     frame = f", frame_id '{params.frame_id}'" if params.frame_id is not None else ""
-    return verdict.about(
-        expected=f"{_name(params)} of {params.topic} within {significant(params.within_s)} s of the message{frame}",
-        measured=verdict.measured or _ages(found),
-        citations=(cite(run, params.topic, *span),),
+    expected = (
+        f"{_name(params)} of {params.topic} within {significant(params.within_s)} s of the message{frame}"
     )
+    cited = (cite(run, params.topic, *span),)
+    return verdict.about(expected=expected, measured=verdict.measured or _ages(found), citations=cited)
 
 
 def _name(params: StampsParams) -> str:

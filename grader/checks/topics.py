@@ -119,7 +119,6 @@ def _cite_channels(run: Run, channels: tuple[Channel, ...]) -> tuple[Citation, .
 
 
 def _other_definition(channel: Channel, params: TopicTypeParams) -> Verdict | None:
-    """Return the verdict where the publisher's type has the right name and other fields."""
     wanted = params.definition
     differs = other_fields(params.type, channel.definition, wanted) if wanted is not None else ""
     if not differs:
@@ -168,11 +167,9 @@ def only_topics(package: PackageFacts, run: Run, params: OnlyTopicsParams) -> Ve
     else:
         missing = None if published else no_node(package, run, "no topic was published")
         verdict = missing or passed("no topic besides those of the lab is published")
-    return verdict.about(
-        expected=f"no topic besides {join_words(params.topics)}" if params.topics else "no topic at all",
-        measured=verdict.measured or join_words(published) or "no topic",
-        citations=(cite(run, "/grader/graph"),),
-    )
+    expected = f"no topic besides {join_words(params.topics)}" if params.topics else "no topic at all"
+    measured = verdict.measured or join_words(published) or "no topic"
+    return verdict.about(expected=expected, measured=measured, citations=(cite(run, "/grader/graph"),))
 
 
 def _judge_unexpected(
@@ -183,8 +180,7 @@ def _judge_unexpected(
     meant = near_names(first, missing)
     named = join_words(f"{t} ({published[t]})" if published[t] else t for t in unexpected)
     message = f"{_publisher(run, first)} publishes on {named}, which the lab does not ask for"
-    hint = f"did you mean {meant[0]}?" if meant else f"remove the {publisher(first)}"
-    return failed(message, hint=hint)
+    return failed(message, hint=f"did you mean {meant[0]}?" if meant else f"remove the {publisher(first)}")
 
 
 def _publisher(run: Run, topic: str) -> str:
@@ -231,11 +227,8 @@ def latched(package: PackageFacts, run: Run, params: LatchedParams) -> Verdict:
         verdict = passed(f"{join_words(c.callerid for c in channels)} latches {params.topic}")
     kinds = join_words(f"{'latched' if c.latching else 'not latched'} by {c.callerid}" for c in channels)
     topic = params.topic if channels else "/grader/graph"
-    return verdict.about(
-        expected=f"a latched publisher on {params.topic}",
-        measured=verdict.measured or kinds,
-        citations=(cite(run, topic),),
-    )
+    expected = f"a latched publisher on {params.topic}"
+    return verdict.about(expected=expected, measured=verdict.measured or kinds, citations=(cite(run, topic),))
 
 
 ENDS: tuple[End, End] = ("publishers", "subscribers")
@@ -283,11 +276,9 @@ def connected(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdi
     else:
         verdict = _apart(package, run, params)
     over = {c.topic: None for _, e in run.graph for c in e.connections if run.is_student_node(c.publisher)}
-    return verdict.about(
-        expected=f"{ends[0]} connected to {ends[1]} over {params.topic}",
-        measured=verdict.measured or (f"connections over {join_words(over)}" if over else "no connection"),
-        citations=(cite(run, "/grader/graph"),),
-    )
+    expected = f"{ends[0]} connected to {ends[1]} over {params.topic}"
+    measured = verdict.measured or (f"connections over {join_words(over)}" if over else "no connection")
+    return verdict.about(expected=expected, measured=measured, citations=(cite(run, "/grader/graph"),))
 
 
 def _fits(run: Run, node: str, wanted: str) -> bool:
@@ -298,7 +289,6 @@ def _fits(run: Run, node: str, wanted: str) -> bool:
 
 
 def _apart(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdict:
-    """Return why no two nodes are connected: one is missing, or not on the topic, or the types differ."""
     lacking = [end for end in ENDS if not _on(run, params.topic, end, params)]
     for end in lacking:
         if verdict := _judge_misnamed(run, end, params):
@@ -317,7 +307,6 @@ def _apart(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdict:
 
 
 def _judge_misnamed(run: Run, end: End, params: ConnectedParams) -> Verdict | None:
-    """The node is there under another name."""
     wanted, there = (
         params.name(end),
         [n for n in dict.fromkeys(n for _, event in run.graph for n in event.nodes) if not is_grader_node(n)],
@@ -342,7 +331,6 @@ def _not_on_topic(run: Run, end: End, params: ConnectedParams) -> Verdict:
 
 
 def _on(run: Run, topic: str, end: End, params: ConnectedParams) -> tuple[str, ...]:
-    """Return the nodes that fit this end and were ever on the topic."""
     return nodes_on(run, topic, end, lambda node: _fits(run, node, params.name(end)))
 
 

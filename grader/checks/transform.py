@@ -124,11 +124,9 @@ def transform(package: PackageFacts, run: Run, params: TransformParams) -> Verdi
         or passed(f"{params.name} is right in {plural(len(seen), 'message')}")
     )
     topics = dict.fromkeys(one.topic for one in own) or (TOPICS[1] if params.static else TOPICS[0],)
-    return verdict.about(
-        expected=_expected_text(params),
-        measured=verdict.measured or _measured_text(seen, own),
-        citations=tuple(cite(run, topic) for topic in topics),
-    )
+    measured = verdict.measured or _measured_text(seen, own)
+    cited = tuple(cite(run, topic) for topic in topics)
+    return verdict.about(expected=_expected_text(params), measured=measured, citations=cited)
 
 
 def _seen_transforms(run: Run, own: Sequence[Sent], params: TransformParams) -> list[Seen]:
@@ -178,9 +176,7 @@ def _not_sent(
         return failed(message, hint=hint)
     slashed = [edge for edge in edges if tuple(name.lstrip("/") for name in edge) == wanted]
     if slashed:
-        message = (
-            f"the frames are {_edge_words(slashed)}: tf2 does not accept frame names that start with a slash"
-        )
+        message = f"the frames are {_edge_words(slashed)}: tf2 takes no frame names that start with a slash"
         return failed(message, hint=hint)
     if params.through:
         path = [one.parent for one in Tree(sent_on(run.channels)).path(params.child, run.end_ns)]
@@ -190,9 +186,7 @@ def _not_sent(
             else f"nothing is sent about {params.child}"
         )
         message = f"{params.parent} and {params.child} are not connected: {up}; there is {_edge_words(edges)}"
-        return failed(
-            message, hint="every frame has one parent: send the transform that is missing in between"
-        )
+        return failed(message, hint="every frame has one parent: send the one that is missing in between")
     names = {name for edge in edges for name in edge}
     near = [
         f"{wrong} for {name}" for name in wanted if name not in names for wrong in near_names(name, names)
@@ -231,9 +225,7 @@ def _no_rotation(seen: Sequence[Seen], params: TransformParams) -> Verdict | Non
     message = (
         f"the rotation of {params.name} is not a rotation in {len(wrong)} of {plural(len(seen), 'message')}"
     )
-    hint = (
-        "a quaternion without rotation has w = 1.0; quaternion_from_euler(roll, pitch, yaw) gives any other"
-    )
+    hint = "a quaternion without rotation has w = 1.0; quaternion_from_euler(roll, pitch, yaw) gives others"
     length = wrong[0].length
     if length > NO_LENGTH and math.isfinite(length):
         why = f"the length of its quaternion is {significant(length)} and not 1, so that tf ignores it"
@@ -290,9 +282,7 @@ def _axes(value: Transform, wanted: Transform, params: TransformParams) -> tuple
 
     for first, second, at in (("x", "y", (y, x, z)), ("x", "z", (z, y, x)), ("y", "z", (x, z, y))):
         if fits(at):
-            hint = (
-                f"translation.{first} is {first}, and translation.{second} is {second}: look at their order"
-            )
+            hint = f"translation.{first} is {first}, and translation.{second} is {second}: see their order"
             return f"its {first} and {second} are swapped", hint
     for axis, at in (("x", (-x, y, z)), ("y", (x, -y, z)), ("z", (x, y, -z))):
         if fits(at):
@@ -317,7 +307,6 @@ def _poses(run: Run, topic: str) -> list[tuple[int, Transform]]:
 
 
 def _strays(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verdict | None:
-    """Return what is wrong with a transform that has to follow poses."""
     poses, to_s = _poses(run, params.pose_of or ""), run_seconds(run)
     if not poses or to_s is None:
         return no_clock(run) or grade_again(f"no pose came on {params.pose_of}")
@@ -343,7 +332,6 @@ def _strays(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verdict 
 def _candidates(
     at_s: float, poses: Sequence[tuple[float, Transform]], slack_s: float, order_s: float
 ) -> list[Transform]:
-    """Return the poses that a transform of that time may have."""
     # The last pose stays right for as long as no other comes, however long that is.
     last_s = max((t for t, _ in poses if t <= at_s), default=at_s)
     return [pose for t, pose in poses if min(at_s - slack_s, last_s) <= t <= at_s + order_s]

@@ -108,8 +108,7 @@ def copies(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
     names = dict.fromkeys((*trio.first_nodes, *trio.second_nodes))
     graph = cite(run, "/grader/graph")
     measured = verdict.measured or f"names of the copies: {join_words(names) or 'none'}"
-    citations = verdict.citations or (graph,)
-    return verdict.about(expected=expected, measured=measured, citations=citations)
+    return verdict.about(expected=expected, measured=measured, citations=verdict.citations or (graph,))
 
 
 def _trio(package: PackageFacts, run: Run, params: CopiesParams) -> Trio | Verdict:
@@ -150,13 +149,10 @@ def _taken_over(package: PackageFacts, run: Run, trio: Trio, params: CopiesParam
         down = "the first takes it back, and both are shut down"
     message = f"both copies are called {name}, and ROS allows each name once: {down}"
     base = name.strip("/")
-    return partial(
-        params.taken_over_score,
-        message,
-        hint=f"write {init(base, anonymous=True)}, so that each copy has its own name",
-        measured=f"one name for two copies: {name}",
-        citations=(*named_at(package, run, "node-name", base), cite(run, "/grader/graph")),
-    )
+    hint = f"write {init(base, anonymous=True)}, so that each copy has its own name"
+    measured = f"one name for two copies: {name}"
+    lines, graph = named_at(package, run, "node-name", base), cite(run, "/grader/graph")
+    return partial(params.taken_over_score, message, hint=hint, measured=measured, citations=(*lines, graph))
 
 
 def _not_both_alive(package: PackageFacts, run: Run, trio: Trio) -> Verdict | None:
@@ -232,7 +228,6 @@ def _other_words(params: CopiesParams) -> Verdict:
 def _judge_both(
     first: Counter[str], second: Counter[str], printed: Counter[str], trio: Trio, params: CopiesParams
 ) -> Verdict | None:
-    """A pass where both were heard."""
     counts = heard_of(first, second, printed), heard_of(second, first, printed)
     if not all(counts):
         return None
@@ -240,10 +235,8 @@ def _judge_both(
     heard = f"{counts[0]} of {plural(first.total(), 'message')} and {counts[1]} of {second.total()}"
     if first.total() + second.total() > LOOKED_AT:
         heard = f"at least {heard}"
-    return passed(
-        f"{names} run at the same time, and {params.listener} prints messages of both",
-        measured=f"{names}; printed: {heard}",
-    )
+    message = f"{names} run at the same time, and {params.listener} prints messages of both"
+    return passed(message, measured=f"{names}; printed: {heard}")
 
 
 def _unheard(
@@ -271,8 +264,6 @@ def _unheard(
         message = f"{names[0]} and {names[1]} send the same texts, and not all of them are printed twice"
         return unjudged(message, hint=f"put the time into each message: {GET_TIME}")
     lost = names[0] if counts[1] else names[1]
-    message = (
-        f"{names[0]} and {names[1]} run at the same time, but {params.listener} prints nothing of {lost}"
-    )
+    message = f"{names[0]} and {names[1]} run together, but {params.listener} prints nothing of {lost}"
     hint = f"subscribe with a callback and {SPIN}; a subscriber hears every publisher of its topic"
     return unjudged(message, hint=hint)

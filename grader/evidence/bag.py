@@ -86,9 +86,7 @@ def _explain(path: Path, reason: str) -> EvidenceError:
     if "not indexed" in reason:
         return EvidenceError(f"{path}: cut short: it has no index", hint=_REINDEX)
     if "version" in reason and "Bag" in reason:
-        return EvidenceError(
-            f"{path}: a bag of another format than 2.0", hint="`rosbag fix` converts old bags"
-        )
+        return EvidenceError(f"{path}: a bag of another format than 2.0", hint="`rosbag fix` converts it")
     if "encryption" in reason:
         return EvidenceError(f"{path}: an encrypted bag", hint="hand it in without encryption")
     if "Compression" in reason:
@@ -283,9 +281,7 @@ def export_bag(run: Run, path: Path, *, everything: bool = False) -> int:
     found = [*run.channels, *(_grader_channels(run) if everything else ())]
     channels = merge_channels((c for c in found if c.messages), renumber=False)
     if not channels:
-        raise EvidenceError(
-            f"{run.evidence}: holds no messages to export", hint="--all exports its records too"
-        )
+        raise EvidenceError(f"{run.evidence}: holds no messages to export", hint="--all exports its records")
     _check_times(run, channels)
     part = path.with_name(f".{path.name}.part")
     try:
@@ -344,7 +340,6 @@ def _check_times(run: Run, channels: Sequence[Channel]) -> None:
 
 
 def _grader_channels(run: Run) -> Iterator[Channel]:
-    """Yield the grader's own records as channels of text, one for each kind."""
     for field, topic in FIELDS.items():
         texts = [(time_ns, event.model_dump_json()) for time_ns, event in getattr(run, field)]
         if texts:

@@ -13,7 +13,17 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple, TypeAlias
 
-from grader.evidence.definitions import PRIMITIVES, Bound, DefinitionError, Field, Types, bound, parse
+from grader.evidence.definitions import (
+    LETTERS,
+    PRIMITIVES,
+    Bound,
+    DefinitionError,
+    Field,
+    Types,
+    bound,
+    full_name,
+    parse,
+)
 from grader.evidence.run import DECODED_BYTES_MAX
 from grader.installable import noetic_definitions
 from grader.model.message_definitions import RULE
@@ -26,11 +36,6 @@ Read: TypeAlias = Callable[[bytes, int], tuple[Value, int]]
 KEPT_LETTERS_MAX = 8_000
 """What reads messages of longer definitions takes much memory, and is not kept for later."""
 FLOAT32_MAX = (2 - 2**-23) * 2.0**127
-_LETTERS = {
-    "bool": "?", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "int64": "q",
-    "uint64": "Q", "float32": "f", "float64": "d",
-}  # fmt: skip
-"""What `struct` calls ROS's numbers."""
 _LENGTH = struct.Struct("<I")
 
 
@@ -78,8 +83,7 @@ class Encoder:
         self._type, self._types = type, plan.types
 
     def encode(self, value: Mapping[str, Any]) -> bytes:
-        """Return the message's bytes; fields that `value` leaves out are zero. Raises ValueError where it does
-        not fit."""
+        """Return the message's bytes; fields left out are zero. Raises ValueError where the value does not fit."""
         try:
             return b"".join(self._fields(self._type, value))
         except (struct.error, OverflowError) as error:
@@ -109,7 +113,7 @@ class Encoder:
             yield _LENGTH.pack(len(value))
         elif len(value) != field.size:
             raise ValueError(f"{field.name} holds {field.size}, not {len(value)}")
-        if letter := _LETTERS.get(field.type):
+        if letter := LETTERS.get(field.type):
             yield struct.pack(f"<{len(value)}{letter}", *[_check_value(field.type, item) for item in value])
             return
         for item in value:
@@ -124,7 +128,7 @@ def _primitive_bytes(type_: str, value: Value) -> bytes:
     if type_ == "string":
         text: bytes = checked.encode()
         return _LENGTH.pack(len(text)) + text
-    return struct.pack("<" + _LETTERS[type_], checked)
+    return struct.pack("<" + LETTERS[type_], checked)
 
 
 class _Plan(NamedTuple):
@@ -136,18 +140,11 @@ class _Plan(NamedTuple):
 
 
 def _plan(type_: str, definition: str) -> _Plan | None:
-    return (
-        _cached_plan(type_, definition)
-        if len(definition) <= KEPT_LETTERS_MAX
-        else _make_plan(type_, definition)
-    )
+    is_kept = len(definition) <= KEPT_LETTERS_MAX
+    return (_make_plan if is_kept else _make_plan.__wrapped__)(type_, definition)
 
 
 @lru_cache(maxsize=64)
-def _cached_plan(type_: str, definition: str) -> _Plan | None:
-    return _make_plan(type_, definition)
-
-
 def _make_plan(type_: str, definition: str) -> _Plan | None:
     try:
         types = parse(type_, definition)
@@ -178,10 +175,10 @@ class _Readers:
     def _field(self, field: Field) -> Read:
         if field.type == "uint8" and field.array:
             return _sized(field.size, _raw)
-        if field.type in _LETTERS and field.array:
-            return _sized(field.size, _list_of_numbers(_LETTERS[field.type]))
-        if field.type in _LETTERS:
-            return _number(struct.Struct("<" + _LETTERS[field.type]))
+        if field.type in LETTERS and field.array:
+            return _sized(field.size, _list_of_numbers(LETTERS[field.type]))
+        if field.type in LETTERS:
+            return _number(struct.Struct("<" + LETTERS[field.type]))
         one = _text if field.type == "string" else self.of(field.type)
         return _sized(field.size, _list_of(one)) if field.array else one
 
@@ -189,7 +186,7 @@ class _Readers:
 def _as_struct(fields: Sequence[Field]) -> struct.Struct | None:
     """Return how numbers lie in a message that has nothing else; None for any other."""
     # One call of `struct` for all of a message of numbers alone: of these a run has most.
-    letters = [_LETTERS.get(field.type, "") for field in fields if not field.array]
+    letters = [LETTERS.get(field.type, "") for field in fields if not field.array]
     return (
         struct.Struct("<" + "".join(letters))
         if fields and all(letters) and len(letters) == len(fields)
@@ -226,7 +223,6 @@ ReadMany: TypeAlias = Callable[[bytes, int, int], tuple[Value, int]]
 
 
 def _sized(size: int | None, read: ReadMany) -> Read:
-    """Return what reads an array of this size, or one that can grow."""
     if size is not None:
         return lambda data, at: read(data, at, size)
     return lambda data, at: read(data, at + _LENGTH.size, _LENGTH.unpack_from(data, at)[0])
@@ -323,8 +319,7 @@ def full_definition(type_: str, text: str, find_text: FindText) -> str:
             raise ValueError(f"{type_} needs more than {_PARTS_MAX} other types")
         parts[name] = _text_of(name, find_text)
         waiting += _needed_types(parts[name], name.partition("/")[0])
-    sections = [text, *(f"MSG: {name}\n{part}" for name, part in parts.items())]
-    return f"\n{RULE}\n".join(sections)
+    return f"\n{RULE}\n".join([text, *(f"MSG: {name}\n{part}" for name, part in parts.items())])
 
 
 def _text_of(name: str, find_text: FindText) -> str:
@@ -336,10 +331,3 @@ def _text_of(name: str, find_text: FindText) -> str:
 def _needed_types(text: str, package: str) -> list[str]:
     types = (match[1] for line in text.splitlines() if (match := _TYPE.match(line.partition("#")[0])))
     return [full_name(name, package) for name in types if name not in _BUILT_IN]
-
-
-def full_name(name: str, package: str) -> str:
-    """Return the whole name of a type that a definition of `package` names."""
-    if "/" in name:
-        return name
-    return "std_msgs/Header" if name == "Header" else f"{package}/{name}"

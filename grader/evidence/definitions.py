@@ -8,6 +8,7 @@ and field gets a name of ours.
 from __future__ import annotations
 
 import re
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -27,20 +28,13 @@ TEXT_BYTES = 60
 TEXT_GROWTH = 2
 
 PACKAGE = "recorded"
-PRIMITIVES = {
-    "bool": 1,
-    "int8": 1,
-    "uint8": 1,
-    "int16": 2,
-    "uint16": 2,
-    "int32": 4,
-    "uint32": 4,
-    "int64": 8,
-    "uint64": 8,
-    "float32": 4,
-    "float64": 8,
-    "string": 4,
-}
+LETTERS = {
+    "bool": "?", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "int64": "q",
+    "uint64": "Q", "float32": "f", "float64": "d",
+}  # fmt: skip
+"""What `struct` calls ROS's numbers."""
+PRIMITIVES = {**{name: struct.calcsize(f"<{letter}") for name, letter in LETTERS.items()}, "string": 4}
+"""The least bytes of each."""
 _SYNONYMS = {"byte": "int8", "char": "uint8"}
 _CLOCKS = {"time": ("uint32 secs", "uint32 nsecs"), "duration": ("int32 secs", "int32 nsecs")}
 _FIELD = re.compile(
@@ -161,11 +155,16 @@ def _fields(owner: str, lines: tuple[str, ...]) -> Iterator[Field]:
 
 
 def _full_type(owner: str, type_: str) -> str:
-    if type_ in PRIMITIVES or type_ in _CLOCKS or "/" in type_:
+    if type_ in PRIMITIVES or type_ in _CLOCKS:
         return type_
-    if type_ in _SYNONYMS:
-        return _SYNONYMS[type_]
-    return "std_msgs/Header" if type_ == "Header" else f"{owner.split('/', 1)[0]}/{type_}"
+    return _SYNONYMS.get(type_) or full_name(type_, owner.partition("/")[0])
+
+
+def full_name(name: str, package: str) -> str:
+    """Return the whole name of a type that a definition of `package` names."""
+    if "/" in name:
+        return name
+    return "std_msgs/Header" if name == "Header" else f"{package}/{name}"
 
 
 class Bound(NamedTuple):
@@ -231,8 +230,7 @@ class _Bounds:
             return Bound(4, 1, one.levels, OBJECT_BYTES, max(one.growth, -(-each // one.size)))
         at_once = field.primitive and field.type != "string"
         steps = 1 if at_once else 1 + field.size * one.steps
-        taken = OBJECT_BYTES + field.size * each
-        return Bound(field.size * one.size, steps, one.levels, taken, one.growth)
+        return Bound(field.size * one.size, steps, one.levels, OBJECT_BYTES + field.size * each, one.growth)
 
 
 def _primitive(type_: str) -> Bound:

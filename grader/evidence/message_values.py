@@ -11,8 +11,8 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, TypeGuard
 
-from grader.evidence.decode import Decoder, Encoder, FindText, definition, full_definition, full_name
-from grader.evidence.definitions import MAX_DEFINITION_BYTES, PRIMITIVES, Field, parse, sections_of
+from grader.evidence.decode import Decoder, Encoder, FindText, definition, full_definition
+from grader.evidence.definitions import MAX_DEFINITION_BYTES, PRIMITIVES, Field, full_name, parse, sections_of
 from grader.installable import noetic_messages
 from grader.model.message_definitions import DIVIDER, NOT_FINITE
 from grader.wording import did_you_mean, join_words
@@ -132,9 +132,7 @@ def action_texts(type_: str, text: str) -> dict[str, str]:
     """
     parts = DIVIDER.split(text)
     if len(parts) != len(ACTION_PARTS):
-        raise ValueError(
-            f"{type_}: an action has a goal, a result and a feedback with a line --- between them"
-        )
+        raise ValueError(f"{type_}: an action has a goal, a result and feedback with a line --- between them")
     name, found = type_.partition("/")[2], {}
     for (part, about), lines in zip(ACTION_PARTS.items(), parts, strict=True):
         found[f"{type_}{part}"] = lines + "\n"
@@ -261,9 +259,8 @@ def _items(field: Field, value: object) -> list[Any]:
 def _repeat(field: Field, value: Mapping[str, Any]) -> list[Any]:
     """Return the items of `{repeat: .inf, count: 360, except: {"150-210": 0.3}}`; both ends of a span belong to it."""
     if "repeat" not in value or not set(value) <= {"repeat", "count", "except"}:
-        raise ValueError(
-            f'{field.name} is an array: write a list, or {{repeat: 0, count: 3, except: {{"1": 5}}}}'
-        )
+        message = f'{field.name} is an array: write a list, or {{repeat: 0, count: 3, except: {{"1": 5}}}}'
+        raise ValueError(message)
     count = value.get("count", field.size)
     if not isinstance(count, int) or isinstance(count, bool) or not 0 <= count <= ITEMS_MAX:
         raise ValueError(f"count must be a whole number of 0 to {ITEMS_MAX}, not {count!r}")
@@ -293,8 +290,7 @@ def md5_of(type_: str, full: str) -> str:
 
 def _md5(type_: str, parts: Mapping[str, tuple[str, ...]], known: dict[str, str]) -> str:
     if type_ not in known:
-        text = _md5_text(type_, parts, known)
-        known[type_] = hashlib.md5(text.encode(), usedforsecurity=False).hexdigest()
+        known[type_] = hashlib.md5(_md5_text(type_, parts, known).encode(), usedforsecurity=False).hexdigest()
     return known[type_]
 
 

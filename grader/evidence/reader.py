@@ -69,7 +69,13 @@ def load_run(source: Path | BinaryIO, budget: MemoryBudget | None = None) -> Run
     if not isinstance(source, Path):
         name = Path(str(getattr(source, "name", "evidence.mcap"))).name
         return _load(name, BytesIO(source.read(MAX_FILE_BYTES + 1)), budget)
-    with _readable(source), source.open("rb") as file:
+    with _named_errors(source):
+        about = source.stat()
+        if not S_ISREG(about.st_mode):
+            raise EvidenceError(f"{source}: not a file")
+        if about.st_size > MAX_FILE_BYTES:
+            raise EvidenceError(f"{source}: larger than {MAX_FILE_BYTES >> 20} MiB")
+    with _named_errors(source), source.open("rb") as file:
         head = file.read(len(SQLITE_MAGIC))
         file.seek(0)
         if head.startswith(BAG_MAGIC):
@@ -110,10 +116,8 @@ def load_evidence(paths: Sequence[Path]) -> dict[str, Run]:
         if run.foreign and not any(channel.messages for channel in run.channels):
             raise EvidenceError(f"{path}: holds no messages", hint="record while the nodes run")
         if run.scenario in runs:
-            raise EvidenceError(
-                f"{origin[run.scenario]} and {path} both hold the scenario {run.scenario!r}",
-                hint="give the evidence of one submission at a time",
-            )
+            message = f"{origin[run.scenario]} and {path} both hold the scenario {run.scenario!r}"
+            raise EvidenceError(message, hint="give the evidence of one submission at a time")
         runs[run.scenario], origin[run.scenario] = run, path
     return runs
 
@@ -121,9 +125,8 @@ def load_evidence(paths: Sequence[Path]) -> dict[str, Run]:
 def package_facts(run: Run) -> PackageFacts:
     """Return the package facts that the run carries (`package.mcap` does). Raises EvidenceError without any."""
     if run.package_json is None:
-        raise EvidenceError(
-            f"{run.evidence}: holds no package facts", hint="give package.mcap of the same recording"
-        )
+        message = f"{run.evidence}: holds no package facts"
+        raise EvidenceError(message, hint="give package.mcap of the same recording")
     try:
         return PackageFacts.read_json(run.package_json)
     except ValidationError as error:
@@ -141,9 +144,8 @@ def _load(name: str, stream: BinaryIO, budget: MemoryBudget, *, shown: str = "")
     try:
         return _RunBuilder(name, budget, shown).read(stream)
     except ValidationError as error:
-        raise EvidenceError(
-            f"{shown}: a record of the grader's own cannot be read: {_first(error)}"
-        ) from error
+        message = f"{shown}: a record of the grader's own cannot be read: {_first(error)}"
+        raise EvidenceError(message) from error
     except BudgetExceeded as error:
         raise EvidenceError(f"{shown}: {error}", hint=LESS) from error
     except ContainerError as error:
@@ -154,7 +156,6 @@ def _load(name: str, stream: BinaryIO, budget: MemoryBudget, *, shown: str = "")
 
 
 def _damage(stream: BinaryIO) -> tuple[str, str]:
-    """Return what is wrong with the file, and what to do."""
     stream.seek(0)
     head = stream.read(32)
     stream.seek(-min(stream.seek(0, os.SEEK_END), len(MAGIC)), os.SEEK_END)
@@ -175,13 +176,8 @@ def _first(error: ValidationError) -> str:
 
 
 @contextmanager
-def _readable(path: Path) -> Iterator[None]:
+def _named_errors(path: Path) -> Iterator[None]:
     try:
-        about = path.stat()
-        if not S_ISREG(about.st_mode):
-            raise EvidenceError(f"{path}: not a file")
-        if about.st_size > MAX_FILE_BYTES:
-            raise EvidenceError(f"{path}: larger than {MAX_FILE_BYTES >> 20} MiB")
         yield
     except OSError as error:
         raise EvidenceError(f"{path}: {error.strerror or type(error).__name__}") from error
@@ -192,15 +188,12 @@ def _files(paths: Iterable[Path]) -> list[Path]:
     for path in paths:
         inside = _recordings(path) if path.is_dir() else [path]
         if not inside:
-            raise EvidenceError(
-                f"{path}: no evidence (*.mcap, *.bag, *.db3) in this folder or in evidence/ below it"
-            )
+            message = f"{path}: no evidence (*.mcap, *.bag, *.db3) in this folder or in evidence/ below it"
+            raise EvidenceError(message)
         for file in inside:
             found.setdefault(_identity(file), file)
     if not found:
-        raise EvidenceError(
-            "no evidence given", hint="name evidence files or a folder of a graded submission"
-        )
+        raise EvidenceError("no evidence given", hint="name evidence files, or a graded submission's folder")
     return list(found.values())
 
 
@@ -213,7 +206,7 @@ def _identity(file: Path) -> object:
 
 
 def _recordings(folder: Path) -> list[Path]:
-    with _listable(folder):
+    with _named_errors(folder):
         listed = {place: _names(place) for place in (folder, folder / "evidence")}
         for place, names in list(listed.items()):
             listed |= {place / name: _names(place / name) for name in names if OTHER_RUNS.fullmatch(name)}
@@ -231,14 +224,6 @@ def _names(folder: Path) -> list[str]:
 
 def _is_recording(name: str) -> bool:
     return not name.startswith(".") and os.path.splitext(name)[1] in SUFFIXES  # noqa: PTH122 - as above
-
-
-@contextmanager
-def _listable(folder: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise EvidenceError(f"{folder}: {error.strerror or type(error).__name__}") from error
 
 
 class _RunBuilder:
@@ -330,10 +315,8 @@ class _RunBuilder:
         if newer := EVIDENCE.newer(f"{EVIDENCE.name}/{version}"):
             raise EvidenceError(f"{self._shown}: {newer}", hint=UPDATE)
         if version not in READ:
-            raise EvidenceError(
-                f"{self._shown}: evidence of format {version!r}, which no grader wrote",
-                hint="record it again, or copy it again",
-            )
+            message = f"{self._shown}: evidence of format {version!r}, which no grader wrote"
+            raise EvidenceError(message, hint="record it again, or copy it again")
         try:
             scenario, clock = self._metadata["scenario"], self._metadata["clock"]
             return {"scenario": scenario, "clock": clock, "warp": float(self._metadata["warp"])}
@@ -349,9 +332,8 @@ class _RunBuilder:
         for channel in self._channels.values():
             schema, wanted = self._schemas.get(channel.schema_id), SCHEMAS.get(channel.message_encoding)
             if wanted and (schema is None or schema.encoding != wanted):
-                raise EvidenceError(
-                    f"{self._shown}: {_one_line(channel.topic)} has no message definition ({wanted})"
-                )
+                message = f"{self._shown}: {_one_line(channel.topic)} has no message definition ({wanted})"
+                raise EvidenceError(message)
 
     def _ros_channels(self) -> tuple[Channel, ...]:
         foreign = self._metadata is None
@@ -379,7 +361,6 @@ class _RunBuilder:
         )
 
     def _ros2_channel(self, number: int, channel: mcap.Channel) -> Channel:
-        """Return the channel with its messages as ROS 1's."""
         from grader.evidence.ros2 import as_ros1  # noqa: PLC0415 - few submissions hold one
 
         return as_ros1(self._ros_channel(number, channel), channel.metadata.get("offered_qos_profiles", ""))

@@ -210,7 +210,6 @@ def _definitions(bag: sqlite3.Connection) -> dict[str, str]:
 
 
 def _messages(bag: sqlite3.Connection, budget: MemoryBudget) -> dict[int, list[Message]]:
-    """Return the messages by topic, in the order of their times."""
     _columns(bag, "messages")
     found: dict[int, list[Message]] = defaultdict(list)
     for number, at_ns, data in bag.execute("SELECT topic_id, timestamp, data FROM messages"):

@@ -14,6 +14,7 @@ from pathlib import PurePosixPath
 from typing import NamedTuple, TypeVar
 
 from grader.checks.messages import code_of
+from grader.checks.support.cpp_errors import CPP_SUFFIXES
 from grader.checks.support.exit_causes import syntax_hint
 from grader.checks.support.launch import not_executable
 from grader.checks.support.launch_slips import node_slip, own_script
@@ -22,12 +23,12 @@ from grader.checks.support.text import RATE_SLOT, TYPE_SLOT, VALUE_SLOT, in_lang
 from grader.evidence.events import PACKAGE_RUN
 from grader.installable import noetic_messages
 from grader.judging.cited_lines import LINE_CHARS, LINES_READ
-from grader.judging.facts import SOURCES, Facts, language_of
+from grader.judging.facts import Facts, language_of
 from grader.model.package import LaunchFile, PackageFacts
 from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation, Status, Verdict, cited_lines
 from grader.rubric.model import Criterion, Rubric
-from grader.wording import numbers_text, significant
+from grader.wording import on_lines, significant
 
 POINTS_MAX = 3
 _NO_FIELD = re.compile(r"has no attribute '(?P<field>\w+)'.*? \((?P<file>[\w./-]+), line (?P<line>\d+)\)")
@@ -104,7 +105,7 @@ def _nodes(package: PackageFacts, launch: LaunchFile) -> Iterator[_Point]:
 
 def _needs_no_bit(package: PackageFacts, path: str) -> bool:
     """Return whether the build makes a program of it: of a script that it installs, and of a source of C++."""
-    return PurePosixPath(path).suffix in SOURCES or any(
+    return PurePosixPath(path).suffix in CPP_SUFFIXES or any(
         one.call.name == PYTHON and names_script(one, path) for one in installed(package)
     )
 
@@ -164,8 +165,7 @@ def with_own_name(result: CriterionResult, rubric: Rubric, package: PackageFacts
 
 
 def compile_command(verdict: Verdict, main: PackageFacts | None) -> str:
-    """Return the command that shows a script's fault of grammar, where the verdict is lost by that line; "" for any
-    other verdict."""
+    """Return the command that shows a script's syntax error, where the verdict is lost by that line; else ""."""
     if main is None or not verdict.status.is_lost:
         return ""
     faults = (
@@ -180,8 +180,7 @@ def compile_command(verdict: Verdict, main: PackageFacts | None) -> str:
 
 
 def fill_slots(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdict:
-    """Return the verdict; its hint has the text, the rate and the type that the lab wants of the node, where it has
-    slots for them."""
+    """Return the verdict; its hint's slots have the text, the rate and the type that the lab wants of the node."""
     if TYPE_SLOT in verdict.hint:
         scenario = rubric.scenarios.get(criterion.scenario or "")
         sent = {str(probe.topic): probe.type for probe in scenario.probes} if scenario is not None else {}
@@ -213,7 +212,5 @@ def name_other_lines(verdict: Verdict, facts: Facts) -> Verdict:
     others = [n for n, line in enumerate(lines, 1) if n != number and same and same.search(line[:LINE_CHARS])]
     if not others:
         return verdict
-    where = f"line{'s' if len(others) > 1 else ''} {numbers_text(others)}"
-    return verdict.model_copy(
-        update={"hint": f"{verdict.hint}, and correct `{found['field']}` on {where} too"}
-    )
+    hint = f"{verdict.hint}, and correct `{found['field']}` on {on_lines(others)} too"
+    return verdict.model_copy(update={"hint": hint})

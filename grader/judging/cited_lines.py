@@ -24,13 +24,13 @@ from grader.checks.support.scripts import (
     lines_that_transform,
 )
 from grader.evidence.run import Run
-from grader.judging.facts import Facts, names_started, scripts_of, sources_of
+from grader.judging.facts import Facts, names_started, scripts_of, sources_of, starts_of
 from grader.model.package import CMAKE, PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.repair import Repair
 from grader.model.verdict import Citation, FileCitation, Status, Verdict
 from grader.rubric.model import Criterion
-from grader.wording import join_words, lines_text, numbers_text
+from grader.wording import join_words, lines_text, on_lines
 
 LINE_CHARS = 200
 """A longer line stays out of the result."""
@@ -49,25 +49,31 @@ def cite_source(
     """Return the verdict; one on what a node says, sends or asks with the line of the script that does so, if it is
     plain which one that is. `repairs` are those of the copy that was judged."""
     package = facts.package_of(criterion)
-    placed = any(isinstance(one, FileCitation) for one in verdict.citations)
     lost = verdict.status in {Status.PARTIAL, Status.FAIL} and not verdict.unjudged
-    if placed or not lost or package is None or package is not facts.package:
+    if _is_placed(verdict) or not lost or package is None or package is not facts.package:
         return verdict
     paths = scripts_of(criterion, facts.rubric, package) | sources_of(criterion, facts.rubric, package)
     started = names_started(criterion, facts.rubric)
     renamed = (one for one in repairs if one.kind == "file-name")
     paths |= {one.before for one in renamed if PurePosixPath(one.after).name in started}
-    lines = [
-        SourceLine(path, number, text)
-        for path in sorted(paths)
-        for number, text in enumerate(build.file_lines(path)[:LINES_READ], 1)
-        if len(text) <= LINE_CHARS and not text.lstrip().startswith(("#", "//"))
-    ]
+    lines = [one for one in _read(build, paths) if not one.text.lstrip().startswith(("#", "//"))]
     found = _lines_to_blame(verdict, criterion, lines)
     if len(found) != 1:
         return verdict
     place = FileCitation(file=found[0].file, line=found[0].number)
     return verdict.model_copy(update={"citations": (place, *verdict.citations)})
+
+
+def _is_placed(verdict: Verdict) -> bool:
+    """Return whether a line of a file is cited already."""
+    return any(isinstance(one, FileCitation) for one in verdict.citations)
+
+
+def _read(build: Run, paths: Iterable[str]) -> Iterator[SourceLine]:
+    for path in sorted(paths):
+        for number, text in enumerate(build.file_lines(path)[:LINES_READ], 1):
+            if len(text) <= LINE_CHARS:
+                yield SourceLine(path, number, text)
 
 
 def _lines_to_blame(verdict: Verdict, criterion: Criterion, lines: list[SourceLine]) -> list[SourceLine]:
@@ -105,19 +111,13 @@ def _published_of(found: list[SourceLine], lines: list[SourceLine], criterion: C
 def cite_quoted(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run) -> Verdict:
     """Return the verdict; one on a name that a script has in quotes in place of another one cites its lines."""
     package, names = facts.package_of(criterion), verdict.sought_names("quoted")
-    placed = any(isinstance(one, FileCitation) for one in verdict.citations)
-    if package is None or package is not facts.package or not names or placed or not verdict.status.is_lost:
+    lost = verdict.status.is_lost and not _is_placed(verdict)
+    if package is None or package is not facts.package or not names or not lost:
         return verdict
     quoted = re.compile(rf"""(["'])(?:{"|".join(map(re.escape, names))})\1""")
-    paths = sorted(
-        scripts_of(criterion, facts.rubric, package) | sources_of(criterion, facts.rubric, package)
-    )
-    places = [
-        FileCitation(file=path, line=number)
-        for path in paths
-        for number, text in enumerate(build.file_lines(path)[:LINES_READ], 1)
-        if len(text) <= LINE_CHARS and quoted.search(text)
-    ]
+    paths = scripts_of(criterion, facts.rubric, package) | sources_of(criterion, facts.rubric, package)
+    lines = [one for one in _read(build, paths) if quoted.search(one.text)]
+    places = [FileCitation(file=one.file, line=one.number) for one in lines]
     if not 0 < len(places) <= QUOTED_MAX:
         return verdict
     where = join_words(f"line {one.line} of {one.file}" for one in places)
@@ -153,8 +153,7 @@ def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: R
 
 
 def _without_comment_signs(hint: str, found: Mapping[str, tuple[int, int]]) -> str:
-    """Return the hint, with the lines of these calls; of the template's catkin_package(…), which has examples in it, no
-    line is left."""
+    """Return the hint with the lines of these calls; the template's catkin_package(…) goes as a whole."""
     rest = dict(found)
     if CATKIN_PACKAGE_ADDED.search(hint) and len(set(rest.get("catkin_package", ()))) > 1:
         where = lines_text(*rest.pop("catkin_package"))
@@ -181,8 +180,7 @@ def _cite_install(verdict: Verdict, package: PackageFacts, build: Run, called: s
 
 
 def cite_find(verdict: Verdict, criterion: Criterion, package: PackageFacts | None, build: Run) -> Verdict:
-    """Return the verdict; one on a package that roslaunch does not find cites the lines of the launch file that name
-    it."""
+    """Return the verdict; one on a package that roslaunch does not find cites the launch file's lines that name it."""
     absent = verdict.sought_name("package")
     if package is None or not absent or not verdict.status.is_lost:
         return verdict
@@ -194,7 +192,7 @@ def cite_find(verdict: Verdict, criterion: Criterion, package: PackageFacts | No
         lines = [n for n, text in enumerate(build.file_lines(file.path)[:LINES_READ], 1) if name.search(text)]
         if lines:
             of_file = "" if asked is not None else f" of {file.path}"
-            where = f"line{'s' * (len(lines) > 1)} {join_words(map(str, lines))}{of_file}"
+            where = f"{on_lines(lines)}{of_file}"
             hint = f"write the package's exact name on {where}, push {absent} if it is your own, or remove it"
             cited = tuple(FileCitation(file=file.path, line=n) for n in lines)
             return verdict.model_copy(update={"hint": hint, "citations": cited})
@@ -203,21 +201,19 @@ def cite_find(verdict: Verdict, criterion: Criterion, package: PackageFacts | No
 
 def cite_unused_argument(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run) -> Verdict:
     """Return the verdict; one of a run that gives a launch file an argument cites the `<arg>` that nothing uses."""
-    package, scenario = facts.package_of(criterion), facts.rubric.scenarios.get(criterion.scenario or "")
-    placed = any(isinstance(one, FileCitation) for one in verdict.citations)
-    if not verdict.status.is_lost or verdict.unjudged or placed or package is None or scenario is None:
+    package = facts.package_of(criterion)
+    if not verdict.status.is_lost or verdict.unjudged or _is_placed(verdict) or package is None:
         return verdict
-    for start in scenario.start:
+    for start in starts_of(criterion, facts.rubric):
         file = find_launch(package, start.launch or "")
-        for name in (arg.partition(":=")[0] for arg in start.args if file is not None):
-            line = (
-                _unused_argument(name, build.file_lines(file.path)[:LINES_READ]) if file is not None else None
-            )
-            if file is not None and line is not None:
+        if file is None:
+            continue
+        for name in (arg.partition(":=")[0] for arg in start.args):
+            line = _unused_argument(name, build.file_lines(file.path)[:LINES_READ])
+            if line is not None:
                 message = f"{verdict.message}; nothing in {file.path} uses its argument {name}"
-                hint = "; ".join(
-                    filter(None, (f"write `$(arg {name})` where its value belongs", verdict.hint))
-                )
+                fix = f"write `$(arg {name})` where its value belongs"
+                hint = f"{fix}; {verdict.hint}" if verdict.hint else fix
                 cited = (FileCitation(file=file.path, line=line), *verdict.citations)
                 return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
     return verdict
@@ -261,7 +257,7 @@ def cite_name(verdict: Verdict, build: Run) -> Verdict:
 
 def show_lines(verdict: Verdict, build: Run) -> Verdict:
     """Return a verdict whose cited lines have their text; one that loses nothing, or cites none, stays as it is."""
-    if not verdict.status.is_lost or not any(isinstance(c, FileCitation) for c in verdict.citations):
+    if not verdict.status.is_lost or not _is_placed(verdict):
         return verdict
     cited = tuple(_with_text(citation, build) for citation in verdict.citations)
     return verdict.model_copy(update={"citations": cited})
@@ -329,12 +325,12 @@ def lost_fields(lines: Sequence[str], slip: PythonSlip, wanted: str) -> str:
         return ""
     alone = slip.kind == "publisher-type" and sum("Publisher(" in text for text in texts) == 1
     sent = [n for n, text in enumerate(texts, 1) if alone and _sends_several(text)]
-    lines_sent = f"line{'s' if len(sent) > 1 else ''} {numbers_text(sent)} of {slip.file}"
-    single = f"publish one value on {lines_sent}, as {wanted} has only `data`" if sent else ""
+    sent_on = f"{on_lines(sent)} of {slip.file}"
+    single = f"publish one value on {sent_on}, as {wanted} has only `data`" if sent else ""
     if not either or not fields:
         return single
     numbers = [number for number, found in taken if found]
-    where = f"line{'s' if len(numbers) > 1 else ''} {numbers_text(numbers)} of {slip.file}"
+    where = f"{on_lines(numbers)} of {slip.file}"
     value = {"String": "a text", "Bool": "True or False"}.get(wanted, "a number")
     use = "use `data`" if slip.kind == "subscriber-type" else f"put {value} into `data`"
     own = texts[first:last] if wanted == "String" else []
@@ -344,9 +340,7 @@ def lost_fields(lines: Sequence[str], slip: PythonSlip, wanted: str) -> str:
         rf"\b(?:{either})\.\w+ *(?:[-+*/]=|[-*/<>]|\+ *\d|[!=]=)|[-*/<>] *(?:{either})\."
     )
     if sums := [n for n, line in enumerate(own, first + 1) if with_number.search(line)]:
-        text += (
-            f"; leave out the calculation with it on line{'s' if len(sums) > 1 else ''} {numbers_text(sums)}"
-        )
+        text += f"; leave out the calculation with it on {on_lines(sums)}"
     fields = [f"`{one}`" for one in fields]
     named = join_words(fields, most=FIELDS_SHOWN)
     return f"{use}, the only field of {wanted}, in place of {named} on {where}{text}{single and f', and {single}'}"

@@ -15,6 +15,7 @@ from grader.checks.build import run_hint
 from grader.checks.reacts import ReactsParams
 from grader.checks.registry import Check, Evidence
 from grader.checks.support.build_errors import unreadable_file
+from grader.checks.support.cpp_errors import CPP_SUFFIXES
 from grader.checks.support.exit_causes import syntax_hint
 from grader.checks.support.launch_slips import own_script, read_launch
 from grader.checks.support.processes import ended_programs, failed_program, plain_type
@@ -93,15 +94,11 @@ class Facts:
         return Evidence(found, scenario=criterion.scenario, package=package)
 
     def _not_here(self, name: str) -> Verdict:
-        """Return the verdict where one of several packages was not handed in."""
         known = (self.package, *self.others.values())
         found = join_words(one.name for one in known if one is not None)
-        return unjudged(
-            f"package {name} is missing; packages found: {found}",
-            expected=f"a package {name}",
-            measured=f"no package {name}",
-            hint=f"hand in {name} too, beside {self.rubric.package}: its folder, with the package.xml that names it",
-        )
+        message = f"package {name} is missing; packages found: {found}"
+        hint = f"hand in {name} too, beside {self.rubric.package}: its folder, with the package.xml that names it"
+        return unjudged(message, expected=f"a package {name}", measured=f"no package {name}", hint=hint)
 
     def _no_package(self) -> Verdict:
         if not any(run.foreign for run in self.runs.values()):
@@ -129,13 +126,10 @@ class Facts:
         if outcome.outcome == "host":
             why = f": {outcome.detail}" if outcome.detail else ""
             message = f"the run {scenario!r} failed on the grading machine{why}"
-            return inconclusive(
-                message, hint="`grader doctor` shows what this machine lacks; then grade again"
-            )
+            return inconclusive(message, hint="`grader doctor` shows what it lacks; then grade again")
         return self._without_program(run, scenario) or run
 
     def _without_program(self, run: Run, scenario: str) -> Verdict | None:
-        """Return the verdict where a program that the rubric starts beside the student's failed."""
         known = self.rubric.scenarios.get(scenario)
         programs = (
             {start.name: start.program for start in known.start if start.program and not start.is_rostest}
@@ -205,8 +199,7 @@ class Facts:
         return any(not file or file in {PurePosixPath(t).name for t in texts_in(asked)} for asked in asking)
 
     def _unparsed_scripts(self, criterion: Criterion) -> Verdict | None:
-        """Return why Python parses none of the scripts that the criterion names, or, where it names none, that its run
-        starts."""
+        """Return why Python parses none of the scripts that the criterion names, or else that its run starts."""
         known = self.rubric.scenarios.get(criterion.scenario or "")
         required = (one for one in self.rubric.criteria if one.id in criterion.requires)
         if known is None or any(one.scenario == criterion.scenario for one in required):
@@ -273,9 +266,7 @@ def _launch_names(package: PackageFacts) -> set[str]:
 
 
 def _not_in_messages(run: Run) -> Verdict:
-    message = (
-        f"{run.evidence} holds messages, but nothing about the processes and nodes that this criterion judges"
-    )
+    message = f"{run.evidence} holds messages, but nothing of the processes and nodes that are judged"
     return inconclusive(message, hint="hand in the package too, so that its nodes can be run")
 
 
@@ -323,8 +314,7 @@ def with_recordings(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:
 def _run_named(name: str, scenario: Scenario, foreign: list[Run]) -> Run | None:
     by_name = [run for run in foreign if run.scenario == name]
     pattern = PurePosixPath(scenario.recording or "").name
-    fitting = [run for run in foreign if fnmatchcase(run.evidence.casefold(), pattern.casefold())]
-    found = by_name or fitting
+    found = by_name or [run for run in foreign if fnmatchcase(run.evidence.casefold(), pattern.casefold())]
     return found[0] if len(found) == 1 else None
 
 
@@ -336,41 +326,38 @@ def unread_recording(run: Run) -> Verdict | None:
         hint = "record with `rosbag record`, end it with Ctrl-C, and hand the file in"
         return unjudged(message, measured="no recording", hint=hint)
     if RECORDING_PROBLEM in run.metadata:
-        return inconclusive(
-            run.metadata[RECORDING_PROBLEM], hint="hand in one recording that `rosbag info` can read"
-        )
+        fix = "hand in one recording that `rosbag info` can read"
+        return inconclusive(run.metadata[RECORDING_PROBLEM], hint=fix)
     return None
+
+
+def starts_of(criterion: Criterion, rubric: Rubric) -> tuple[Start, ...]:
+    """Return what the criterion's scenario starts."""
+    scenario = rubric.scenarios.get(criterion.scenario or "")
+    return scenario.start if scenario is not None else ()
 
 
 def scripts_of(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> set[str]:
     """Return the paths of the scripts that the criterion's scenario starts."""
-    scenario = rubric.scenarios.get(criterion.scenario or "")
-    named = [start.script for start in scenario.start if start.script] if scenario is not None else []
+    named = [start.script for start in starts_of(criterion, rubric) if start.script]
     return {file.path for path in named if (file := find_script(package, path)) is not None}
-
-
-SOURCES = {".c", ".cc", ".cpp", ".cxx"}
 
 
 def names_started(criterion: Criterion, rubric: Rubric) -> set[str]:
     """Return the names of the programs that the criterion's scenario starts."""
-    scenario = rubric.scenarios.get(criterion.scenario or "")
-    started = scenario.start if scenario is not None else ()
-    return {PurePosixPath(one.script).name for one in started if one.script}
+    return {PurePosixPath(one.script).name for one in starts_of(criterion, rubric) if one.script}
 
 
 def sources_of(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> set[str]:
     """Return the paths of the C++ sources of the programs that the criterion's scenario starts."""
-    scenario = rubric.scenarios.get(criterion.scenario or "")
-    started = scenario.start if scenario is not None else ()
     names = names_started(criterion, rubric)
-    every = any(one.built for one in started)
+    every = any(one.built for one in starts_of(criterion, rubric))
     made = [
         one for one in programs(package) if every or one.target in names or any(map(one.is_called, names))
     ]
     words = {word.rpartition("/")[2] for one in made for word in one.call.args}
     paths = [PurePosixPath(file.path) for file in package.files]
-    return {str(path) for path in paths if path.suffix in SOURCES and path.name in words}
+    return {str(path) for path in paths if path.suffix in CPP_SUFFIXES and path.name in words}
 
 
 def language_of(verdict: Verdict, criterion: Criterion, facts: Facts) -> Language | None:
@@ -423,7 +410,7 @@ def _written_in(package: PackageFacts, path: str) -> Language:
     if file is not None and file.python:
         return "python"
     built = any(name.stem == one.target or one.is_called(name.name) for one in programs(package))
-    return "cpp" if built or name.suffix in SOURCES else "python"
+    return "cpp" if built or name.suffix in CPP_SUFFIXES else "python"
 
 
 RATE_SHARE = 0.05

@@ -214,7 +214,6 @@ def _with_cited_lines(verdict: Verdict, criterion: Criterion, facts: Facts, used
 
 
 def _in_order(rubric: Rubric) -> Iterable[str]:
-    """Return the ids of the criteria, each after those that it requires."""
     return TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order()
 
 
@@ -264,8 +263,7 @@ def _seen_elsewhere(
 
 
 def _with_made_up(rubric: Rubric, criterion: Criterion, verdict: Verdict) -> Verdict:
-    """Return a verdict on what is wrong with where the values come from that the criterion asks for; what has another
-    cause needs no values."""
+    """Return a verdict on what is wrong, without another cause, with where the values come from that are asked for."""
     if verdict.status not in {Status.FAIL, Status.PARTIAL} or verdict.unjudged or verdict.cause:
         return verdict
     hint = tell_made_up(rubric, criterion, verdict.hint, verdict.measured)
@@ -281,8 +279,16 @@ EXPLANATIONS = (
     explain_by_unread_parameter,
     explain_by_misplaced_parameter,
     explain_by_wrong_value,
-    explain_by_waiting_callback,
 )
+
+
+def explain_loss(check: Check, package: PackageFacts | None, run: object, verdict: Verdict) -> Verdict:
+    """Return a lost mark with what explains it in the run as a whole."""
+    if package is None or not isinstance(run, Run):
+        return verdict
+    for explain in EXPLANATIONS if verdict.status.is_lost else ():
+        verdict = explain(check, package, run, verdict)
+    return explain_by_waiting_callback(check, package, run, verdict)  # that may take back an excuse
 
 
 def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> Verdict:
@@ -292,9 +298,8 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
     check = checks.get(criterion.check)
     if check is None:
         message = f"this grader has no check {criterion.check!r}"
-        return Verdict(
-            status=Status.ERROR, score=0.0, message=message, hint="`grader rubric validate` finds this"
-        )
+        hint = "`grader rubric validate` finds this"
+        return Verdict(status=Status.ERROR, score=0.0, message=message, hint=hint)
     try:
         asked = facts.of(check, criterion, check.params.model_validate(criterion.parameters))
         found = (
@@ -304,8 +309,7 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
         )
         if not isinstance(asked, Verdict):
             package, run = facts.package_of(criterion), asked.get("run")
-            for explain in EXPLANATIONS:
-                found = explain(check, package, run, found)
+            found = explain_loss(check, package, run, found)
             own = facts.rubric.starts_of(criterion)
             started = {event.name for _, event in run.processes} if isinstance(run, Run) else set()
             all_of_run = facts.rubric.starts_of(criterion.model_copy(update={"parameters": {}}))
@@ -330,8 +334,7 @@ def _without_git(verdict: Verdict, package: PackageFacts | None) -> Verdict:
 
 
 def _with_package_name(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdict:
-    """Return a verdict on another package than the main one with its name, and files as they lie from the main one's
-    folder."""
+    """Return a verdict on another package than the main one with its name, and its files seen from the main one."""
     main, package = facts.package, facts.package_of(criterion)
     if main is None or package is None or package is main:
         return verdict
@@ -478,8 +481,7 @@ class _Judging:
             self.results[name] = EarlyVerdict(criterion=result, final=final)
 
     def _facts(self, asked: set[str]) -> Facts:
-        """Return the facts; `asked` collects what was looked at that the build makes more precise, or that only a build
-        gives."""
+        """Return the facts; `asked` collects what was looked at that the build refines, or that only a build gives."""
         main, others = views_of(self._rubric, self._package)
         runs = {PACKAGE_RUN: cast("Run", _Watched(UNBUILT, asked))}
         return Facts(

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from grader.checks.messages import code_of
 from grader.checks.support.console_output import probes_on
+from grader.checks.support.cpp_errors import CPP_SUFFIXES
 from grader.checks.support.exit_causes import MAIN, syntax_hint
 from grader.checks.support.launch import NOT_STARTED, refusal, unset_arg_fixes
 from grader.checks.support.launch_connections import find_renaming
@@ -38,14 +39,14 @@ from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.installable import NOTHING_TO_DO, PYTHON_2
 from grader.judging.cited_lines import LINE_CHARS, LINES_READ, LOOPS, OF_DATA, PLACES, loop_spins, lost_fields
-from grader.judging.facts import SOURCES, Facts, is_other_rate, names_started, scripts_of, sources_of
+from grader.judging.facts import Facts, is_other_rate, names_started, scripts_of, sources_of
 from grader.judging.repeats_and_repairs import text_as_handed_in
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.repair import Repair
 from grader.model.verdict import Verdict, cited_lines
 from grader.rubric.model import Criterion, Rubric
-from grader.wording import join_words, numbers_text, significant
+from grader.wording import join_words, on_lines, significant
 
 NAMES_SHOWN = 3
 ASKS = re.compile(r"[^#'\"]*\b(?:raw_)?input\s*\(")
@@ -209,7 +210,7 @@ class Later:
         return self._build.file_lines(path) if self._build is not None else ()
 
     def _texts_of_cpp(self) -> Iterator[PythonSlip]:
-        for path in sorted(path for path in self._paths if PurePosixPath(path).suffix in SOURCES):
+        for path in sorted(path for path in self._paths if PurePosixPath(path).suffix in CPP_SUFFIXES):
             lines = self._lines(path)[:LINES_READ]
             for kind, line, text in texts_of_cpp(text[:LINE_CHARS] for text in lines):
                 yield PythonSlip(file=path, line=line, kind=kind, message=text)
@@ -236,12 +237,8 @@ class Later:
         asked = self._asked() - told
         for file in sorted({path for path, _ in asked}):
             lines = sorted(number for path, number in asked if path == file)
-            where = (
-                f"line {lines[0]} of {file} asks"
-                if len(lines) == 1
-                else f"lines {numbers_text(lines)} of {file} ask"
-            )
-            yield Fix(f"write a value in the code where {where} for input")
+            asks = "asks" if len(lines) == 1 else "ask"
+            yield Fix(f"write a value in the code where {on_lines(lines)} of {file} {asks} for input")
         yield from self._left_over()
 
     def _left_over(self) -> Iterator[Fix]:
@@ -266,8 +263,8 @@ class Later:
         """Sources of C++ that are not there: CMake asks for them only once it has found all packages."""
         calls = cmake_calls(self._package, "add_executable", "add_library")
         words = (word for call in calls for word in call.args[1:])
-        named = dict.fromkeys(word for word in words if PurePosixPath(word).suffix in SOURCES)
-        there = [one.path for one in self._package.files if PurePosixPath(one.path).suffix in SOURCES]
+        named = dict.fromkeys(word for word in words if PurePosixPath(word).suffix in CPP_SUFFIXES)
+        there = [one.path for one in self._package.files if PurePosixPath(one.path).suffix in CPP_SUFFIXES]
         for path in (one for one in named if "$" not in one and self._package.file(one) is None):
             near = near_names(path, there)
             fix = (
@@ -329,8 +326,8 @@ class Later:
             and len({(one.file, one.message) for one in numbers}) == 1
             and is_other_rate(numbers[0], hz)
         ):
-            word, ask = ("lines", "ask") if len(numbers) > 1 else ("line", "asks")
-            where = f"{word} {numbers_text(sorted(one.line for one in numbers))} of {numbers[0].file}"
+            ask = "ask" if len(numbers) > 1 else "asks"
+            where = f"{on_lines(sorted(one.line for one in numbers))} of {numbers[0].file}"
             yield Fix(f"make it {significant(hz)} Hz on {where}, which {ask} for {numbers[0].message} Hz")
         for slip in self._of("not-called"):
             if "sleep" in slip.name:
@@ -500,8 +497,7 @@ class Later:
             told = f"/{slip.message} on" in self._verdict.message and OF_DATA.fullmatch(name)
             others = self._making(slip) if told else ()
             if others:
-                where = f"line{'s' if len(others) > 1 else ''} {numbers_text(others)} of {slip.file}"
-                yield Fix(f"write {name} instead of {slip.message} on {where}")
+                yield Fix(f"write {name} instead of {slip.message} on {on_lines(others)} of {slip.file}")
                 yield from self._fields(name, slip)
 
     def _making(self, slip: PythonSlip) -> list[int]:
@@ -520,7 +516,7 @@ class Later:
 
     def _retype(self, verb: str, wanted: str, slip: PythonSlip) -> Iterator[Fix]:
         others, (package, _, name) = self._making(slip), wanted.partition("/")
-        notes = [f"made on line{'s' if len(others) > 1 else ''} {numbers_text(others)}"] if others else []
+        notes = [f"made on {on_lines(others)}"] if others else []
         known = re.compile(rf"[^#]*\bimport\b.*(\b{name}\b|\*)")
         if not any(known.match(line[:LINE_CHARS]) for line in self._lines(slip.file) or ["import *"]):
             notes.append(f"with `from {package}.msg import {name}` at the top")
@@ -559,7 +555,7 @@ class Later:
             if not could_say(text, sample):
                 yield Fix(f"publish `{code}`", (f"`{code}`",))
         elif not could_say(text, sample):
-            words = in_words(template) if said[0].file.endswith(tuple(SOURCES)) else code
+            words = in_words(template) if said[0].file.endswith(CPP_SUFFIXES) else code
             yield Fix(f"publish `{words}` on {_line(said[0])}, not '{in_source(text)}'")
         elif SECONDS in template and self._of("no-clock"):
             yield Fix(f"publish the time on {_line(said[0])}, `{code}`: the script only counts")

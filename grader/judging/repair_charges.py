@@ -98,8 +98,7 @@ def charge_repairs(
 
 
 def _may_ask_for(found: Verdict, repair: Repair) -> bool:
-    """Return whether a criterion can be lost by what was repaired: by what keeps a script from being started only where
-    that script is named."""
+    """Return whether what was repaired can lose a criterion; what keeps a script from starting, where it is named."""
     return repair.kind not in DONE_BEFORE_RUNS or PurePosixPath(repair.file).name in found.message
 
 
@@ -172,9 +171,8 @@ def charged_verdict(
     is_next = is_next_fault(verdict, copy, repairs) or (blocked and copy.status.is_lost and not copy.unjudged)
     if blocked:
         message = "; ".join(messages_of(repairs))
-        verdict = failed(
-            message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations
-        )
+        cited = verdict.citations
+        verdict = failed(message, expected=copy.expected, measured=verdict.measured, citations=cited)
     further = copy.status is Status.BLOCKED and verdict.unjudged and copy.cause != verdict.cause
     paths = re.findall(r"[\w-]+(?:/[\w.-]+)+", copy.hint)
     told_at_once = paths != [] and all(path in verdict.hint for path in paths)

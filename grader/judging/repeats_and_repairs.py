@@ -56,8 +56,7 @@ OF_ANY_WORDS = AT_ANY_RATE | {"rate", "connected", "launch-connects", "launch-ru
 GENERATION = re.compile(
     r"generate_messages|message_generation|add_(message|service|action)_files|add_executable|\.(msg|srv|action)\b"
 )
-"""Where these are wrong in CMakeLists.txt, a build can succeed that makes nothing of the package's own definitions, or
-another program."""
+"""Where these are wrong in CMakeLists.txt, a build may succeed without the package's definitions or programs."""
 INSTALLING = re.compile(r"\bcatkin_install_python\b|\bPROGRAMS\b")
 
 Runs = dict[str, Run]
@@ -107,8 +106,7 @@ def needs_build(package: PackageFacts | None) -> bool:
 
 
 def programs_of_build(package: PackageFacts) -> set[str]:
-    """Return the paths of the scripts of which the build makes programs: neither their bit nor their first line is
-    used."""
+    """Return the paths of the scripts of which the build makes programs: neither their bit nor first line is used."""
     named = [one for one in installed(package) if one.call.name == PYTHON]
     return {file.path for file in package.files if any(names_script(one, file.path) for one in named)}
 
@@ -356,7 +354,6 @@ def is_first_line_added(repair: Repair, rubric: Rubric, repairs: Iterable[Repair
 
 
 def _started_files(scenario: Scenario) -> set[str]:
-    """Return the names of the files that the scenario starts."""
     return {PurePosixPath(path).name for s in scenario.start for path in (s.script, s.launch) if path}
 
 
@@ -419,8 +416,7 @@ def text_as_handed_in(text: str, repairs: Sequence[Repair], alone: str = "") -> 
 
 
 def repairs_as_handed_in(needed: Iterable[Repair], repairs: Iterable[Repair]) -> tuple[Repair, ...]:
-    """Return the repairs with the names that their files have in the package as it is: on the copy, a file may have
-    got its right name first."""
+    """Return the repairs with their files' names in the package as it is: the copy may have renamed them first."""
     names = {new: old for old, new in _renamed(repairs).items()}
     old = ((one, names.get(one.file, one.file)) for one in needed)
     return tuple(

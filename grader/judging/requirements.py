@@ -120,7 +120,6 @@ class Requirements:
 
 
 def _graph_names(criterion: Criterion) -> set[str]:
-    """Return the topics, services and nodes that the criterion asks for."""
     return {text for text in texts_in(criterion.parameters) if text.startswith("/")}
 
 

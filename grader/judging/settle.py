@@ -126,7 +126,6 @@ def _apply(
 
 
 def _is(earlier: AppliedOverride, override: Override) -> bool:
-    """Return whether it is the same decision."""
     return all(getattr(earlier, name) == getattr(override, name) for name in Override.model_fields)
 
 
@@ -146,8 +145,7 @@ def _decide(criterion: CriterionResult, override: Override | None, digits: int) 
 
 
 def deadline_of(rubric: Rubric, extension_days: float = 0.0) -> datetime | None:
-    """Return the rubric's deadline with one submission's extension, in its time zone; None where the rubric has
-    none."""
+    """Return the rubric's deadline with one submission's extension, in its time zone; None where it has none."""
     if rubric.deadline is None:
         return None
     moved = rubric.deadline.astimezone(timezone.utc) + timedelta(days=extension_days)

@@ -15,6 +15,7 @@ from typing import Literal
 
 from grader import __version__
 from grader.evidence.run import Run
+from grader.judging.facts import starts_of
 from grader.model.package import PackageFacts
 from grader.model.result import (
     CriterionResult,
@@ -181,8 +182,7 @@ def criteria_text(results: Sequence[CriterionResult], *, ascii_only: bool = Fals
 def judged_text(
     rubric: Rubric, judged: Iterable[tuple[str, Sequence[CriterionResult] | str]], *, ascii_only: bool = False
 ) -> str:
-    """Return several submissions as JSON, each with its points and criteria, or with the error that kept it from
-    them."""
+    """Return several submissions as JSON, each with its points and criteria, or with the error in their place."""
     return json_text([_about(rubric, name, found) for name, found in judged], ascii_only=ascii_only)
 
 
@@ -285,8 +285,7 @@ def _is_named(path: str, names: Collection[str]) -> bool:
 
 def _programs(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> Iterator[str]:
     """Yield the names of the student's programs in the criterion's run: of its process, where it judges one."""
-    scenario = rubric.scenarios.get(criterion.scenario or "")
-    starts = scenario.start if scenario is not None else ()
+    starts = starts_of(criterion, rubric)
     process = criterion.parameters.get("process")
     for start in [one for one in starts if one.name == process] or starts:
         if start.script is not None:

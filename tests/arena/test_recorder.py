@@ -274,4 +274,4 @@ def test_a_run_says_how_many_messages_it_dropped_and_so_do_its_verdicts(tmp_path
     check = CHECKS["counter-step"]
     verdict = account_for_losses(check, asked, check.function(**asked))
     assert verdict.status.value == "pass"
-    assert verdict.measured.endswith("; the recorder kept 1000 messages of /numbers and dropped 7000")
+    assert verdict.measured.endswith("; the recorder kept 1000 messages of /numbers, dropped 7000")

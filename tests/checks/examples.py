@@ -17,7 +17,7 @@ from grader.checks import CHECKS
 from grader.checks.support.text import in_language
 from grader.checks.support.topics import account_for_losses
 from grader.evidence.run import Run
-from grader.judging.judge import EXPLANATIONS
+from grader.judging.judge import explain_loss
 from grader.model.message_definitions import parse_interface
 from grader.model.package import PackageFacts
 from grader.model.verdict import Status, Verdict
@@ -106,8 +106,7 @@ def judge_runs(name: str, params: dict[str, Any], runs: dict[str, Run]) -> Verdi
     }
     asked = {fact: facts[fact] for fact in check.facts}
     verdict = account_for_losses(check, asked, check.function(**asked))
-    for explain in EXPLANATIONS:
-        verdict = explain(check, facts["package"], facts["run"], verdict)
+    verdict = explain_loss(check, facts["package"], facts["run"], verdict)
     return verdict.model_copy(update={"hint": in_language(verdict.hint, "python")})
 
 

@@ -55,4 +55,4 @@ def test_what_was_not_recorded(check: str, params: dict[str, Any]) -> None:
     found = verdict(check, params)
     assert found.unjudged
     assert found.message.startswith("/map is not in ")
-    assert found.hint.endswith("record it: rosbag record /map, or -a for all topics")
+    assert found.hint.endswith("record it: rosbag record /map, or -a for all")

@@ -44,7 +44,7 @@ def test_the_messages_of_an_action() -> None:
     for name, text in texts.items():
         full = full_definition(name, text, texts.get)
         assert md5_of(name, full) == md5sum(name)
-    with pytest.raises(ValueError, match="lab/Test: an action has a goal, a result and a feedback"):
+    with pytest.raises(ValueError, match="lab/Test: an action has a goal, a result and feedback"):
         action_texts("lab/Test", "int32 goal\n---\nint32 result\n")
 
 

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import PurePosixPath
 
-from grader.checks.support.build_output import FIRST_ERROR_HINT, BuildError, Explained, folder_names
+from grader.checks.support.build_output import (
+    FIRST_ERROR_HINT,
+    BuildError,
+    Explain,
+    Explained,
+    folder_names,
+    told,
+)
 from grader.checks.support.cpp_errors import (
     CPP_ERRORS,
     CPP_SUFFIXES,
@@ -40,7 +47,7 @@ from grader.model.package import (
     meant_command,
 )
 from grader.model.verdict import FileCitation
-from grader.wording import is_word_of, join_words, numbers_text, there_is
+from grader.wording import is_word_of, join_words, on_lines, there_is
 
 ALWAYS_THERE = ("catkin", "rospy", "roscpp", "std_msgs")
 ONE_EDIT = 0.88
@@ -97,8 +104,7 @@ def move_into(folder: str) -> str:
 
 
 def unreadable_file(package: PackageFacts) -> Explained | None:
-    """Return what is wrong with `package.xml`, else `CMakeLists.txt`, where it cannot be read, so that nothing is
-    built."""
+    """Return what is wrong with `package.xml`, else `CMakeLists.txt`, where nothing is built because of it."""
     of_cmake = package.cmake.fault if package.cmake is not None else None
     fault = next((f for f in (package.manifest_fault, of_cmake) if f and f.kind != "Missing"), None)
     if fault is None:
@@ -228,13 +234,6 @@ def _missing_folder(found: re.Match[str], package: PackageFacts, _lines: Sequenc
     return Explained(why, f"put your .{folder} files into {folder}/ and push them, or remove {call}(…)")
 
 
-def _missing_include(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    folder = found[1].rstrip("/")
-    why = f"catkin_package(…) names the folder {folder}/, which is not in the package"
-    fix = f"remove INCLUDE_DIRS {folder}: it is for C++ header files, and git keeps no empty folder"
-    return Explained(why, f"{fix}; or put them into {folder}/ and push them")
-
-
 def _missing_launch(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     path, call = _below(found[1], package), "roslaunch_add_file_check(…)"
     if posixpath.splitext(path)[1]:
@@ -259,10 +258,7 @@ def _calls_of_targets(package: PackageFacts, made: Sequence[CMakeCall], absent: 
     """Return how the targets that are built of nothing but absent files are left out: all of their calls."""
     targets = {c.args[0] for c in made if c.args and set(_sources(c)) and set(_sources(c)) <= set(absent)}
     lines = {c.line for c in cmake_calls(package, *OF_TARGETS) if c.args and c.args[0] in targets}
-    words = "line" if len(lines) == 1 else "lines"
-    return (
-        f"delete what is built from them: the calls on {words} {numbers_text(sorted(lines))}" if lines else ""
-    )
+    return f"delete what is built from them: the calls on {on_lines(sorted(lines))}" if lines else ""
 
 
 def _sources(call: CMakeCall) -> list[str]:
@@ -270,8 +266,7 @@ def _sources(call: CMakeCall) -> list[str]:
 
 
 def no_types(package: PackageFacts) -> Explained | None:
-    """Return what is wrong with the fields of the package's own definitions whose types there are none of; None where
-    there are all."""
+    """Return which fields of the package's own definitions have types that do not exist; None where all do."""
     own = {posixpath.basename(one.path).partition(".")[0] for one in package.interfaces}
     faults = [one.fault for one in package.interfaces if one.fault is not None]
     wrong = [
@@ -327,11 +322,6 @@ def _unfound_dependency(found: re.Match[str], package: PackageFacts, _lines: Seq
     return Explained(why, f"write {name} after COMPONENTS in the find_package(…){where}{more}")
 
 
-def _before_catkin_package(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    why = f"{found[1]}() is called after catkin_package()"
-    return Explained(why, f"move {found[1]}(…) above catkin_package(…)")
-
-
 def _late_project(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     """CMake gives a name of its own to what comes before `project(…)`."""
     call = next(iter(cmake_calls(package, "project")), None)
@@ -366,11 +356,6 @@ def _misplaced(call: str, package: PackageFacts, ending: str) -> Explained | Non
         why = f"{call}(…) looks for {posixpath.basename(there[0])} in {folder}/, and it is {there[0]}"
         return Explained(why, f"make the folder {folder}/, if there is none, and move {there[0]} into it")
     return None
-
-
-def _generated_before(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    why = f"{found[1]}(…) is called after generate_messages(…)"
-    return Explained(why, f"move {found[1]}(…) above generate_messages(…)")
 
 
 def _missing_script(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -447,11 +432,6 @@ def _missing_dependency(found: re.Match[str], package: PackageFacts, _lines: Seq
     return Explained(why, hint, uncalled="generate_messages")
 
 
-def _depends(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    why = f"DEPENDS in catkin_package(…) names {found[1]}, which is not a library that find_package(…) found"
-    return Explained(why, f"take {found[1]} out of DEPENDS; ROS packages go after CATKIN_DEPENDS")
-
-
 def _run_dependency(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     name = found[1]
     tag = "run_depend" if package.manifest and package.manifest.format == 1 else "exec_depend"
@@ -459,11 +439,6 @@ def _run_dependency(found: re.Match[str], package: PackageFacts, _lines: Sequenc
     return Explained(
         why, f"add <{tag}>{name}</{tag}> to package.xml, or take {name} out of catkin_package(…)"
     )
-
-
-def _build_dependency(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    why = f"find_package(…) names {found[1]}, and package.xml does not declare it as a build dependency"
-    return Explained(why, f"add <build_depend>{found[1]}</build_depend> to package.xml")
 
 
 def _unused_argument(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -556,7 +531,7 @@ def _not_catkin(found: re.Match[str], package: PackageFacts, _lines: Sequence[st
     return Explained(f"{package.manifest.file} is for a ROS 2 package", "make a package for ROS 1")  # type: ignore[union-attr]
 
 
-_EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str]], Explained]], ...] = (
+_EXPLAINED: tuple[tuple[str, Explain], ...] = (
     (
         r'Could not find a package configuration file provided by "([\w-]+(?:[,;.:][\w,;.:-]*)?)"',
         _missing_package,
@@ -569,15 +544,28 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
         _missing_message,
     ),
     (r"catkin_install_python\(\) called with non-existing file '([^']+)'", _missing_script),
-    (r"catkin_package\(\)(?: absolute)? include dir '([^']+)' does not exist", _missing_include),
+    (
+        r"catkin_package\(\)(?: absolute)? include dir '([^']+?)/*' does not exist",
+        told(
+            "catkin_package(…) names the folder {1}/, which is not in the package",
+            "remove INCLUDE_DIRS {1}: it is for C++ header files, and git keeps no empty folder; "
+            "or put them into {1}/ and push them",
+        ),
+    ),
     (r"roslaunch_add_file_check\(\) path '([^']+)' was not found", _missing_launch),
     (r"Cannot find source file: (\S+)", _missing_source),
     (r"Could not find messages which '([^']+)' depends on", _message_of_another),
     (r"Messages depends on unknown pkg: ([\w-]+)", _unfound_dependency),
     (r"(Invalid declaration|is not a legal message|InvalidMsgSpec|MsgNotFound)", _no_definition),
     (r"genaction\.py", _no_definition),
-    (r"generate_messages\(\) must be called after (\w+)\(\)", _generated_before),
-    (r"(generate_messages)\(\) must be called before catkin_package\(\)", _before_catkin_package),
+    (
+        r"generate_messages\(\) must be called after (\w+)\(\)",
+        told("{1}(…) is called after generate_messages(…)", "move {1}(…) above generate_messages(…)"),
+    ),
+    (
+        r"(generate_messages)\(\) must be called before catkin_package\(\)",
+        told("{1}() is called after catkin_package()", "move {1}(…) above catkin_package(…)"),
+    ),
     (r"You must call project\(\) before calling (\w+)\(\)", _late_project),
     (r"does not match current PROJECT_NAME '([^']*)'", _other_project),
     (UNKNOWN_COMMAND + r' "(\w+)"', _unknown_command),
@@ -587,11 +575,20 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (NO_TARGET, _missing_dependency),
     (
         r"catkin package '([^']+)' has been find_package\(\)-ed but is not listed as a build",
-        _build_dependency,
+        told(
+            "find_package(…) names {1}, and package.xml does not declare it as a build dependency",
+            "add <build_depend>{1}</build_depend> to package.xml",
+        ),
     ),
     (r"catkin_package\(\) called with unused arguments: (\S+)", _unused_argument),
     (r"catkin_package\(\) DEPENDS on the catkin package '([^']+)' which must", _run_dependency),
-    (r"catkin_package\(\) DEPENDS on (?:the catkin package )?'([^']+)'", _depends),
+    (
+        r"catkin_package\(\) DEPENDS on (?:the catkin package )?'([^']+)'",
+        told(
+            "DEPENDS in catkin_package(…) names {1}, which is not a library that find_package(…) found",
+            "take {1} out of DEPENDS; ROS packages go after CATKIN_DEPENDS",
+        ),
+    ),
     (r"(?<![\w+/.-])(\w+)/(\w+)\.h: No such file or directory", _header_race),
     (r"cannot find -l(\S+?)(?::|$)", missing_link),
     (r"([\w+./-]+): No such file or directory", missing_header),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from grader.checks.support.scripts import path_in_package
@@ -51,6 +51,20 @@ class Explained(NamedTuple):
     uncalled: str = ""
 
 
+Explain = Callable[[re.Match[str], PackageFacts, Sequence[str]], Explained]
+"""From what was found in an error, the package and the build's lines to the error in a student's words."""
+
+
+def told(why: str, hint: str) -> Explain:
+    """Return what explains an error in these words; {0} stands for all of it, {1} for the pattern's first group."""
+
+    def explain(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+        printed = (found.string, *found.groups())
+        return Explained(why.format(*printed), hint.format(*printed))
+
+    return explain
+
+
 def first_error(lines: Sequence[str], package: PackageFacts) -> BuildError | None:
     """Return the first line that fits: a compiler's error comes before make's summary of it."""
     for index, line in enumerate(lines):
@@ -65,11 +79,8 @@ def first_error(lines: Sequence[str], package: PackageFacts) -> BuildError | Non
             return BuildError("cmake", shown(text), place)
         if match := _COMPILER_ERROR.match(line):
             place = _own_line(package, match["file"], int(match["line"]))
-            name = (
-                ""
-                if match["file"].startswith(SYSTEM)
-                else f"{posixpath.basename(match['file'])}:{match['line']}: "
-            )
+            where = f"{posixpath.basename(match['file'])}:{match['line']}: "
+            name = "" if match["file"].startswith(SYSTEM) else where
             return BuildError("compiler", shown(name + match["text"]), place)
     other = next((m["text"] for m in map(_OTHER_ERROR.match, lines) if m), None)
     return BuildError("other", shown(other), None) if other else None

@@ -162,9 +162,7 @@ def _other_pace(told: Sequence[float], span_s: float) -> Verdict:
     if all(b - a == 1 for a, b in pairwise(told)):
         message = f"the number in the messages counts them ({_plain(told[0])}, {_plain(told[1])}, …) and is not a time"
         return failed(message, hint=ASK_AGAIN)
-    message = (
-        f"the number in the messages grows by {_plain(growth)} in {span_s:.1f} s: it is not a time in seconds"
-    )
+    message = f"the number in the messages grows by {_plain(growth)} in {span_s:.1f} s: not a time in seconds"
     return failed(f"{message} ({plural(len(told), 'message')})", hint=ASK_AGAIN)
 
 
@@ -211,8 +209,7 @@ class Lateness(NamedTuple):
         return (self.busy or 0.0) >= FULL
 
     def reason(self, max_ms: float, p95_ms: float = math.inf) -> str:
-        """Return what was the matter with the machine, `busy` or `late itself, by up to 80 ms`; "" where it was late by
-        less than this."""
+        """Return what the machine was, `busy` or `late itself, by up to 80 ms`; "" where it was less late than this."""
         if self.full:
             return "busy"
         late = self.max_ms >= max_ms or self.p95_ms >= p95_ms

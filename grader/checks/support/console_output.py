@@ -343,8 +343,7 @@ class Logged(NamedTuple):
 
 
 def logged_by(run: Run, nodes: Collection[str]) -> tuple[Logged, ...]:
-    """Return the log messages of these nodes by time; of all nodes in another tool's recording, which knows no
-    graph."""
+    """Return the log messages of these nodes by time; all of them in another tool's recording, which knows no graph."""
     found = [
         Logged(
             t,
@@ -402,6 +401,11 @@ class Traceback(NamedTuple):
         """Those outside Python's and ROS's own code, the innermost last."""
         return tuple(f for f in self.frames if not f.in_library)
 
+    @property
+    def innermost(self) -> Frame:
+        """The innermost of these; one without a file where there is none."""
+        return self.own_frames[-1] if self.own_frames else Frame("", 0)
+
 
 def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
     """Return every traceback, also the bare `File …` form of a syntax error. One that was cut short is left out."""
@@ -443,8 +447,7 @@ def unpack_traceback(line: str) -> list[str]:
 
 
 def _followed_by_syntax_error(lines: Sequence[str]) -> list[bool]:
-    """For each line whether only indented ones come, then the name of a syntax error: one of the script itself has no
-    heading."""
+    """For each line whether only indented ones come, then a syntax error's name: that of the script has no heading."""
     found, named = [False] * len(lines), False
     for index in range(len(lines) - 1, -1, -1):
         found[index], line = named, lines[index]

@@ -150,8 +150,7 @@ class Wrong(NamedTuple):
 
 
 def wrong_steps(count: Count, run: Run, *, maximum: int, rate_hz: float) -> Wrong:
-    """Return the wrong ones of `steps_to_judge`. Where the counter falls by more than one, it may have started again:
-    that is no such step."""
+    """Return the wrong ones of `steps_to_judge`; a fall by more than one may be a new start, and is none."""
     wrong = tuple(s for s in steps_to_judge(count, maximum) if s.change in {0, -1} or s.change > 1)
     skips = tuple(s for s in wrong if s.change > 1)
     usual = count.usual_step()
@@ -399,12 +398,9 @@ def _judge_death(count: Count, run: Run, package: PackageFacts, params: WrapPara
         high = next((one for one in limits if int(one.message) > params.maximum), None)
         first = next((one for one in limits if one.fix), None)
         if first is not None:
-            why = (
-                f"{message}; line {first.line} calculates the `%` before the `+`, so the counter never wraps"
-            )
-            return failed(
-                why, hint=f"on line {first.line}, {first.fix}", citations=(first.place, *end.citations)
-            )
+            why = f"{message}; line {first.line} computes the `%` before the `+`, so the counter never wraps"
+            fix = f"on line {first.line}, {first.fix}"
+            return failed(why, hint=fix, citations=(first.place, *end.citations))
         if high is not None and last == params.maximum:
             hint = _limit_hint(high, params)
             return failed(f"{message}; line {high.line} compares the counter with {high.message}", hint=hint)
@@ -433,9 +429,7 @@ def _silent(count: Count, run: Run, package: PackageFacts, params: WrapParams) -
         return None
     found = [t for one in lives(run) for t in process_tracebacks(run, one.name)]
     cause = f": {explain_traceback(found[-1], package).cause}" if found else ""
-    message = (
-        f"the node stops publishing after {significant(count.values[-1])}, although it keeps running{cause}"
-    )
+    message = f"the node stops publishing after {significant(count.values[-1])}, but keeps running{cause}"
     verdict = failed(message, hint=params.reset_hint) if len(count.values) > 1 else unjudged(message)
     return verdict if found else verdict.if_repeated()
 
@@ -446,9 +440,8 @@ def _too_few(count: Count, good: list[Step], run: Run, params: WrapParams) -> Ve
     wrong = any(s.change in {0, -1} or s.change > 1 for s in count.steps)
     outcome = run.outcome.outcome if run.outcome else None
     if good and outcome == "complete" and all(s.change in {0, 1} or s in good for s in count.steps):
-        return passed(
-            f"after {significant(good[0].before)} comes {params.minimum}; values repeat, so only {seen}"
-        )
+        told = f"after {significant(good[0].before)} comes {params.minimum}; values repeat, so only {seen}"
+        return passed(told)
     if count.is_flood(run, params.rate_hz) or wrong:
         message = f"{params.wraps} resets were not seen: {seen}, which do not count up one by one"
         return unjudged(message, hint="first make the counter go up by one at its rate")

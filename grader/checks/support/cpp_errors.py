@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
-from grader.checks.support.build_output import FIRST_ERROR_HINT, Explained
+from grader.checks.support.build_output import FIRST_ERROR_HINT, Explain, Explained, told
 from grader.checks.support.scripts import cmake_calls
 from grader.checks.support.text import near_names
 from grader.installable import ON_THE_MACHINE
@@ -43,35 +43,17 @@ def _no_semicolon_above(found: re.Match[str], _package: PackageFacts, lines: Seq
     return Explained(f"{found.string}: a `;` is missing above it", hint)
 
 
-def _no_brace(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    return Explained(
-        f"{found.string}: a `}}` is missing",
-        "write a `}` for each `{`; the indentation shows where one is missing",
-    )
-
-
 def _explain_undeclared(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
     name, near = found[1], found[2]
     if re.fullmatch(r"_\d", name) and any("boost::bind" in line for line in lines):
         return _no_placeholder(name)
-    if re.fullmatch(r"_\d", name) and any("std::bind" in line for line in lines):
-        return Explained(
-            found.string, f"write std::placeholders::{name}, and #include <functional> at the top"
-        )
-    if name in STANDARD:
-        return Explained(found.string, f"write std::{name}, and #include <{STANDARD[name]}> at the top")
+    is_bound = re.fullmatch(r"_\d", name) is not None and any("std::bind" in line for line in lines)
+    if is_bound or name in STANDARD:
+        whole, header = (f"placeholders::{name}", "functional") if is_bound else (name, STANDARD[name])
+        return Explained(found.string, f"write std::{whole}, and #include <{header}> at the top")
     declare = f"declare {name} above that line, or include the header that does"
-    return Explained(
-        found.string,
-        f"write {near} there, if that is what you mean; otherwise {declare}" if near else declare,
-    )
-
-
-def _standard_type(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    name = found[1]
-    if name not in STANDARD:
-        return Explained(found.string, f"declare {name} above that line, or include the header that does")
-    return Explained(found.string, f"write std::{name}, and #include <{STANDARD[name]}> at the top")
+    meant = f"write {near} there, if that is what you mean; otherwise {declare}"
+    return Explained(found.string, meant if near else declare)
 
 
 def other_namespace(found: re.Match[str], package: PackageFacts, _lines: Sequence[str] = ()) -> Explained:
@@ -92,17 +74,13 @@ def _no_message(found: re.Match[str], _package: PackageFacts, lines: Sequence[st
     if kind.endswith("*"):
         why = f"{where}a callback takes a plain pointer, `{kind}`, and ROS has none to give it"
         return Explained(why, f"write `const {bare}::ConstPtr&` as the type of what the callback takes")
-    return Explained(
-        f"{where}`{kind}` is not the type of a message", "write the type of the topic's messages"
-    )
+    return Explained(f"{where}`{kind}` is no message type", "write the type of the topic's messages")
 
 
 def _no_placeholder(name: str) -> Explained:
     """The Boost of ROS Noetic knows `_1` by itself, and later ones do not."""
     why = f"{name} in boost::bind(…) is unknown to this grading machine's Boost, which is newer than ROS Noetic's"
-    hint = (
-        f"{ON_THE_MACHINE}build it with ROS Noetic's own Boost; boost::placeholders::{name} works with both"
-    )
+    hint = f"{ON_THE_MACHINE}build it with ROS Noetic's Boost; boost::placeholders::{name} works with both"
     return Explained(why, hint, of_machine=True)
 
 
@@ -112,23 +90,18 @@ def _explain_subscription(found: re.Match[str], _package: PackageFacts, _lines: 
     why = "subscribe(…) does not take this callback"
     if "lambda" in given or "bind" in given.lower():
         kind = "a lambda" if "lambda" in given else "what bind(…) makes"
-        return Explained(
-            f"{why}: {kind} does not tell it the message's type",
-            "write the type behind subscribe: nh.subscribe<std_msgs::String>(…), with your own type",
-        )
+        hint = "write the type behind subscribe: nh.subscribe<std_msgs::String>(…), with your own type"
+        return Explained(f"{why}: {kind} does not tell it the message's type", hint)
     if method := re.search(r"\((\w+)::\*\)", given):
-        return Explained(
-            f"{why}: a method of {method[1]} needs its object",
-            f"give the object behind the method: `this` in a method of {method[1]}, elsewhere the address of one",
-        )
+        fix = f"give the object behind the method: `this` in a method of {method[1]}, elsewhere the address of one"
+        return Explained(f"{why}: a method of {method[1]} needs its object", fix)
     return Explained(found.string, FIRST_ERROR_HINT)
 
 
 def _no_address(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     method = re.sub(r"\(.*", "", found[1]).split()[-1]
-    return Explained(
-        found.string, f"write &{method} where you give it to another function, without brackets behind it"
-    )
+    hint = f"write &{method} where you give it to another function, without brackets behind it"
+    return Explained(found.string, hint)
 
 
 def _no_type(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -136,10 +109,6 @@ def _no_type(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]
     near = near_names(found[2], ("Request", "Response"))
     hint = f"write {found[1]}::{near[0]}" if near else f"look up the name of that part of {found[1]}"
     return Explained(f"there is no {found[2]} in {found[1]}", hint)
-
-
-def _no_member(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    return Explained(found.string, f"write {found[2]} in place of {found[1]}")
 
 
 def _explain_unlinked(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -165,11 +134,6 @@ def call_below(program: str, command: str, words: str) -> str:
     return f"{command}({program} {words}) below its add_executable(…)"
 
 
-def _main_twice(_found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    why = "two sources of one program have a `main` function"
-    return Explained(why, "write a separate add_executable(…) for each program")
-
-
 def _missing_target(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     name = found[1]
     why = f"it names the target {name}, which no add_executable(…) or add_library(…) above it makes"
@@ -186,21 +150,35 @@ def _missing_target(found: re.Match[str], package: PackageFacts, _lines: Sequenc
     return Explained(why, f"take that line out, or make {name} above it")
 
 
-CPP_ERRORS: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str]], Explained]], ...] = (
+CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
     (r"expected (',' or )?';' before '([^']+)'", _no_semicolon),
     (r"expected initializer before '([^']+)'", _no_semicolon_above),
-    (r"expected '}' at end of input", _no_brace),
-    (r"'([^']+)' was not declared in this scope(?:; did you mean '([^']+)')?", _explain_undeclared),
+    (
+        r"expected '}' at end of input",
+        told(
+            "{0}: a `}}` is missing", "write a `}}` for each `{{`; the indentation shows where one is missing"
+        ),
+    ),
+    (
+        r"'([^']+)' (?:was not declared in this scope|does not name a (?:template )?type)(?:; did you mean '([^']+)')?",
+        _explain_undeclared,
+    ),
     (r"no matching function for call to '(?:ros::)?NodeHandle::subscribe(.*)", _explain_subscription),
     (r"invalid use of non-static member function '([^']+)'", _no_address),
     (r"'([^']+)::(\w+)' has not been declared", _no_type),
-    (r"'(\w+)' does not name a (?:template )?type", _standard_type),
     (r"'__s_get\w+' is not a member of '([^']+)'", _no_message),
     (r"'(\w+)' (?:has not been declared|is not a class, namespace, or enumeration)", other_namespace),
-    (r"'([^']+)' is not a member of .*; did you mean '([^']+)'", _no_member),
-    (r"has no member named '([^']+)'; did you mean '([^']+)'", _no_member),
+    (
+        r"(?:has no member named '([^']+)'|'([^']+)' is not a member of .*); did you mean '([^']+)'",
+        lambda found, _package, _lines: Explained(
+            found.string, f"write {found[3]} in place of {found[1] or found[2]}"
+        ),
+    ),
     (r"undefined reference to '([^']+)", _explain_unlinked),
-    (r"multiple definition of 'main", _main_twice),
+    (
+        r"multiple definition of 'main",
+        told("two sources of one program have a `main`", "write an add_executable(…) for each program"),
+    ),
     (r'dependencies to non-existent target "([^"]+)"', _missing_target),
     (r'link libraries for target "([^"]+)" which is not built', _missing_target),
 )

@@ -566,7 +566,7 @@ def explain_operand(found: Traceback, package: PackageFacts) -> tuple[str, str] 
     of_text = bool(match[1]) or "str" in match.groups()
     left = match[3] == "str" or (not of_text and bool(fields_of(package, match[2])))
     kind, is_right = (match[1], True) if match[1] else (match[2], False) if left else (match[3], True)
-    other = _other_side(found.own_frames[-1], is_right=is_right)
+    other = _other_side(found.innermost, is_right=is_right)
     if fields := fields_of(package, kind):
         value = f"{other or 'msg'}.{fields[0]}"
         value = value if kind == "String" or not of_text else f"str({value})"

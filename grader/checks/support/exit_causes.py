@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
 from grader.checks.registry import Check
-from grader.checks.support.console_output import Frame, Traceback, tracebacks, unpack_traceback
+from grader.checks.support.console_output import Traceback, tracebacks, unpack_traceback
 from grader.checks.support.exceptions import (
     OF_ROSCPP,
     SLIPS,
@@ -62,7 +62,7 @@ from grader.model.package import Fault, PackageFacts, SourceFile
 from grader.model.python_slip import PythonSlip
 from grader.model.verdict import Citations, FileCitation, Span, Verdict, machine_lacks
 from grader.syntax_fixes import COMMENTED_OUT, corrected, without_brace
-from grader.wording import join_words, plural
+from grader.wording import join_words, on_lines, plural
 
 OTHER_NAMES_SHOWN = 3
 """Names of the same script that are not defined either."""
@@ -222,8 +222,7 @@ def _not_run(life: Life, run: Run, package: PackageFacts) -> Ending | None:
     is_node = bool(nodes_of(run, life.name))  # also by a name that no line of it says
     if script is not None and not is_node and (other := _real_copy(script, package)):
         cause = f"its script ran to the end: it makes no node, but {other}, which has the same name, does"
-        hint = without_git(move_hint(package, other, script.path), package)
-        return Ending(cause, hint, by_itself=True)
+        return Ending(cause, without_git(move_hint(package, other, script.path), package), by_itself=True)
     if script is not None and script.shebang_fault == "empty-file":
         return Ending("its file is empty", f"write the node in {script.path}", by_itself=True)
     kinds = ("main-guard", "not-called", "never-called", "loop-left", "commented-out", "no-init")
@@ -246,23 +245,22 @@ def _not_run(life: Life, run: Run, package: PackageFacts) -> Ending | None:
 
 
 def _real_copy(script: SourceFile, package: PackageFacts) -> str:
-    """Return the only other file of a script's name, where that one makes a node and the script itself makes none; ""
-    where it is not so."""
+    """Return the only other file of a script's name, where that one makes a node and the script none; else ""."""
     nodes = {s.file for s in package.slips if s.kind == "node-name"}
     others = [one.path for one in copies_of(package, script.path) if one.path != script.path]
     return others[0] if script.path not in nodes and len(others) == 1 and others[0] in nodes else ""
 
 
 def _in_comments(slips: Sequence[PythonSlip]) -> dict[str, str]:
-    """Return the message and the fix of all calls that make a script a node and that are only there in comments;
-    nothing of a single one."""
+    """Return the message and the fix of several calls that make a script a node and are only there in comments."""
     kinds = {one.kind for one in slips}
     gone = (s for s in slips if s.kind == "commented-out" and "`#`" in s.fix)
     lines = sorted({s.line for s in gone if MAKES_NODES.get(s.name.rpartition(" ")[2], s.kind) not in kinds})
-    listed = f"lines {join_words(map(str, lines))}"
-    if len(lines) < 2:
-        return {}
-    return {"message": f"{listed} are commented out", "fix": f"remove the `#` from {listed}"}
+    told = {
+        "message": f"{on_lines(lines)} are commented out",
+        "fix": f"remove the `#` from {on_lines(lines)}",
+    }
+    return told if len(lines) > 1 else {}
 
 
 def explain_error(
@@ -281,13 +279,10 @@ def explain_error(
     return explain_traceback(found[-1], package) if found else None
 
 
-def explain_by_exception(
-    check: Check, package: PackageFacts | None, run: object, verdict: Verdict
-) -> Verdict:
+def explain_by_exception(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a lost mark with the exception that a callback raised, which rospy prints and outlives. One when nothing
     was due need not be why."""
-    unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
-    if not unexplained or package is None or not isinstance(run, Run) or early_end(run):
+    if not check.of_callbacks or verdict.cause or early_end(run):
         return verdict
     end = explain_error(package, run, during=verdict.due)
     if end is None:
@@ -398,7 +393,7 @@ def _of_broken_machine(found: Traceback, broken: str, place: FileCitation | None
 def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
     """Return the cause and the hint of an error that other lines of the file explain."""
     own = [s for s in package.slips if s.file == place.file]
-    said = f"{found.message} {found.own_frames[-1].source}"
+    said = f"{found.message} {found.innermost.source}"
     hidden = [s for s in own if s.kind == "hides-class" and re.search(rf"\b{s.name}\b", said)]
     if found.kind == "TypeError":
         hidden += [s for s in own if (s.kind, s.line) == ("defined-twice", place.line)]
@@ -433,7 +428,7 @@ def _no_number(found: Traceback, place: FileCitation, package: PackageFacts) -> 
             else read.fix.replace("map(int, ", "map(float, ").replace("= int(", "= float(")
         )
         return "a command-line argument is a string", f"on line {read.line}, write `{fix}`"
-    if ".publish(" in found.own_frames[-1].source:
+    if ".publish(" in found.innermost.source:
         return None
     return "it takes a number but gets something else", f"turn the value into one first: `{kind}(…)`"
 
@@ -462,12 +457,11 @@ def _asks_for_input(
     rated = {one.file for one in package.slips if one.kind.startswith("rate-")}
     asks = {s.line: s.name for s in package.slips if s.kind == "input" and place and s.file == place.file}
     asking = sorted(asks)
-    source = found.own_frames[-1].source if found.own_frames else ""
+    source = found.innermost.source
     fixes = [s.fix for s in package.slips if s.kind == "input" and place and s.file == place.file and s.fix]
     instead = ""
     if len(asking) > 1:
-        lines = join_words(map(str, asking))
-        instead = f"write values in the code in place of each `input()`: lines {lines}"
+        instead = f"write values in the code in place of each `input()`: {on_lines(asking)}"
     elif fixes and fixes[0].startswith("publish …"):
         instead = fixes[0].replace("…", VALUE_SLOT, 1)
     elif number := _NUMBER_ASKED.search(source):
@@ -487,7 +481,7 @@ def _asks_for_input(
 
 def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """Return the cause and the hint of a known slip, by what was said, by the module and by the line itself."""
-    source = found.own_frames[-1].source if found.own_frames else ""
+    source = found.innermost.source
     if found.kind == "IndexError" and "argv" in source:
         return "it reads a command-line argument, but is started without any", ARGUMENT_HINT
     name = _NAME.search(found.message)
@@ -502,14 +496,13 @@ def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
         or known
         or other_name(found, package)
     )
-    frame = found.own_frames[-1] if found.own_frames else Frame("", 0)
+    frame = found.innermost
     meant = meant or explain_formatting(found.message, source)
     return meant or explain_exception(found.kind, found.message, frame.source, frame.marked)
 
 
 def _misspelt(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
-    """Return the name that is meant, where the file defines one that is spelt alike; other slips of its names are told
-    with it."""
+    """Return the name that is meant, where the file defines one that is spelt alike, with other slips of its names."""
     name = _NAME.search(found.message)
     slips = [s for s in package.slips if s.file == place.file]
     if outside := next((s for s in slips if (s.line, s.kind) == (place.line, "outside-method")), None):
@@ -556,7 +549,7 @@ def _is_answer(found: Traceback) -> bool:
 def is_rospys_own(found: Traceback) -> bool:
     """Return whether it is a race of rospy's own shutdown, a thread in which no line of the student's takes part, or
     how a service refuses a call."""
-    if found.own_frames and found.own_frames[-1].source.startswith("raise ") and _is_answer(found):
+    if found.innermost.source.startswith("raise ") and _is_answer(found):
         return True
     race = found.kind == "ROSException" and any(said in found.message for said in RACES)
     if found.kind == "TypeError" and _ARITY.match(found.message):

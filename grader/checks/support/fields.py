@@ -143,8 +143,7 @@ def refuse_disorder(low: float | None, high: float | None) -> None:
 
 
 def is_within(value: float, low: float | None, high: float | None) -> bool:
-    """Return whether the value is within. A bound counts, also where a 32-bit field cannot hold it exactly; NaN does
-    not."""
+    """Return whether the value is within. Bounds count, also where 32 bits cannot hold them exactly; NaN does not."""
     above = low is None or value >= low - ROUNDING * max(1.0, abs(low))
     below = high is None or value <= high + ROUNDING * max(1.0, abs(high))
     return above and below and value == value  # noqa: PLR0124 - NaN is not itself
@@ -272,9 +271,7 @@ def unit_slip(got: object, wanted: object) -> str:
             return f" ({significant(factor)} times too large, as {small} in place of {large} are)"
         if math.isclose(got * factor, wanted, rel_tol=SLIP):
             return f" ({significant(factor)} times too small, as {large} in place of {small} are)"
-    return next(
-        (f" ({what})" for other, what in others.items() if math.isclose(got, other, rel_tol=SLIP)), ""
-    )
+    return next((f" ({what})" for n, what in others.items() if math.isclose(got, n, rel_tol=SLIP)), "")
 
 
 def has_hole(value: object) -> bool:

@@ -301,8 +301,7 @@ def track(
         return Track(fault="hold values that are not numbers, or that no robot could follow")
     if poses:
         return Track(tuple(poses))
-    end_s = seconds(observed_until_ns(run) or run.end_ns)
-    return Track(tuple(driven(commands, hold_s, end_s)))
+    return Track(tuple(driven(commands, hold_s, seconds(observed_until_ns(run) or run.end_ns))))
 
 
 def _publishers(run: Run, topic: str, fields: PoseFields | None) -> list[Channel]:
@@ -361,8 +360,7 @@ def commands_of(channel: Channel) -> list[tuple[int, Command]]:
 
 
 def other_axis(channel: Channel) -> str:
-    """Return the other axis (`angular.x`) around which velocities on a topic turn, where angular.z is always 0; ""
-    where they do not."""
+    """Return the axis other than z (`angular.x`) around which velocities on a topic turn; "" where there is none."""
     values = channel.values if "Twist" in channel.type else ()
     twists = [one.get("twist", one) for one in values if isinstance(one, Mapping)]
     turns = [one["angular"] for one in twists if isinstance(one.get("angular"), Mapping)]

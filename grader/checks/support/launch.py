@@ -27,7 +27,7 @@ from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFil
 from grader.model.submission import chmod_hint
 from grader.model.verdict import FileCitation, Verdict, failed, grade_again, joined, machine_lacks, unjudged
 from grader.untrusted_text import without_colours
-from grader.wording import join_words
+from grader.wording import join_words, on_lines
 
 NOT_EXECUTED = (2, 126, 127)
 """Exit codes of `env` and of a shell that find no such program, or cannot read what it is given."""
@@ -123,8 +123,7 @@ class Absence(NamedTuple):
     """What the pattern's group names."""
 
     def verdict(self, message: str, *, judged: bool = False) -> Verdict:
-        """Return the verdict: nothing to judge in the launch file where the machine is at fault, or a script that is
-        not `judged` too."""
+        """Return the verdict: unjudged where the machine is at fault, or a script that is not `judged` too."""
         kind = machine_lacks if self.of_machine else unjudged if self.of_script and not judged else failed
         verdict = kind(message, hint=self.hint, citations=self.citations)
         verdict = verdict.model_copy(update={"unbuilt": self.unbuilt})
@@ -214,12 +213,8 @@ def _declared(name: str, package: PackageFacts) -> tuple[FileCitation, ...]:
     return tuple(arg.place for arg in args if arg.name == name)[:1]
 
 
-def explain_by_refused_launch(
-    _check: Check, package: PackageFacts | None, run: object, verdict: Verdict
-) -> Verdict:
+def explain_by_refused_launch(_check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a lost mark with why roslaunch started nothing, where it ended and that is all that is said."""
-    if package is None or not verdict.status.is_lost or not isinstance(run, Run):
-        return verdict
     ended = early_end(run)
     refused = refusal(run, package) if ended is not None and ended.start.argv[:1] == ("roslaunch",) else None
     is_told = NOTHING_STARTS in verdict.message or (refused is not None and refused.why in verdict.message)
@@ -255,13 +250,12 @@ def _unset_args(text: str, package: PackageFacts) -> Absence | None:
     args = lacking[0]
     lines = sorted({arg.line for arg in args})
     names = join_words(f"$(arg {arg.name})" for arg in args)
-    where = f"line{'s' * (len(lines) > 1)} {join_words(map(str, lines))} of {args[0].file}"
+    where = f"{on_lines(lines)} of {args[0].file}"
     declares = join_words(f'<arg name="{arg.name}" default="…"/>' for arg in args)
     verb = "uses" if len(lines) == 1 else "use"
     why = f"{NOTHING_STARTS}: {where} {verb} {names}, which no <arg> declares"
     hint = f"below <launch>, add {declares}, with {'its value' if len(args) == 1 else 'their values'} in place of …"
-    cited = tuple(arg.place for arg in args)
-    return Absence(why, hint, citations=tuple(dict.fromkeys(cited)))
+    return Absence(why, hint, citations=tuple(dict.fromkeys(tuple(arg.place for arg in args))))
 
 
 def unset_arg_fixes(file: LaunchFile, told: str, given: Iterable[str] = ()) -> Iterator[str]:
@@ -300,9 +294,7 @@ def why_not_up(package: PackageFacts, run: Run, node: LaunchNode) -> Absence:
         or why_died(package, run, node)
         or refusal(run, package)
         or _silent(run, node)
-        or Absence(
-            f"roslaunch did not start it{quoted(run)}", "run roslaunch by hand and read what it prints"
-        )
+        or Absence(f"roslaunch did not start it{quoted(run)}", "run roslaunch by hand and read its output")
     )
 
 
@@ -377,9 +369,7 @@ def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | N
         why = f"CMakeLists.txt makes the program {node.type}, but the build did not make it"
         return Absence(why, BUILD_FIRST_HINT, of_script=True, unbuilt=True)
     if "Cannot locate" not in line:
-        return Absence(
-            f"there is no package {node.pkg}", "check the spelling of pkg, and that it is installed"
-        )
+        return Absence(f"there is no package {node.pkg}", "check how pkg is spelt, and that it is installed")
     why = f"roslaunch finds no program {node.type} in the package {node.pkg}"
     if near := near_names(str(node.type), PROGRAMS_OF.get(str(node.pkg), ())):
         return Absence(f"{why}; it has {near[0]}", f'write type="{near[0]}"')
@@ -399,9 +389,7 @@ def _silent(run: Run, node: LaunchNode) -> Absence | None:
     if not started:
         return None
     if others:
-        why = (
-            f"{join_words(others)} came up instead: the script does not take the name that roslaunch gives it"
-        )
+        why = f"{join_words(others)} came up instead: the script takes another name than roslaunch gives it"
         return Absence(why, "start the script itself, and leave sys.argv alone", of_script=True)
     return Absence("its script runs, but never registers as a node", hint, of_script=True)
 

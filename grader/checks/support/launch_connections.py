@@ -21,7 +21,7 @@ from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchLine, LaunchNode, PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.verdict import FileCitation, Verdict, failed
-from grader.wording import join_words
+from grader.wording import join_words, on_lines
 
 UNRESOLVED = "$("
 CONNECTED_WITHIN_S = 3.0
@@ -153,7 +153,7 @@ def _described(uses: Sequence[_Use], topic: str, *, drop_ns: bool, drop_remaps: 
 
 def _in_lines(found: Sequence[LaunchLine]) -> str:
     numbers = sorted({line.line for line in found})
-    return f" on line{'s' * (len(numbers) > 1)} {join_words(map(str, numbers))}" if numbers else ""
+    return f" on {on_lines(numbers)}" if numbers else ""
 
 
 def over_another_topic(run: Run, topic: str, said: str = "") -> Verdict:
@@ -193,12 +193,9 @@ def blame_renaming(
     return verdict.model_copy(update=update)
 
 
-def explain_by_late_remap(
-    check: Check, package: PackageFacts | None, run: object, verdict: Verdict
-) -> Verdict:
+def explain_by_late_remap(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a loss with the `<remap>` that would give a topic its name, and stands below the nodes that have it."""
-    lost = verdict.status.is_lost and not verdict.cause and not check.name.endswith("-xml")
-    if not lost or package is None or not isinstance(run, Run) or any(run_scripts(run)):
+    if verdict.cause or check.name.endswith("-xml") or any(run_scripts(run)):
         return verdict
     had = {topic for end in ENDS for topic in topics_with(run, end)}
     said = f"{verdict.message} {verdict.expected}"

@@ -24,7 +24,7 @@ from grader.checks.support.scripts import (
 from grader.checks.support.text import near_names, shown
 from grader.model.package import Executable, LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.verdict import FileCitation, MistakeKind, Verdict, failed, unjudged
-from grader.wording import join_words, there_is
+from grader.wording import join_words, on_lines, there_is
 
 OTHER_ATTRIBUTES = {"package": "pkg", "exec": "type", "executable": "type", "script": "type"}
 """What ROS 2, or plain English, calls them."""
@@ -146,8 +146,7 @@ def _absent(package: PackageFacts, launch: str, wanted: set[str]) -> Verdict:
 
 
 def starts_built(package: PackageFacts, file: LaunchFile, script: str) -> list[LaunchNode]:
-    """Return the nodes that start a program which CMake builds, and which is called as the script is without its
-    `.py`."""
+    """Return the nodes that start a program that CMake builds, called as the script is without its `.py`."""
     stem = PurePosixPath(script).stem
     is_built = stem != script and any(one.is_called(stem) for one in programs(package))
     off = {line for _, line, _ in file.switched_off}
@@ -230,20 +229,15 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
 
 def at_its_lines(slip: Slip, slips: Sequence[Slip]) -> Slip:
     """Return the slip with a fix that names its line where there are others, and all lines of the same fix."""
-    lines = [str(one.line) for one in slips if one.fix == slip.fix]
-    if len(slips) < 2:
-        return slip
-    return slip._replace(fix=f"on line{'s' if len(lines) > 1 else ''} {join_words(lines)}, {slip.fix}")
+    lines = [one.line for one in slips if one.fix == slip.fix]
+    return slip._replace(fix=f"on {on_lines(lines)}, {slip.fix}") if len(slips) > 1 else slip
 
 
 def later_fixes(file: LaunchFile, script: str) -> Iterator[str]:
-    """Yield what lets the file start a script that is meant in it: an `if` or `unless` that leaves its node out, and
-    its whole name as `type`."""
+    """Yield what lets the file start a script: an `if` or `unless` that leaves its node out, and its name as `type`."""
     name = PurePosixPath(script).name
     stem = PurePosixPath(name).stem
-    off = [(kind, line, said) for kind, line, said in file.switched_off if PurePosixPath(kind).stem == stem][
-        :1
-    ]
+    off = [one for one in file.switched_off if PurePosixPath(one[0]).stem == stem][:1]
     for _, line, said in off:
         other = ", or give its <arg> the other default" if "$(arg" in said else ""
         yield f"remove {said} from line {line}{other}"

@@ -1,5 +1,4 @@
-"""Names that are asked for and that are not there: modules, classes and types of messages, attributes, arguments; and
-what is meant by them."""
+"""Names that are not there (modules, classes, types, attributes, arguments), and what is meant by them."""
 
 from __future__ import annotations
 
@@ -82,11 +81,11 @@ def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
     if wrong := _NO_TYPE.match(found.message):
         return _other_types(wrong[1], wrong[2])
     if wrong := _NO_ATTRIBUTE.search(found.message):
-        source = found.own_frames[-1].source if found.own_frames else ""
+        source = found.innermost.source
         return _field_of_number(found, wrong[1]) or _other_attributes(package, wrong[1], wrong[2], source)
     if wrong := re.match(r"(\w+) is not an attribute of (\w+)$", found.message):
         known = fields_of(package, wrong[2])
-        source = found.own_frames[-1].source if found.own_frames else ""
+        source = found.innermost.source
         left = [one for one in known if not re.search(rf"\b{one}=", source)]
         near = near_names(wrong[1], known) or (left if len(left) == 1 else ())
         hint = f"write `{near[0]}=` instead of `{wrong[1]}=`" if near else ""
@@ -102,7 +101,7 @@ def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
 def hiding_file(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """Return the cause and the hint where a file beside the script has the name of the module that is imported."""
     wanted = _HIDDEN.search(found.message)
-    script = path_in_package(package, found.own_frames[-1].file) if found.own_frames else None
+    script = path_in_package(package, found.innermost.file)
     if wanted is None or script is None:
         return None
     name = wanted[1] or wanted[2]
@@ -117,8 +116,7 @@ def hiding_file(found: Traceback, package: PackageFacts) -> tuple[str, str] | No
 def own_message(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """Return the import as it has to be where the line looks for what the build makes of the package's own messages,
     services and actions in another place, or by another name."""
-    source = found.own_frames[-1].source if found.own_frames else ""
-    asked = _imported_names(source) if found.kind in IMPORT_ERRORS else None
+    asked = _imported_names(found.innermost.source) if found.kind in IMPORT_ERRORS else None
     if asked is None:
         return None
     module, names = asked
@@ -195,8 +193,7 @@ def unmade(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
 
 def _undefined(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """Return the cause and the hint of an import of definitions from a package that has none at all."""
-    source = found.own_frames[-1].source if found.own_frames else ""
-    module, names = (found.kind in IMPORT_ERRORS and _imported_names(source)) or ("", ())
+    module, names = (found.kind in IMPORT_ERRORS and _imported_names(found.innermost.source)) or ("", ())
     kind = {f"{package.name}.msg": "message", f"{package.name}.srv": "service"}.get(module)
     if kind is None or package.interfaces or f"'{package.name}" not in found.message:
         return None
@@ -218,7 +215,7 @@ def _unlisted(found: Traceback, package: PackageFacts) -> tuple[str, str] | None
     """Return the cause and the hint of a name that `from lab1.srv import *` does not bring, because CMakeLists.txt
     lists other definitions than its own."""
     wanted = re.match(r"name '(\w+)' is not defined", found.message)
-    file = found.own_frames[-1].file if found.own_frames else ""
+    file = found.innermost.file
     if wanted is None or any(s.name == wanted[1] and file.endswith(f"/{s.file}") for s in package.slips):
         return None
     for maker in (package, *package.also):
@@ -238,7 +235,7 @@ def _makes(package: PackageFacts, message: str) -> bool:
 
 def unimported_module(found: Traceback, package: PackageFacts) -> str:
     """Return a module that the script which imports one that is not there uses, and does not import; "" for none."""
-    file = found.own_frames[-1].file if found.own_frames else ""
+    file = found.innermost.file
     slips = (s for s in package.slips if s.kind == "undefined" and file.endswith(f"/{s.file}"))
     return next((s.name for s in slips if s.fix == IMPORT % s.name), "")
 
@@ -248,7 +245,7 @@ def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | 
     message = found.message
     if inner := _IN_MODULE.search(message):
         own = f"write `from {inner[1]} import {inner[2]}`"
-        source = found.own_frames[-1].source if found.own_frames else ""
+        source = found.innermost.source
         hint = (
             f"{own} on a line of its own, and take {inner[1]}.{inner[2]} out of this one"
             if "," in source
@@ -302,7 +299,7 @@ def _module_of_others(name: str, package: PackageFacts) -> tuple[str, str] | Non
 def _own_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """Return why Python does not find a file of the package's own, and what lets it."""
     asked = NO_MODULE.search(found.message)
-    script = path_in_package(package, found.own_frames[-1].file) if found.own_frames else None
+    script = path_in_package(package, found.innermost.file)
     if asked is None or script is None:
         return None
     paths = [PurePosixPath(file.path) for file in package.files if not is_product(file.path)]
@@ -378,8 +375,7 @@ def _other_field(owner: str, known: tuple[str, ...], wrong: str, source: str) ->
     """Return what a message has in place of a field that it has not, and that is like none of its own."""
     inner = re.search(rf"\.{wrong}\.({'|'.join(known)})\b", source)
     if inner:  # `feedback.feedback.count`: this is the inner part already
-        hint = f"write `.{inner[1]}` instead of `.{wrong}.{inner[1]}`"
-        return f"it is the {owner} already", hint
+        return f"it is the {owner} already", f"write `.{inner[1]}` instead of `.{wrong}.{inner[1]}`"
     if len(known) == 1:
         return f"{owner} has only {known[0]}", _line_with(source, wrong, known[0])
     way = [
@@ -533,8 +529,7 @@ def broken_import(found: Traceback, package: PackageFacts) -> str:
 
 
 def imported_line(found: Traceback) -> str:
-    """Return the student's line that imports something, and does nothing else, if it was the last of the student's to
-    be run."""
-    source = found.own_frames[-1].source if found.own_frames else ""
+    """Return the student's line that imports something, and nothing else, if it was the last of them to be run."""
+    source = found.innermost.source
     only = all(re.match(r"\s*((import|from)\s|$)", part) for part in source.split(";"))
     return source if only else ""

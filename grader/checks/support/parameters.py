@@ -18,7 +18,7 @@ from grader.checks.support.exit_causes import Ending, explain_end, explain_error
 from grader.checks.support.fields import value_text
 from grader.checks.support.processes import early_end
 from grader.checks.support.text import get_param, init, near_names
-from grader.checks.support.topics import cite, is_unexplained, nodes_on, published_topics
+from grader.checks.support.topics import cite, nodes_on, published_topics
 from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
 from grader.model.package import LaunchNode, LaunchParam, PackageFacts
@@ -199,9 +199,7 @@ def duplicate_advice(path: str, keys: tuple[Key, ...]) -> str:
     if twice is None:
         return ""
     name, lines = twice
-    return (
-        f"{path} gives {name} on line {lines[0]} and again on line {lines[-1]}, and only the last one counts"
-    )
+    return f"{path} gives {name} on line {lines[0]} and again on line {lines[-1]}, and only the last counts"
 
 
 def params_given(run: Run) -> dict[str, Given]:
@@ -215,14 +213,12 @@ def _may_rest_on_one(check: Check, verdict: Verdict) -> bool:
     """Return whether a parameter may be the cause of a loss that nothing explains yet: what a node does upon what it
     hears, or other words of its own than the lab's."""
     says = check.name in {"logs", "prints"} and not verdict.unjudged
-    return is_unexplained(check, verdict) or (says and verdict.status.is_lost and not verdict.cause)
+    return (check.of_callbacks or says) and not verdict.cause
 
 
-def explain_by_unread_parameter(
-    check: Check, _package: PackageFacts | None, run: object, verdict: Verdict
-) -> Verdict:
+def explain_by_unread_parameter(check: Check, _package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a lost mark with the parameter that the run sets and that no node asked for, whatever it did instead."""
-    if not _may_rest_on_one(check, verdict) or not isinstance(run, Run) or early_end(run):
+    if not _may_rest_on_one(check, verdict) or early_end(run):
         return verdict
     reads = [(e.actor, absolute_name(e.topic or "")) for _, e in run.actors if e.action == "read"]
     names = {name for _, name in reads}  # a program of the grader's reads some of them itself
@@ -248,10 +244,10 @@ def explain_by_unread_parameter(
 
 
 def explain_by_misplaced_parameter(
-    check: Check, package: PackageFacts | None, run: object, verdict: Verdict
+    check: Check, package: PackageFacts, run: Run, verdict: Verdict
 ) -> Verdict:
     """Return a lost mark with the parameter that the node reads and a launch file sets somewhere else."""
-    if not _may_rest_on_one(check, verdict) or package is None or not isinstance(run, Run) or early_end(run):
+    if not _may_rest_on_one(check, verdict) or early_end(run):
         return verdict
     found = next(_misplaced(package, run, _publishing(verdict, run)), None)
     if _is_too_early(run):
@@ -275,10 +271,10 @@ def explain_by_misplaced_parameter(
 
 
 def explain_by_overwritten_parameter(
-    check: Check, package: PackageFacts | None, run: object, verdict: Verdict
+    check: Check, package: PackageFacts, run: Run, verdict: Verdict
 ) -> Verdict:
     """Return a lost mark with the line that sets a parameter which the run or the launch file gives another value."""
-    if not _may_rest_on_one(check, verdict) or package is None or not isinstance(run, Run):
+    if not _may_rest_on_one(check, verdict):
         return verdict
     given, nodes = {name: one.value for name, one in params_given(run).items()}, run.student_nodes()
     found: dict[str, Verdict] = {}  # by the node that sets it
@@ -293,9 +289,7 @@ def explain_by_overwritten_parameter(
             slips = [s for s in slips if resolved_param(s.message, event.caller_id) == name]
             where = f"line {slips[0].line} of {slips[0].file}" if slips else event.caller_id
             giver = f"line {param.line} of {param.file}" if param is not None else "the run"
-            why = (
-                f"{where} sets {name} to {value_text(event.value)}, in place of the value that {giver} gives"
-            )
+            why = f"{where} sets {name} to {value_text(event.value)}, in place of the one that {giver} gives"
             hint = "read it with `rospy.get_param(…)`, and do not set it"
             hint = f"on {where}, write `get_param` instead of `set_param`" if slips else hint
             places = tuple(s.place for s in slips[:1])

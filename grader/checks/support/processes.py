@@ -22,7 +22,7 @@ from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, unjudged
-from grader.wording import join_words, seconds, shorten
+from grader.wording import join_words, on_lines, seconds, shorten
 
 NO_SCRIPT_HINT = "add the script to the package, and push it"
 LOGGERS = ("/get_loggers", "/set_logger_level")
@@ -161,8 +161,7 @@ def slips_of(package: PackageFacts, run: Run, callerid: str, *kinds: SlipKind) -
 
 
 def named_at(package: PackageFacts, run: Run, kind: SlipKind, name: str) -> tuple[FileCitation, ...]:
-    """Return the line of the run's scripts whose call names this node, topic or parameter; nothing where none does, or
-    several do."""
+    """Return the one line of the run's scripts whose call names this node, topic or parameter."""
     found = {slip.place for slip in slips_that_name(package, run, kind, name) if not slip.fix}
     return tuple(found) if len(found) == 1 else ()
 
@@ -186,15 +185,14 @@ def run_slips(package: PackageFacts, run: Run, *kinds: SlipKind) -> list[PythonS
 def copied_topic(
     package: PackageFacts, run: Run, kind: Literal["publisher", "subscriber"], topic: str = ""
 ) -> str:
-    """Return the lines of one running script that name the same topic, this one if any is given: one is copied and not
-    changed; "" for none."""
+    """Return the lines of one running script that name the same topic, as where one is copied; "" for none."""
     places: dict[tuple[str, str], list[int]] = {}
     for slip in run_slips(package, run, kind):
         name = slip.message.strip("/")
         if name == (topic.strip("/") or name):
             places.setdefault((slip.file, name), []).append(slip.line)
     found = ((file, sorted(set(lines))) for (file, _), lines in places.items())
-    return next((f"lines {join_words(map(str, n))} of {file}" for file, n in found if len(n) > 1), "")
+    return next((f"{on_lines(n)} of {file}" for file, n in found if len(n) > 1), "")
 
 
 def by_copies(package: PackageFacts, run: Run, topic: str, of_node: Callable[..., Verdict]) -> Verdict | None:
@@ -220,8 +218,7 @@ def run_scripts(run: Run) -> set[str | None]:
 
 def early_end(run: Run) -> Life | None:
     """Return the first process of the student's that ended before the grader stopped it."""
-    early = [one for one in lives(run) if one.ended_early]
-    return min(early, key=lambda one: one.end_ns or 0, default=None)
+    return min([one for one in lives(run) if one.ended_early], key=lambda one: one.end_ns or 0, default=None)
 
 
 def first_interrupt_ns(run: Run) -> int | None:
@@ -284,8 +281,7 @@ TypeName = Annotated[str, Field(pattern=r"^[A-Za-z]\w*/[A-Za-z]\w*$")]
 
 
 def nodes_of(run: Run, process: str) -> tuple[str, ...]:
-    """Return the nodes of one process; all of the student's where `process` is empty, or the graph names no
-    processes."""
+    """Return the nodes of one process; all of the student's where it is empty, or the graph names no processes."""
     return run.student_nodes(process) if process and are_noted(run) else run.student_nodes()
 
 

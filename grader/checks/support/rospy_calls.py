@@ -1,5 +1,4 @@
-"""What is wrong with a call of rospy's, by what it raised and the line that calls it: a name, a type or a value in the
-wrong place."""
+"""What is wrong with a call of rospy's, by what it raised and its line: a name, type or value in the wrong place."""
 
 from __future__ import annotations
 
@@ -8,12 +7,12 @@ import re
 from contextlib import suppress
 from pathlib import PurePosixPath
 
-from grader.checks.support.console_output import Frame, Traceback
+from grader.checks.support.console_output import Traceback
 from grader.checks.support.text import shown
 from grader.installable import noetic_messages
 from grader.model.package import PackageFacts
 from grader.syntax_fixes import parsed
-from grader.wording import join_words
+from grader.wording import join_words, on_lines
 
 Meaning = tuple[str, str]
 """The cause, and what to do."""
@@ -75,8 +74,7 @@ ACTIONS = ("SimpleActionServer", "SimpleActionClient", "ActionServer", "ActionCl
 
 
 def wrong_class(source: str) -> Meaning | None:
-    """Return what is wrong with the type that a line gives a service or an action: one half of it, a value, a text, or
-    the place of the name."""
+    """Return what is wrong with the type that a line gives a service or an action: a half of it, a value, a text."""
     call = next(iter(calls_in_line(source, *SERVICES, *ACTIONS)), None)
     if call is None or len(call.args) < 2:
         return None
@@ -104,7 +102,7 @@ _HAS_NOT = re.compile(r"'(?:(\w+?)(Action|Goal|Result|Feedback)|\w+)' object has
 
 def part_of_action(found: Traceback) -> Meaning | None:
     """Of `publish_feedback(…)` and the like with another part of the action, with its class, or with a plain value."""
-    source = found.own_frames[-1].source if found.own_frames else ""
+    source = found.innermost.source
     call = next(iter(calls_in_line(source, *ACTION_PARTS)), None)
     lacks = _HAS_NOT.search(found.message)
     if lacks is None or call is None or not call.args or not isinstance(call.func, ast.Attribute):
@@ -314,7 +312,7 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
     if made and any(one.path.endswith(f"/{made[1]}.srv") for one in package.interfaces):
         fix = f"write `{made[1]}Response(…)`, and import it beside {made[1]}"
         return f"`{made[1]}` is the service's type, and its response has another type", fix
-    frame = found.own_frames[-1] if found.own_frames else Frame("", 0)
+    frame = found.innermost
     wants_text = "must be of type bytes or an ascii string" in found.message
     if not wants_text and "integer type" not in found.message:
         return None
@@ -381,14 +379,14 @@ def of_typed_text(found: Traceback, file: str, package: PackageFacts) -> tuple[s
     """Return the lines that keep what is typed as a text, where a line computes with it, as Python 2 could."""
     if found.kind != "TypeError" or not _TEXT_AND_NUMBER.search(found.message):
         return None
-    source = found.own_frames[-1].source
+    source = found.innermost.source
     typed = [s for s in package.slips if (s.kind, s.file) == ("typed-text", file)]
     bases = ((s.line, s.name if s.name.startswith("self.") else s.name.partition(".")[0]) for s in typed)
     read = [line for line, name in bases if re.search(rf"(?<![\w.]){re.escape(name)}\b", source)]
     if not read:
         return None
-    where = f"line{'s' if len(read) > 1 else ''} {join_words(map(str, read))}"
-    return "input() gives a text in Python 3", f"on {where}, write `float(input(…))` in place of `input(…)`"
+    hint = f"on {on_lines(read)}, write `float(input(…))` in place of `input(…)`"
+    return "input() gives a text in Python 3", hint
 
 
 def _time_and_number(time: ast.expr, source: str) -> tuple[str, str] | None:

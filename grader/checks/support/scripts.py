@@ -82,8 +82,7 @@ def path_in_package(package: PackageFacts, file: str) -> str | None:
 
 
 def paths_by_name(package: PackageFacts) -> dict[str, str]:
-    """Return the paths of all files that no build made and that are not an editor's backups, by their names without
-    folders."""
+    """Return the paths of all files that are no product of a build and no editor's backup, by their names."""
     paths = (f.path for f in package.files if not is_product(f.path) and not f.path.endswith(BACKUPS))
     return {PurePosixPath(path).name: path for path in paths}
 
@@ -273,8 +272,7 @@ _PUBLISHES = re.compile(r"(\w*)(?:\.|->)publish\s*\(")
 
 
 def lines_that_call(lines: Sequence[SourceLine], service: str) -> list[SourceLine]:
-    """Return the lines that call the service, or send the action a goal, by the variable that the client is given
-    to."""
+    """Return the lines that call the service, or send the action a goal, by the client's variable."""
     own = _names_given(lines, r"ServiceProxy|serviceClient|SimpleActionClient", service)
     if not own:
         return []
@@ -290,8 +288,7 @@ def _names_given(lines: Sequence[SourceLine], makers: str, name: str) -> set[str
 
 
 def lines_that_answer(lines: Sequence[SourceLine], service: str) -> list[SourceLine]:
-    """Return the lines with which the callback of the service returns, where the callback is a function of Python in
-    the same file."""
+    """Return the lines with which the service's callback, a function of Python in the same file, returns."""
     quoted = re.escape(service.lstrip("/"))
     offers = re.compile(
         rf"""\bService\(\s*["']/?{quoted}["']\s*,\s*[\w.]+\s*,\s*(?:handler\s*=\s*)?(?:self\.)?(\w+)"""

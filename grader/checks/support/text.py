@@ -151,15 +151,12 @@ _PLACES = re.compile(
 
 
 def unfilled(text: str) -> str:
-    """Return what to write where a text came out with the places for its values, and not with the values; "" for any
-    other text."""
+    """Return what to write where a text came out with the places for its values; "" for any other text."""
     found = _PLACES.search(text)
     if found is None:
         return ""
     if found["name"]:
-        return (
-            f"write an `f` before the opening quote of that text: without it, `{shown(found[0])}` is no value"
-        )
+        return f"write an `f` before the quote of that text: without it, `{shown(found[0])}` is no value"
     if found[0] == "{}":
         return "write `.format(…)` behind that text, with a value for each `{}`"
     return f"give that text a value for its `{shown(found[0])}`: {both('`% value` behind it', 'the next argument')}"
@@ -268,8 +265,7 @@ _CPP_PRINTS = re.compile(
 
 
 def could_say(said: str, wanted: str) -> bool:
-    """Return whether the text of a source can come out as `wanted`, without regard to capitals and blanks. Gaps may be
-    filled with anything."""
+    """Return whether the text of a source, its gaps filled, can be `wanted`, whatever its capitals and blanks."""
     text = " ".join(wanted.split()).casefold()
     first, *inner = [" ".join(part.split(" ")).casefold() for part in _GAP.split(" ".join(said.split()))]
     if not inner:

@@ -55,8 +55,7 @@ from grader.wording import join_words, plural
 SYSTEM_TOPICS = frozenset({"/rosout", "/rosout_agg", "/clock"})
 End = Literal["publishers", "subscribers"]
 Sender = Literal["student", "program", "anyone"]
-"""Whose messages a check judges: the student's nodes', those of programs that the scenario starts beside them (a
-simulator), or both."""
+"""Whose messages a check judges: the student's nodes', those of the programs beside them, or both."""
 READ_TOO = {"logs": ("/rosout",), "hears": ("/rosout",), "transform": ("/tf", "/tf_static")}
 """Topics that a check reads, and that its parameters do not name."""
 TAKEN = {Status.FAIL, Status.PARTIAL}
@@ -114,8 +113,7 @@ def no_node(package: PackageFacts, run: Run, what: str) -> Verdict | None:
         end = explain_end(ended, run, package)
         if end.by_itself and (error := explain_error(package, run)):  # it may have to end, but not to fail
             return error.verdict(unjudged, f"{what}: {error.cause}", measured="ended")
-        message = f"{what}: {ended.name} ended before ({end.cause})"
-        return end.verdict(unjudged, message, measured="ended")
+        return end.verdict(unjudged, f"{what}: {ended.name} ended before ({end.cause})", measured="ended")
     if not run.student_nodes():
         hint = f"call {INIT}, and run the node"
         return unjudged(f"{what}: no node was registered", measured="no node", hint=hint)
@@ -139,9 +137,7 @@ def no_message(
     measured, what = join_words(published) or "no topic", f"no message came on {topic}"
     if run.foreign:
         seen = f"; {join_words(near)} is" if near else ""
-        hint = (
-            f"publish on {topic} while you record, and record it: rosbag record {topic}, or -a for all topics"
-        )
+        hint = f"publish on {topic} while you record, and record it: rosbag record {topic}, or -a for all"
         return unjudged(f"{topic} is not in {run.evidence}{seen}", measured=measured, hint=hint)
     if found := _judge_uncancelled(run, topic) or _judge_misnamed(package, run, topic, of_node):
         return found
@@ -182,8 +178,7 @@ def _judge_misnamed(
 
 
 def _namespaced_node(package: PackageFacts, run: Run, topic: str) -> LaunchNode | None:
-    """Return the launch file's node in whose namespace the topic is, where the run is a launch file's and the node's
-    names are remapped."""
+    """Return the launch file's remapped node in whose namespace the topic is, where the run is a launch file's."""
     if not lives(run) or any(run_scripts(run)):
         return None
     nodes = [n for f in package.launch_files for n in f.brings if n.remaps and topic.startswith(n.namespace)]
@@ -390,13 +385,10 @@ def _remap_to(package: PackageFacts, run: Run, topic: str, heard: str) -> str:
     return f"write `{right}` into the <node> on line {node.line} of {node.file}"
 
 
-def explain_by_unheard_topic(
-    check: Check, package: PackageFacts | None, run: object, verdict: Verdict
-) -> Verdict:
+def explain_by_unheard_topic(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a lost mark with the topic on which the run publishes and that no node heard, whatever it did instead."""
-    if not is_unexplained(check, verdict) or not isinstance(run, Run) or early_end(run):
-        return verdict
-    if (found := unheard(run, package)) is None:
+    is_unexplained = check.of_callbacks and not verdict.cause and not early_end(run)
+    if not is_unexplained or (found := unheard(run, package)) is None:
         return verdict
     explained = verdict.explained(found.message, found.hint, cause=found.message)
     return explained.about(citations=(cite(run, "/grader/graph"),))
@@ -412,23 +404,15 @@ def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | 
     return next(iter(run_slips(package, run, *kinds)), None)
 
 
-def is_unexplained(check: Check, verdict: Verdict) -> bool:
-    """Return whether it is a loss of what comes of callbacks, and nothing says yet why it came to it."""
-    return check.of_callbacks and verdict.status.is_lost and not verdict.cause
-
-
 SEEN_AS = {"nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": ""}
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so."""
 
 
-def explain_by_wrong_value(
-    check: Check, package: PackageFacts | None, run: object, verdict: Verdict
-) -> Verdict:
+def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a lost mark with the line of a script that runs on which the value goes wrong, or with its conditions that
     are always or never true."""
-    if package is None or not isinstance(run, Run) or not verdict.status.is_lost:
-        return verdict
-    files, kinds = _files_that_run(package, run), ["wrong-value"] * is_unexplained(check, verdict)
+    files = _files_that_run(package, run)
+    kinds = ["wrong-value"] if check.of_callbacks and not verdict.cause else []
     if check.name == "action-result" and any("To transition to a" in c.line for _, c in run.console):
         kinds.append("goes-on")  # actionlib was told to end a goal that is over
     found = [s for s in package.slips if s.kind in kinds and s.file in files]
@@ -454,14 +438,10 @@ def _files_that_run(package: PackageFacts, run: Run) -> set[str | None]:
     return scripts.union(launched, *made)
 
 
-def explain_by_waiting_callback(
-    check: Check, package: PackageFacts | None, run: object, verdict: Verdict
-) -> Verdict:
+def explain_by_waiting_callback(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a lost mark with the callback that sleeps or never ends: until it returns, its script receives nothing."""
     of_callbacks = check.of_callbacks or check.name in OF_RESULTS
-    if not of_callbacks or verdict.cause or package is None or not isinstance(run, Run):
-        return verdict
-    files = _files_that_run(package, run)
+    files = _files_that_run(package, run) if of_callbacks and not verdict.cause else ()
     slip = next((s for s in package.slips if s.kind == "callback-waits" and s.file in files), None)
     if slip is None or verdict.callbacks == "before":
         return verdict
@@ -523,7 +503,6 @@ def misfit(run: Run, topic: str = "") -> Verdict | None:
 
 
 def _judge_refused(run: Run, topic: str) -> Verdict | None:
-    """Return the verdict where the recorder could not connect to the topic's publisher."""
     refused = [e for _, e in run.recorder if e.topic == topic and e.event in {"refused", "invalid"}]
     if not refused or run.student_channels(topic):
         return None
@@ -542,9 +521,7 @@ class Losses(Record):
     @property
     def words(self) -> str:
         if self.dropped:
-            return (
-                f"the recorder kept {plural(self.kept, 'message')} of {self.topic} and dropped {self.dropped}"
-            )
+            return f"the recorder kept {plural(self.kept, 'message')} of {self.topic}, dropped {self.dropped}"
         return f"the recorder may have missed messages of {self.topic}, because it could not keep up"
 
 
