@@ -152,6 +152,7 @@ def _note_excess(writer: EvidenceWriter, *found: str) -> None:
 
 def _syntax_spec(place: ProcessEnvironment) -> dict[str, Any]:
     """Return how to start ROS's own Python, which compiles every script of the package and runs none."""
+    # Isolated (`-I`): no module of the package's can take the place of one that it imports.
     script = 'python3 -I "$1/grader-syntax.py" "$2" < "$1/python-files.json" >' + _target(place, SYNTAX)
     argv = ["/bin/bash", "-c", script, "bash", place.shims, place.package_folder]
     room = 2 * REPORT_BYTES_MAX

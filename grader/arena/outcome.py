@@ -39,6 +39,7 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
             return "complete", ""
     elif now_s - live.started_s > until.limit_s:
         return "complete", f"watched for {until.limit_s:g} s"
+    # A process that may yet become a node, or a goal that is worked on, makes silence no news.
     wanting = still_starting or (bool(until.ended) and has_goal(live))
     silent = "" if wanting else _silent(live, until, now_s) or _never(live, until, given, now_s)
     silent = silent or _in_namespaces(live, until, now_s)

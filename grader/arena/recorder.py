@@ -91,6 +91,7 @@ class Recorder:
         self._rubric = rubric
         self._beside = beside
         self._progress = progress
+        # The bytes of one submission's evidence are shared among its runs.
         keeping = sum(bool(scenario.keeps) for scenario in rubric.scenarios.values())
         self._limits = RunLimits().shared_by(len(rubric.scenarios), keeping=keeping)
         ros = find_ros()
@@ -240,6 +241,7 @@ class Recorder:
         package = facts.asked or self._rubric.package
         starts = [start for scenario in self._rubric.scenarios.values() for start in scenario.start]
         wanted = {s.script for s in starts if s.script and self._rubric.package_of(s) == package}
+        # Reversed, so that of several files of one name the shallowest stays.
         names = {Path(path).name: path for path in reversed(paths)}
         matches = (script if script in paths else names.get(Path(script).name) for script in sorted(wanted))
         return [match for match in matches if match is not None]

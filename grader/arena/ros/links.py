@@ -14,6 +14,7 @@ from bounded_sockets import ProtocolError, call, port_of, slave_api
 from guard import NAME_CHARS_MAX, OWN_NODE, ROSOUT, shown
 from quotas import Pool, cut
 
+# With less, a busy machine's late answer would count as no connection.
 BUS_INFO_S, ROUND_S = 1.5, 3.0
 CONNECTIONS_MAX = 2000
 UDP = "UDPROS"
@@ -84,7 +85,7 @@ class Links:
         deadline = time.monotonic() + ROUND_S
         found, answered, asked = {}, threading.Semaphore(0), 0
         for node, api in apis.items():
-
+            # Bound now: the loop's variables have moved on when a thread runs it.
             def ask(node=node, api=api):
                 if time.monotonic() < deadline:
                     answer = self._answer(api)
@@ -155,10 +156,12 @@ class Ties:
     def _join(self, publisher, subscriber, *, udp):
         ours, theirs = self._listening.get(publisher), self._listening.get(subscriber)
         if not ours or not theirs:
+            # In a sandbox all that the run has is in its trees: who holds no socket there has ended.
             if self._rows and self._owners.whole:
                 return False
             unknown = [port for port, pids in ((publisher, ours), (subscriber, theirs)) if not pids]
             return None if all(port is None or sockets.listening(port) for port in unknown) else False
+        # UDP is rare: its table is read only where a node says that it uses it.
         if not udp:
             return self._streams.meet(ours, theirs, {publisher, subscriber})
         if self._datagrams is None:

@@ -9,6 +9,7 @@ TICKS_HZ = os.sysconf("SC_CLK_TCK")
 PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 PROCESSES_MAX = 5000
 MAPS_MAX = 100000
+# So /proc names anonymous memory that is shared (man 2 mmap, MAP_SHARED | MAP_ANONYMOUS).
 SHARED = b" /dev/zero (deleted)\n"
 PIECE_BYTES = 64 << 20
 READ_BYTES = 1 << 16
@@ -18,6 +19,7 @@ KEYS = {
     ("pids", 1): "pids.max",
     ("pids", 2): "pids.max",
 }
+# Version 1 limits memory and swap together, version 2 swap alone.
 SWAP = {1: "memory.memsw.limit_in_bytes", 2: "memory.swap.max"}
 PEAK = "memory.max_usage_in_bytes"
 NEAR_BYTES = 4 << 20  # the kernel charges in pieces, the largest is a huge page
@@ -173,6 +175,7 @@ PROGRAMS_MAX, THREADS_MAX = 30, 200
 ASLEEP_S = 0.8
 """`rospy.spin()` wakes every 0.5 s."""
 WORKING = 0.4
+# Twice a second, with room for what a callback or a log message wakes.
 SPIN_HZ = 3.2
 COMPUTES_S, STUCK_S = 0.6, 5.0
 """CPU seconds in one stretch, without new memory: so many, and a program computes; so many, and it does only that."""
@@ -213,6 +216,7 @@ class Rest:
         late_s = {thread: _late_s(self._pid, thread) for thread in threads[:THREADS_MAX]}
         waited_s = max((late_s[thread] - self._late_s.get(thread, 0.0) for thread in late_s), default=0.0)
         work_s = used_s - self._used_s + waited_s
+        # The first look has nothing to compare with. Waiting for a processor is work that others keep it from.
         working = self._late_s == {} or work_s > WORKING * (now_s - self._looked_s)
         sleeps, waits = now_s - self._woke_s > ASLEEP_S, "futex" in waits_in(self._pid, self._pid)
         if working or asleep or (sleeps and not (waits and self._rests_asleep(threads, now_s))):
@@ -223,6 +227,7 @@ class Rest:
         if self.since_s is not None:
             self._only_callbacks = self._only_callbacks and waits
             self._napping = self._napping or napping
+            # One more for a wake-up that falls on the edge of the time that is looked at.
             rarely = wakes - self._wakes_before <= SPIN_HZ * (now_s - self.since_s) + 1
             self.spins = not (self._napping or sleeps) and (rarely or self._only_callbacks)
         grows = pages - self._pages > GROWS
@@ -285,6 +290,7 @@ class TreeRest:
         """Return (rest, programs): one of `KINDS`, and how many programs have no others below them."""
         if len(pids) > PROGRAMS_MAX:
             return None, PROGRAMS_MAX
+        # The kernel's function behind `wait` (man 2): a shell whose child runs.
         pids = [pid for pid in pids if not waits_in(pid, pid).startswith("do_wait")]
         seen = {pid: read_stat(pid) for pid in pids}
         self._programs = {pid: self._programs.get(pid) or Rest(pid, now_s) for pid in pids}
@@ -296,6 +302,7 @@ class TreeRest:
         above = [p for pid, p in self._programs.items() if pid in parents]
         if not last or any(program.kind is None for program in above):
             return None, len(last)
+        # One program that is not at rest keeps the tree from it.
         return min((self._programs[pid].kind for pid in last), key=KINDS.index), len(last)
 
 

@@ -42,13 +42,14 @@ class Budget:
         self._lock = threading.Lock()
 
     def open(self, key, process):
-        """The account of a channel, made again where there is room for one more; else None. `key` is all that makes it
-        what it is, its definition too."""
+        """Return the account of a channel, a new one if there is room for it, else None. `key` is all that makes the
+        channel what it is: topic, publisher, type, MD5 sum and definition."""
         with self._lock:
             if key not in self._channels:
                 held = self._of_process.get(process, 0)
                 others = len(self._channels) - held
                 size = sum(map(len, key))
+                # Half of what is left: the first process to advertise many topics leaves room for the next.
                 if held >= (self.channels_max - others + 1) // 2 or size > self._shared_left:
                     return None
                 self._shared_left -= size
@@ -145,10 +146,12 @@ class Pool:
         return True
 
     def _next(self):
+        # In order of their turns; a key with its share of threads is passed over.
         for key, jobs in self._waiting.items():
             if self._busy[key] < self._each_max:
                 job = jobs.popleft()
                 self._busy[key] += 1
+                # To the end of the queue, so that the keys take turns.
                 del self._waiting[key]
                 if jobs:
                     self._waiting[key] = jobs
@@ -177,6 +180,7 @@ class Notifications:
         """`marker` is the address of the node that the task speaks to."""
 
         def job():
+            # rosmaster's tasks raise whatever the node's answer makes them.
             with contextlib.suppress(Exception):  # whatever a node answers, or does not, is not waited for
                 task(*args)
 

@@ -22,6 +22,7 @@ def define(namespace):
         if stem is None:
             raise AttributeError(f"module {package}.{kind} has no attribute {name}")
         made = _make(package, kind, stem, definitions[stem].read_text(encoding="utf-8"))
+        # As if genpy had written a file for it: `turtlesim.msg._Pose` is a module, too.
         setattr(sys.modules[namespace["__name__"]], "_" + stem, made)
         namespace.update({key: value for key, value in vars(made).items() if key.startswith(stem)})
         return namespace.get(name, made)
