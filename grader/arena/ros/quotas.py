@@ -112,12 +112,17 @@ class Pool:
             if len(jobs) >= WAITING_MAX:
                 return False
             jobs.append(job)
-            if self._idle:
-                self._changed.notify()
-            elif self._workers < self._workers_max:
+            # A worker that was woken counts as idle until it runs: it takes one job only, and that may wait for long.
+            if self._startable() > self._idle and self._workers < self._workers_max:
                 self._workers += 1
                 threading.Thread(target=self._work, daemon=True).start()
+            else:
+                self._changed.notify()
         return True
+
+    def _startable(self):
+        """Return how many of the jobs that wait may begin now, as far as their keys' shares go."""
+        return sum(min(len(jobs), self._each_max - self._busy[key]) for key, jobs in self._waiting.items())
 
     def _work(self):
         try:
