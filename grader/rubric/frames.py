@@ -179,7 +179,7 @@ def _in_degrees(angle: float) -> int:
     """Return what a multiple of an eighth of a turn in radians is in degrees; 0 for any other angle."""
     eighths = round(angle / (math.pi / 4))
     is_one = 0 < abs(eighths) <= 8 and abs(angle - eighths * math.pi / 4) <= ROUNDED
-    return 45 * eighths if is_one and not angle.is_integer() else 0
+    return 45 * eighths if is_one else 0  # no whole number is one: they are all farther off
 
 
 def _swapped_frames(criterion: WrittenCriterion, criteria: list[WrittenCriterion]) -> Iterator[Fault]:

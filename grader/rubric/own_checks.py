@@ -108,7 +108,8 @@ def run_checks_file(path: Path, raw: bytes) -> OwnChecks:
 
 
 def _contain(function: Callable[..., Verdict]) -> Callable[..., Verdict]:
-    """What it prints goes to stderr, as stdout may be JSON, and it does not end the grader."""
+    """Return the check's function, made so that what it prints goes to stderr, as stdout may be JSON, and that its
+    `sys.exit` is an error and does not end the grader."""
 
     @wraps(function)
     def contained(**facts: object) -> Verdict:
@@ -133,6 +134,7 @@ def _run(path: Path, raw: bytes) -> LineFault | None:
         with printing_to_stderr():
             module.__spec__.loader.exec_module(module)
     except SyntaxError as error:
+        # Else the syntax error is in a file that this one imports.
         own = error.filename in {str(path), None}
         return (error.lineno or 1) if own else _line(path, error), f"{error.msg}"
     except (Exception, SystemExit) as error:  # noqa: BLE001 - an instructor's own code may raise anything

@@ -161,11 +161,13 @@ def rubric_schema(checks: Mapping[str, Check] | None = None) -> dict[str, Any]:
     criteria = Annotated[tuple[member, ...], Field(min_length=1)]
     model = create_model("Rubric", __base__=Rubric, __doc__=Rubric.__doc__, criteria=(criteria, ...))
     schema = model.model_json_schema(by_alias=True)
+    # pydantic writes a pattern for the keys, and with it alone all other keys would pass.
     schema["properties"]["scenarios"]["additionalProperties"] = False
     _describe(model, schema)
     for record in inner_records(model):
         _describe(record, schema["$defs"].get(record.__name__, {}))
     for name, record_schema in schema["$defs"].items():
+        # By prefix, since each check's criterion is a record of its own: `Criterion_rate`.
         if not name.startswith(WITHOUT_PLACES):
             keys = record_schema.get("properties", {})
             keys |= {key: _with_places(found) for key, found in keys.items()}
