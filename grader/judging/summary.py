@@ -119,6 +119,7 @@ def leave_out(rubric: Rubric, results: Sequence[CriterionResult]) -> tuple[Crite
         if group.best is None:
             continue
         members = [found[i] for i in group.criteria if i in found]
+        # Of equal points, what is still open counts first: it may earn more.
         members.sort(key=lambda r: (-r.points, not r.status.is_open))
         for r in members[group.best :]:
             left_out = LeftOut(points=r.points, max_points=r.max_points, group=name)
