@@ -35,6 +35,7 @@ from grader.evidence.run import (
     recorded_elsewhere,
 )
 
+# By their first bytes: what a chunk's header says of its compression need not be believed.
 BZ2 = b"BZh"
 LZ4 = b"\x04\x22\x4d\x18"
 MAX_CONNECTIONS = 4_096
@@ -144,6 +145,7 @@ class _File:
     def __init__(self, path: Path, data: bytes | None) -> None:
         self._path, self._data = path, data
         size_bytes = path.stat().st_size if data is None else len(data)
+        # An index may lead to the same place any number of times.
         self._left_bytes = READ_TIMES * size_bytes + MAX_HEADER_BYTES
 
     def __str__(self) -> str:
@@ -230,6 +232,7 @@ class _Unpacker:
 
     def __call__(self, data: bytes) -> bytes:
         if data.startswith(BZ2):
+            # At most one byte more than allowed: a few bytes can unpack to gigabytes.
             plain = bz2.BZ2Decompressor().decompress(data, MAX_CHUNK_BYTES + 1)
         elif data.startswith(LZ4):
             plain = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=MAX_CHUNK_BYTES + 1)

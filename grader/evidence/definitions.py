@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
+# Far more than any type of ROS's own has.
 MAX_DEFINITION_BYTES = 64 * 1024
 MAX_FIELDS = 2_000
 MAX_DEPTH = 24
@@ -222,6 +223,7 @@ class _Bounds:
         one = _primitive(field.type) if field.primitive else self.check(field.type, depth=depth + 1)
         if not field.array:
             return one
+        # Items without bytes: four bytes of length could stand for four billion of them.
         if one.size == 0 or (field.size or 0) > MAX_ARRAY:
             raise DefinitionError(f"{field.name} is an array without end")
         # Bytes become one object, and Python has its own objects for small numbers.

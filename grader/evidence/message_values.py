@@ -17,6 +17,7 @@ from grader.installable import noetic_messages
 from grader.model.message_definitions import DIVIDER, NOT_FINITE
 from grader.wording import did_you_mean, join_words
 
+# `count` in a rubric is one word for any number of items.
 ITEMS_MAX = 1_000_000
 NS = 1_000_000_000
 CLOCKS = ("time", "duration")
@@ -111,6 +112,7 @@ class ServiceTypes:
     def md5sum(self) -> str:
         """As `rossrv md5` gives it."""
         parts = (self.request, self.response)
+        # Of both texts one behind the other, as genmsg makes it: not of the two sums.
         texts = (_md5_text(p.type, dict(sections_of(p.type, p.definition)), {}) for p in parts)
         return hashlib.md5("".join(texts).encode(), usedforsecurity=False).hexdigest()
 
@@ -306,6 +308,7 @@ def _md5_text(type_: str, parts: Mapping[str, tuple[str, ...]], known: dict[str,
             constants.append(f"{match[1]} {match[2]}={value.strip()}")
         elif (match := _FIELD.match(line)) is not None:
             fields.append(_md5_line(type_, match, parts, known))
+    # Constants first, whatever their order in the file, as genmsg does.
     return "\n".join([*constants, *fields])
 
 
@@ -315,4 +318,5 @@ def _md5_line(
     kind, brackets, name = match[1], match[2] or "", match[3]
     if kind in PRIMITIVES or kind in CLOCKS or kind in {"byte", "char"}:
         return f"{kind}{brackets} {name}"
+    # In place of a type's name its own sum stands, without brackets, as genmsg has it.
     return f"{_md5(full_name(kind, owner.partition('/')[0]), parts, known)} {name}"

@@ -71,6 +71,7 @@ def load_run(source: Path | BinaryIO, budget: MemoryBudget | None = None) -> Run
         return _load(name, BytesIO(source.read(MAX_FILE_BYTES + 1)), budget)
     with _readable(source), source.open("rb") as file:
         head = file.read(len(SQLITE_MAGIC))
+        # By its first bytes: a file that is named alone may have any ending.
         file.seek(0)
         if head.startswith(BAG_MAGIC):
             from grader.evidence.bag import load_bag  # noqa: PLC0415 - few submissions hold a bag
@@ -196,6 +197,7 @@ def _files(paths: Iterable[Path]) -> list[Path]:
                 f"{path}: no evidence (*.mcap, *.bag, *.db3) in this folder or in evidence/ below it"
             )
         for file in inside:
+            # A folder and a file in it may both be named, or a link to it.
             found.setdefault(_identity(file), file)
     if not found:
         raise EvidenceError(
@@ -269,6 +271,7 @@ class _RunBuilder:
                 self._describe(found)
         if unknown := self._messages.keys() - self._channels.keys():
             raise ContainerError(f"messages on {len(unknown)} channels that are not there")
+        # Stable: messages of one time keep the order of the file.
         for messages in self._messages.values():
             messages.sort(key=ARRIVAL)
         return self._run()
@@ -374,6 +377,7 @@ class _RunBuilder:
             md5sum=about.get("md5sum", ""),
             definition=schema.data.decode(errors="replace") if schema else "",
             latching=about.get("latching") in {"1", "true", "True"},
+            # Taken out, so that the messages are not in memory twice.
             messages=tuple(self._messages.pop(number, ())),
             budget=self._budget,
         )

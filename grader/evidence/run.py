@@ -278,6 +278,7 @@ class Run:
         name.
         """
         text = self.attachments.get(path, b"")[:FILE_BYTES_MAX].decode("utf-8-sig", errors="replace")
+        # Not `splitlines`, which also divides at characters that Python and editors take for part of a line.
         lines = _LINE_END.split(text)
         if lines[0].startswith("#!") and text.startswith(f"{lines[0]}\r"):
             lines[0] += "\r"
