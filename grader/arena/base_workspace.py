@@ -213,7 +213,7 @@ def keep(name: str, data: bytes) -> None:
     folder = user_folder("cache")
     with suppress(OSError, GraderError):
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        # Another user's folder or link: what is kept there could be replaced, and so could every student's build.
+        # In a folder of another user's, or behind a link, someone could replace what every build begins with.
         if folder.is_symlink() or folder.stat().st_uid != os.geteuid():
             return
         folder.chmod(0o700)

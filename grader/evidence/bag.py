@@ -293,6 +293,7 @@ def export_bag(run: Run, path: Path, *, everything: bool = False) -> int:
     part = path.with_name(f".{path.name}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        # Left by an export that was killed: rosbags writes over no file.
         part.unlink(missing_ok=True)
         with Writer(part) as writer:
             count = _write(writer, channels)
@@ -309,6 +310,7 @@ def export_bag(run: Run, path: Path, *, everything: bool = False) -> int:
 def _write(writer: Writer, channels: Sequence[Channel]) -> int:
     connections = [_connection(writer, channel) for channel in channels]
     count = 0
+    # Merged and not sorted: the messages would be in memory once more.
     for row in heapq.merge(*(_rows(number, channel.messages) for number, channel in enumerate(channels))):
         writer.write(connections[row.channel], row.time_ns, row.data)
         count += 1

@@ -28,6 +28,7 @@ MAX_FILE_BYTES = 1 << 30
 MAX_CHUNK_BYTES = 32 << 20
 """Of any record, too. The arena records no message that comes near it."""
 MAX_UNPACKED_BYTES = 512 << 20
+# A record may have no more than nine bytes, and each costs the same time.
 MAX_RECORDS = 2_000_000
 
 _HEAD = struct.Struct("<BQ")

@@ -96,6 +96,7 @@ def parse(type_: str, definition: str) -> Types:
     types = {name: tuple(_fields(name, lines)) for name, lines in sections.items()}
     bounds = _Bounds(types)
     bounds.check(type_, depth=0)
+    # A dict keeps the place of a key that comes again: the message's own type stays the first.
     return {type_: types[type_]} | {name: types[name] for name in bounds.known}
 
 
@@ -230,6 +231,7 @@ class _Bounds:
         light = {"uint8": 2, "int8": FIELD_BYTES, "bool": FIELD_BYTES}
         each = light.get(field.type, one.decoded_bytes + FIELD_BYTES)
         if field.size is None:
+            # `-(-a // b)` rounds up: what an item takes for each byte of it.
             return Bound(4, 1, one.levels, OBJECT_BYTES, max(one.growth, -(-each // one.size)))
         at_once = field.primitive and field.type != "string"
         steps = 1 if at_once else 1 + field.size * one.steps

@@ -216,6 +216,7 @@ class _Filling:
             raise ValueError(f"a number that changes is written {form}, not {dict(value)!r}")
         if self._moment.total is None:
             raise ValueError("from and to need a last message: give count or duration_s")
+        # A single message has the first value.
         return first + (last - first) * self._moment.number / max(1, self._moment.total - 1)
 
     def _clock(self, type_: str, value: object) -> dict[str, Any]:
@@ -229,6 +230,7 @@ class _Filling:
         else:
             meant = "now, now-2, now+0.5 or a number of seconds" if type_ == "time" else "a number of seconds"
             raise ValueError(f"{value!r} is no {type_}: write {meant}")
+        # A time of ROS's is never before 0.
         secs, nsecs = divmod(ns if type_ == "duration" else max(0, ns), NS)
         return {"secs": secs, "nsecs": nsecs}
 

@@ -46,6 +46,7 @@ SQLITE_MAGIC = b"SQLite format 3\0"
 SCHEMAS = {"ros1": "ros1msg", "cdr": "ros2msg"}
 """By the encoding of messages, that of their definitions: of ROS 1, and of ROS 2."""
 ARRIVAL = itemgetter(Message._fields.index("log_time_ns"))
+# What the libraries raise for a damaged file: these have no base of their own.
 _DAMAGE = (
     McapError,
     ZstdError,
@@ -163,6 +164,7 @@ def _damage(stream: BinaryIO) -> tuple[str, str]:
     if head.startswith(b"version https://git-lfs"):
         return "only a pointer of Git LFS, the recording itself is not here", "`git lfs pull` fetches it"
     again = "record it again, or copy it again"
+    # Without the version and the line end behind it, which a copy as text changes.
     if not head.startswith(MAGIC[:5]):
         return "not an MCAP file and not a bag", again
     return ("damaged" if tail == MAGIC else "cut short: it has no end"), again
@@ -257,6 +259,7 @@ class _RunBuilder:
         self._channels: dict[int, mcap.Channel] = {}
         self._messages: dict[int, list[Message]] = defaultdict(list)
         self._attachments: dict[str, bytes] = {}
+        # The grader writes it before all messages: as long as there is none, the file counts as another tool's.
         self._metadata: dict[str, str] | None = None
         self._profile = ""
 

@@ -416,6 +416,7 @@ def _languages(facts: Facts, scenario: Scenario, run: Run | None) -> dict[str, L
             }
     for _, event in run.graph if run else ():
         for node, process in event.processes.items():
+            # A program that was built is a process `<start>/<program>`.
             name = process.partition("/")[0]
             found |= {node: found[name]} if name in found else {}
     return found

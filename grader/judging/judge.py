@@ -141,6 +141,7 @@ def judge_all_runs(
         )
         for c in rubric.criteria
     )
+    # Last, when all hints have their final words: advice that one of them has is left out.
     if package is not None:
         named = (name_unchanged_files(result, rubric, package, handed_out) for result in results)
         results = add_advice([with_own_name(one, rubric, package) for one in named], package, rubric)
@@ -471,6 +472,7 @@ class _Judging:
             return
         verdict = verdict_of(criterion, facts, self._checks)
         final = not asked
+        # Which criterion explains it is known only once all that it requires are judged.
         if verdict.unjudged:
             if not self.results.keys() >= set(criterion.requires):
                 return

@@ -28,7 +28,7 @@ SIZE_BYTES = 512 << 20
 INODES = 100_000
 COPIED_BYTES = 1 << 20
 KEYCTL_JOIN_SESSION_KEYRING = 1
-# Neither Python nor every libc has a function for it: the call's number by processor (asm/unistd.h).
+# Neither Python nor the C library has a function for it: the call's number by processor (asm/unistd.h).
 KEYCTL = {
     "x86_64": 250,
     "aarch64": 219,

@@ -20,9 +20,8 @@ ANSWER_BYTES_MAX = 24 << 20
 LARGE_BYTES = 32 << 10
 HEAD_BYTES_MAX = 64 << 10
 CONNECTIONS_MAX = 256
-# Python's own 5 ms would be the lateness of what is recorded beside a thread that parses a large call.
 TURN_OF_THREADS_S = 0.001
-"""What is read and recorded does not wait long for threads that work on calls."""
+"""Python's own 5 ms would be too long for what is recorded beside threads that work on large calls."""
 REQUEST_S, IDLE_S, TURN_S = 8.0, 120.0, 8.0
 READ_AHEAD_BYTES = 8 << 10
 CALLS_HZ, CALLS_AT_ONCE, PAUSE_S = 1000.0, 2000, 3.0
