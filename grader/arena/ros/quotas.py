@@ -125,15 +125,11 @@ class Pool:
         return sum(min(len(jobs), self._each_max - self._busy[key]) for key, jobs in self._waiting.items())
 
     def _work(self):
-        try:
-            while self._work_once():
-                pass
-        finally:
-            with self._changed:
-                self._workers -= 1
+        while self._work_once():
+            pass
 
     def _work_once(self):
-        """Run one job; False where none came for a while."""
+        """Run one job; return False, and leave, where none came for a while."""
         with self._changed:
             found = self._next()
             if found is None:
@@ -141,11 +137,16 @@ class Pool:
                 self._changed.wait(IDLE_S)
                 self._idle -= 1
                 found = self._next()
-        if found is None:
-            return False
+            if found is None:
+                self._workers -= 1  # under the same lock: a job that comes next is not left to this one
+                return False
         key, job = found
         try:
             job()
+        except BaseException:
+            with self._changed:
+                self._workers -= 1
+            raise
         finally:
             self._finish(key)
         return True
