@@ -183,9 +183,13 @@ class Template:
         self, request: bytes, passed: Sequence[tuple[int, int, array.array[int]]] = ()
     ) -> tuple[int, float]:
         with self._lock:
-            # One request at a time: an answer does not say whose it is.
-            self._sock.sendmsg([request], passed)
-            answer = self._sock.recv(ANSWER.size)
+            # One request at a time: an answer does not say which one it is for.
+            try:
+                self._sock.sendmsg([request], passed)
+                answer = self._sock.recv(ANSWER.size)
+            except OSError:
+                self._sock.close()  # a late answer would be taken for that to the next request
+                raise
         if len(answer) != ANSWER.size:
             raise ConnectionResetError("the template has ended")
         pid, cpu_s = ANSWER.unpack(answer)
