@@ -130,8 +130,8 @@ async def _run_catkin_make(
 
 
 def _catkin_make(place: ProcessEnvironment) -> list[str]:
-    """With a trace of every `CMakeLists.txt` and of the package's own `.cmake` files; those in its folder are picked
-    from it."""
+    """Return the command of the build, with a trace of every `CMakeLists.txt` and of the package's own `.cmake` files.
+    The package's part is picked from it later."""
     own = (place.workspace, *place.workspace.others.values())
     packages = [one.repaired / one.folder for one in own]
     found = {p.relative_to(folder).as_posix() for folder in packages for p in folder.rglob("*.cmake")}
@@ -192,8 +192,8 @@ async def _answer(place: ProcessEnvironment, arena: ArenaSession, script: str) -
 
 
 def _trace(place: ProcessEnvironment) -> tuple[Path | None, str]:
-    """The trace that CMake left, as far as the package's files bear it out: the build could write into it. And what of
-    it was too much to be read, in words, or ""."""
+    """Return the trace that CMake left, as far as the package's files bear it out, since the build could write into it;
+    and what of it was too much to be read, in words, or ""."""
     if place.sandbox.bubblewrap:
         data = read_member(place.archive, f"./{TRACE}", READ_MAX + 1)
     else:

@@ -324,7 +324,8 @@ class ProcessEnvironment:
         return first + (before + TAKE + run if copy else TAKE + RUN)
 
     def _limits(self, *, copy: bool) -> RunLimits:
-        """A workspace of the size that was handed in has room beside what else may be written."""
+        """Return the limits of one process. With a `copy` of the workspace, its home has room for that beside what else
+        may be written."""
         room = self.limits.home_bytes + (2 * self.workspace.copied_bytes if copy else 0)
         return self.limits.model_copy(update={"home_bytes": room})
 

@@ -64,7 +64,7 @@ class _OnlyHttps(HTTPRedirectHandler):
     def redirect_request(  # noqa: PLR0917 - as its base has it
         self, req: Request, fp: IO[bytes], code: int, msg: str, headers: HTTPMessage, newurl: str
     ) -> Request | None:
-        """Follow it on encrypted ways alone."""
+        """Follow a redirection only to https://."""
         if urlsplit(newurl).scheme != "https":
             raise URLError("it is redirected to an address without https://")
         return super().redirect_request(req, fp, code, msg, headers, newurl)

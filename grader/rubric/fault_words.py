@@ -190,7 +190,7 @@ def _as_named(pattern: str, text: str) -> str:
 
 
 def _literal(value: object, expected: str) -> str:
-    """pydantic gives what it expects as `'real' or 'warped'`."""
+    """Return what one of several words has to be. pydantic gives these as `'real' or 'warped'`."""
     words = expected.replace(" or ", ", ").replace("'", "").split(", ")
     near = did_you_mean(value, words) if isinstance(value, str) else ""
     return f"must be {expected.replace(chr(39), chr(34))}, not {shown(value)}{near}"

@@ -109,7 +109,7 @@ class _Notes:
     def pytest_runtest_makereport(
         self, item: pytest.Item, call: pytest.CallInfo[None]
     ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-        """One note a test: the worst of its setup, its call and its teardown."""
+        """Take one note for each test: the worst of its setup, its call and its teardown."""
         report = yield
         error = call.excinfo.value if call.excinfo else None
         if isinstance(error, NoSuchScenario | pytest.FixtureLookupError):

@@ -214,7 +214,7 @@ def _never_sent(about: WrittenCriterion, others: Sequence[WrittenCriterion]) -> 
 
 
 def _is_published(topic: str, criterion: WrittenCriterion) -> bool:
-    """Whether a criterion may ask the student for messages on this topic; one that is heard, the grader sends."""
+    """Return whether a criterion may ask the student for messages on this topic: what is heard, the grader sends."""
     return criterion.given.get("topic") == topic and criterion.check != "hears"
 
 
@@ -485,7 +485,7 @@ class _Demand(NamedTuple):
     """Which one message it is about, the `first` or the `last`."""
 
     def excludes(self, other: _Demand) -> bool:
-        """Whether no messages satisfy both."""
+        """Return whether no messages satisfy both demands."""
         # Each may hold of another message.
         if not (self.every or other.every or (self.when and self.when == other.when)):
             return False

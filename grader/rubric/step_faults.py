@@ -147,7 +147,7 @@ def _action_name(at: KeyPath, given: dict[str, Any]) -> Iterator[Fault]:
 
 
 def _action(at: KeyPath, given: dict[str, Any], types: dict[str, str]) -> Iterator[Fault]:
-    """`types` are those of what earlier steps publish on, and send goals to."""
+    """Yield the faults of a goal. `types` are those of what earlier steps publish on, and send goals to."""
     name, kind = str(given.get("name")), str(given.get("type"))
     yield from _action_name(at, given)
     types.setdefault(name, kind)
@@ -177,7 +177,7 @@ def _seconds(step: dict[str, Any]) -> float:
 
 
 def _publish(at: KeyPath, publish: dict[str, Any], types: dict[str, str]) -> Iterator[Fault]:
-    """`types` are those of the topics that earlier steps publish on."""
+    """Yield the faults of messages to send. `types` are those of the topics that earlier steps publish on."""
     topic, kind = publish.get("topic"), publish.get("type")
     if ("value" in publish) == bool(publish.get("values")):
         yield at, "give one of value and values"

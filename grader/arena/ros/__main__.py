@@ -161,7 +161,7 @@ class Arena:
             groups.remove()
 
     def _trees(self):
-        """Each process of the run with the ids of all that runs below it."""
+        """Return each process of the run by its name, with the ids of all that runs below it."""
         # A copy of the list: threads that answer calls ask while the loop starts and ends processes.
         return [(process.name, process.tree()) for process in list(self._processes.values())]
 

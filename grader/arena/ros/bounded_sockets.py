@@ -210,7 +210,8 @@ def receive_into(sock, view):
 
 
 def _arrived_ns(notes):
-    """The kernel's time is the wall clock's: how long ago that was tells it on the arena's clock."""
+    """Return when the bytes arrived, on the arena's clock. The kernel's note is by the wall clock, so what is taken
+    from it is how long ago that was."""
     for level, kind, value in notes:
         if level == socket.SOL_SOCKET and kind == SO_TIMESTAMPNS and len(value) >= TIMESPEC.size:
             seconds, nanoseconds = TIMESPEC.unpack_from(value)

@@ -66,7 +66,7 @@ class Calibration:
             self._wire.messages(self._channel, [chunk[:whole]], time_ns)
 
     def stop(self):
-        """End it, with what it used: CPU seconds."""
+        """End its process; return the CPU seconds that it used."""
         with contextlib.suppress(ProcessLookupError):  # it has ended already
             os.kill(self._pid, signal.SIGKILL)
         with contextlib.suppress(ChildProcessError):  # others have waited for it

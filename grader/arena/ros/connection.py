@@ -118,7 +118,7 @@ class Connection:
             self._invalid(too_long)
 
     def _fill(self):
-        """More of a large message."""
+        """Read on in a large message, and hand it on when it is whole; return how many bytes were read."""
         end = min(len(self._message), self._filled + LARGE_READ_BYTES)
         with memoryview(self._message) as view:
             count, time_ns = receive_into(self.sock, view[self._filled : end])

@@ -97,9 +97,8 @@ def _raise_loopback():
 
 
 def leave_keys_behind():
-    """Join a new, empty session keyring (man 7 keyrings), which all that the process starts inherits: what hangs on
-    the session of the person who grades is not for students. Where the kernel has no keys, or
-    does not let it, there is nothing that could be read either way."""
+    """Join a new, empty session keyring (man 7 keyrings), which all that the process starts inherits: the keys of the
+    person who grades are not for students. Where the kernel has no keys, or forbids this, none can be read anyway."""
     number = KEYCTL.get(os.uname().machine)
     if number is not None:
         LIBC.syscall(number, KEYCTL_JOIN_SESSION_KEYRING, None)

@@ -66,7 +66,7 @@ def _children_of_thread(pid, thread):
 
 
 def cpu_s(pid):
-    """Of a process and of the children that it waited for."""
+    """Return the CPU seconds of a process and of the children that it waited for."""
     return read_stat(pid)[1]
 
 
@@ -145,7 +145,8 @@ def _late_s(pid, thread):
 
 
 def shared_memory(pids):
-    """(bytes, maps): memory without a name that processes share, each piece once, and how many maps were looked at.
+    """Return (bytes, maps): the memory without a name that processes share, each piece once, and how many maps were
+    looked at.
 
     The kernel keeps a piece for as long as any of it is mapped, though no process is shown to hold what it let go: a
     piece counts up to the last byte that is mapped, and for no less than `PIECE_BYTES`.
@@ -245,7 +246,7 @@ class Rest:
         )
 
     def _rests_asleep(self, threads, now_s):
-        """Whether a program whose main thread waits for its others does nothing by itself: none of them sleeps."""
+        """Return whether a program whose main thread waits for others does nothing by itself: none of these sleeps."""
         if _is_compiled(self._pid):
             return True
         awake = {}
@@ -261,7 +262,7 @@ class Rest:
         )
 
     def _others(self, threads, now_s):
-        """Whether one of the other threads sleeps for a time, and whether for long (a timer, say)."""
+        """Return whether one of the other threads sleeps for a time, and whether for long (a timer, say)."""
         naps = {}
         if len(threads) > THREADS_MAX:
             return True, True
@@ -336,7 +337,8 @@ class Groups:
                 _write(folder, SWAP[version], amount if version == 1 else 0)
 
     def _shared_groups(self, version, parent):
-        """Of version 2, a process is in one group only, which has all controllers."""
+        """Return the folder of the group to make. Of version 2, a process is in one group only, so that one has all
+        controllers."""
         made = [folder for known, folder in self._made.values() if known == version == 2]
         ours = "grader-{}-{}".format(os.getpid(), secrets.token_hex(6))
         return made[0] if made and os.path.dirname(made[0]) == parent else os.path.join(parent, ours)
@@ -361,8 +363,8 @@ class Groups:
         return []
 
     def memory_kills(self):
-        """How often the kernel killed a process because the tree had too much memory. What it kills because the whole
-        machine has too little counts here too: then this group never came to its own limit."""
+        """Return how often the kernel killed a process because the tree had too much memory. What it kills because the
+        whole machine has too little is counted in the same place; then this group never came to its own limit."""
         if "memory" not in self._made:
             return 0
         version, folder = self._made["memory"]
@@ -374,7 +376,7 @@ class Groups:
         return events.get("oom_kill", 0) if reached else 0
 
     def cpu_s(self):
-        """Of all that ever ran in the tree, waited for or not; None where no group counts it."""
+        """Return the CPU seconds of all that ever ran in the tree, waited for or not; None if no group counts them."""
         if "cpuacct" not in self._made:
             return None
         version, folder = self._made["cpuacct"]

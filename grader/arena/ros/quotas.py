@@ -93,9 +93,8 @@ class Account:
 
 
 class Pool:
-    """Threads that wait for students' nodes. At most `workers_max` jobs at a time, and `each_max` of one key (a
-    process): a node that never answers takes no more than its
-    process's share. Jobs of one key start in order."""
+    """Threads that wait for students' nodes: at most `workers_max` jobs at a time, and `each_max` of one key (a
+    process). So a node that never answers takes no more than its process's share. Jobs of one key start in order."""
 
     def __init__(self, workers_max=WORKERS_MAX, each_max=EACH_MAX):
         self._workers_max = workers_max
@@ -183,7 +182,7 @@ class Notifications:
         self._large = Pool(workers_max=1)
 
     def queue_task(self, marker, task, args):
-        """`marker` is the address of the node that the task speaks to."""
+        """Queue a task of rosmaster's; `marker` is the address of the node that it speaks to."""
 
         def job():
             # rosmaster's tasks raise whatever the node's answer makes them.

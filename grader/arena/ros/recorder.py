@@ -205,7 +205,7 @@ class Recorder:
         self._pool.submit(self._processes.get(connection.caller_id), work)
 
     def reserve(self, size):
-        """Reserve room in memory for a message that is still coming."""
+        """Reserve room in memory for a message that is still coming; return whether there is any."""
         with self._lock:
             if size and self._pending_bytes + size > PENDING_BYTES_MAX:
                 return False

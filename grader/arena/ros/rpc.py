@@ -218,7 +218,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
 
     @contextlib.contextmanager
     def _turn(self, large):
-        """Large ones take turns."""
+        """Wait for this call's turn if it is large, since one large call is worked on at a time. Raises Busy."""
         if not large:
             yield False
             return
@@ -294,7 +294,7 @@ def _ends(request):
 
 
 def serve(port, answer, guard, owners, title):
-    """Serve in a thread of its own; give the server, of which `uri` is what nodes are told."""
+    """Serve in a thread of its own; return the server, whose `uri` is what nodes are told."""
     sys.setswitchinterval(TURN_OF_THREADS_S)
     server = Server(port, answer, guard, owners, title)
     # It is never told to stop, so it need not wake to look.

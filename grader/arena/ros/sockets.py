@@ -259,7 +259,8 @@ class Owners:
             return {inode: self._pids.get("socket:[{}]".format(inode), frozenset()) for inode in inodes}
 
     def _may_look(self, api):
-        """Whether to look: an address without a listener costs a few looks, not one at every change of the graph."""
+        """Return whether to look: an address without a listener costs a few looks, not one at every change of the
+        graph."""
         now_s = time.monotonic()
         looks, last_s = self._asked.get(api, (0, 0.0))
         if looks >= LOOKS_MAX or now_s - last_s < AGAIN_S or len(self._asked) > ASKED_MAX:

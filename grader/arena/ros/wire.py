@@ -136,7 +136,7 @@ class Wire:
                 self._went.notify_all()
 
     def _take(self):
-        """Some of what waits: small parts together, a large one alone."""
+        """Return some of what waits: small parts together, a large one alone."""
         with self._lock:
             self._await_work()
             parts = [self._queue.popleft()]
@@ -217,7 +217,7 @@ def _messages(data, start, end):
 
 
 def _fields(payload):
-    """Halves of surrogate pairs, which no record can hold, become question marks."""
+    """Return the fields of a frame. Halves of surrogate pairs, which no record can hold, become question marks."""
     fields = json.loads(payload)
     # Nearly every frame has neither, and is parsed only once.
     if b"\\ud" in payload or b"\xed" in payload:

@@ -36,14 +36,14 @@ def _parts(kind):
 
 
 def _definition_of(name, definitions, kind):
-    """The definition that a name of the module comes from: `Spawn` for `SpawnRequest` and for `_Spawn`."""
+    """Return the definition that a name of the module comes from: `Spawn` for `SpawnRequest` and for `_Spawn`."""
     candidates = [name[1:]] if name.startswith("_") else [name]
     candidates += [name[: -len(part)] for part in _parts(kind) if part and name.endswith(part)]
     return next((stem for stem in candidates if stem in definitions), None)
 
 
 def _make(package, kind, stem, text):
-    """The module that genpy's programs would have written into a file."""
+    """Return the module that genpy's programs would have written into a file."""
     full_name = f"{package}/{stem}"
     context = genmsg.msg_loader.MsgContext.create_default()
     if kind == "srv":

@@ -178,7 +178,7 @@ class Robot:
             self.x, self.y = x, y
 
     def _is_blocked(self, x, y):
-        """Whether a wall is in the way, and nearer than before."""
+        """Return whether a wall is in the way, and nearer than before."""
         at = self._near_at
         if at is None or hypot(x - at[0], y - at[1]) > NEAR_M:
             self._near_at = (x, y)
