@@ -161,6 +161,7 @@ class Recorder:
             await self._write_package(self._folder / "first", last=False)
         except ArenaError as error:
             self._progress.step("build", "waiting", f"once more: {error.message}", BUILD_EXPECTED_S)
+            # In a new folder: what the first try left there may be what went wrong.
             await self._write_package(self._folder / "second", last=True)
 
     async def _write_package(self, folder: Path, *, last: bool) -> None:
@@ -183,6 +184,7 @@ class Recorder:
             for one in (facts, *facts.also)
         )
         answers_of = dict(zip((one.asked for one in facts.also), more, strict=True))
+        # A build starts at least as many processes as a run.
         async with self._admission.run(), self._admission.start():
             self._progress.step("build", "running", "catkin_make", BUILD_EXPECTED_S)
             try:

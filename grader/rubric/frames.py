@@ -190,6 +190,7 @@ def _swapped_frames(criterion: WrittenCriterion, criteria: list[WrittenCriterion
         return
     sent = [(one.get("parent"), one.get("child")) for one in given_steps(scenario, "transform")]
     earlier = [one.given for one in criteria if one.check == "transform" and one.place < criterion.place]
+    # Those of other topics of poses, too: a frame has one parent in the whole of tf.
     sent += [(one.get("parent"), one.get("child")) for one in earlier if one.get("through") is not True]
     equal = [one.given for one in criteria if one.check == "field-equals"]
     of_pose = [one for one in equal if one.get("topic") == given.get("pose_of")]

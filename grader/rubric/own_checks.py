@@ -124,6 +124,7 @@ def _contain(function: Callable[..., Verdict]) -> Callable[..., Verdict]:
 
 def _run(path: Path, raw: bytes) -> LineFault | None:
     """Run the file as a module of its own, which stays: records of parameters look their types up in it."""
+    # By path and content: another rubric's file of this name, or this one once it has changed, is another module.
     name = f"grader_own_{hashlib.sha256(str(path).encode() + raw).hexdigest()[:16]}"
     module = importlib.util.module_from_spec(ModuleSpec(name, _Loader(path, raw), origin=str(path)))
     module.__file__ = str(path)

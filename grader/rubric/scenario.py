@@ -491,6 +491,7 @@ class Scenario(Record):
     @property
     def digest(self) -> str:
         """The sha256 of what is run and until when: evidence of a scenario with another one says something else."""
+        # Words that change nothing of the run.
         left_out: dict[str, Any] = {"title": True}
         # Keys that a scenario does not use are left out: a newer grader that knows more keys gives the same digest, and
         # what was recorded before still fits.

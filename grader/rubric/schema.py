@@ -183,6 +183,7 @@ def _with_places(found: dict[str, Any]) -> dict[str, Any]:
     for kind in inner:
         kind |= {name: _with_places(kind[name]) for name in INSIDE if isinstance(kind.get(name), dict)}
         kind |= {name: [_with_places(one) for one in kind[name]] for name in kind.keys() & {"prefixItems"}}
+    # Numbers, texts and choices; in lists and maps the values inside have their own.
     if any(kind.get("type", "array") not in {"array", "object", "null"} or "enum" in kind for kind in kinds):
         inner.append({"$ref": "#/$defs/Place"})
     return about | ({"anyOf": inner} if len(inner) > 1 else inner[0])

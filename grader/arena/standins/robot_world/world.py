@@ -42,6 +42,7 @@ def read_plan(path, parse):
 def read_pgm(data):
     """Return the rows of a picture (PGM), from the top, each value from 0 (black) to 1 (white)."""
     fields, place = [], 0
+    # Kind, width, height and white, with any blanks and comments between them (man 5 pgm).
     while len(fields) < 4:
         place = _skip_blanks(data, place)
         end = place

@@ -156,6 +156,7 @@ class World:
             if began_s is None and now_s:
                 began_s = now_s
             if began_s is not None:
+                # The small number makes up for what float sums fall short of a whole step.
                 due = int((now_s - began_s) / STEP_S + 1e-6) - self._steps
                 for _ in range(min(due, CATCH_UP_STEPS)):
                     self._step(
@@ -173,6 +174,7 @@ class World:
             self._robot.step()
         self._steps += 1
         robot = self._robot
+        # Once for each collision, not in each step of 10 ms.
         if robot.hits != self._hit:
             self._hit = robot.hits
             self._collision.publish(self._hit)
