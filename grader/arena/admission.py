@@ -145,6 +145,7 @@ class Admission:
     def __init__(self, folder: Path | None, *, starts: int | None = None) -> None:
         self._folder = folder
         self._starts = starts or len(os.sched_getaffinity(0))
+        # Locks of files know no order: without this one, a later start could go before an earlier one.
         self._next = asyncio.Lock()
 
     @asynccontextmanager

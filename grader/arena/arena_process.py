@@ -38,6 +38,7 @@ class ArenaProcess:
         self._ended = asyncio.Event()
         self._open: set[int] = set()
         self._errors = b""
+        # Plain pipes, since the child is the template's and not this process's: asyncio cannot start it.
         pipes = [os.pipe() for _ in range(3)]
         (commands_r, self._commands), (self._output, output_w), (self._words, words_w) = pipes
         try:
@@ -72,6 +73,7 @@ class ArenaProcess:
             timer.cancel()
         finally:
             self._kill()
+            # Only after the kill: until the template has waited for it, its id and group cannot belong to others.
             self._template.forget(self.pid)
             for descriptor in self._open:
                 self._loop.remove_reader(descriptor)
@@ -114,6 +116,7 @@ class Template:
     def __init__(self, argv: Sequence[str], env: Mapping[str, str]) -> None:
         self.user = os.getpid()
         self._lock = threading.Lock()
+        # Packets, so that a request and its descriptors come as one.
         self._sock, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._sock.settimeout(ANSWER_S)
         with theirs:
@@ -129,6 +132,7 @@ class Template:
 
     def take_over(self) -> None:
         """Get a socket of this process's own, where it is a copy of the one that had this object."""
+        # A new lock, too: another thread may have held the old one while this process was copied.
         self.user, self._popen, self._lock = os.getpid(), None, threading.Lock()
         own, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         own.settimeout(ANSWER_S)
@@ -179,8 +183,13 @@ class Template:
         self, request: bytes, passed: Sequence[tuple[int, int, array.array[int]]] = ()
     ) -> tuple[int, float]:
         with self._lock:
-            self._sock.sendmsg([request], passed)
-            answer = self._sock.recv(ANSWER.size)
+            # One request at a time: an answer does not say which one it is for.
+            try:
+                self._sock.sendmsg([request], passed)
+                answer = self._sock.recv(ANSWER.size)
+            except OSError:
+                self._sock.close()  # a late answer would be taken for that to the next request
+                raise
         if len(answer) != ANSWER.size:
             raise ConnectionResetError("the template has ended")
         pid, cpu_s = ANSWER.unpack(answer)
@@ -230,5 +239,6 @@ def _drop(template: Template) -> None:
 
 def _close_all() -> None:
     for template in list(_templates.values()):
+        # A copied process must not end the template that its parent still uses.
         if template.user == os.getpid():
             template.close()

@@ -62,6 +62,7 @@ SYSTEM = (
     "/usr/local", "/usr/share", "/usr/src", "/var/lib/dpkg/status",
 )  # fmt: skip
 BELOW = (
+    # Relative to each prefix: what `find_package` and `find_program` look through.
     "bin",
     "conda-meta",
     "include",
@@ -72,6 +73,7 @@ BELOW = (
     "share/roslaunch/package.xml",
     "src",
 )
+# A base workspace is far smaller: anything larger is not one.
 BYTES_MAX = 8 << 20
 FILES_MAX = 8
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
@@ -86,6 +88,7 @@ def provide_base(mode: SandboxMode) -> None:
     sandbox = choose_sandbox(mode) if ros else None
     if ros is None or sandbox is None or not sandbox.bubblewrap:
         return
+    # Others may pass through the folder, but not list it: students' processes have another user where root grades.
     with temporary_folder("run", temporary_base(sandbox)) as folder:
         folder.chmod(0o711)
         inner = folder / "base"
@@ -106,6 +109,7 @@ def has_base(place: ProcessEnvironment) -> bool:
     if kept is None:
         return False
     place.base.write_bytes(kept)
+    # The sandbox's user reads it.
     place.base.chmod(0o644)
     _hand_answers(place)
     return True
@@ -166,8 +170,9 @@ def _file_name(place: ProcessEnvironment) -> str:
 
 
 def machine_digest(place: ProcessEnvironment) -> str:
-    """Return another one for whatever else CMake could find: another machine, other programs, another ROS."""
+    """Return a digest of all that CMake learns here: another machine, other programs or another ROS have another."""
     spec = base_spec(place)
+    # Whatever is missing here would let a build use what CMake learnt of another machine.
     known = {
         "grader": __version__,
         "kernel": [platform.system(), platform.release(), platform.machine()],
@@ -208,6 +213,7 @@ def keep(name: str, data: bytes) -> None:
     folder = user_folder("cache")
     with suppress(OSError, GraderError):
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        # In a folder of another user's, or behind a link, someone could replace what every build begins with.
         if folder.is_symlink() or folder.stat().st_uid != os.geteuid():
             return
         folder.chmod(0o700)
@@ -290,8 +296,9 @@ def unpack(built: bytes, folder: Path) -> None:
 
 
 def _as_ours(member: tarfile.TarInfo) -> bool:
-    """Return whether it stays inside the folder; from then on it is the grader's own, and writable by no one else."""
+    """Return whether a member stays inside the folder, and make it the grader's own, which no one else can write."""
     member.uid, member.gid, member.uname, member.gname = os.geteuid(), os.getegid(), "", ""
+    # Without setuid bits, and closed to the student's user for writing.
     member.mode &= 0o755
     plain = member.isreg() or member.isdir() or (member.issym() and "/" not in member.linkname)
     return (

@@ -130,8 +130,8 @@ async def _run_catkin_make(
 
 
 def _catkin_make(place: ProcessEnvironment) -> list[str]:
-    """With a trace of every `CMakeLists.txt` and of the package's own `.cmake` files; those in its folder are picked
-    from it."""
+    """Return the command of the build, with a trace of every `CMakeLists.txt` and of the package's own `.cmake` files.
+    The package's part is picked from it later."""
     own = (place.workspace, *place.workspace.others.values())
     packages = [one.repaired / one.folder for one in own]
     found = {p.relative_to(folder).as_posix() for folder in packages for p in folder.rglob("*.cmake")}
@@ -152,6 +152,7 @@ def _note_excess(writer: EvidenceWriter, *found: str) -> None:
 
 def _syntax_spec(place: ProcessEnvironment) -> dict[str, Any]:
     """Return how to start ROS's own Python, which compiles every script of the package and runs none."""
+    # Isolated (`-I`): no module of the package's can take the place of one that it imports.
     script = 'python3 -I "$1/grader-syntax.py" "$2" < "$1/python-files.json" >' + _target(place, SYNTAX)
     argv = ["/bin/bash", "-c", script, "bash", place.shims, place.package_folder]
     room = 2 * REPORT_BYTES_MAX
@@ -191,8 +192,8 @@ async def _answer(place: ProcessEnvironment, arena: ArenaSession, script: str) -
 
 
 def _trace(place: ProcessEnvironment) -> tuple[Path | None, str]:
-    """The trace that CMake left, as far as the package's files bear it out: the build could write into it. And what of
-    it was too much to be read, in words, or ""."""
+    """Return the trace that CMake left, as far as the package's files bear it out, since the build could write into it;
+    and what of it was too much to be read, in words, or ""."""
     if place.sandbox.bubblewrap:
         data = read_member(place.archive, f"./{TRACE}", READ_MAX + 1)
     else:

@@ -28,6 +28,7 @@ from grader.portable import system
 
 MOUNTINFO = Path("/proc/self/mountinfo")
 MEMBERSHIP = Path("/proc/self/cgroup")
+# No start takes so long from making a group to putting a process into it.
 ABANDONED_S = 600.0
 KEYS = {
     ("memory", 1): "memory.limit_in_bytes",

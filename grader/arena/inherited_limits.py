@@ -143,8 +143,8 @@ def _soft(need: Need, soft: int, hard: int) -> int:
 
 
 def _running(hard: int) -> int:
-    """What counts against the number of processes: all tasks of the user, on the whole machine. Root's do not count,
-    and its students have a user of their own, which runs nothing yet."""
+    """Return how many tasks count against the limit of processes: all of the user's, on the whole machine. Root's do
+    not count, and its students have a user of their own, which runs nothing yet."""
     return 0 if hard < 0 or _is_root() else tasks_of(os.getuid())
 
 

@@ -84,7 +84,8 @@ def _cancel(loop: asyncio.AbstractEventLoop, task: asyncio.Task[Any]) -> None:
 def _cancelling(
     loop: asyncio.AbstractEventLoop, task: asyncio.Task[Any], signals: list[int]
 ) -> Iterator[None]:
-    """Signals reach only the main thread; elsewhere its own handlers stay. Those that came are in `signals`."""
+    """Let SIGINT and SIGTERM cancel the task while the block runs, and note them in `signals`. They reach the main
+    thread alone; in another one, its own handlers stay."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

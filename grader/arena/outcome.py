@@ -39,6 +39,7 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
             return "complete", ""
     elif now_s - live.started_s > until.limit_s:
         return "complete", f"watched for {until.limit_s:g} s"
+    # A process that may yet become a node, or a goal that is worked on, makes silence no news.
     wanting = still_starting or (bool(until.ended) and has_goal(live))
     silent = "" if wanting else _silent(live, until, now_s) or _never(live, until, given, now_s)
     silent = silent or _in_namespaces(live, until, now_s)
@@ -141,7 +142,8 @@ def _window(live: RunState, until: Until, now_s: float) -> bool:
 
 
 def _talks_elsewhere(live: RunState, until: Until, now_s: float) -> bool:
-    """Whether the nodes have talked for so long on topics that are not waited for that no more will come of them."""
+    """Return whether the nodes have talked for so long on topics that are not waited for that no more will come of
+    them."""
     first_s = min((seen.first_s for seen in _talking(live)), default=now_s)
     return now_s > first_s + max(until.window_s or 0, _late_s(live, until, now_s))
 
@@ -295,7 +297,8 @@ def _began_s(live: RunState) -> float:
 
 
 def _standstill(live: RunState, until: Until, now_s: float) -> str:
-    """Nothing happens any more, though more nodes, programs or ends were waited for."""
+    """Return that nothing happens any more, though more nodes, programs or ends were waited for; "" where something
+    may."""
     growing_up = live.nodes and now_s < _lived_s(live, until.alive_s or 0)
     if growing_up or _nodes(live, until, now_s):
         return ""

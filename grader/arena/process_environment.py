@@ -39,6 +39,7 @@ from grader.ros_env import SYSTEM_PATH, RosInstallation
 TEXT_BYTES_MAX = 64 << 10
 LOOPBACK = "127.0.0.1"
 """As an address: not every machine knows the name localhost."""
+# What `stdbuf -oL` preloads: a C++ program's `printf` into a pipe would come only at its end.
 LIBSTDBUF = Path("/usr/libexec/coreutils/libstdbuf.so")
 HEAD = (
     "echo >&{lifeline} && read -r _ <&{lifeline} && exec {lifeline}>&-"
@@ -172,6 +173,7 @@ class ProcessEnvironment:
         """
         name = Path(script).name
         found = self.script_path(script)
+        # `rosrun` looks in devel/lib first.
         if name in self.built.programs:
             return f"{self.devel_programs}/{name}", found or script
         if found is None:
@@ -256,6 +258,7 @@ class ProcessEnvironment:
         package = self.workspace.repaired / self.workspace.folder
         if (package / script).is_file():
             return script
+        # The path breaks ties, so that every run starts the same file.
         others = sorted(package.rglob(Path(script).name), key=lambda p: (len(p.parts), str(p)))
         return next((p.relative_to(package).as_posix() for p in others if p.is_file()), None)
 
@@ -274,10 +277,13 @@ class ProcessEnvironment:
         binds: Sequence[Word] = (),
         **more: Any,  # noqa: ANN401 - fields of the spec
     ) -> dict[str, Any]:
-        """What the arena needs to start a process. With `copy` it gets a workspace of its own: the sources with the
-        repairs, or `as_handed_in`, and what the build made. `build` is the build itself, `number` says how many others
-        the run starts before it. What the process writes to `{collect}`, `collect_bytes` at most, becomes the file of
-        that name in `workspace.kept`. `binds` are more arguments of bubblewrap's."""
+        """Return what the arena needs to start a process.
+
+        With `copy` it gets a workspace of its own: the sources with the repairs, or `as_handed_in`, and what the build
+        made. `build` is the build itself, `number` says how many others the run starts before it. What the process
+        writes to `{collect}`, `collect_bytes` at most, becomes the file of that name in `workspace.kept`. `binds` are
+        more arguments of bubblewrap's.
+        """
         boxed = self.sandbox.bubblewrap
         limits = self._limits(copy=copy)
         filtered = system_call_filter() if boxed else None
@@ -296,6 +302,7 @@ class ProcessEnvironment:
                 place=self.folder,
                 limits=limits,
                 binds=[*self._binds(copy=copy, as_handed_in=as_handed_in or build, output=build), *binds],
+                # What the grader runs without a master (the base workspace, a compilation) needs no network.
                 net=role != "grader" or not as_handed_in,
             ),
             "filter": base64.b64encode(filtered).decode() if filtered else None,
@@ -312,11 +319,13 @@ class ProcessEnvironment:
     def _words(self, *, copy: bool, build: bool, number: int) -> str:
         """Return the script of the first shell. Nothing of the submission is in it."""
         before, run = (BUILD_COPY, BUILD_RUN) if build else (COPY, RUN_AS_NUMBER % number if number else RUN)
+        # `ulimit` before all else: a process tree inherits it from the shell.
         first = self.sandbox.first_words(self.limits) + HEAD
         return first + (before + TAKE + run if copy else TAKE + RUN)
 
     def _limits(self, *, copy: bool) -> RunLimits:
-        """A workspace of the size that was handed in has room beside what else may be written."""
+        """Return the limits of one process. With a `copy` of the workspace, its home has room for that beside what else
+        may be written."""
         room = self.limits.home_bytes + (2 * self.workspace.copied_bytes if copy else 0)
         return self.limits.model_copy(update={"home_bytes": room})
 
@@ -339,6 +348,7 @@ class ProcessEnvironment:
             return None
         folder = self.folder / STAGE
         folder.mkdir(mode=0o711, exist_ok=True)
+        # `mkdir`'s mode is cut by the umask.
         folder.chmod(0o711)
         return {"folder": str(folder), "owner": self.sandbox.uid or os.geteuid()}
 
@@ -369,6 +379,7 @@ class ProcessEnvironment:
 
 
 def search_path(ros: RosInstallation, path: str, *first: str) -> str:
-    """What the package adds comes last: a program of its own never takes the place of the system's or of ROS's."""
+    """Return the search path for programs. What the package adds comes last: a program of its own never takes the place
+    of the system's or of ROS's."""
     entries = [*first, *ros.env["PATH"].split(os.pathsep), *SYSTEM_PATH.split(":"), *path.split(os.pathsep)]
     return os.pathsep.join(dict.fromkeys(e for e in entries if e))

@@ -91,6 +91,7 @@ class Recorder:
         self._rubric = rubric
         self._beside = beside
         self._progress = progress
+        # The bytes of one submission's evidence are shared among its runs.
         keeping = sum(bool(scenario.keeps) for scenario in rubric.scenarios.values())
         self._limits = RunLimits().shared_by(len(rubric.scenarios), keeping=keeping)
         ros = find_ros()
@@ -160,6 +161,7 @@ class Recorder:
             await self._write_package(self._folder / "first", last=False)
         except ArenaError as error:
             self._progress.step("build", "waiting", f"once more: {error.message}", BUILD_EXPECTED_S)
+            # In a new folder: what the first try left there may be what went wrong.
             await self._write_package(self._folder / "second", last=True)
 
     async def _write_package(self, folder: Path, *, last: bool) -> None:
@@ -182,6 +184,7 @@ class Recorder:
             for one in (facts, *facts.also)
         )
         answers_of = dict(zip((one.asked for one in facts.also), more, strict=True))
+        # A build starts at least as many processes as a run.
         async with self._admission.run(), self._admission.start():
             self._progress.step("build", "running", "catkin_make", BUILD_EXPECTED_S)
             try:
@@ -240,6 +243,7 @@ class Recorder:
         package = facts.asked or self._rubric.package
         starts = [start for scenario in self._rubric.scenarios.values() for start in scenario.start]
         wanted = {s.script for s in starts if s.script and self._rubric.package_of(s) == package}
+        # Reversed, so that of several files of one name the shallowest stays.
         names = {Path(path).name: path for path in reversed(paths)}
         matches = (script if script in paths else names.get(Path(script).name) for script in sorted(wanted))
         return [match for match in matches if match is not None]

@@ -198,6 +198,7 @@ class RunState:
         picture = nodes if picture is None else picture
         if picture != self.graph_picture:
             self.graph_changed_s, self.graph_picture = now_s, picture
+        # Only a process's first node counts: later ones do not make the run wait longer.
         if set(processes.values()) & self.running - self.registered:
             self.registered_s = now_s
             self.sought.pop(UNNAMED, None)  # what asked before may be a node now
@@ -215,6 +216,7 @@ class RunState:
         (None). One that computes is at rest where it can have nothing else to do."""
         known = self.at_rest.pop(process, None)
         if rest is not None and (rest != "computes" or process in self.endless):
+            # A rest goes on when its kind changes, and begins again with another program.
             same = known is not None and known.programs == programs
             since_s, lost_s = (known.since_s, known.lost_before_s) if known and same else (now_s, self.lost_s)
             self.at_rest[process] = Rest(since_s, lost_s, programs, rest)
@@ -281,6 +283,7 @@ class RunState:
 
     def note_line(self, line: str, now_s: float, process: str = "") -> None:
         self.last_line_s = now_s
+        # The hash, not the line: a process may print megabytes.
         seen = hash((process, LOG_TIME.sub("", line)))
         if seen not in self.lines_seen:
             self.new_line_s = now_s

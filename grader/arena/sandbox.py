@@ -100,7 +100,7 @@ class Sandbox(Record):
     def wall(
         self, *, ros: RosInstallation, place: Path, limits: RunLimits, binds: Sequence[Word], net: bool
     ) -> list[Word] | None:
-        """bubblewrap's arguments, or None without it. `place` is the run's own folder (`sandbox_files.prepare`),
+        """Return bubblewrap's arguments, or None without it. `place` is the run's own folder (`sandbox_files.prepare`),
         `binds` are more arguments. Only memory of fixed size can be written: the scratches, and what `binds` give."""
         if not self.bubblewrap:
             return None
@@ -134,13 +134,17 @@ class Sandbox(Record):
         yield f"--fsize={limits.file_bytes}"
         yield f"--nofile={limits.open_files}"
         yield f"--as={limits.address_space_bytes}"
+        # The soft limit is a signal that a process may ignore, the hard one ends it.
         yield f"--cpu={limits.cpu_s:.0f}:{limits.cpu_s + 10:.0f}"
+        # The core file of a crash would fill the little room that the sandbox has for files.
         yield "--core=0"
         yield f"--memlock={limits.locked_bytes}"
+        # POSIX message queues hold memory that no process is charged for.
         yield "--msgqueue=0"
         yield "--rtprio=0"
         yield "--nice=0"
         yield f"--sigpending={limits.queued_signals}"
+        # It counts all processes of a user: only a user of the student's own can have such a limit.
         if self.uid and not self._counts_apart():
             yield f"--nproc={limits.tasks}"
 
@@ -166,6 +170,7 @@ def _system(ros: RosInstallation) -> list[Word]:
         argv += ["--ro-bind", prefix, prefix]
         shown.append(Path(prefix).resolve())
     if any(OWN_FOLDER.is_relative_to(folder) for folder in shown):
+        # Otherwise students' code could read how it is judged.
         argv += ["--size", "4096", "--tmpfs", str(OWN_FOLDER)]
     return argv
 
@@ -194,7 +199,8 @@ def _counts_by_namespace() -> bool:
 
 
 def temporary_base(sandbox: Sandbox | None) -> Path:
-    """Where run folders go: `$TMPDIR`, or where root's is closed to others, a place that the student's user can pass.
+    """Return where run folders go: `$TMPDIR`, or where root's is closed to others, a place that the student's user can
+    pass.
 
     Raises HostError where there is none.
     """
@@ -314,6 +320,7 @@ def _walls() -> tuple[str, bool]:
             return f"{program} is not installed", False
     said = _refusal(NO_NESTING)
     nesting = bool(NESTS.fullmatch(said) or KNOWN.fullmatch(said))
+    # Without the word that was refused, there may be a sandbox all the same.
     if nesting:
         said = _refusal()
     if said and not KNOWN.fullmatch(said):
@@ -322,11 +329,13 @@ def _walls() -> tuple[str, bool]:
 
 
 def _unprivileged_uid() -> int:
-    """A user that no directory of users knows, where this machine has the whole range of them (a container may not)."""
+    """Return the number of a user that nobody has, of a range that is unused where this machine has all numbers (a
+    container may not)."""
     try:
         mapped = max(int(line.split()[0]) + int(line.split()[2]) for line in UID_MAP.read_text().splitlines())
     except (OSError, ValueError, IndexError):
         mapped = 0
+    # A number that cannot be guessed: gradings of root's that run side by side do not share a user.
     return random.SystemRandom().randrange(*(UNUSED_UIDS if mapped >= UNUSED_UIDS[1] else FEW_UIDS))
 
 
@@ -337,6 +346,7 @@ def _refusal(*more: str) -> str:
     walls = [*files, *WALLS, *more, *calls, "--die-with-parent", "/bin/true"]
     return last_error_line(
         [
+            # In a process of its own, since it leaves this process's namespaces.
             sys.executable,
             "-I",
             str(NAMESPACES),

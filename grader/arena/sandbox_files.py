@@ -60,9 +60,12 @@ def prepare(place: Path, ros: RosInstallation) -> None:
     etc, shims = place / "etc", place / "bin"
     for folder in (etc, shims, place / "home"):
         folder.mkdir(parents=True)
+    # Some programs fail for a user without a name, and the machine's own users are not shown.
     (etc / "passwd").write_text(f"student:x:1000:1000:student:{HOME}:/bin/bash\n")
     (etc / "group").write_text("student:x:1000:\n")
+    # roslaunch resolves its own host name, which is `localhost` in a sandbox.
     (etc / "hosts").write_text("127.0.0.1 localhost\n::1 localhost\n")
+    # Both are ROS's interpreter: a newer system has no `python`, and its `python3` may be another one.
     for name in ("python", "python3"):
         (shims / name).symlink_to(ros.python)
     shutil.copyfile(ROS_SIDE / "syntax.py", shims / "grader-syntax.py")
@@ -75,12 +78,13 @@ def prepare(place: Path, ros: RosInstallation) -> None:
     _program(shims, "network_and_screen.sh", "grader-reachable", ASKING)
     _program(shims, "rosbag_record.sh", RECORD_SHIM, ())
     shutil.copyfile(ROS_SIDE / "opener.py", shims / "grader-open.py")
-    _quicker(shims, ros)
+    _write_quick_programs(shims, ros)
     copy_standins(place / "standins", ros)
 
 
-def _quicker(shims: Path, ros: RosInstallation) -> None:
-    """Put shell programs that answer known questions before programs that start Python, where those are there."""
+def _write_quick_programs(shims: Path, ros: RosInstallation) -> None:
+    """Write programs that come before ROS's own on a sandbox's PATH and are quicker: they know the answer, or load
+    less."""
     (shims / ANSWERS).mkdir()
     asked = sorted({question.split()[0] for question in QUESTIONS})
     _program(shims, "cached_answers.sh", "grader-answers", [name for name in asked if ros.program(name)])
@@ -88,14 +92,15 @@ def _quicker(shims: Path, ros: RosInstallation) -> None:
         _program(shims, "find_pkg.sh", "catkin_find_pkg", ())
     empy, modules = ros.program("empy"), [Path(prefix) / EM for prefix in (*ros.prefixes, "/usr")]
     module = next((path for path in modules if path.is_file()), None)
+    # Only where the program is the module with another first line: a distribution may have changed either.
     if empy and module and _below_shebang(Path(empy)) == _below_shebang(module):
-        _filled_in(shims / "empy", "empy.py", "@EM@", str(module))
+        _write_filled_in(shims / "empy", "empy.py", "@EM@", str(module))
     roslaunch = ros.program("roslaunch")
     if roslaunch and b"python" in Path(roslaunch).read_bytes().partition(b"\n")[0]:
-        _filled_in(shims / "roslaunch", "roslaunch.py", "@PROGRAM@", roslaunch)
+        _write_filled_in(shims / "roslaunch", "roslaunch.py", "@PROGRAM@", roslaunch)
 
 
-def _filled_in(program: Path, source: str, name: str, value: str) -> None:
+def _write_filled_in(program: Path, source: str, name: str, value: str) -> None:
     program.write_text((ROS_SIDE / source).read_text().replace(name, value))
     program.chmod(0o755)
 
@@ -161,7 +166,8 @@ def with_course(env: Mapping[str, str], course: Path, inside: str) -> dict[str, 
 
 
 def _prepend(path: str, entries: list[str]) -> str:
-    """Entries that are there already stay where they are: the student's workspace goes before the course's."""
+    """Return the path with the entries in front of it. One that is there already stays where it is, so the student's
+    workspace goes before the course's."""
     before = [entry for entry in path.split(os.pathsep) if entry]
     return os.pathsep.join([*(entry for entry in entries if entry not in before), *before])
 
@@ -202,7 +208,7 @@ def _installed_standins(ros: RosInstallation) -> Iterator[str]:
 
 
 def _overlaid(ros: RosInstallation) -> Iterator[str]:
-    """Packages of the workspaces that a `setup.bash` is made of, which may lie deeper, or be the entry itself."""
+    """Yield the packages of source workspaces on ROS_PACKAGE_PATH, which may lie deeper, or be the entry itself."""
     from catkin_pkg.packages import find_package_paths  # noqa: PLC0415 - slow to load, and not needed to read files
 
     for entry in _package_path(ros):

@@ -42,8 +42,10 @@ IDLE = re.compile(
     rb"^[ \t]*while\s*\(?\s*" + ENDLESS + rb"\s*\)?\s*:\s*(?:#[^\n]*\n\s*)*(?:pass|continue)\b", re.MULTILINE
 )
 """A loop that does nothing and never ends: `while True: pass`."""
+# Of the run's time. A node's timer or sleep is late by one step at most.
 CLOCK_STEP_S = 0.05
 UNFOLLOWED_S = 2.0
+# By the wall's clock: a node of 10 Hz that follows the simulated clock is many times as fast.
 UNFOLLOWED_HZ = 15.0
 REGISTERED_S = 1.0
 HEARD_SETTLE_S = 0.3
@@ -184,6 +186,7 @@ async def _run(
                 continue
             if start.after is not None:
                 await _await_node(start.after, scenario, arena, tell)
+                # A simulator begins to send at once: a node that is not connected yet would miss it.
                 if start.program is not None:
                     await arena.await_connections()
             arena.start(spec)
@@ -226,8 +229,8 @@ async def _await_node(process: str, scenario: Scenario, arena: ArenaSession, tel
 
 
 async def _await_rostests(scenario: Scenario, arena: ArenaSession, tell: Tell) -> None:
-    """Until the tests of `.test` files are over. Once all of the student's processes have ended, they have little left
-    to wait for."""
+    """Wait until the tests of `.test` files are over. Once all of the student's processes have ended, they have little
+    left to wait for."""
     live, names = arena.live, {start.name for start in scenario.start if start.is_rostest}
     until_s = live.started_s + scenario.until.limit_s
     while names & live.helpers and time.monotonic() < until_s + live.lost_s:

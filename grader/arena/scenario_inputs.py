@@ -21,6 +21,7 @@ PROBE_SHAPES = (
 )  # fmt: skip
 """Long and short, with numbers as a lab's own texts, with commas and colons: a text that is cut anywhere is noticed. No
 number is one that a lab counts."""
+# With fewer, there is no place in the middle for a value that comes twice.
 VALUES_FOR_ONE_TWICE = 4
 PAUSE_BEFORE_SAME = 3
 RANGES = {
@@ -30,6 +31,7 @@ RANGES = {
     for bits in (8, 16, 32, 64)
     for signed in (True, False)
 }
+# The system's randomness: a student's process cannot work out the next values from those that it has seen.
 _random = random.SystemRandom()
 FILE_BYTES_MAX = 256 << 10
 EVENTS_MAX = 2_000
@@ -211,6 +213,7 @@ def _content(data: bytes | None) -> dict[Any, Any]:
         raise _UnreadableError(TOO_LARGE)
     text = data.decode()
     aliases = depth = 0
+    # Events are counted before anything is made of them: an alias costs a few letters, its value any memory.
     for count, event in enumerate(yaml.parse(text, _Loader)):
         aliases += isinstance(event, yaml.AliasEvent)
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
@@ -225,6 +228,7 @@ def _content(data: bytes | None) -> dict[Any, Any]:
 def _check_size(values: list[Any]) -> None:
     """Raise for too large a file: with aliases, a few letters can stand for lists without number or end."""
     count, waiting = 0, [(values, 0)]
+    # The list grows while it is walked through.
     for items, depth in waiting:
         count += len(items)
         if count > VALUES_MAX or depth > DEPTH_MAX:

@@ -76,6 +76,7 @@ class ServedServices:
 
     def _note_request(self, time_ns: int, fields: dict[str, Any]) -> None:
         one, live = self._served[fields["service"]], self._arena.live
+        # Until the answer has gone out, a client that waits for it is no sign that the graph has settled.
         live.answers_s = max(live.answers_s, time.monotonic() + one.delay_s)
         request = self._types[one.name].request.decode(base64.b64decode(fields["data"]))
         response = None if one.fails else one.in_turn[fields["answer"]]
@@ -160,6 +161,7 @@ class ServedAction:
                 return
             goal = self._types["goal"].decode(self._goals.popleft())
             if goal is not None:
+                # While the goal is worked on, nothing counts as settled.
                 self._arena.live.answers_s = math.inf
                 await self._pursue(goal["goal_id"], goal["goal"])
                 self._arena.live.answers_s = time.monotonic()
@@ -170,6 +172,7 @@ class ServedAction:
         status = {"goal_id": goal_id, "status": ACTIVE}
         self._send("status", {"status_list": [status]})
         cancelled = False
+        # None stands for the pause after the last feedback, before the result.
         for feedback in (*one.feedback, None):
             await self._arena.wait(lambda: self._is_cancelled(goal_id["id"]), one.delay_s)
             cancelled = self._is_cancelled(goal_id["id"])
@@ -186,6 +189,7 @@ class ServedAction:
         self._arena.note(ActorEvent(action="serve", actor=node, **about), began_ns)
         self._send("status", {"status_list": [end]})
         self._send("result", {"status": end, "result": one.result})
+        # A cancel without an id is for the goals that there were, not for the next one.
         self._cancels.clear()
 
     def _is_cancelled(self, goal: str) -> bool:
@@ -243,6 +247,7 @@ async def call_functions(process: str, tests: Path, arena: ArenaSession, tell: T
 async def _call(process: str, request: dict[str, Any], arena: ArenaSession) -> str:
     """Return the answer as JSON."""
     line, printed = json.dumps(request), arena.watch_console(process)
+    # A student's function prints as it likes: only what comes after this request can be its answer.
     printed.clear()
     data = base64.b64encode(f"{line}\n".encode()).decode()
     arena.send(do="type", name=process, data=data, record=None)

@@ -63,6 +63,7 @@ LEFT_FILES_MAX = 200
 def arena_command(ros: RosInstallation) -> tuple[list[str], dict[str, str]]:
     """Return the managed roscore's command, and its environment: ROS and nothing of the shell's."""
     env = {"LANG": "C.UTF-8", "ROS_IP": LOOPBACK, **ros.env, "PATH": search_path(ros, "")}
+    # -s: no packages of the user's own. -B: no compiled files beside the grader's sources.
     return [ros.python, "-s", "-B", str(ARENA)], env
 
 
@@ -226,6 +227,7 @@ class ArenaSession:
     async def wait(self, condition: Callable[[], bool], timeout_s: float) -> bool:
         """Wait until the condition holds; False when it does not in time. Time that others took of a full machine does
         not count. Raises ArenaError if the arena dies."""
+        # `lost_s` grows while others fill the machine, and moves the deadline with it.
         deadline = time.monotonic() - self.live.lost_s + timeout_s
         while True:
             self._raise_failure()
@@ -234,6 +236,7 @@ class ArenaSession:
             left = deadline - (time.monotonic() - self.live.lost_s)
             if left <= 0:
                 return False
+            # Cleared after the condition was looked at, in one thread: no change can come between the two.
             self._changed.clear()
             timer = asyncio.get_running_loop().call_later(left, self._changed.set)
             try:
@@ -321,6 +324,7 @@ class ArenaSession:
         self._writer.event(topic, frame.time_ns, TOPICS[topic].model_validate(record))
         if topic == "/grader/graph":
             nodes = [n for n in record["nodes"] if not is_grader_node(n)]
+            # Connections are asked for again and again, and say nothing of what is registered.
             picture = {key: value for key, value in record.items() if key != "connections"}
             self.live.note_graph(nodes, record["processes"], time.monotonic(), picture=picture)
             self.live.services = set(record["services"])
@@ -474,6 +478,7 @@ class LeftFiles:
         inside = PurePosixPath(path).relative_to(sources).parts
         try:
             with open_untrusted(self._place.workspace.repaired, *inside) as file:
+                # One byte more shows a file that was longer.
                 before = file.read(size_bytes + 1)
         except OSError:
             return False

@@ -130,6 +130,7 @@ def left_out_events(facts: PackageFacts) -> Iterable[ActorEvent]:
 
 def _texts(facts: PackageFacts) -> list[SourceFile]:
     found = (f for f in facts.files if not f.binary and f.link is None and f.path.endswith(ATTACHED_SUFFIXES))
+    # `sorted` keeps the order of equals, so all else stays as it was.
     return sorted(found, key=lambda file: file.path.endswith(LAST_SUFFIXES))
 
 

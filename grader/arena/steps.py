@@ -158,7 +158,7 @@ class StepRunner:
             self._start(name)
 
     def _is_over(self) -> bool:
-        """Whether nothing of the student's runs any more, nor will."""
+        """Return whether nothing of the student's runs any more, nor will."""
         return not self._live.running and not self._may_start
 
     @property
@@ -204,6 +204,7 @@ class StepRunner:
         self._live.sent_s = time.monotonic()
         type_, moment = self._types[topic], Moment(index, total, self._arena.ros_now_ns())
         data, shown = type_.encode(value, moment), type_.shown(value, moment)
+        # Only such a value can be found again in what a node prints.
         if isinstance(shown, str | int) and not isinstance(shown, bool):
             self._live.note_probe(str(shown), time.monotonic())
         about = deed or {"action": "publish", "topic": topic, "type": type_.type, "value": shown}
@@ -468,6 +469,7 @@ class StepRunner:
         record = {"action": "call", "actor": "grader", **about}
         encoded = base64.b64encode(data).decode()
         limit_s = ANSWER_S if call.limit_s is None else call.limit_s
+        # A second call of a service that is silent: it is given less, and never all of the rubric's own time.
         again_s = min(AGAIN_S, limit_s / 2)
         begun_s, limit_s = time.monotonic(), again_s if call.service in self._in_vain else limit_s
         answer = await self._arena.call(

@@ -32,6 +32,7 @@ from grader.package.reading import printable
 from grader.package.repairs.files import to_utf8
 
 CATKIN_IGNORE = "CATKIN_IGNORE"
+# Left by earlier builds and by git: a fresh workspace is to be without them.
 IGNORED = {".git", "build", "devel", "install", "__pycache__"}
 SHEBANG = b"#!/usr/bin/env python3\n"
 ABSOLUTE_PYTHON = re.compile(r"/(\w+/)*python3?")
@@ -198,6 +199,7 @@ class _Copier:
             self.copied_bytes += target.stat().st_size
             executable = package.executable.get(source.relative_to(package.folder).as_posix())
             if executable is None:
+                # A zip without modes says nothing against a script: it counts as executable.
                 executable = package.mode_source == "none" and _starts_as_script(source)
             target.chmod(0o755 if executable else 0o644)
 
@@ -222,6 +224,7 @@ def _repair(path: Path, facts: SourceFile | None) -> Iterator[str]:
     usable = shebang is not None and shebang.found is not False and not facts.names_other_language
     if shebang is not None and not shebang.crlf and usable:
         return
+    # Before `#!`, the kernel takes a byte order mark for part of a file that is no script.
     text = data.removeprefix(b"\xef\xbb\xbf")
     if shebang is not None:
         yield "line ending of the shebang" if shebang.crlf else f"shebang ({shebang.text})"
@@ -299,6 +302,7 @@ def read_archive(archive: Path, package: str) -> Built:
 def read_folder(devel: Path, package: str) -> Built:
     """Return what is in the folder `devel` itself, where there was no sandbox."""
     folder = devel / "lib" / package
+    # The build could have put a link in its place, to a folder of the machine's.
     if any(path.is_symlink() for path in (devel, folder.parent, folder)) or not folder.is_dir():
         return Built()
     paths = list(islice(folder.iterdir(), MEMBERS_MAX + 1))
@@ -330,7 +334,8 @@ def _content(tar: tarfile.TarFile, member: tarfile.TarInfo, limit_bytes: int) ->
 def _members(
     archive: Path, tell: Callable[[str], None] = lambda _: None
 ) -> Iterator[tuple[tarfile.TarFile, tarfile.TarInfo]]:
-    """Its entries, as far as it is whole and of reasonable length; `tell` is told what is not of reasonable length."""
+    """Yield the entries of an archive, as far as it is whole and of reasonable length; `tell` gets, in words, what is
+    not of reasonable length."""
     try:
         with tarfile.open(archive, "r:", tarinfo=_Member) as tar:
             for number, member in enumerate(tar):

@@ -35,6 +35,7 @@ from grader.evidence.run import (
     recorded_elsewhere,
 )
 
+# By their first bytes: what a chunk's header says of its compression need not be believed.
 BZ2 = b"BZh"
 LZ4 = b"\x04\x22\x4d\x18"
 MAX_CONNECTIONS = 4_096
@@ -142,6 +143,7 @@ class _File:
     def __init__(self, path: Path, data: bytes | None) -> None:
         self._path, self._data = path, data
         size_bytes = path.stat().st_size if data is None else len(data)
+        # An index may lead to the same place any number of times.
         self._left_bytes = READ_TIMES * size_bytes + MAX_HEADER_BYTES
 
     def __str__(self) -> str:
@@ -228,6 +230,7 @@ class _Unpacker:
 
     def __call__(self, data: bytes) -> bytes:
         if data.startswith(BZ2):
+            # At most one byte more than allowed: a few bytes can unpack to gigabytes.
             plain = bz2.BZ2Decompressor().decompress(data, MAX_CHUNK_BYTES + 1)
         elif data.startswith(LZ4):
             plain = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=MAX_CHUNK_BYTES + 1)
@@ -286,6 +289,7 @@ def export_bag(run: Run, path: Path, *, everything: bool = False) -> int:
     part = path.with_name(f".{path.name}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        # Left by an export that was killed: rosbags writes over no file.
         part.unlink(missing_ok=True)
         with Writer(part) as writer:
             count = _write(writer, channels)
@@ -302,6 +306,7 @@ def export_bag(run: Run, path: Path, *, everything: bool = False) -> int:
 def _write(writer: Writer, channels: Sequence[Channel]) -> int:
     connections = [_connection(writer, channel) for channel in channels]
     count = 0
+    # Merged and not sorted: the messages would be in memory once more.
     for row in heapq.merge(*(_rows(number, channel.messages) for number, channel in enumerate(channels))):
         writer.write(connections[row.channel], row.time_ns, row.data)
         count += 1

@@ -28,6 +28,7 @@ MAX_FILE_BYTES = 1 << 30
 MAX_CHUNK_BYTES = 32 << 20
 """Of any record, too. The arena records no message that comes near it."""
 MAX_UNPACKED_BYTES = 512 << 20
+# A record may have no more than nine bytes, and each costs the same time.
 MAX_RECORDS = 2_000_000
 
 _HEAD = struct.Struct("<BQ")
@@ -76,6 +77,7 @@ def records(stream: BinaryIO) -> Iterator[McapRecord | Messages]:
     source, meter, known = _Source(stream), _Meter(), _OUTSIDE
     read_magic(source)
     while True:
+        # Taken before the record is read: that of the data's end does not count itself.
         checksum = source.crc
         opcode, body = _next(source, meter)
         if isinstance(body, dict):
@@ -156,6 +158,7 @@ def _inside(chunk: Chunk, meter: _Meter) -> Iterator[McapRecord | Messages]:
     _verify(chunk.uncompressed_crc, zlib.crc32(plain), "a chunk")
     size_bytes, at, count, head_bytes = len(plain), 0, 0, _HEAD.size
     padded = plain + bytes(_WHOLE_HEAD.size)  # so that the head of a message can be read of any record
+    # Local names and `tuple.__new__`: this loop runs for each of up to two million records.
     read_head, new, message_op = _WHOLE_HEAD.unpack_from, tuple.__new__, int(Opcode.MESSAGE)
     messages: Messages = defaultdict(list)
     described = _IN_CHUNK.keys()
@@ -164,6 +167,7 @@ def _inside(chunk: Chunk, meter: _Meter) -> Iterator[McapRecord | Messages]:
         begin = at + head_bytes
         at = begin + length
         if at > size_bytes:
+            # A length that no record has is told as that, and not as the end of the file.
             meter.record(length)
             raise EndOfFile
         count += 1
@@ -191,8 +195,10 @@ def _unpack(chunk: Chunk) -> bytes:
     if chunk.uncompressed_size > MAX_CHUNK_BYTES:
         raise ContainerError(f"a chunk of more than {MAX_CHUNK_BYTES >> 20} MiB")
     if chunk.compression == "zstd":
+        # A frame may ask for a window of any size, which would be memory before a byte is unpacked.
         unpacker = zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK_BYTES)
         with unpacker.stream_reader(chunk.data, read_across_frames=True) as reader:
+            # One byte more shows that the chunk holds more than it says.
             plain = reader.read(chunk.uncompressed_size + 1)
     elif chunk.compression == "lz4":
         plain = lz4.frame.LZ4FrameDecompressor().decompress(

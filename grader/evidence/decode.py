@@ -63,6 +63,7 @@ class Decoder:
         `time` and `duration` become `{"secs": …, "nsecs": …}`. None too for what would take more memory than
         a whole recording may.
         """
+        # Before anything is read: a few bytes can stand for millions of values.
         if self._plan is None or self.decoded_bytes(len(data)) > DECODED_BYTES_MAX:
             return None
         try:
@@ -303,6 +304,7 @@ FindText = Callable[[str], str | None]
 
 _TYPE = re.compile(r"^\s*([A-Za-z][\w/]*)\s*(?:\[\d*\])?\s+[A-Za-z]\w*\s*$", re.ASCII)
 _BUILT_IN = {*PRIMITIVES, "byte", "char", "time", "duration"}
+# Far more than any type of ROS's own needs.
 _PARTS_MAX = 100
 
 

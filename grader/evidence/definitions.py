@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
+# Far more than any type of ROS's own has.
 MAX_DEFINITION_BYTES = 64 * 1024
 MAX_FIELDS = 2_000
 MAX_DEPTH = 24
@@ -89,6 +90,7 @@ def parse(type_: str, definition: str) -> Types:
     types = {name: tuple(_fields(name, lines)) for name, lines in sections.items()}
     bounds = _Bounds(types)
     bounds.check(type_, depth=0)
+    # A dict keeps the place of a key that comes again: the message's own type stays the first.
     return {type_: types[type_]} | {name: types[name] for name in bounds.known}
 
 
@@ -221,12 +223,14 @@ class _Bounds:
         one = _primitive(field.type) if field.primitive else self.check(field.type, depth=depth + 1)
         if not field.array:
             return one
+        # Items without bytes: four bytes of length could stand for four billion of them.
         if one.size == 0 or (field.size or 0) > MAX_ARRAY:
             raise DefinitionError(f"{field.name} is an array without end")
         # Bytes become one object, and Python has its own objects for small numbers.
         light = {"uint8": 2, "int8": FIELD_BYTES, "bool": FIELD_BYTES}
         each = light.get(field.type, one.decoded_bytes + FIELD_BYTES)
         if field.size is None:
+            # `-(-a // b)` rounds up: what an item takes for each byte of it.
             return Bound(4, 1, one.levels, OBJECT_BYTES, max(one.growth, -(-each // one.size)))
         at_once = field.primitive and field.type != "string"
         steps = 1 if at_once else 1 + field.size * one.steps

@@ -79,6 +79,7 @@ def _interval(times: Sequence[int]) -> tuple[float | None, float | None]:
     if batches < 2:
         return None, None
     cuts = [round(batch * gaps / batches) for batch in range(batches + 1)]
+    # Batches of gaps and not single ones: these depend on each other.
     periods = [(times[end] - times[begin]) / (end - begin) for begin, end in pairwise(cuts)]
     mean = (times[-1] - times[0]) / gaps
     half = _T95[batches - 2] * stdev(periods) / sqrt(batches)

@@ -17,6 +17,7 @@ from grader.installable import noetic_messages
 from grader.model.message_definitions import DIVIDER, NOT_FINITE
 from grader.wording import did_you_mean, join_words
 
+# `count` in a rubric is one word for any number of items.
 ITEMS_MAX = 1_000_000
 NS = 1_000_000_000
 CLOCKS = ("time", "duration")
@@ -111,6 +112,7 @@ class ServiceTypes:
     def md5sum(self) -> str:
         """As `rossrv md5` gives it."""
         parts = (self.request, self.response)
+        # Of both texts one behind the other, as genmsg makes it: not of the two sums.
         texts = (_md5_text(p.type, dict(sections_of(p.type, p.definition)), {}) for p in parts)
         return hashlib.md5("".join(texts).encode(), usedforsecurity=False).hexdigest()
 
@@ -212,6 +214,7 @@ class _Filling:
             raise ValueError(f"a number that changes is written {form}, not {dict(value)!r}")
         if self._moment.total is None:
             raise ValueError("from and to need a last message: give count or duration_s")
+        # A single message has the first value.
         return first + (last - first) * self._moment.number / max(1, self._moment.total - 1)
 
     def _clock(self, type_: str, value: object) -> dict[str, Any]:
@@ -225,6 +228,7 @@ class _Filling:
         else:
             meant = "now, now-2, now+0.5 or a number of seconds" if type_ == "time" else "a number of seconds"
             raise ValueError(f"{value!r} is no {type_}: write {meant}")
+        # A time of ROS's is never before 0.
         secs, nsecs = divmod(ns if type_ == "duration" else max(0, ns), NS)
         return {"secs": secs, "nsecs": nsecs}
 
@@ -302,6 +306,7 @@ def _md5_text(type_: str, parts: Mapping[str, tuple[str, ...]], known: dict[str,
             constants.append(f"{match[1]} {match[2]}={value.strip()}")
         elif (match := _FIELD.match(line)) is not None:
             fields.append(_md5_line(type_, match, parts, known))
+    # Constants first, whatever their order in the file, as genmsg does.
     return "\n".join([*constants, *fields])
 
 
@@ -311,4 +316,5 @@ def _md5_line(
     kind, brackets, name = match[1], match[2] or "", match[3]
     if kind in PRIMITIVES or kind in CLOCKS or kind in {"byte", "char"}:
         return f"{kind}{brackets} {name}"
+    # In place of a type's name its own sum stands, without brackets, as genmsg has it.
     return f"{_md5(full_name(kind, owner.partition('/')[0]), parts, known)} {name}"

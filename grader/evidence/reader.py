@@ -46,6 +46,7 @@ SQLITE_MAGIC = b"SQLite format 3\0"
 SCHEMAS = {"ros1": "ros1msg", "cdr": "ros2msg"}
 """By the encoding of messages, that of their definitions: of ROS 1, and of ROS 2."""
 ARRIVAL = itemgetter(Message._fields.index("log_time_ns"))
+# What the libraries raise for a damaged file: these have no base of their own.
 _DAMAGE = (
     McapError,
     ZstdError,
@@ -77,6 +78,7 @@ def load_run(source: Path | BinaryIO, budget: MemoryBudget | None = None) -> Run
             raise EvidenceError(f"{source}: larger than {MAX_FILE_BYTES >> 20} MiB")
     with _named_errors(source), source.open("rb") as file:
         head = file.read(len(SQLITE_MAGIC))
+        # By its first bytes: a file that is named alone may have any ending.
         file.seek(0)
         if head.startswith(BAG_MAGIC):
             from grader.evidence.bag import load_bag  # noqa: PLC0415 - few submissions hold a bag
@@ -163,6 +165,7 @@ def _damage(stream: BinaryIO) -> tuple[str, str]:
     if head.startswith(b"version https://git-lfs"):
         return "only a pointer of Git LFS, the recording itself is not here", "`git lfs pull` fetches it"
     again = "record it again, or copy it again"
+    # Without the version and the line end behind it, which a copy as text changes.
     if not head.startswith(MAGIC[:5]):
         return "not an MCAP file and not a bag", again
     return ("damaged" if tail == MAGIC else "cut short: it has no end"), again
@@ -191,6 +194,7 @@ def _files(paths: Iterable[Path]) -> list[Path]:
             message = f"{path}: no evidence (*.mcap, *.bag, *.db3) in this folder or in evidence/ below it"
             raise EvidenceError(message)
         for file in inside:
+            # A folder and a file in it may both be named, or a link to it.
             found.setdefault(_identity(file), file)
     if not found:
         raise EvidenceError("no evidence given", hint="name evidence files, or a graded submission's folder")
@@ -240,6 +244,7 @@ class _RunBuilder:
         self._channels: dict[int, mcap.Channel] = {}
         self._messages: dict[int, list[Message]] = defaultdict(list)
         self._attachments: dict[str, bytes] = {}
+        # The grader writes it before all messages: as long as there is none, the file counts as another tool's.
         self._metadata: dict[str, str] | None = None
         self._profile = ""
 
@@ -254,6 +259,7 @@ class _RunBuilder:
                 self._describe(found)
         if unknown := self._messages.keys() - self._channels.keys():
             raise ContainerError(f"messages on {len(unknown)} channels that are not there")
+        # Stable: messages of one time keep the order of the file.
         for messages in self._messages.values():
             messages.sort(key=ARRIVAL)
         return self._run()
@@ -356,6 +362,7 @@ class _RunBuilder:
             md5sum=about.get("md5sum", ""),
             definition=schema.data.decode(errors="replace") if schema else "",
             latching=about.get("latching") in {"1", "true", "True"},
+            # Taken out, so that the messages are not in memory twice.
             messages=tuple(self._messages.pop(number, ())),
             budget=self._budget,
         )

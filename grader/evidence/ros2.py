@@ -89,6 +89,7 @@ def _converter(type_: str, definition: str) -> Callable[[bytes], bytes] | None:
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore  # noqa: PLC0415 - as above
     from rosbags.typesys.base import TypesysError  # noqa: PLC0415 - as above
 
+    # Without ROS's own types: the recording's definition counts, also for a type of the same name.
     store, name = get_typestore(Stores.EMPTY), f"{PACKAGE}/msg/{alias(type_)}"
     try:
         types = parse(type_, definition)

@@ -67,6 +67,7 @@ class MemoryBudget:
             )
 
 
+# As in `arena/ros/guard.py`, which runs under ROS's own Python and imports nothing from here.
 OWN_NODE = re.compile(r"/grader_(recorder|actor|calibration)_[0-9a-f]{8}(_knock)?")
 BARE_NAME = "/grader"
 OTHER_RUNS = re.compile(r"(repaired|repeated)-[1-9]")
@@ -278,6 +279,7 @@ class Run:
         name.
         """
         text = self.attachments.get(path, b"")[:FILE_BYTES_MAX].decode("utf-8-sig", errors="replace")
+        # Not `splitlines`, which also divides at characters that Python and editors take for part of a line.
         lines = _LINE_END.split(text)
         if lines[0].startswith("#!") and text.startswith(f"{lines[0]}\r"):
             lines[0] += "\r"
@@ -352,6 +354,7 @@ def merge_channels(channels: Iterable[Channel], *, renumber: bool) -> tuple[Chan
     for one in channels:
         key = (one.topic, one.callerid, one.type, one.md5sum, one.definition)
         groups.setdefault(key, []).append(one)
+    # Popped one by one, so that joined messages are not held twice.
     return tuple(_merge_group(groups.pop(key), renumber=renumber) for key in list(groups))
 
 

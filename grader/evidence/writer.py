@@ -40,6 +40,7 @@ class EvidenceChannel:
 
     def message(self, log_time_ns: int, data: bytes) -> None:
         """Write one message as sent, with its arrival (ns)."""
+        # Twice the same time: a message of ROS 1 does not say when it was published.
         self._mcap.add_message(self._number, log_time_ns, data, log_time_ns, self._sequence)
         self._sequence += 1
 
@@ -220,6 +221,7 @@ def _encode(record: Record) -> bytes:
     """Return the record as JSON that reads back; a value that would not is converted into one that does."""
     try:
         data = record.model_dump_json().encode()
+        # The only field in which students' programs may have put anything.
         if "value" in type(record).model_fields:
             type(record).model_validate_json(data)
     except (PydanticSerializationError, ValidationError, UnicodeEncodeError):

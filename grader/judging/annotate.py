@@ -43,6 +43,7 @@ def add_advice(
 ) -> tuple[CriterionResult, ...]:
     """Return the criteria, with what none of them tells as the hint of one that passed."""
     visible = {c.id for c in rubric.criteria if c.visibility == "visible"}
+    # Only on one that passed: a loss has a hint of its own.
     good = [c for c in results if c.status is Status.PASS and c.id in visible]
     host = next((c for check in OF_FILES for c in good if c.check == check), None)
     points = [point.text for point in _points(package) if not _is_told(point, results)][:POINTS_MAX]

@@ -34,6 +34,7 @@ from grader.wording import join_words, lines_text, on_lines
 
 LINE_CHARS = 200
 """A longer line stays out of the result."""
+# No script of a lab is so long, and each search goes through all of them.
 LINES_READ = 2_000
 LOOPS = re.compile(r"\s*while\b.*:")
 SAYS = {
@@ -125,6 +126,7 @@ def cite_quoted(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run
     return verdict.model_copy(update=update)
 
 
+# More places say nothing of which one is wrong.
 QUOTED_MAX = 3
 
 

@@ -302,6 +302,7 @@ def with_recordings(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:
     """
     own = {name: run for name, run in runs.items() if not run.foreign}
     foreign = [run for run in runs.values() if run.foreign]
+    # Whoever judges one bag without a package has named it however they liked.
     alone = foreign[0] if len(foreign) == 1 and PACKAGE_RUN not in own else None
     found = dict(own)
     for name, scenario in rubric.scenarios.items():
@@ -314,6 +315,7 @@ def with_recordings(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:
 def _run_named(name: str, scenario: Scenario, foreign: list[Run]) -> Run | None:
     by_name = [run for run in foreign if run.scenario == name]
     pattern = PurePosixPath(scenario.recording or "").name
+    # Two that fit would be a guess.
     found = by_name or [run for run in foreign if fnmatchcase(run.evidence.casefold(), pattern.casefold())]
     return found[0] if len(found) == 1 else None
 
@@ -374,6 +376,7 @@ def language_of(verdict: Verdict, criterion: Criterion, facts: Facts) -> Languag
     known = _languages(facts, scenario, run)
     graph = run.graph if run else ()
     publishing = {node for _, event in graph for topic in asked for node in event.publishers.get(topic, ())}
+    # From the surest to the vaguest: the first that leaves one language decides.
     for nodes in (set(re.findall(r"[\w/-]+", verdict.message)), asked, publishing, known):
         found = {known[one] for one in nodes if one in known}
         if len(found) == 1:
@@ -400,6 +403,7 @@ def _languages(facts: Facts, scenario: Scenario, run: Run | None) -> dict[str, L
             }
     for _, event in run.graph if run else ():
         for node, process in event.processes.items():
+            # A program that was built is a process `<start>/<program>`.
             name = process.partition("/")[0]
             found |= {node: found[name]} if name in found else {}
     return found

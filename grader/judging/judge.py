@@ -141,6 +141,7 @@ def judge_all_runs(
         )
         for c in rubric.criteria
     )
+    # Last, when all hints have their final words: advice that one of them has is left out.
     if package is not None:
         named = (name_unchanged_files(result, rubric, package, handed_out) for result in results)
         results = add_advice([with_own_name(one, rubric, package) for one in named], package, rubric)
@@ -214,6 +215,7 @@ def _with_cited_lines(verdict: Verdict, criterion: Criterion, facts: Facts, used
 
 
 def _in_order(rubric: Rubric) -> Iterable[str]:
+    # The rubric has no circles: `consistency.py` refuses them.
     return TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order()
 
 
@@ -270,6 +272,7 @@ def _with_made_up(rubric: Rubric, criterion: Criterion, verdict: Verdict) -> Ver
     return verdict if hint == verdict.hint else verdict.model_copy(update={"hint": hint})
 
 
+# In this order: each gets the verdict as the one before it left it.
 EXPLANATIONS = (
     explain_by_refused_launch,
     explain_by_late_remap,
@@ -374,6 +377,7 @@ def result_of(
     package: PackageFacts | None = None,
 ) -> CriterionResult:
     """Return the report's line of a criterion, with the points of its verdict."""
+    # What a copy earned in full needs no advice of the rubric's on how to fix it.
     earned = repaired is not None and not repaired.charged and verdict.score >= repaired.share
     lost = (verdict.status.is_lost or verdict.status is Status.INCONCLUSIVE) and not earned
     share = f"; {share_text(verdict.score)} of the points for what is right: "
@@ -412,6 +416,7 @@ FROM_FILES = {"package", "build", "params"}
 REFINED = frozenset({"cmake", "slips"})
 REFINED_OF_FILES = frozenset({"python_fault"})
 """What the build makes more precise (`package.facts.with_build_facts`)."""
+# Stands for the build's run before there is one: a check that asks for it finds that nothing was built.
 UNBUILT = Run(
     evidence=f"{PACKAGE_RUN}.mcap",
     scenario=PACKAGE_RUN,
@@ -470,6 +475,7 @@ class _Judging:
             return
         verdict = verdict_of(criterion, facts, self._checks)
         final = not asked
+        # Which criterion explains it is known only once all that it requires are judged.
         if verdict.unjudged:
             if not self.results.keys() >= set(criterion.requires):
                 return

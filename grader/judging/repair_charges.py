@@ -67,6 +67,7 @@ def charge_repairs(
     criteria = [by_id[name] for name in order if name in better]
     criteria_of_runs = [c for c in rubric.criteria if c.scenario is not None and c.points > 0]
     needed = dict.fromkeys(one for repairs in needs.values() for one in repairs)
+    # Names first: `misnamed` keeps other repairs from their criteria.
     for repair in sorted(needed, key=lambda one: one.kind not in NAMES):
         asking = [c for c in rubric.criteria if c.scenario is None and asks_for(first[c.id], repair)]
         if repair.kind in OF_BUILDS:  # of a file with several faults, those that speak of this line
@@ -312,5 +313,6 @@ def lines_read_now(repairs: Iterable[Repair]) -> set[tuple[str, int]]:
 
 
 def _is_other_fault(one: Verdict, copy: Verdict) -> bool:
+    # The same fault may be measured a little otherwise in another run.
     said, then = (NUMBER.sub("", verdict.message) for verdict in (one, copy))
     return copy.status.is_lost and said != then

@@ -57,6 +57,7 @@ GENERATION = re.compile(
     r"generate_messages|message_generation|add_(message|service|action)_files|add_executable|\.(msg|srv|action)\b"
 )
 """Where these are wrong in CMakeLists.txt, a build may succeed without the package's definitions or programs."""
+# What only makes `rosrun` find a script: runs start it from its source anyway.
 INSTALLING = re.compile(r"\bcatkin_install_python\b|\bPROGRAMS\b")
 
 Runs = dict[str, Run]
@@ -125,6 +126,7 @@ def repairs_of(rubric: Rubric, repaired: Mapping[str, Run]) -> tuple[Repair, ...
         found = tuple(Repair.model_validate(entry) for entry in json.loads(written))
     except (ValueError, ValidationError):
         return ()
+    # All or none: the copy ran with all of them, so what it shows cannot be told apart.
     return found if all(rubric.share_of(one.kind) > 0 for one in found) else ()
 
 
@@ -167,6 +169,7 @@ def apply_repaired_copy(
         if criterion.id not in better or not needed:
             continue
         verdict, copy = first[criterion.id], on_copy[criterion.id]
+        # The least: a criterion that needs two repairs earns no more than with the dearer one.
         share = min(rubric.share_of(one.kind) for one in needed) if criterion.points else 1.0
         told = repairs_as_handed_in(charged or needed, repairs)
         placed = with_names_as_handed_in(copy, repairs)

@@ -40,6 +40,7 @@ class Requirements:
             names = _graph_names(criterion)
             shared = {r: len(names & _graph_names(self._criteria[r])) for r in lost}
             blocking = min(same or lost, key=lambda r: (not self.verdicts[r].unjudged, -shared[r]))
+            # The root of a chain: what has to be fixed first, and not what is blocked itself.
             root = self._roots[criterion.id] = self._roots.get(blocking, blocking)
             message = f"blocked by {root}: {self.verdicts[root].message}"
             if verdict.message not in message:

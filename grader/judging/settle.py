@@ -52,6 +52,7 @@ def settle(
     not have are left out.
     """
     automatic = unsettled(result, rubric)
+    # Also those that a group had left out: with a person's points, others may be its best.
     judged = take_in(automatic.criteria)
     said = {criterion.id: _automatic(criterion) for criterion in judged}
     applied = tuple(_apply(name, overrides[name], said[name], before) for name in said if name in overrides)
@@ -134,6 +135,7 @@ def _decide(criterion: CriterionResult, override: Override | None, digits: int) 
     if override is None or override.points is None:
         return criterion
     points = round_half_up(override.points, digits)
+    # The fewest points that it can have: 0, or minus the whole of a penalty.
     least = criterion.full - criterion.max_points - abs(criterion.extra)
     status = Status.PASS if points >= criterion.full else Status.PARTIAL if points > least else Status.FAIL
     author = f" by {override.author}" if override.author else ", decided by a person"
@@ -148,6 +150,7 @@ def deadline_of(rubric: Rubric, extension_days: float = 0.0) -> datetime | None:
     """Return the rubric's deadline with one submission's extension, in its time zone; None where it has none."""
     if rubric.deadline is None:
         return None
+    # In UTC a day is 24 hours; in the deadline's zone clocks may change in between.
     moved = rubric.deadline.astimezone(timezone.utc) + timedelta(days=extension_days)
     return moved.astimezone(rubric.deadline.tzinfo)
 
@@ -162,6 +165,7 @@ def lateness(points: float, rubric: Rubric, handed_in: HandedIn | None) -> Laten
     deadline = given.deadline or deadline_of(rubric, given.extension_days) or given.before
     if deadline is None:
         return None
+    # `-(-a // b)` rounds up: a day that has begun is used.
     used = min(given.late_days, -(-_late_by(given.at, deadline, rubric.late) // UNITS["day"]))
     moved = (deadline.astimezone(timezone.utc) + used * UNITS["day"]).astimezone(deadline.tzinfo)
     late = _late_by(given.at, moved, rubric.late)
@@ -206,6 +210,7 @@ def _cost(points: float, rubric: Rubric, late: timedelta) -> tuple[float, str]:
     if policy.cut_off_days is not None and late > timedelta(days=policy.cut_off_days):
         return 0.0, f"{_span(late)} late, after the cut-off: nothing counts"
     begun = -(-late // UNITS[policy.per])
+    # Decimals: three times 0.1 % is 0.3 %, and a half is rounded as people round it.
     summed, cap = begun * Decimal(repr(policy.lost)), Decimal(repr(policy.cap))
     percent = min(summed, cap)
     whole = points if policy.of == "reached" else rubric.max_points

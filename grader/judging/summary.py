@@ -120,6 +120,7 @@ def leave_out(rubric: Rubric, results: Sequence[CriterionResult]) -> tuple[Crite
         if group.best is None:
             continue
         members = [found[i] for i in group.criteria if i in found]
+        # Of equal points, what is still open counts first: it may earn more.
         members.sort(key=lambda r: (-r.points, not r.status.is_open))
         for r in members[group.best :]:
             left_out = LeftOut(points=r.points, max_points=r.max_points, group=name)
@@ -211,6 +212,7 @@ def criteria_bytes(results: Sequence[CriterionResult]) -> bytes:
 def round_half_up(points: float, digits: int) -> float:
     """Return the rounded points: `round_half_up(2.25, 1)` is 2.3, where Python's own `round` says 2.2."""
     step = Decimal(1).scaleb(-digits)
+    # By its shortest text: 2.675 is a little less as a float, and would be rounded down.
     return float(Decimal(repr(points)).quantize(step, rounding=ROUND_HALF_UP))
 
 

@@ -35,7 +35,9 @@ OTHER_TYPES = {
     "boolean": "bool",
 }
 """What other languages call the types of fields."""
+# At most nine digits, so that a length is a number of ordinary size.
 _TYPE = r"(?P<type>[A-Za-z]\w*(?:/[A-Za-z]\w*)?(?:\[\d{0,9}\])?)"
+# ASCII: ROS knows no other letters in names.
 _FIELD = re.compile(rf"{_TYPE}\s+(?P<name>[A-Za-z]\w*)", re.ASCII)
 _CONSTANT = re.compile(rf"{_TYPE}\s+(?P<name>[A-Za-z]\w*)\s*=\s*(?P<value>.*)", re.ASCII)
 _CHARS_MAX = 200
@@ -48,7 +50,7 @@ def parse_interface(data: bytes, path: str) -> Interface:
     fields: list[InterfaceField] = []
     number, fault = 0, None
     for line, text in enumerate(lines, 1):
-        if text.partition("#")[0].strip() == "---":
+        if text.partition("#")[0].strip() == DIVIDING:
             number += 1
             continue
         one = _parse_line(text, parts[min(number, len(parts) - 1)], line)
@@ -74,6 +76,7 @@ def parse_definition(text: str, suffix: str) -> Iterator[InterfaceField]:
 def exchanged_parts(found: Collection[InterfaceField], wanted: Collection[InterfaceField]) -> dict[str, str]:
     """Return by each part the one in which its fields are, where whole parts have changed places; nothing otherwise."""
     there = {one.name: one.part for one in found}
+    # A name that is in two parts could be from either.
     if len(there) < len(found) or any(one.name not in there for one in wanted):
         return {}
     places = list(dict.fromkeys((one.part, there[one.name]) for one in wanted))
@@ -84,6 +87,7 @@ def exchanged_parts(found: Collection[InterfaceField], wanted: Collection[Interf
 def refuse_unknown(type_: str) -> None:
     """Raise ValueError where a type has the form of a built-in one, and is none."""
     base = type_.partition("[")[0]
+    # Built-in types are small, and messages begin with a capital letter.
     if base.islower() and "/" not in base and base not in {*BUILT_IN, *FULL_NAMES}:
         near = get_close_matches(base, sorted(BUILT_IN), n=1)
         raise ValueError(f'there is no type "{type_}"' + (f' (did you mean "{near[0]}"?)' if near else ""))
@@ -91,6 +95,7 @@ def refuse_unknown(type_: str) -> None:
 
 def _parse_line(text: str, part: str, line: int) -> InterfaceField | None:
     bare = text.partition("#")[0].strip()
+    # In a constant of type string, # begins no comment (wiki.ros.org/msg).
     if constant := _CONSTANT.fullmatch(text.strip() if bare.startswith("string") else bare):
         value = constant["value"].strip()[:_CHARS_MAX]
         return InterfaceField(part=part, type=constant["type"], name=constant["name"], value=value, line=line)
@@ -102,11 +107,13 @@ def _no_field(text: str, path: str, line: int) -> Fault:
     shown = text.strip()[:60]
     message = f"`{shown}` is not a field: a line is a type and a name, like `float64 speed`"
     bare = shown.partition("//")[0].strip().rstrip(";, ")
+    # Also dashes that a word processor made of `---`.
     if re.fullmatch(r"[-_=*\u2013\u2014]{1,}", bare) and not path.endswith(".msg"):
         cause = f"`{shown}` on line {line} does not divide its parts: that takes three of `-`"
         return Fault(
             file=path, line=line, kind="NoField", message=cause, cause=cause, fix=f"write `{DIVIDING}`"
         )
+    # `float64: speed` and `int32 A: 5` with ROS's own signs, `std_msgs.Header` with a slash.
     right = re.sub(
         r"^(\w+\s+\w+)\s*(?::=?|==|\s)\s*(?=[-\d])", r"\1 = ", re.sub(r"^(\w+)\.", r"\1/", bare)
     ) + (f"  # {note.strip()}" if (note := shown.partition("//")[2]) else "")
@@ -172,6 +179,7 @@ def meant_type(type_: str, own: Collection[str], known: Mapping[str, Collection[
     base, bracket, size = type_.partition("[")
     if base in {*BUILT_IN, *FULL_NAMES, *own} or "/" in base:
         return type_
+    # Small letters on both sides: `pose` is meant for the package's own `Pose`.
     near = get_close_matches(base.lower(), sorted(map(str.lower, own)), 1)
     plain = OTHER_TYPES.get(base.lower(), base.lower())
     having = [package for package, types in known.items() if base in types]

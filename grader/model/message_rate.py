@@ -13,8 +13,11 @@ from pydantic import model_validator
 from grader.model.record import Record
 from grader.wording import hertz, plural
 
+# A gap that is exactly a bound is inside, however floats round it.
 ROUNDING = 1e-6
+# Standard deviations to each side hold 95 % of a normal distribution.
 CONFIDENCE = 1.96
+# Of fewer gaps, their differences say nothing of the mean.
 LEAST_GAPS = 5
 CLEAR_GAPS = 20
 EVEN_FROM, EVEN_TO, UNEVEN_SHARE = 0.5, 1.5, 0.05
@@ -37,6 +40,7 @@ class Rhythm(Record):
     @cached_property
     def gaps_ns(self) -> tuple[int, ...]:
         """Return the gaps between messages, and the silence at the end where it lasted."""
+        # A publisher that falls silent sends no message that would end its last gap.
         tail = (self.tail_ns,) if self.tail_ns else ()
         return (*(b - a for a, b in pairwise(self.times_ns)), *tail)
 
@@ -50,7 +54,7 @@ class Rhythm(Record):
 
     @property
     def mean_hz(self) -> float:
-        """Gaps over time; 0 where there is no gap."""
+        """The number of gaps over the time that they take (Hz); 0 where there is no gap."""
         return len(self.gaps_ns) * 1e9 / self.span_ns if self.span_ns > 0 else 0.0
 
     @property
@@ -66,7 +70,7 @@ class Rhythm(Record):
 
     @property
     def comes_in_bursts(self) -> bool:
-        """Many gaps are far shorter than the mean one, and some far longer."""
+        """Whether many gaps are far shorter than the mean one, and some far longer."""
         if not self.gaps_ns:
             return False
         mean_ns = self.span_ns / len(self.gaps_ns)
@@ -75,7 +79,7 @@ class Rhythm(Record):
 
     @property
     def is_even(self) -> bool:
-        """Nearly all gaps are like the mean one, whatever that is."""
+        """Whether nearly all gaps are like the mean one, whatever that is."""
         if not self.gaps_ns:
             return True
         mean_ns = self.span_ns / len(self.gaps_ns)
@@ -84,9 +88,11 @@ class Rhythm(Record):
     def is_single_stall(self, outside: Sequence[int], period_ns: float) -> bool:
         """Return whether one message came late and the next on its schedule again: one long gap, then one short one."""
         match outside:
+            # Not the silence at the end, after which nothing came on its schedule.
             case [late]:
                 return self.gaps_ns[late] > period_ns and late < len(self.gaps_ns) - bool(self.tail_ns)
             case [late, early]:
+                # Two gaps of two periods together: the second message kept to its schedule.
                 together = self.gaps_ns[late] + self.gaps_ns[early]
                 return early == late + 1 and abs(together - 2 * period_ns) <= period_ns / 2
         return False
@@ -102,13 +108,15 @@ class Rhythm(Record):
             return math.inf
         mean_ns = statistics.fmean(self.gaps_ns)
         squares = math.fsum([(gap_ns - mean_ns) ** 2 for gap_ns in self.gaps_ns])
-        error = (
-            CONFIDENCE * math.sqrt(squares / (count - 1)) / math.sqrt(count)
-        )  # `stdev`, which takes 20 times as long
+        # Not `statistics.stdev`, which takes 20 times as long.
+        error = CONFIDENCE * math.sqrt(squares / (count - 1)) / math.sqrt(count)
         return self.mean_hz * error / mean_ns
 
     def described(self, low_ns: float, high_ns: float) -> str:
-        """`9.98 ± 0.02 Hz over 6.0 s: 60 messages, 98 % of gaps in 0.05 to 0.15 s, longest 0.162 s`."""
+        """Return it in words.
+
+        `9.98 ± 0.02 Hz over 6.0 s: 60 messages, 98 % of gaps in 0.05 to 0.15 s, longest 0.162 s`
+        """
         count = plural(len(self.times_ns), "message")
         if not self.gaps_ns:
             return count
@@ -133,8 +141,9 @@ class RateBounds(Record):
     min_window_s: float
 
     def decided_by(self, times_ns: Sequence[int]) -> bool:
-        """Whether a longer look would change nothing: the mean's confidence interval lies inside of the bounds and so
-        does every gap, or it lies outside of them."""
+        """Return whether a longer look would change nothing: the mean's confidence interval lies inside of the bounds,
+        and so does every gap, or it lies outside of them."""
+        # The least time is asked for by the rubric, and a few gaps may be even by chance.
         if len(times_ns) <= CLEAR_GAPS or times_ns[-1] - times_ns[0] < self.min_window_s * 1e9:
             return False
         found = Rhythm(times_ns=tuple(times_ns), until_ns=times_ns[-1])

@@ -142,6 +142,7 @@ class Mutant(Record):
 
 
 def _plain(text: str) -> str:
+    # A text that is broken into lines in the file counts as one line.
     return " ".join(text.casefold().split())
 
 

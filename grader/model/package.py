@@ -59,6 +59,7 @@ class Fault(Record):
     @property
     def advice(self) -> str:
         """What to do on which line; "" if that is not known."""
+        # Such a fix says its line itself.
         named = self.line is None or re.match(r"(below|delete|write|make) line \d", self.fix)
         where = "" if named else f"line {self.line}: "
         return f"{where}{self.fix}" if self.fix else ""
@@ -113,6 +114,7 @@ def meant_command(name: str) -> str:
     """Return the command of CMake or catkin that a name, in small letters, is a slip of; empty where it is none."""
     if name in CMAKE_COMMANDS or len(name) <= SHORT:
         return ""
+    # The same words in another order: `package_catkin`.
     turned = [known for known in CMAKE_COMMANDS if sorted(known.split("_")) == sorted(name.split("_"))]
     turned += [known for known in CMAKE_COMMANDS if is_one_edit(known, name)]
     near = turned or get_close_matches(name, CMAKE_COMMANDS, 1, ALIKE)
@@ -124,6 +126,7 @@ def meant_manifest(name: str) -> str:
     if name == "manifest.xml":
         written = "write package.xml, and a CMakeLists.txt without rosbuild's lines, as catkin_create_pkg makes them"
         return f"{name} is rosbuild's, which catkin does not read: {written}"
+    # `package (1).xml`, as browsers call a second download, and `Package.xml`.
     plain = re.sub(r"\s|\(\d+\)", "", name.casefold())
     alike = plain == MANIFEST or is_one_edit(plain, MANIFEST) or plain.startswith(f"{MANIFEST}.")
     if name == MANIFEST or not alike:
@@ -181,6 +184,7 @@ def _properties(call: CMakeCall) -> Iterator[tuple[str, str, str]]:
     rest = list(call.args[at + 1 :])
     while rest:
         name = rest.pop(0)
+        # Where the value was empty, the next word is already a property's name.
         value = rest.pop(0) if rest and rest[0] not in OF_NAMES else ""
         if name in OF_NAMES:
             yield from ((target, name, value) for target in targets)
@@ -212,6 +216,7 @@ class Executable(Record):
 
     def is_called(self, name: str) -> bool:
         """Return whether the program's file has this name, as far as that is known."""
+        # Between the parts that are written out, a variable may have any value.
         literals = re.split(r"\$\{[^{}]*\}|\$<[^<>]*>", self.name)
         return re.fullmatch(".*".join(map(re.escape, literals)), name) is not None
 
@@ -389,15 +394,14 @@ class LaunchFile(Record):
     switched_off: tuple[tuple[str, int, str], ...] = ()
     unset_args: tuple[LaunchArg, ...] = ()
     late_remaps: tuple[LateRemap, ...] = ()
+    readable: tuple[LaunchNode, ...] = ()
+    given: tuple[str, ...] = Field(default=(), exclude_if=lambda value: not value)
+    """The arguments with which it is read: `robot:=tb3`."""
 
     def starts(self, programs: AbstractSet[str]) -> set[str]:
         """Return which of these programs the file starts, by their names; the `.py` may be missing."""
         types = {node.type for node in self.nodes}
         return {name for name in programs if {name, name.removesuffix(".py")} & types}
-
-    readable: tuple[LaunchNode, ...] = ()
-    given: tuple[str, ...] = Field(default=(), exclude_if=lambda value: not value)
-    """The arguments with which it is read: `robot:=tb3`."""
 
 
 CLASSES_OF = {
@@ -514,6 +518,7 @@ class PackageFacts(Record):
 
     def views(self) -> tuple[PackageFacts, ...]:
         """Return this package and those of `also`, in this order, each with all the others as its own `also`."""
+        # Without its own `also`: otherwise each of them would hold all others, and these each other again.
         alone = [one.model_copy(update={"also": ()}) for one in (self, *self.also)]
         return tuple(
             one.model_copy(update={"also": tuple(other for other in alone if other is not one)})
@@ -532,7 +537,7 @@ class PackageFacts(Record):
 
     @property
     def has_no_manifest(self) -> bool:
-        """There is no `package.xml`; one that cannot be read is another fault."""
+        """Whether there is no `package.xml`; one that cannot be read is another fault."""
         return self.manifest is None and (
             self.manifest_fault is None or self.manifest_fault.kind == "Missing"
         )
@@ -549,6 +554,7 @@ class PackageFacts(Record):
         """Return the folder that has all of the package's own folders, where `package.xml` and `CMakeLists.txt` lie
         beside it and name files as if they lay in it; "" of other packages."""
         code = [PurePosixPath(f.path) for f in self.files if PurePosixPath(f.path).suffix in OF_PACKAGES]
+        # A copy of the package in a folder of catkin's own says nothing of where the sources are.
         inside = [path for path in code if len(path.parts) > 1 and path.parts[0] not in BUILD_SPACES]
         tops = {path.parts[0] for path in inside}
         top = next(iter(tops)) if len(tops) == 1 else ""

@@ -20,6 +20,7 @@ T = TypeVar("T")
 class Record(BaseModel):
     """An immutable record that can be written as JSON and read back to an equal one."""
 
+    # `defer_build`: a command that uses few records does not wait at its start until all are built.
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     @classmethod
@@ -35,6 +36,7 @@ class Record(BaseModel):
             return []
         with suppress(ValidationError):
             found = _list_of(cls).validate_json(b"[%b]" % b",".join(datas), extra="ignore")
+            # One line may hold `{…}, {…}`, which is two records in a list and none by itself.
             if len(found) == len(datas):
                 return found
         return [cls.read_json(data) for data in datas]
@@ -51,6 +53,7 @@ def build_records() -> None:
     while waiting:
         kind = waiting.pop()
         waiting += kind.__subclasses__()
+        # One that names what is not imported yet is built when it is first used.
         kind.model_rebuild(raise_errors=False)
 
 
@@ -61,12 +64,14 @@ def field_docstrings(record: type) -> dict[str, str]:
     """
     texts: dict[str, str] = {}
     fields = record.model_fields if issubclass(record, Record) else {}
+    # The class itself comes last, so that its words take the place of its base's.
     for kind in reversed(record.__mro__):
         if kind in {Record, BaseModel, tuple, object}:
             continue
         for node, text in pairwise(_classes(kind.__module__).get(kind.__name__, [])):
             match node, text:
                 case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(words))):
+                    # A field with the name of a keyword, or of something in pydantic, has a `_` behind it.
                     key = (fields[name].serialization_alias if name in fields else "") or name.removesuffix(
                         "_"
                     )

@@ -115,6 +115,7 @@ def _added(before: str, after: str) -> list[str]:
     return [line.strip() for line in after.split("\n") if line not in old and line.strip()]
 
 
+# Texts in quotes fit first, and stay as they are.
 TABS_INSIDE = re.compile(r"""("[^"]*"|'[^']*')|[ ]*\t[ \t]*""")
 
 
@@ -129,6 +130,7 @@ def _where_and_how(repair: Repair) -> tuple[str, str]:
     """Return where and how it is done by hand: `package.xml`, ``below line 9 add `<depend>rospy</depend>` ``."""
     new, added = repair.after.split("\n"), _added(repair.before, repair.after)
     if repair.fix != "; ".join(added):
+        # A fix that is a sentence: it mostly names the line itself.
         below = len(new) > 1 and new[0] == repair.before and repair.line is not None
         named = re.match(
             r"(delete|replace the tabs: start|start|indent|write|make|remove the `#` of|in place of|"
@@ -139,8 +141,10 @@ def _where_and_how(repair: Repair) -> tuple[str, str]:
             return repair.file, f"below line {repair.line}, {repair.fix}"
         return repair.file if named else place_of(repair), repair.fix
     code = join_words(map(as_code, added))
+    # Where a line is added, the line beside it is the first or the last of the new ones, unchanged.
     replaced, script = repair.before not in (new[0], new[-1]), repair.file.endswith(".py")
     if replaced:
+        # In Python the indentation is a part of what to write.
         moved = script and _blanks(new[0]) != _blanks(repair.before)
         return place_of(repair), f"write {code}{_indentation(new[0]) if moved else ''}"
     where = "below" if repair.before == new[0] else "above"

@@ -151,6 +151,7 @@ class Point(Record):
     """A word for programs: `uncommitted`, `untracked`, `ignored`, `mode`, `unpushed`, …"""
     text: str
     """One line for people."""
+    # In files the key is `mend`, on which other programs rely.
     fix: str = Field(default="", validation_alias=AliasChoices("mend", "fix"), serialization_alias="mend")
     """A command that fixes it, or nothing."""
     remark: bool = False
@@ -264,6 +265,7 @@ class CriterionResult(Record):
     @property
     def missing(self) -> float:
         """The points that it lost, or that are still open."""
+        # What is open is not earned yet: a bonus and a penalty may still change the total, too.
         if self.status.is_open:
             return self.max_points - self.points + abs(self.extra)
         return max(0.0, self.max_points - self.points)
@@ -377,6 +379,7 @@ class Attempts(Record):
 class GradingResult(Record):
     """The whole result of one submission."""
 
+    # With a `_`, since pydantic has a method `schema`.
     schema_: Literal["grader.result/1"] = Field(default="grader.result/1", alias="schema")
     """Which format this is, and its version."""
     submission: SubmissionInfo

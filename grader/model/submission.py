@@ -21,6 +21,7 @@ def chmod_hint(source: ModeSource | None, *paths: str, only_git_lacks_it: bool =
     files = shlex.join(paths)
     if source == "git" and only_git_lacks_it:
         return f"git update-index --chmod=+x {files}, then commit and push"
+    # `git add --chmod` as well: where `core.fileMode` is off, as on Windows, git does not look at the disk's bit.
     if source == "git":
         return f"chmod +x {files}, then git add --chmod=+x {files}, commit and push"
     if source == "archive":

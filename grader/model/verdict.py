@@ -13,6 +13,7 @@ from typing_extensions import TypedDict, Unpack
 from grader.model.record import Record
 
 
+# Not `StrEnum`, which Python 3.10 does not have.
 class Status(str, Enum):
     """The seven statuses of a criterion (docs/design.md, Statuses)."""
 
@@ -193,6 +194,7 @@ class Verdict(Record):
     ) -> Verdict:
         """Return the verdict with what was expected, measured and said; None leaves a field. `citations`, where it
         shows, come behind those that it has."""
+        # `dict.fromkeys` keeps the order, and each place once.
         places = None if citations is None else tuple(dict.fromkeys((*self.citations, *citations)))
         fields = {"expected": expected, "measured": measured, "said": said, "citations": places}
         return self.model_copy(update={name: value for name, value in fields.items() if value is not None})
@@ -254,12 +256,14 @@ class Verdict(Record):
 def joined(losses: Sequence[Verdict]) -> Verdict | None:
     """Return several losses as one, each reason once, with the fields of the first that could be judged; None where
     there is none."""
+    # Two checks of one cause say the same sentence.
     different = list({one.message: one for one in losses}.values())
     if len(different) < 2:
         return different[0] if different else None
     first = next((one for one in different if not one.unjudged), different[0])
     update = {
         "message": "; ".join(one.message for one in different),
+        # Clause by clause: two hints may have a part in common.
         "hint": "; ".join(dict.fromkeys(clause for one in different for clause in one.hint.split("; "))),
         "citations": tuple(dict.fromkeys(place for one in different for place in one.citations)),
     }

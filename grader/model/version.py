@@ -7,6 +7,7 @@ import re
 from dataclasses import dataclass
 
 UPDATE = "update the grader: install its new version as you installed this one"
+# `int` takes time with the square of the number of digits, and a file may have any.
 _DIGITS_MAX = 9
 
 

@@ -82,7 +82,7 @@ def swallowed_keys(rubric: dict[str, Any]) -> Iterator[Fault]:
 
 
 def _packages(rubric: WrittenRubric) -> Iterator[Fault]:
-    """Each package is named once, none is the course's, and starts and criteria name those that there are."""
+    """Yield packages that are named twice or are the course's, and starts and criteria with one that there is not."""
     known = rubric.packages
     for index, name in as_texts(rubric.data.get("package")):
         if name in known[:index]:
@@ -115,6 +115,7 @@ def _check(criterion: WrittenCriterion, checks: Mapping[str, Check], *, complete
         return
     if name not in checks:
         near = did_you_mean(name, [*checks, MANUAL])
+        # A broken file of checks may have a check of that name.
         if complete or near:
             yield (*criterion.place, "check"), f'there is no check "{name}"{near}'
         return
@@ -138,7 +139,7 @@ def _place(
 
 
 def _uncalled_faults(criterion: WrittenCriterion, scenarios: dict[str, Any]) -> Iterator[Fault]:
-    """Answers can only be judged to calls that the scenario makes."""
+    """Yield criteria that judge more answers than the scenario makes calls."""
     if criterion.check != ANSWERS or criterion.run not in scenarios:
         return
     run, service = criterion.scenario, criterion.given.get("service")
@@ -180,7 +181,9 @@ def _circles(criteria: list[WrittenCriterion]) -> Iterator[Fault]:
 
 def _circle(start: str, needs: dict[str, list[str]]) -> list[str]:
     """Return the shortest way from `start` along `requires` back to itself; empty where there is none."""
+    # Breadth first, and each criterion once: linear however many ways lead through the rubric.
     ways, seen = [[start]], {start}
+    # `ways` grows while it is walked through.
     for way in ways:
         for name in needs.get(way[-1], ()):
             if name == start:
@@ -203,6 +206,7 @@ def _points(rubric: WrittenRubric) -> Iterator[Fault]:
     if not all(is_number(points) for points in given_points):
         return
     total = _total(rubric)
+    # Thirds in floats do not add up exactly.
     if abs(total - TOTAL_POINTS) > 1e-6:
         yield ("criteria",), f"the points add up to {total:g}, not to {TOTAL_POINTS}"
     mark = rubric.data.get("pass_mark")
@@ -217,6 +221,7 @@ def _total(rubric: WrittenRubric) -> float:
     worth = {criterion.id: float(criterion.data.get("points", 0)) for criterion in rubric.criteria}
     total = 0.0
     for group in map(as_map, as_map(rubric.data.get("groups")).values()):
+        # Taken out, so that what is left over are the criteria without a group.
         found = [worth.pop(name, 0.0) for _, name in as_texts(group.get("criteria"))]
         best, points = group.get("best"), group.get("points")
         counted = sum(found[:best] if isinstance(best, int) else found)
@@ -225,7 +230,7 @@ def _total(rubric: WrittenRubric) -> float:
 
 
 def _groups(rubric: WrittenRubric) -> Iterator[Fault]:
-    """A criterion is in one group at most, and those of which the best count are alike."""
+    """Yield faults of groups: a criterion is in one at most, and those of which the best count are worth the same."""
     known = {criterion.id: criterion.data for criterion in rubric.criteria}
     other: dict[str, str] = {}
     for name, group in as_map(rubric.data.get("groups")).items():
@@ -252,6 +257,7 @@ def _best(
     if best >= len(criteria) > 0:
         yield (*path, "best"), f"{best} of {len(criteria)} is all of them"
     if isinstance(points, int | float) and isinstance(digits, int):
+        # Whole steps of the rubric's digits: whichever criteria are the best, each counts the same.
         share = points * 10.0**digits / best
         if abs(share - round(share)) > 1e-6:
             yield (*path, "points"), f"{points:g} points cannot be shared out evenly to the best {best}"
@@ -308,7 +314,8 @@ def scenario_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
 
 
 def _means(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
-    """A scenario starts something and says until when, or it names a recording and nothing else."""
+    """Yield keys that are missing or too much: a scenario starts something and says until when, or it names a recording
+    and nothing else."""
     if scenario.get("recording") is None:
         if scenario.get("start") in (None, []):
             yield (*path, "start"), "is missing: give start, or recording"

@@ -136,6 +136,7 @@ def _cross_faults(source: Source) -> Iterator[Fault]:
     labs = {name: as_map(lab) for name, lab in as_map(data.get("labs")).items()}
     folders: dict[str, str] = {}
     for name, lab in labs.items():
+        # As a path: `a/` and `a` are one folder.
         folder = str(Path(str(lab.get("results") or f"results/{name}")))
         if folders.setdefault(folder, name) != name:
             yield ("labs", name, "results"), f"{folder} is the folder of {folders[folder]} already"

@@ -34,9 +34,11 @@ def folder_files(folder: Path, name: str) -> dict[str, bytes]:
     found: dict[str, bytes] = {}
     size = 0
     for place, folders, files in os.walk(folder / name):
+        # Sorted, so that the first files past a limit are the same on every file system.
         folders[:] = sorted(f for f in folders if f not in IGNORED and not f.startswith("."))
         for file in sorted(files):
             path = Path(place) / file
+            # A link could make any file of the machine's a part of the rubric.
             if path.is_symlink() or not path.is_file():
                 continue
             size += path.stat().st_size
@@ -91,6 +93,7 @@ def _programs(rubric: WrittenRubric, package: str, files: Mapping[str, bytes]) -
     known |= set(_TARGET.findall(cmake))
     for at, start in rubric.starts():
         path, (owner, _, name) = (*at, "program"), str(start.get("program")).partition("/")
+        # With a variable of CMake's in it, a target's name is not known.
         if owner == package and name not in known and "${" not in cmake:
             yield path, f'{package} has no program or launch file "{name}"{did_you_mean(name, known)}'
         elif owner == package and name.endswith(ROSTEST_ENDING):

@@ -33,6 +33,7 @@ PATH_PARTS = re.compile(r"[A-Za-z]\w*|\[(?:\d+|\*)\]")
 def slip_of(name: str, there: Iterable[str]) -> str:
     """Return the name that is meant, where this one is all but it; "" for none."""
     names = [one for one in there if one != name]
+    # Of names with three letters or fewer, one other letter makes another name.
     same = (one for one in names if one.lower() == name.lower() or (len(name) > 3 and is_one_edit(one, name)))
     return next(same, "") or closest(name, names, cutoff=ALMOST)
 
@@ -75,6 +76,7 @@ class Shape(NamedTuple):
         field, done = self.root, ""
         first, _, rest = path.partition(".")
         names = {one.name for one in self.types[self.root.type]}
+        # The name of a callback's argument in place of the message itself.
         if first in {"msg", "message"} and first not in names and re.split(r"\W", rest)[0] in names:
             raise Misfit(f"{self.what} has no field {first}: write {rest}")
         for part in PATH_PARTS.findall(path):
@@ -197,6 +199,7 @@ class Definitions:
         }
         for _, type_, suffix, own in own_texts(rubric):
             known = self._own.get((type_, suffix))
+            # A whole definition says more than some fields of it.
             if known is None or (own.whole and not known.whole):
                 self._own[type_, suffix] = own
         self._shapes: dict[tuple[str, str], Shape | None] = {}

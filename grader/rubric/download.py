@@ -29,6 +29,7 @@ def fetch_rubric(url: str, digest: str) -> Path:
 
     Raises UsageError where the address has no digest or another file, HostError where it cannot be fetched.
     """
+    # A password would be in results and logs, where the rubric's name is.
     if urlsplit(url).scheme.lower() != "https" or "@" in urlsplit(url).netloc:
         raise UsageError(
             f"{_printable(url.rpartition('@')[2])}: a rubric is fetched by https:// without a password only"
@@ -38,6 +39,7 @@ def fetch_rubric(url: str, digest: str) -> Path:
             f"{_printable(url)}: a rubric's address needs the rubric's digest",
             hint="write #sha256: and the digest after it, as `grader rubric validate` prints it",
         )
+    # The name is for people, since the folder has the digest. It comes from an address and must not be a path.
     name = re.sub(r"[^\w.-]", "", urlsplit(url).path.rpartition("/")[2]).removesuffix(".yaml").strip(".")
     file = user_folder("cache") / "rubrics" / digest / f"{name or 'rubric'}.yaml"
     kept = read_untrusted(file, BYTES_MAX)
@@ -62,7 +64,7 @@ class _OnlyHttps(HTTPRedirectHandler):
     def redirect_request(  # noqa: PLR0917 - as its base has it
         self, req: Request, fp: IO[bytes], code: int, msg: str, headers: HTTPMessage, newurl: str
     ) -> Request | None:
-        """Follow it on encrypted ways alone."""
+        """Follow a redirection only to https://."""
         if urlsplit(newurl).scheme != "https":
             raise URLError("it is redirected to an address without https://")
         return super().redirect_request(req, fp, code, msg, headers, newurl)
@@ -72,6 +74,7 @@ def _download(url: str) -> bytes:
     end, data = time.monotonic() + WHOLE_S, b""
     try:
         with build_opener(_OnlyHttps).open(Request(url), timeout=TIMEOUT_S) as answer:  # noqa: S310 - https alone
+            # `read` would wait for the whole: a server that sends a byte now and then is cut off by the clock.
             while block := answer.read1(BLOCK_BYTES):
                 data += block
                 if len(data) > BYTES_MAX:

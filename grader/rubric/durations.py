@@ -96,8 +96,10 @@ def longest_s(scenario: dict[str, Any], played_s: float | None = None) -> float 
     steps, starts = _read_steps(scenario), [start for _, start in as_maps(scenario.get("start"))]
     if steps is None or "recording" in scenario or not all(map(is_number, (first_s, limit_s, warp))):
         return None
+    # Their own length is not in the rubric.
     if any("tests" in one or str(one.get("program")).endswith(ROSTEST_ENDING) for one in starts):
         return None
+    # Steps are counted by the run's clock. Waits are by the wall's, and longer by a clock that runs ahead.
     waits_s = total_s = 0.0
     if "until" in scenario or "steps" not in scenario:
         waits_s += limit_s

@@ -31,7 +31,9 @@ PATTERN_RULES = {
 }
 TIME = "a time with its zone, such as 2026-11-20T23:59:00+01:00"
 DAY = "a day such as 2026-11-02"
+# As Python imports a type (`std_msgs.msg.String`), and ROS 2 writes it.
 _TYPE_ELSEWHERE = re.compile(r"(\w+)[./](?:msg|srv|action)[./](\w+)")
+# `5 Hz`, `30s`, `90 %`: keys have their unit in their names.
 _NUMBER_AND_UNIT = re.compile(r"\s*(-?\d+(?:\.\d+)?)\s*([A-Za-z%]*)\s*")
 MUST_BE = {
     "string_type": "text",
@@ -77,7 +79,7 @@ def model_faults(model: type[BaseModel], data: object, base: KeyPath = ()) -> li
 
 
 def _friendly(model: type[BaseModel], data: object, details: Iterable[ErrorDetails]) -> list[Fault]:
-    """One fault for each path: the members of a union each complain, and are joined by "or"."""
+    """Return one fault for each path: each member of a union complains, and these are joined by "or"."""
     by_path: dict[KeyPath, list[str]] = {}
     for detail in details:
         if detail["type"] == "too_short" and len(detail["input"]) >= detail["ctx"]["min_length"]:
@@ -95,6 +97,7 @@ def _data_path(data: object, detail: ErrorDetails) -> KeyPath:
     path: KeyPath = ()
     for part in detail["loc"]:
         if not _holds(data, part):
+            # A missing key is not in the data, and its name is what has to be said.
             return (*path, part) if detail["type"] == "missing" else path
         data = data[part]  # type: ignore[index]
         path = (*path, part)
@@ -187,7 +190,7 @@ def _as_named(pattern: str, text: str) -> str:
 
 
 def _literal(value: object, expected: str) -> str:
-    """pydantic gives what it expects as `'real' or 'warped'`."""
+    """Return what one of several words has to be. pydantic gives these as `'real' or 'warped'`."""
     words = expected.replace(" or ", ", ").replace("'", "").split(", ")
     near = did_you_mean(value, words) if isinstance(value, str) else ""
     return f"must be {expected.replace(chr(39), chr(34))}, not {shown(value)}{near}"

@@ -43,6 +43,7 @@ class LabFile(NamedTuple):
 def rubrics_folder() -> Path:
     """Return the folder of the rubrics that come with the grader."""
     checkout = PACKAGE.parent
+    # In site-packages lies no pyproject.toml, whatever else is called rubrics there.
     if (checkout / "pyproject.toml").is_file() and (checkout / "rubrics").is_dir():
         return checkout / "rubrics"
     return PACKAGE / "_data" / "rubrics"
@@ -112,6 +113,7 @@ def named_labs(name: str) -> list[LabFile]:
     return known or [lab for lab in example_labs() if lab.id == name]
 
 
+# The grader's own files do not change while it runs; a user's may.
 @cache
 def _built_in(folder: Path, source: str = BUILT_IN) -> tuple[LabFile, ...]:
     paths = sorted(folder.glob("*.yaml"))
@@ -172,6 +174,7 @@ def _written_down() -> tuple[Path, ...]:
         lines = config_file().read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError):
         return ()
+    # A relative path in the file would depend on where the grader is started.
     return tuple(Path(line) for line in lines if line.startswith("/"))
 
 

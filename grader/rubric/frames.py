@@ -179,7 +179,7 @@ def _in_degrees(angle: float) -> int:
     """Return what a multiple of an eighth of a turn in radians is in degrees; 0 for any other angle."""
     eighths = round(angle / (math.pi / 4))
     is_one = 0 < abs(eighths) <= 8 and abs(angle - eighths * math.pi / 4) <= ROUNDED
-    return 45 * eighths if is_one and not angle.is_integer() else 0
+    return 45 * eighths if is_one else 0  # no whole number is one: they are all farther off
 
 
 def _swapped_frames(criterion: WrittenCriterion, criteria: list[WrittenCriterion]) -> Iterator[Fault]:
@@ -190,6 +190,7 @@ def _swapped_frames(criterion: WrittenCriterion, criteria: list[WrittenCriterion
         return
     sent = [(one.get("parent"), one.get("child")) for one in given_steps(scenario, "transform")]
     earlier = [one.given for one in criteria if one.check == "transform" and one.place < criterion.place]
+    # Those of other topics of poses, too: a frame has one parent in the whole of tf.
     sent += [(one.get("parent"), one.get("child")) for one in earlier if one.get("through") is not True]
     equal = [one.given for one in criteria if one.check == "field-equals"]
     of_pose = [one for one in equal if one.get("topic") == given.get("pose_of")]

@@ -107,12 +107,14 @@ def load_rubric(name_or_path: str) -> LoadedRubric:
 
 def _load_file(path: Path, name: str) -> LoadedRubric:
     source = read_source(path, name)
+    # First: an unknown key of a newer format would be told as a slip.
     refuse_newer(source, RUBRIC)
     samples = sample_data(source.data)
     beside = read_instructor(samples[0], path.parent)
     faults = _faults(source, samples, beside, path.parent)
     if faults:
         raise RubricError(faults)
+    # As JSON and strictly: text is no number then, and a list may still become a tuple.
     rubric = share_points(Rubric.model_validate_json(json.dumps(samples[0]), strict=True))
     if rubric.made_up:
         rubric.remember(as_map(source.data), {})
@@ -147,8 +149,8 @@ def split_pin(text: str) -> tuple[str, str]:
 
 
 def _load_of_course(file: Path, name: str) -> LoadedRubric:
-    """The course's deadline and late policy take the place of the rubric's, and leave its digest: nothing is judged by
-    them."""
+    """Return a lab's rubric with the course's deadline and late policy in place of its own. Its digest stays, since
+    nothing is judged by these."""
     found = load_course(file)
     lab = found.lab(name)
     rubric_name, pin = split_pin(lab.rubric)
@@ -182,7 +184,9 @@ def share_points(rubric: Rubric) -> Rubric:
 def _shares(whole: float, weights: dict[str, float], digits: int) -> dict[str, float]:
     steps = round(whole * 10**digits)
     exact = {name: steps * weight / sum(weights.values()) for name, weight in weights.items()}
+    # A share that is whole may be a hair less as a float.
     shares = {name: int(share + 1e-9) for name, share in exact.items()}
+    # Those that were rounded down most come first; of equals the first in the rubric, on every machine.
     for name in sorted(exact, key=lambda name: shares[name] - exact[name])[: steps - sum(shares.values())]:
         shares[name] += 1
     return {name: share / 10**digits for name, share in shares.items()}
@@ -217,6 +221,7 @@ def _digest(raw: bytes, beside: Beside) -> str:
     """Return the digest, of the rubric alone where nothing else belongs to it."""
     digest = hashlib.sha256(raw)
     for name, content in sorted(beside.files.items()):
+        # No path has a NUL: no other names and contents make the same bytes.
         digest.update(f"\0{name}\0{hashlib.sha256(content).hexdigest()}".encode())
     return digest.hexdigest()
 
@@ -252,6 +257,7 @@ def _faults(source: Source, samples: Sequence[Value], beside: Beside, folder: Pa
             source.fault((), "a rubric is a map of keys and values, beginning with schema: grader.rubric/1")
         ]
     found = [*source.faults, *swallowed_keys(source.data), *made_up_faults(source.data), *beside.faults]
+    # Faults of a later sample count only where the first has none: they would be the same with another number.
     for sample in samples:
         faults = [
             *model_faults(Rubric, sample),
@@ -358,6 +364,7 @@ def cancels_of(rubric: Rubric) -> dict[str, dict[str, float]]:
             params = [ActionResultParams.model_validate(one) for one in own]
             asked = [one.after_cancel_s for one in params if (one.action, one.goal) == (action, number)]
             known = [seconds for seconds in asked if seconds is not None]
+            # One criterion without a bound may still judge what comes later.
             if known and len(known) == len(asked):
                 found[name][action] = max(known)
     return dict(found)

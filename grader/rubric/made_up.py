@@ -34,6 +34,7 @@ KEY = "made_up"
 """The key of a rubric, of a place in it, and of the evidence's metadata."""
 PLACES = ("with", "hint", "reproduce")
 """The keys of a criterion in which made-up values may stand."""
+# Without vowels no word comes about, and l looks like 1.
 CONSONANTS = "bcdfghjkmnpqrstvwxz"
 GIVEN = {
     "params": "the parameter {}",
@@ -90,6 +91,7 @@ class MadeUp(Record):
     def may_be_zero(self) -> bool:
         """Whether it can be 0, as far as that is known: a range and a choice say it, what follows from others may."""
         if self.from_ is not None:
+            # Decimals: 0.1 + 2 * 0.1 is 0.30000000000000004 as floats, and reports would show it so.
             low, step = Decimal(repr(self.from_)), Decimal(repr(self.step))
             return low <= 0 <= low + (self.count - 1) * step and low % step == 0
         return 0 in self.one_of if self.one_of else True
@@ -123,7 +125,7 @@ COUNTED: Mapping[str, Callable[[list[Decimal]], Decimal]] = {
 
 
 def _number(exact: Decimal) -> int | float:
-    """A whole number only where it was made of such: `1.0` stays a decimal."""
+    """Return a number as Python's own: a whole one only if it was made of whole numbers (`1.0` stays a decimal)."""
     exponent = exact.as_tuple().exponent
     return int(exact) if isinstance(exponent, int) and exponent >= 0 else float(exact)
 
@@ -135,6 +137,7 @@ def draw_values(rubric: Rubric, digest: str) -> dict[str, Value]:
     """Return the values of the submission whose content has this digest; they stay when the rubric's words change."""
     values: dict[str, Value] = {}
     for name, one in rubric.made_up.items():
+        # Seeded by name: a value that is added to the rubric leaves the others as they are.
         seeded = Random(f"{rubric.id} {name} {digest}")  # noqa: S311 - to be the same on every machine
         values[name] = one.value(values, seeded.randrange)
     return values
@@ -165,6 +168,7 @@ def with_recorded_values(rubric: Rubric, runs: Mapping[str, Run]) -> Rubric:
     values = draw_values(rubric, digest)
     try:
         for known in (json.loads(one[KEY]) for one in recorded if one.get(KEY)):
+            # Values that the rubric no longer declares have no place in it.
             values |= {name: value for name, value in known.items() if name in values}
         return with_values(rubric, values)
     except (ValueError, AttributeError) as error:  # no JSON, no map, no value that fits
@@ -191,6 +195,7 @@ def tell_made_up(rubric: Rubric, criterion: Criterion, hint: str, seen: str) -> 
     for name in sorted(names_in(written.get("with"))):
         value = _as_shown(rubric.values[name])
         written_as = "|".join(map(re.escape, (as_text(rubric.values[name]), value)))
+        # As a whole number or word, and not where it is the number of a line.
         of_value = re.compile(rf"(?<![\w.:-])(?<!line )(?:{written_as})(?!\w|\.\d)")
         if of_value.search(seen):
             continue
@@ -313,6 +318,7 @@ def sample_data(data: Any) -> list[Any]:  # noqa: ANN401 - what a file holds
     declared = _declared_values(data)
     longest = max((len(one.one_of) for one in declared.values()), default=0)
     samples = []
+    # The least of each, then each choice, then the most: `min` below keeps the number in range.
     for nth in (*range(max(longest, 1)), COUNT_MAX):
         values: dict[str, Value] = {}
         for name, one in declared.items():

@@ -72,6 +72,7 @@ def field_faults(rubric: WrittenRubric, known: Definitions) -> Iterator[Fault]:
     """Yield fields that are not there, and values that they can never have."""
     yield from _no_types(rubric, known)
     yield from _quoted_params(rubric)
+    # Told only where the type of the topic shows nothing wrong: it says more, and which of the two it is.
     other_kinds = list(_other_kinds(rubric))
     for criterion in rubric.criteria:
         path, given = criterion.at, criterion.given
@@ -135,12 +136,14 @@ def _judged_fields(
             usual = USUAL_TYPES.get(topic.rpartition("/")[2])
             if not faults and usual and (shape := known.shape(usual)):
                 values: dict[str, Any] = {key: given[key] for key in given if key in {"value", "values"}}
+                # As if only some fields were known: the topic may have another type, so only a near miss is a fault.
                 faults = [_no_such(shape._replace(partial=frozenset(shape.types)), field, values)]
             if isinstance(field, str) and faults and all(faults):
                 yield (*path, *at), faults[0]
         quoted = [one for key in ("value", "values") for one in _quoted((*path, key), given.get(key), topic)]
         if quoted and "tolerance" not in given:
             is_known = any(_has_field(known.shape(kind), given.get("field")) for kind in types)
+            # With a known type, the misfit of the value is told already.
             yield from () if is_known else quoted
         yield from _counted(path, given, types)
     for key, inner in given.items():
@@ -201,6 +204,7 @@ def _quoted_params(rubric: WrittenRubric) -> Iterator[Fault]:
             given.append(((*at, "value"), asked.get("name"), asked.get("value")))
         elif criterion.check == "launch-runs":
             given += [((*at, "params", key), key, one) for key, one in as_map(asked.get("params")).items()]
+    # `/node/rate` and `node/rate` are one parameter.
     numbers = {str(name).strip("/") for _, name, value in given if is_number(value)}
     for at, param, value in given:
         yield from _quoted(at, value)

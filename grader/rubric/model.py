@@ -207,6 +207,7 @@ class Rubric(Record):
 
         plain = {name: one.model_dump(exclude_unset=True) for name, one in self.scenarios.items()}
         written = (plain, [c.parameters for c in self.criteria])
+        # The same object, so that `LoadedRubric.of_submission` sees that nothing has changed.
         if renamed(written) == written:
             return self
         update = {
@@ -260,7 +261,9 @@ class Rubric(Record):
     def max_points(self) -> float:
         """The most points that can be reached, without bonuses."""
         worth = {c.id: c.points for c in self.criteria}
+        # Of a group that counts its best, all criteria are worth the same (`consistency.py`).
         uncounted = sum(
             worth.get(name, 0.0) for g in self.groups.values() if g.best for name in g.criteria[g.best :]
         )
+        # A sum of floats is off by a hair: 0.1 + 0.2 is not 0.3.
         return round(sum(worth.values()) - uncounted, 6)

@@ -108,7 +108,8 @@ def run_checks_file(path: Path, raw: bytes) -> OwnChecks:
 
 
 def _contain(function: Callable[..., Verdict]) -> Callable[..., Verdict]:
-    """What it prints goes to stderr, as stdout may be JSON, and it does not end the grader."""
+    """Return the check's function, made so that what it prints goes to stderr, as stdout may be JSON, and that its
+    `sys.exit` is an error and does not end the grader."""
 
     @wraps(function)
     def contained(**facts: object) -> Verdict:
@@ -123,6 +124,7 @@ def _contain(function: Callable[..., Verdict]) -> Callable[..., Verdict]:
 
 def _run(path: Path, raw: bytes) -> LineFault | None:
     """Run the file as a module of its own, which stays: records of parameters look their types up in it."""
+    # By path and content: another rubric's file of this name, or this one once it has changed, is another module.
     name = f"grader_own_{hashlib.sha256(str(path).encode() + raw).hexdigest()[:16]}"
     module = importlib.util.module_from_spec(ModuleSpec(name, _Loader(path, raw), origin=str(path)))
     module.__file__ = str(path)
@@ -133,6 +135,7 @@ def _run(path: Path, raw: bytes) -> LineFault | None:
         with printing_to_stderr():
             module.__spec__.loader.exec_module(module)
     except SyntaxError as error:
+        # Else the syntax error is in a file that this one imports.
         own = error.filename in {str(path), None}
         return (error.lineno or 1) if own else _line(path, error), f"{error.msg}"
     except (Exception, SystemExit) as error:  # noqa: BLE001 - an instructor's own code may raise anything

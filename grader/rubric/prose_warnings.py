@@ -36,14 +36,18 @@ WORDS = {
     "fifty": 50,
 }
 _NUMBER = rf"\d+(?:\.\d+)?|{'|'.join(WORDS)}"
+# `10 Hz`, `twice a second`, `five messages per second`.
 PER_SECOND = re.compile(rf"\b({_NUMBER})(?: ?Hz\b|(?: \w+)? (?:a|per) second)", re.IGNORECASE)
 SHIFTS = (10, 100, 1000, 0.1, 0.01, 0.001, -1)
 """By so much a number is another where a digit is forgotten, the unit is a thousandth, or the sign is missing."""
 EXPECTED = ("value", "values", "numbers", "rate_hz", "result", "expect", "goal", "start", "min", "max",
             "translation", "tolerance_m", "cause", "effect")  # fmt: skip
 """Keys of what a criterion asks for, as numbers."""
+# Not the 1 of `turtle1` or `1.2.3`.
 PLAIN_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w]|\.\d)")
+# `uint8` of a definition, and `std_msgs/UInt8` of a topic.
 PRIMITIVE = re.compile(r"(?:std_msgs/)?([Uu]?[Ii]nt|[Ff]loat)(8|16|32|64)")
+# What ROS itself takes these two for (wiki.ros.org/msg).
 OLD_NAMES = {"byte": "int8", "char": "uint8"}
 TEXTS = {"prints": ("text", "template"), "logs": ("text", "template"), "definition": ("file",)}
 """By check, the parameters that the handout has as text."""
@@ -96,10 +100,15 @@ def _shifted_numbers(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iter
     for key in EXPECTED:
         asked = criterion.given.get(key)
         for at, number in numbers_in((key,), asked) if key != "goal" else ():  # which of the goals
+            # A rate is compared with rates alone: the text has other numbers for other things.
             known = said_hz if key == "rate_hz" else said
+            # Bounds are often each other's negative.
             shifts = SHIFTS[:-1] if at[-1] in {"min", "max"} else SHIFTS
+            # Rounded, since a tenth of a float is mostly off by a hair.
             meant = next((number / by for by in shifts if round(number / by, 9) in known), None)
+            # 0.1 or 100 is chosen by itself so often that a digit is no sign of a slip.
             is_round = key != "rate_hz" and re.fullmatch(r"0?\.?0*10*", f"{abs(number):.9g}") is not None
+            # A list of values may have both signs on purpose.
             is_opposite = key == "values" and meant in own
             if number in said | known or meant is None or is_opposite or is_round or there.count(number) > 1:
                 continue
@@ -171,6 +180,7 @@ def _other_node(criterion: WrittenCriterion, handout: str) -> Iterator[Fault]:
         return
     script, name = PurePosixPath(str(starts[0].get("script"))).stem, names[0]
     quoted = re.findall(r"`[/~]?(\w+)`", handout)
+    # Only where the handout has the script's name and not this one: both may be names of nodes.
     if name == process and script != name and script in quoted and not re.search(rf"\b{name}\b", handout):
         fault = f"{name} is what the rubric calls the process, and the handout has `{script}`: is that the node's name?"
         yield (*criterion.at, "names", 0), fault
@@ -209,6 +219,7 @@ def _of_another_topic(criterion: WrittenCriterion, rubric: WrittenRubric) -> Ite
 def _other_level(criterion: WrittenCriterion, handout: str) -> Iterator[Fault]:
     """Yield the level of a log message for which the title, or the handout's sentence about its text, has another."""
     text, level = f"`{criterion.given.get('text')}`", criterion.given.get("level", "info")
+    # The text itself is cut out: it may have a level's name in it, as in `error: no odometry`.
     about = [str(criterion.data.get("title")), *(one for one in SENTENCE_END.split(handout) if text in one)]
     found = {"".join(groups).lower() for one in about for groups in LEVEL.findall(one.replace(text, "`…`"))}
     said = {{"err": "error", "warning": "warn"}.get(one, one) for one in found}
@@ -253,6 +264,7 @@ def _other_types(at: KeyPath, given: dict[str, Any], handout: str) -> Iterator[F
     for path, written in asked:
         plain, bracket, _ = str(written).partition("[")
         kind = OLD_NAMES.get(plain, plain)
+        # `float32` is in the handout, and `float32[]` nowhere.
         if bracket and plain in said and not re.search(rf"\b{plain}\b.?\[", handout):
             yield path, f"is a list, and the handout has {plain}"
         is_said = str(kind) in said or ("/" in str(kind) and _plain(kind) in map(_plain, said))
@@ -299,6 +311,7 @@ def _numbers_of_title(criterion: WrittenCriterion, rubric: WrittenRubric) -> Ite
     """Yield numbers of a criterion's title that neither the criterion nor a run has, where they have others; and a rate
     that is not the title's, or where that has none, the handout's."""
     given, title = criterion.given, str(criterion.data.get("title"))
+    # A title's own rate counts before all else, then the handout's sentences about the topic.
     rate_hz, rates = given.get("rate_hz"), _rates(title)
     of_topic = [one.given for one in rubric.criteria if one.given.get("topic") == given.get("topic")]
     known = {one.get("rate_hz") for one in of_topic}
@@ -345,6 +358,7 @@ def _other_text(at: KeyPath, given: dict[str, Any], handout: str, keys: tuple[st
     for path, text in asked:
         if not _letters(text) or text == path[-1]:
             continue
+        # `{number}` in a template stands for any number that the handout may have as an example.
         pattern = r"[-+]?\d+(?:\.\d+)?".join(map(re.escape, text.split("{number}")))
         quoted = [re.sub(r"\s+", " ", one) for one in re.findall(r"`([^`]+)`", handout)]
         alike = [one for one in quoted if _letters(one) == _letters(text) or _is_begun(one, text)]
@@ -360,6 +374,7 @@ def _other_text(at: KeyPath, given: dict[str, Any], handout: str, keys: tuple[st
 
 def _is_begun(said: str, text: str) -> bool:
     """Return whether a text begins with the words of one that the handout has, but not with its signs."""
+    # A single word begins too many texts to say anything.
     is_longer = len(said.split()) > 1 and _letters(text).startswith(_letters(said))
     return is_longer and not re.match(rf"{re.escape(said.strip().lower())}(?!\w)", text.lower())
 

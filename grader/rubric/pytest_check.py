@@ -36,6 +36,7 @@ ALL_RUN = {0, 1}
 NOT_RUN = {3, 4}
 Outcome = Literal["passed", "failed", "skipped", "open"]
 MAX_BYTES = 1_000_000
+# More than all calls may take together (`TOGETHER_S` in `arena/served.py`), with pytest's own start.
 RECORDING_S = 120.0
 
 
@@ -54,6 +55,7 @@ class PytestParams(Record):
         if dangling := re.search(r"(?:^|\s)(and|or|not)\s*$", self.select):
             raise ValueError(f'select: a name is missing after "{dangling[1]}"')
         words = (word for word in re.findall(r"\w+", self.select) if word not in {"and", "or", "not"})
+        # pytest's `-k` compares with the file's name as well.
         if word := next((word for word in words if word.lower() in self.file.lower()), ""):
             raise ValueError(
                 f'select: "{word}" is in the name of the file, too, and so fits all its tests: rename one'
@@ -175,6 +177,7 @@ def _fits(expression: ast.expr, names: Sequence[str]) -> bool:
 class TestsBroken(Exception):
     """The tests could not be run, which is not the student's fault."""
 
+    # pytest would take it for a test by its name.
     __test__ = False
 
 
@@ -227,6 +230,7 @@ def _session(path: Path, evidence: Evidence, params: PytestParams) -> SessionOut
             outcome = SessionOutcome.model_validate_json((folder / "outcome").read_bytes())
         except (OSError, ValidationError) as error:
             raise TestsBroken(_last_words(folder, code)) from error
+        # A wrong `-k` leaves an outcome without tests: pytest's own words say more.
         if code in NOT_RUN and not outcome.faults:
             raise TestsBroken(_last_words(folder, code))
     if outcome.faults:
@@ -271,7 +275,9 @@ def _environment() -> dict[str, str]:
         **env,
         "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
         "PYTHONDONTWRITEBYTECODE": "1",
+        # The order of sets would differ from run to run, and with it what tests say.
         "PYTHONHASHSEED": "0",
+        # pytest runs in a folder of its own, and has to find this grader and no other.
         "PYTHONPATH": str(Path(grader.__file__).resolve().parent.parent),
     }
 

@@ -33,6 +33,7 @@ from grader.wording import shorten
 MESSAGE_CHARS = 300
 SAYING = (AssertionError, NotRecorded, pytest.fail.Exception, pytest.skip.Exception)
 """What a test says of the student's work; any other exception is a fault of the test."""
+# An object's address in a message differs from run to run, and the same evidence must give the same bytes.
 _ADDRESS = re.compile(r"\b0x[0-9a-fA-F]{6,}\b")
 _EVIDENCE = pytest.StashKey[Evidence]()
 
@@ -108,7 +109,7 @@ class _Notes:
     def pytest_runtest_makereport(
         self, item: pytest.Item, call: pytest.CallInfo[None]
     ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-        """One note a test: the worst of its setup, its call and its teardown."""
+        """Take one note for each test: the worst of its setup, its call and its teardown."""
         report = yield
         error = call.excinfo.value if call.excinfo else None
         if isinstance(error, NoSuchScenario | pytest.FixtureLookupError):
@@ -141,6 +142,7 @@ class _Notes:
         own = error if isinstance(error, StudentError) else StudentError("")
         cause, hint = self._explanation(own)
         noted = self._tests.get(item.nodeid)
+        # A teardown that fails counts, too, but does not take the place of what failed before it.
         if noted is None or noted.outcome == "passed":
             self._tests[item.nodeid] = TestOutcome(
                 name=name,
@@ -189,7 +191,7 @@ class _Notes:
         return self._short(f"{item.name}: {place}: {info.typename}{': ' if text else ''}{text}")
 
     def _short(self, text: str) -> str:
-        """Without what differs from run to run, addresses and folders, and as what can be written down."""
+        """Return a text without what differs from run to run (addresses, folders), as UTF-8 can hold it, and short."""
         text = text.encode("utf-8", "backslashreplace").decode()
         text = text.replace(self._folder, "…").replace(f"{self._rootdir}/", "")
         text = _ADDRESS.sub("0x…", text)
@@ -233,6 +235,7 @@ class StudentFile:
         self._file, self._test, self._ask = file, test, ask
 
     def __getattr__(self, function: str) -> Callable[..., Any]:
+        # Python itself asks for such attributes (`__iter__`): they are no functions of the student's.
         if function.startswith("__"):
             raise AttributeError(function)
 
@@ -276,7 +279,8 @@ def _value(answer: Answer, shown: str) -> object:
 
 
 def _student_error(answer: Answer, shown: str) -> StudentError:
-    """`pytest.raises(ValueError)` takes it where a student's function raises a ValueError."""
+    """Return what a student's function raised as a StudentError, which is also of the builtin kind that was raised:
+    `pytest.raises(ValueError)` takes it."""
     file, line = str(answer.get("file", "")), answer.get("line")
     line = line if isinstance(line, int) else 0
     module = MISSING_MODULE.fullmatch(str(answer.get("message", "")))
@@ -293,6 +297,7 @@ def _student_error(answer: Answer, shown: str) -> StudentError:
     place = f" ({file}:{line})" if file else ""
     message = f"{shown} raises {raised.text}{place}"
     about: dict[str, Any] = {"hint": hint, "call": shown, "raised": raised}
+    # The name comes from the sandbox: only an exception of Python's own is taken, and no other object.
     base = getattr(builtins, str(answer.get("builtin")), None)
     if isinstance(base, type) and issubclass(base, Exception):
         try:
@@ -378,5 +383,6 @@ def decode(value: Any) -> Any:  # noqa: ANN401 - JSON
         return [decode(item) for item in value]
     if not isinstance(value, dict):
         return value
+    # One key: anything else is no value that `encode` made, and raises ValueError.
     ((kind, items),) = value.items()
     return {"tuple": tuple, "set": set, "dict": dict}[kind](decode(items))

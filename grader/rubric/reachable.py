@@ -107,6 +107,7 @@ def _too_many_nodes(rubric: WrittenRubric) -> Iterator[Fault]:
     for name, scenario in rubric.scenarios.items():
         nodes, starts = as_map(scenario.get("until")).get("nodes"), starts_of(scenario)
         scripts = [start for start in starts if start.get("script") is not None]
+        # A launch file, or an unknown program, may start any number of nodes.
         of_scripts = all(start.get("script") or start.get("program") in PROGRAMS for start in starts)
         if isinstance(nodes, int) and of_scripts and starts and nodes > len(scripts):
             fault = f"{name} starts {plural(len(scripts), 'script')} of the student's, and each is one node"
@@ -118,6 +119,7 @@ def _too_few(criteria: Sequence[WrittenCriterion]) -> Iterator[Fault]:
     for criterion in criteria:
         name, path = criterion.run, criterion.at
         given, until = criterion.given, as_map(criterion.scenario.get("until"))
+        # With such a condition a run goes on after these messages.
         counts = {} if {"window_s", "alive_s", "quiet_s"} & until.keys() else as_map(until.get("messages"))
         if criterion.check == "counter-wrap":
             least, most, wraps = (given.get(key, default) for key, default in WRAPS.items())
@@ -151,6 +153,7 @@ def _sent_on(topic: str, scenario: dict[str, Any]) -> list[Any] | None:
     sent = [one for one in parts if one.get("topic") == topic]
     if "recording" in scenario or given_steps(scenario, "play"):
         return None
+    # These are made up when the run begins.
     if any(one.get(key) for one in sent for key in ("text", "integers", "among")):
         return None
     values = [
@@ -172,6 +175,7 @@ def _values_at(value: object, parts: Sequence[str]) -> list[Any] | None:
     if not parts:
         return [value]
     if part[0] != "[":
+        # Fields that are left out are zero.
         inside = value.get(part, {} if parts[1:] else 0) if isinstance(value, dict) else None
         return None if inside is None else _values_at(inside, parts[1:])
     items = as_list(value)
@@ -193,10 +197,12 @@ def _never_sent(about: WrittenCriterion, others: Sequence[WrittenCriterion]) -> 
         parts = PATH_PARTS.findall(field)
         yield from (((*at, "field"), fault) for fault in _past_the_end(topic, parts, field, about.scenario))
         sent = _sent_on(topic, about.scenario)
+        # The student's node may send there as well, and then something else comes.
         if not sent or any(_is_published(topic, one) for one in others):
             continue
         lengths = [_length(value, parts) for value in sent]
         found = [_values_at(one, parts) if n is None else [] for one, n in zip(sent, lengths, strict=True)]
+        # Each list is too short, not only some: a longer one may be the one that is meant.
         if None not in lengths:
             most = plural(max(n for n in lengths if n is not None), "item")
             yield (*at, "field"), f"what {about.run} sends on {topic} has {most} there, counted from 0"
@@ -208,7 +214,7 @@ def _never_sent(about: WrittenCriterion, others: Sequence[WrittenCriterion]) -> 
 
 
 def _is_published(topic: str, criterion: WrittenCriterion) -> bool:
-    """Whether a criterion may ask the student for messages on this topic; one that is heard, the grader sends."""
+    """Return whether a criterion may ask the student for messages on this topic: what is heard, the grader sends."""
     return criterion.given.get("topic") == topic and criterion.check != "hears"
 
 
@@ -287,6 +293,7 @@ def _robot(about: WrittenCriterion, others: Sequence[WrittenCriterion]) -> _Robo
     speeds = [b["max"] for b in bounds if b.get("topic") == "/turtle1/cmd_vel" and b.get("field") == "linear.x"
               and is_number(b.get("max"))]  # fmt: skip
     is_moved = "calls" in about.scenario or given_steps(about.scenario, "call")
+    # turtlesim puts its first turtle in the middle, and a service may put it anywhere.
     middle = None if is_moved else (FIELD_M / 2, FIELD_M / 2)
     return _Robot(middle, min(speeds, default=None), FIELD_M if topic == "/turtle1/pose" else None)
 
@@ -309,6 +316,7 @@ def _too_far(about: WrittenCriterion, others: Sequence[WrittenCriterion]) -> Ite
     way = [spot for point in as_list(given.get("points")) if (spot := _spot(point))]
     relative = given.get("relative", True)
     length_m = sum(math.dist(a, b) for a, b in pairwise(way))
+    # A robot may cut each corner by the tolerance, on its way to it and away from it.
     if length_m - 2 * tolerance_m * len(way) > farthest_m:
         yield (*about.at, "points"), f"it cannot come so far: the way is {length_m:.3g} m, and {limit}"
     shift = (robot.start or (0, 0)) if relative else (0, 0)
@@ -348,6 +356,7 @@ def _goal_faults(
     if fault := _not_last(about, others, goal):
         yield at, fault
         return
+    # It may start as far off as it may end.
     away_m = math.dist(start, goal) - 2 * tolerance_m if start else 0
     if away_m > farthest_m:
         yield at, f"it cannot come so far: {limit}"
@@ -476,10 +485,12 @@ class _Demand(NamedTuple):
     """Which one message it is about, the `first` or the `last`."""
 
     def excludes(self, other: _Demand) -> bool:
-        """Whether no messages satisfy both."""
+        """Return whether no messages satisfy both demands."""
+        # Each may hold of another message.
         if not (self.every or other.every or (self.when and self.when == other.when)):
             return False
         if self.word is None or other.word is None:
+            # Both are about numbers: a number and a word are told by their type elsewhere.
             return self.word is other.word and (self.low > other.high or self.high < other.low)
         if isinstance(self.word, tuple) and isinstance(other.word, tuple):
             return not _may_be_equal(self.word, other.word, (self.high, other.high))
@@ -528,6 +539,7 @@ def _demanded(criterion: WrittenCriterion) -> Iterator[tuple[KeyPath, dict[str, 
         wanted = ("cause",) if given.get("never") is True else ("cause", "effect")
         parts = [((key,), as_map(given.get(key))) for key in wanted]
     for part, asked in parts:
+        # A cause that the grader sends is no demand on the student's node.
         if part != ("cause",) or _sent_on(str(asked.get("topic")), criterion.scenario) == []:
             is_cause = part == ("cause",)
             yield from ((part, asked, one._replace(is_cause=is_cause)) for one in _demands(check, asked))

@@ -160,7 +160,8 @@ def _with_ending(file: str, rubric: WrittenRubric) -> str:
 
 
 def _of_machine(path: KeyPath, to: str, value: object, rubric: WrittenRubric) -> Iterator[Fault]:
-    """A program, or a type of messages or services. The student's own package may have any type."""
+    """Yield why no machine has what is named: a program, a package, or a type. The student's own package may have any
+    type."""
     if not isinstance(value, str):
         return
     own = {*rubric.packages, *(PurePosixPath(name).name for _, name in as_texts(rubric.data.get("packages")))}
@@ -243,6 +244,7 @@ def _wrong_sender(topic: str, says_of: object, check: Check, scenario: dict[str,
         yield f"{program} publishes on {topic}, and {check.name} judges the student's messages: give it of: program"
     given = _sent_by_grader(scenario)
     until = as_map(scenario.get("until"))
+    # Named in `until`, the topic is one that the run waits for: then the student publishes there as well.
     may_be_either = says_of is None and "of" in check.params.model_fields
     if may_be_either and topic in given and topic not in topics_in(until):
         yield (
@@ -309,6 +311,7 @@ def _same_names(rubric: WrittenRubric) -> Iterator[Fault]:
         first: dict[str, int] = {}
         scenario = rubric.scenarios.get(name, {})
         for index, start in as_maps(scenario.get("start")) if not given_steps(scenario, "start") else ():
+            # With a name or a namespace of its own, the second node does not replace the first.
             named = any(text.startswith(("__ns:=", "__name:=")) for _, text in as_texts(start.get("args")))
             script = start.get("script")
             if isinstance(script, str) and not named and first.setdefault(script, index) != index:
@@ -345,7 +348,7 @@ def _is_process(name: str, start: dict[str, Any]) -> bool:
 
 
 def _is_set(name: str, scenario: dict[str, Any]) -> bool:
-    """A file's parameters are known only once there is the student's file."""
+    """Return whether a scenario sets the parameter, or may: what a file of the student's sets is not known before."""
     params = [param for _, param in as_maps(scenario.get("params"))]
     names = {"/" + str(param.get("name")).strip("/") for param in params}
     return name in names or any(param.get("file") is not None for param in params) or "steps" in scenario
@@ -356,8 +359,10 @@ def _too_short(one: Reference, check: Check, scenario: dict[str, Any]) -> Iterat
     until = as_map(scenario.get("until"))
     limit_s = until.get("limit_s", Until.model_fields["limit_s"].default)
     lasting = [until[key] for key in ("window_s", "alive_s") if key in until]
+    # Fewer than there are: one of them is no number, which is said elsewhere.
     known = [s for s in (*lasting, limit_s) if isinstance(s, int | float)]
     if scenario.get("clock", "real") != "real":
+        # Behind a warped clock, how late the machine is would be 20 times as much.
         if hasattr(check.params, "rate_bounds"):
             yield "rates are judged in real time: give the criterion a scenario with clock: real"
         return
@@ -388,6 +393,7 @@ def _unused_faults(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterat
     used: set[str] = set()
     for criterion in rubric.criteria:
         check = checks.get(criterion.check)
+        # A check of the instructor's that was not found, or one that gets all runs, may use any of them.
         if (check is None and criterion.check != "manual") or (check and "evidence" in check.facts):
             return
         used.add(criterion.run)
@@ -411,6 +417,7 @@ def _other_goals_and_types(criteria: list[WrittenCriterion]) -> Iterator[Fault]:
             yield (*path, "status"), fault
         number, asked_on = given.get("number"), given.get("asked_on")
         sent = [s for s in given_steps(scenario, "publish") if s.get("topic") == asked_on]
+        # Steps that send several messages: how many come is not the number of steps.
         together = {"count", "duration_s", "values", "background"}
         singly = bool(sent) and not any(together & one.keys() for one in sent)
         if singly and isinstance(number, int) and number > len(sent) and not scenario.get("probes"):

@@ -161,11 +161,13 @@ def rubric_schema(checks: Mapping[str, Check] | None = None) -> dict[str, Any]:
     criteria = Annotated[tuple[member, ...], Field(min_length=1)]
     model = create_model("Rubric", __base__=Rubric, __doc__=Rubric.__doc__, criteria=(criteria, ...))
     schema = model.model_json_schema(by_alias=True)
+    # pydantic writes a pattern for the keys, and with it alone all other keys would pass.
     schema["properties"]["scenarios"]["additionalProperties"] = False
     _describe(model, schema)
     for record in inner_records(model):
         _describe(record, schema["$defs"].get(record.__name__, {}))
     for name, record_schema in schema["$defs"].items():
+        # By prefix, since each check's criterion is a record of its own: `Criterion_rate`.
         if not name.startswith(WITHOUT_PLACES):
             keys = record_schema.get("properties", {})
             keys |= {key: _with_places(found) for key, found in keys.items()}
@@ -181,6 +183,7 @@ def _with_places(found: dict[str, Any]) -> dict[str, Any]:
     for kind in inner:
         kind |= {name: _with_places(kind[name]) for name in INSIDE if isinstance(kind.get(name), dict)}
         kind |= {name: [_with_places(one) for one in kind[name]] for name in kind.keys() & {"prefixItems"}}
+    # Numbers, texts and choices; in lists and maps the values inside have their own.
     if any(kind.get("type", "array") not in {"array", "object", "null"} or "enum" in kind for kind in kinds):
         inner.append({"$ref": "#/$defs/Place"})
     return about | ({"anyOf": inner} if len(inner) > 1 else inner[0])

@@ -61,6 +61,7 @@ PROGRAMS: Mapping[str, Program] = {
 }  # fmt: skip
 TRUE_POSE = "/base_pose_ground_truth"
 """Where the robot world says where its robot is, as Stage does."""
+# The same numbers as in `arena/standins/robot_world/world_node.py`, which cannot be imported without rospy.
 ROBOTS = {
     "turtlebot3": {"max_linear": 0.22, "samples": 360, "radius": 0.105},
     "stage": {"max_linear": 1.0, "samples": 271, "radius": 0.18},
@@ -302,6 +303,7 @@ def _distance(spot: Spot, one: Spot, other: Spot) -> float:
 def _is_inside(spot: Spot, line: Sequence[Spot]) -> bool:
     """Return whether a closed line goes around a spot."""
     x, y = spot
+    # A ray to the right crosses the line an odd number of times from inside.
     crossed = 0
     for (x0, y0), (x1, y1) in pairwise(line):
         if (y0 > y) != (y1 > y) and x < x0 + (y - y0) * (x1 - x0) / (y1 - y0):

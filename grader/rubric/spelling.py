@@ -46,6 +46,7 @@ USUAL_FRAMES = {"map", "odom", "base_link", "base_footprint", "base_scan", "lase
 them."""
 POSES = {"robot_world": TRUE_POSE, "turtlesim_node": "/turtle1/pose"}
 """By the program that publishes them."""
+# Letters first, and two of them at least.
 _WORD = r"[^\W\d]\w+"
 CHARS_MIN = 3
 """Of names of so few letters, one that differs in a letter is another name."""
@@ -109,8 +110,10 @@ def _misspelt_words(rubric: WrittenRubric, *, code: bool) -> Iterator[tuple[KeyP
     for path, text in rubric.texts:
         if path[0] != "criteria" or _key(path) not in WORDS or text == path[-1]:
             continue
+        # No placeholders of templates: `{number}`.
         for word in re.findall(rf"(?<![{{\w]){_WORD}(?![\w}}])", text):
             near = next((one for one in sorted(known) if is_slip(word, one)), "")
+            # A word that is there twice was meant.
             if near and _count(word, word, rubric.texts) == 1:
                 yield path, word, near
 
@@ -130,6 +133,7 @@ def _named_once(rubric: WrittenRubric, folder: Path) -> Iterator[tuple[KeyPath, 
     for path, text, last in names:
         if text.rpartition("/")[0] in actions:  # `/dock/cancel`
             continue
+        # A file beside the rubric, or a known program's name, is no slip though nothing else names it.
         if text in known_ones or (folder / text).is_file() or not programs.isdisjoint(text.split("/")):
             continue
         if _count(last, text, texts) == 1:
@@ -137,6 +141,7 @@ def _named_once(rubric: WrittenRubric, folder: Path) -> Iterator[tuple[KeyPath, 
             alike = [one for one in known if is_slip(word, one) and _count(one, one, texts) > 1]
             alike += [one for one in re.findall(r"`[/~]?(\w+)`", handout) if is_slip(last, one)]
             yield path, text, next(iter(alike), "")
+        # The last word is there more than once, and the whole name is not: a folder or namespace may be the slip.
         elif re.search(r"[/.]", text) and _count(text, text, texts) == 1:
             whole = _in_namespace(path, text, names)
             if whole and not re.search(rf"(?<![\w~]){text}(?!\w)", handout):
@@ -158,6 +163,7 @@ def _count(word: str, name: str, texts: list[tuple[KeyPath, str]]) -> int:
     """Return how often a word is there. `steps` is a word of prose too, `/steps` is not."""
     end = rf"{re.escape(word)}(?!\w)"
     whole = re.compile(rf"(?<!\w){end}")
+    # With its slash, or in backticks: the bare word in a sentence is no mention of the topic.
     in_prose = re.compile(rf"[/~`_]{end}") if name.startswith("/") and not word.startswith("/") else whole
     there = [(at, one) for at, one in texts if word in one]
     return sum(len((whole if PROSE.isdisjoint(at) else in_prose).findall(one)) for at, one in there)
@@ -256,6 +262,7 @@ def _unknown_topics(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Itera
     named = {topic for criterion in rubric.criteria for topic in topics_in(criterion.given)}
     named |= {topic for criterion in rubric.criteria for topic in READ_TOO.get(criterion.check, ())}
     found = [checks.get(criterion.check) for criterion in rubric.criteria]
+    # Such a check may look at any topic in ways that the rubric does not show.
     own = any(check is None or check.source or "evidence" in check.facts for check in found)
     for name, scenario in rubric.scenarios.items():
         until = as_map(scenario.get("until"))
@@ -263,6 +270,7 @@ def _unknown_topics(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Itera
         known |= {t for key, part in scenario.items() if key != "until" for t in topics_in(part)}
         open_ = own or any(start.get("script") is None for start in starts_of(scenario))
         for at, topic in _waited_for(until):
+            # Where something else may know the topic, only what is nearly surely a slip is a fault.
             near = _near(topic, named, cutoff=SURE if open_ else LIKELY)
             if topic.startswith("/") and topic not in known and (near or not open_):
                 meant = f' (did you mean "{near}"?)' if near else ""

@@ -94,6 +94,7 @@ def _without_program(rubric: WrittenRubric) -> Iterator[Fault]:
     for criterion in rubric.criteria:
         starts = starts_of(criterion.scenario)
         programs = [str(start.get("program")) for start in starts if start.get("program") is not None]
+        # A launch file, or a program that the grader does not know, may publish anything.
         are_others = [one.endswith(OPEN_ENDINGS) or one.partition("/")[0] not in OWNERS for one in programs]
         may_start_others = [
             {"launch", "built"} & one.keys() or str(one.get("script")) in PROGRAMS for one in starts
@@ -145,6 +146,7 @@ def argument_faults(scenario: dict[str, Any], rubric: WrittenRubric) -> Iterator
 def argument_warnings(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield private parameters that nothing else in the rubric names, and decimal numbers with a comma."""
     known = _known(rubric)
+    # A handout that writes private parameters with ~ has them all so.
     named = known.params if re.search(r"~\w", rubric.handout) else known.params | known.words
     for place, start in rubric.starts():
         for number, text in as_texts(start.get("args")):
@@ -200,6 +202,7 @@ def _fault(text: str, start: dict[str, Any], known: Known) -> str:
     if name.startswith("__"):
         return "" if name in SPECIAL else f"ROS has no {name}{did_you_mean(name, SPECIAL)}"
     spaces = {topic.split("/")[1] for topic in known.topics}
+    # A private parameter `ns` may be meant, unless its value is a namespace of the rubric's topics.
     if name == "_ns" and value.strip("/") in spaces:
         return f"ROS reads __ns:={value}, with two underscores"
     if name.startswith("_"):
@@ -214,6 +217,7 @@ def _other_way(text: str, start: dict[str, Any], scenario: dict[str, Any], known
     """Return that a remap of a script that runs alone is the wrong way round, that its namespace is missing, or that it
     names a topic outside of it: the run waits for a topic that the node then never has."""
     name, mark, value = text.partition(":=")
+    # Another process may have the topic under the old name.
     is_alone = start.get("script") is not None and len(as_maps(scenario.get("start"))) == 1
     if not mark or not is_alone or name.startswith("_"):
         return ""

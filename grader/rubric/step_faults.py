@@ -147,7 +147,7 @@ def _action_name(at: KeyPath, given: dict[str, Any]) -> Iterator[Fault]:
 
 
 def _action(at: KeyPath, given: dict[str, Any], types: dict[str, str]) -> Iterator[Fault]:
-    """`types` are those of what earlier steps publish on, and send goals to."""
+    """Yield the faults of a goal. `types` are those of what earlier steps publish on, and send goals to."""
     name, kind = str(given.get("name")), str(given.get("type"))
     yield from _action_name(at, given)
     types.setdefault(name, kind)
@@ -177,7 +177,7 @@ def _seconds(step: dict[str, Any]) -> float:
 
 
 def _publish(at: KeyPath, publish: dict[str, Any], types: dict[str, str]) -> Iterator[Fault]:
-    """`types` are those of the topics that earlier steps publish on."""
+    """Yield the faults of messages to send. `types` are those of the topics that earlier steps publish on."""
     topic, kind = publish.get("topic"), publish.get("type")
     if ("value" in publish) == bool(publish.get("values")):
         yield at, "give one of value and values"
@@ -221,6 +221,7 @@ def misfits(
         return
     message_type, first = MessageType(kind), FIRST._replace(total=None if endless else 1)
     for place, value in values:
+        # A value that changes may fit at first and leave its type's range later.
         later = () if endless or not _changes(value) else range(MOMENTS)
         moments = [first, *(FIRST._replace(number=number, total=MOMENTS) for number in later)]
         if empty := empty_in(value):
@@ -266,6 +267,7 @@ def _processes(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
     named = [
         (kind, step[kind]) for _, step in steps for kind in PROCESS_STEPS if isinstance(step.get(kind), str)
     ]
+    # Reversed, so that the first step of each process stays.
     first = {name: kind for kind, name in reversed(named)}
     later = {name for name, kind in first.items() if kind == "start"}
     runs = dict.fromkeys(later, False)
@@ -300,8 +302,10 @@ def _after_the_last(
     for place, (index, step) in enumerate(steps):
         ended = str(step.get("stop") or step.get("kill"))
         rest = steps[place + 1 :]
+        # One that a later step may start again is not gone for good.
         living -= {ended} if not any({"start", "restart"} & one.keys() for _, one in rest) else set()
         kind = next((key for key in FOR_NODES if key in step), "")
+        # A pause in seconds needs nobody.
         if not living and starts and kind and as_map(step.get("wait")).get("seconds") is None:
             fault = "nothing runs any more that could take part: it has been stopped"
             yield (*path, "steps", index, kind), fault

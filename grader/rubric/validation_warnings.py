@@ -114,6 +114,7 @@ def _short_times(rubric: WrittenRubric) -> Iterator[Fault]:
 def _lone_quotes(rubric: WrittenRubric) -> Iterator[Fault]:
     for path, text in rubric.texts:
         for quote in ('"', "'"):
+            # Only at an end: an apostrophe within a text has no partner either.
             if text.count(quote) == 1 and (text.startswith(quote) or text.endswith(quote)):
                 yield path, f"has one quotation mark, {quote}, without its partner"
             is_value = path[-1] == "value" or path[-2:-1] == ("values",)
@@ -139,6 +140,7 @@ def _patterns(rubric: WrittenRubric) -> Iterator[Fault]:
         for key in ("value", "values"):
             for at, text in texts_in((key,), criterion.given.get(key)):
                 is_one = criterion.check == "field-equals" and PATTERN.search(text)
+                # A topic or a path is no pattern, though it begins and ends with a slash.
                 if is_one and not re.fullmatch(r"(/\w+)+/?", text):
                     yield (*criterion.at, *at), "is compared letter by letter: it is no pattern"
 
@@ -174,6 +176,7 @@ def _first_packages(rubric: WrittenRubric) -> Iterator[Fault]:
 def _same_criteria(rubric: WrittenRubric) -> Iterator[Fault]:
     first: dict[str, str] = {}
     for criterion in rubric.criteria:
+        # Sorted, since the order of keys makes no difference.
         judged = json.dumps([criterion.data.get(key) for key in JUDGED], sort_keys=True)
         other = first.setdefault(judged, criterion.id)
         if other != criterion.id and criterion.check != "manual":
@@ -191,6 +194,7 @@ def _other_rates(rubric: WrittenRubric) -> Iterator[Fault]:
         started = json.dumps([scenario.get("start"), scenario.get("params")], sort_keys=True)
         key = (str(given.get("topic")), str(given.get("of")), started)
         earlier, other_hz, other = before.setdefault(key, (criterion.id, rate_hz, cause))
+        # Different causes may have different rates.
         if rate_hz != other_hz and (cause == other or not (cause and other)):
             fault = f"{earlier} wants {other_hz:g} Hz on {key[0]}, not {rate_hz:g}"
             yield (*criterion.at, "rate_hz"), fault
@@ -203,6 +207,7 @@ def _other_process(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterat
     own = [start for start in starts_of(criterion.scenario) if start.get("name") == process]
     for index, name in as_texts(criterion.given.get("names")):
         is_own = any(_words(name) & {*_words(str(process)), *_words(str(one.get("script")))} for one in own)
+        # A name that shares a word with the process or its script is that node's own.
         if own and not is_own and name.strip("/") in others:
             fault = f"{name} is the name of another process of the rubric, and this is about {process}"
             yield (*criterion.at, "names", index), fault
@@ -293,6 +298,7 @@ def _other_run(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[F
     for other in rubric.criteria:
         is_same = other.given.get("topic") == topic and other.run != criterion.run
         there = other.scenario
+        # With a process in common, the topic may come from that one here as well.
         if is_same and _is_named(topic, there) and _processes(there).isdisjoint(_processes(here)):
             fault = f"nothing in {criterion.run} names {topic}, and {other.run} does"
             yield (*criterion.place, "scenario"), f"{fault}: is this criterion for that run?"
@@ -389,6 +395,7 @@ def _ends_and_lives(rubric: WrittenRubric) -> Iterator[Fault]:
     for name, scenario in rubric.scenarios.items():
         starts = {str(start.get("name")): start for start in starts_of(scenario)}
         for index, ended in as_texts(as_map(scenario.get("until")).get("ended")):
+            # Ended by a step, and not by itself: both may be asked for.
             stopped = any(
                 step.get(kind) == ended
                 for _, step in as_maps(scenario.get("steps"))
@@ -403,6 +410,7 @@ def _what(start: dict[str, Any]) -> str:
     return json.dumps([start.get(key) for key in ("script", "launch", "package", "args")])
 
 
+# A handout that speaks of a rate or of repeating means a node that publishes by itself.
 PERIODIC = re.compile(r"\bHz\b|\b(?:a|per|each|every) (?:\w+ )?second\b|times", re.IGNORECASE)
 ANSWERED_TIMES = 2
 """A node that answers each message may publish so many times as many, and what it publishes at its start."""

@@ -19,7 +19,9 @@ from yaml.composer import Composer
 
 from grader.errors import RubricError
 
+# No rubric is nested so deeply: what is would come to the end of Python's stack.
 MAX_DEPTH = 50
+# What JSON readers of other languages, and ROS's int64, can hold.
 MAX_NUMBER = (1 << 63) - 1
 MAX_NUMBER_LETTERS = 100
 OF_ANY_KIND = frozenset({
@@ -34,6 +36,7 @@ PLAIN_TAGS = frozenset({"tag:yaml.org,2002:map", "tag:yaml.org,2002:seq"})
 
 AT_BEGINNING = "^"
 """Before a problem that is told where the part begins in which PyYAML finds it, not where that is seen."""
+# In this order: the first that fits is told.
 YAML_PROBLEMS = {
     "mapping values are not allowed": (
         "a colon where no key can stand: text with a colon needs quotes; else look for a colon, a dash or a blank that "
@@ -122,6 +125,7 @@ def read_source(path: Path, name: str, form: Form = RUBRIC) -> Source:
 def source_of(raw: bytes, name: str, form: Form) -> Source:
     """Return the data of a file that holds these bytes. Raises RubricError as `read_source` does."""
     try:
+        # Windows' editors write a byte order mark, which is no part of the text.
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
@@ -223,6 +227,7 @@ def texts_at(path: Path, name: str, key: str) -> tuple[str, ...]:
     found, is_key, depth = "", False, 0
     texts: list[str] | None = None
     try:
+        # Events and not the whole: this is asked of every lab on the machine, also of files with faults further down.
         for event in yaml.parse(read_bytes(path, name, RUBRIC), Loader=yaml.SafeLoader):
             begins = isinstance(event, yaml.CollectionStartEvent)
             if depth == 0 and isinstance(event, yaml.SequenceStartEvent):
@@ -278,6 +283,7 @@ def _compose(text: str, raw: bytes, name: str, form: Form) -> Source:
         raise RubricError([f"{name}:1: is nested too deeply"]) from error
     finally:
         if loader is not None:
+            # A loader refers to itself: without this it would wait for the garbage collector.
             loader.dispose()
     return Source(name=name, raw=raw, data=data, lines=reader.lines, faults=reader.faults)
 
@@ -319,7 +325,7 @@ LIBYAML = _libyaml_loader()
 
 
 def _yaml_fault(error: yaml.YAMLError, text: str, name: str) -> str:
-    """Return one line out of PyYAML's several."""
+    """Return PyYAML's error as one line, in plain words where its own are hard to understand."""
     if isinstance(error, yaml.reader.ReaderError):
         line = text.count("\n", 0, error.position) + 1
         return f"{name}:{line}: a character that YAML does not allow (U+{ord(_char(error)):04X})"
@@ -362,10 +368,12 @@ class _Reader:
         self._count(node)
         if len(path) > MAX_DEPTH:
             raise yaml.MarkedYAMLError(problem="is nested too deeply", problem_mark=node.start_mark)
+        # `!!python/object` and the like, and sets and ordered maps, which JSON does not have.
         if not isinstance(node, yaml.ScalarNode) and node.tag not in PLAIN_TAGS:
             raise yaml.MarkedYAMLError(
                 problem=f"the tag {node.tag} is not for {self.form.what}", problem_mark=node.start_mark
             )
+        # `_mapping` has the line of the key, which is where people look.
         self.lines.setdefault(path, node.start_mark.line + 1)
         if isinstance(node, yaml.MappingNode):
             return self._mapping(node, path)
@@ -376,6 +384,7 @@ class _Reader:
     def _mapping(self, node: yaml.MappingNode, path: KeyPath) -> dict[str, Any]:
         data: dict[str, Any] = {}
         own: set[str] = set()
+        # What is merged comes first: a map's own keys take its place, wherever `<<` is written.
         for merge_node in [value for key, value in node.value if key.tag == MERGE_TAG]:
             data = {**self._merge(merge_node, path), **data}
         for key_node, value_node in node.value:
@@ -383,6 +392,7 @@ class _Reader:
             if key is None:
                 continue
             line = key_node.start_mark.line + 1
+            # PyYAML would take the last one, without a word.
             if key in own:
                 self.faults.append(((*path, key), f"is given twice, again on line {line}"))
                 continue
@@ -397,6 +407,7 @@ class _Reader:
         if isinstance(node, yaml.MappingNode):
             return self._mapping(node, path)
         if isinstance(node, yaml.SequenceNode) and all(isinstance(n, yaml.MappingNode) for n in node.value):
+            # Reversed, since of equal keys the last one in a dict stays.
             parts = [self._mapping(item, path) for item in reversed(node.value)]
             return {key: value for part in parts for key, value in part.items()}
         raise yaml.MarkedYAMLError(problem="<< takes a map or a list of maps", problem_mark=node.start_mark)
@@ -408,6 +419,7 @@ class _Reader:
             return str(node.value)
         shown = node.value if isinstance(node, yaml.ScalarNode) else "this"
         line = node.start_mark.line + 1
+        # `rate: 1,5` in braces: YAML ends the value at the comma, and 5 becomes a key without a value.
         is_cut = node.tag == INT_TAG and value.start_mark.index == value.end_mark.index
         remedy = "a decimal number has a point, no comma" if is_cut else "put the key in quotes"
         truth = str(self.loader.construct_object(node)).lower() if node.tag == BOOL_TAG else ""
@@ -449,6 +461,7 @@ class _Reader:
 
 def _read_otherwise(written: str, value: object, path: KeyPath) -> str:
     """Return that YAML does not read a value as people do, and how to write it; empty where it does."""
+    # YAML 1.1, which PyYAML reads, takes yes, no, on and off for truth values.
     if isinstance(value, bool) and written.lower() not in {"true", "false"} and OF_ANY_KIND & {*path}:
         truth = str(value).lower()
         return f'{written} is {truth} in YAML: write {truth}, or "{written}" in quotes where it is text'
@@ -458,6 +471,7 @@ def _read_otherwise(written: str, value: object, path: KeyPath) -> str:
 
 def _other_base(written: str) -> str:
     """Return how to write a number that YAML does not read as people do; empty where it does."""
+    # YAML 1.1: 010 is octal, and 1:30 counts to the base of 60.
     if re.fullmatch(r"[-+]?0[0-7_]+", written):
         return f"as its first digit is 0: write {written.lstrip('-+0') or 0}"
     return "in minutes and seconds: write it without a colon, or in quotes" if ":" in written else ""

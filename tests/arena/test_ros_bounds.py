@@ -242,6 +242,37 @@ def test_who_never_answers_takes_no_more_than_its_share(module) -> None:
     stuck.set()
 
 
+def test_a_job_does_not_wait_for_one_that_came_just_before_it(module) -> None:
+    pool, ran, hung = module("quotas").Pool(), threading.Event(), threading.Event()
+    pool.submit("first", lambda: None)
+    deadline = time.monotonic() + 5
+    while not pool._idle and time.monotonic() < deadline:
+        time.sleep(0.001)
+    with pool._changed:  # the idle worker cannot run before both are there
+        pool.submit("never answers", lambda: hung.wait(10))
+        pool.submit("another", ran.set)
+    assert ran.wait(3)
+    hung.set()
+
+
+def test_a_job_is_run_that_comes_as_the_last_worker_leaves(module, monkeypatch) -> None:
+    monkeypatch.setattr(module("quotas"), "IDLE_S", 0.01)
+    pool, ran, found = module("quotas").Pool(workers_max=1), threading.Event(), []
+    take = pool._next
+    monkeypatch.setattr(pool, "_next", lambda: found.append(take()) or found[-1])
+
+    class Changed(threading.Condition):
+        def __exit__(self, *error: object) -> None:
+            super().__exit__(*error)
+            if found[-2:] == [None, None]:  # neither before nor after it was idle
+                found.clear()
+                pool.submit("late", ran.set)
+
+    pool._changed = Changed()
+    pool.submit("first", lambda: None)
+    assert ran.wait(3)
+
+
 def test_values_of_any_kind_fit_into_the_evidence(module) -> None:
     values = module("quotas")
     strange = {"b": xmlrpc.client.Binary(b"\0"), "l": [{"d": xmlrpc.client.DateTime(0)}, None, 1.5]}

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from pathlib import Path
 
 import pytest
 
-from grader.arena import session
+from grader.arena import arena_process, session
 from grader.arena.session import Killed
 
 INSIDE = {"signal": 9, "exit_code": 137, "stopped_by": None}
@@ -95,3 +97,24 @@ def test_a_machine_that_tells_nothing_is_suspected(tmp_path: Path) -> None:
     for name in ("vmstat", "meminfo"):
         (tmp_path / name).unlink()
     assert suspect(INSIDE).first(last_run=True) == "talker"
+
+
+def test_a_late_answer_is_not_taken_for_that_to_the_next_request(monkeypatch) -> None:
+    monkeypatch.setattr(arena_process, "ANSWER_S", 0.5)
+    slow = """
+import socket, struct, sys, time
+sock = socket.socket(fileno=0)
+for number in (1, 2):
+    sock.recvmsg(64, 1024)
+    time.sleep(0.7 if number == 1 else 0)
+    sock.send(struct.pack("<id", number, 0.0))
+"""
+    template = arena_process.Template([sys.executable, "-c", slow], {})
+    descriptor = os.open(os.devnull, os.O_RDONLY)
+    try:
+        template.forget(1)  # is not told that there was no answer
+        with pytest.raises(OSError, match="Bad file descriptor"):
+            template.start([descriptor])
+    finally:
+        os.close(descriptor)
+        template.close()

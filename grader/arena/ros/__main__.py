@@ -36,6 +36,7 @@ ROS = ("actor", "guard", "master", "recorder", "rpc", "services", "sockets", "tc
 """What a run needs, and a build does not."""
 UNSEEN = ("encodings.idna",)
 """What Python itself imports late: where it first looks up an address."""
+# An arena ends after that even if a killed process is still in the kernel.
 FINISH_S = 2.0
 REAP_S = 1.0
 ANSWER = struct.Struct("<id")
@@ -70,6 +71,7 @@ class Arena:
         self.loop.call_later(WATCH_S, self._watch_sockets)
         if config["master"]:
             self._start_master(config)
+        # `run_arena` read the first line from the same descriptor, and had to wait for it.
         os.set_blocking(0, False)
         self.loop.add_reader(0, self._command_bytes)
         wire.status("ready", uri=os.environ.get("ROS_MASTER_URI", ""))
@@ -159,7 +161,8 @@ class Arena:
             groups.remove()
 
     def _trees(self):
-        """Each process of the run with the ids of all that runs below it."""
+        """Return each process of the run by its name, with the ids of all that runs below it."""
+        # A copy of the list: threads that answer calls ask while the loop starts and ends processes.
         return [(process.name, process.tree()) for process in list(self._processes.values())]
 
     def _used_s(self):
@@ -319,7 +322,9 @@ def run_arena():
     LIBC.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     signal.signal(signal.SIGINT, lambda *_: None)  # ignored, it would be ignored by all that is started
     wire = Wire(os.dup(1))
+    # A print of any library would otherwise break the frames.
     os.dup2(2, 1)
+    # Unbuffered: the commands behind the first line are the loop's to read.
     with open(0, "rb", buffering=0, closefd=False) as commands:
         line = commands.readline()
     if not line:
@@ -327,6 +332,7 @@ def run_arena():
     config = json.loads(line.decode())
     leave_keys_behind()
     if config["stage"]:
+        # Before the first thread: the kernel gives a user namespace only to a process with a single one.
         enter_own_namespaces()
     calibration = Calibration() if config["master"] and config["calibrated"] else None
     arena = Arena(wire, config, calibration)
@@ -337,6 +343,7 @@ def run_arena():
     own_s = usage.ru_utime + usage.ru_stime + calibration_s
     wire.status("done", cpu_s=own_s, max_rss_bytes=peak_bytes())
     wire.flush()
+    # This is a copy of the template: it must not return into the template's code.
     os._exit(0)
 
 
@@ -393,6 +400,7 @@ def _start(socks, descriptors, live):
     try:
         os.setsid()
         for sock in socks:
+            # `closerange` closes the numbers: the object must not close one again when it belongs to something else.
             sock.detach()
         for target, number in enumerate(descriptors):
             os.dup2(number, target)

@@ -197,6 +197,7 @@ class Actor:
 
     def _send(self, topic, sock, frame):
         try:
+            # It does not block: a part that was sent would break the stream, so a full socket ends the subscription.
             if sock.send(frame) == len(frame):
                 return
         except OSError:
@@ -242,7 +243,7 @@ class Actor:
         return ""
 
     def _note_other_type(self, topic, header):
-        """Each subscriber and type once: it tries again and again."""
+        """Note a subscriber of another type, once: it tries again and again."""
         who, type_ = str(header.get("callerid")), header.get("type")
         key = topic.name, who, type_
         if key in self._other_types or len(self._other_types) >= OTHER_TYPES_MAX:
@@ -267,6 +268,7 @@ class Clock:
         self._step_s = step_s
         self._pause_s = step_s / warp
         self._step_ns = int(step_s * NS)
+        # Not 0, which rospy takes for "no time has come yet".
         self._now_ns = self._step_ns
         self._held_until_s = None
         self._stopped = False
@@ -316,6 +318,7 @@ class TcprosServer:
         self._waiting = collections.OrderedDict()
         self._crowded = False
         self._lock = threading.Lock()
+        # A long queue: where it is full, the kernel lets a client try again only after a second.
         self._server = socket.create_server((LOOPBACK, 0), backlog=4096)
         self.port = self._server.getsockname()[1]
         loop.add_reader(self._server, self._accept)
@@ -330,6 +333,7 @@ class TcprosServer:
         if oldest is not None:
             with contextlib.suppress(OSError):  # it was closed
                 oldest.shutdown(socket.SHUT_RDWR)
+        # A client that sends no header must not keep the loop.
         threading.Thread(target=self._handshake, args=(sock, address, oldest), daemon=True).start()
 
     def _handshake(self, sock, address, pushed_out):
@@ -358,7 +362,7 @@ class TcprosServer:
         return self._owners.caller(address, (LOOPBACK, self.port)) or UNKNOWN_PROCESS
 
     def _note_crowd(self):
-        """Whose most of them are: asked once."""
+        """Note the process that has most of the connections that said nothing. It is looked up once in a run."""
         with self._lock:
             waiting, self._crowded = None if self._crowded else list(self._waiting.values()), True
         if waiting is not None:

@@ -18,6 +18,7 @@ UNKNOWN_PROCESS = "an unknown process"
 SO_TIMESTAMPNS = 35
 TIMESPEC = struct.Struct("@ll")
 SPACE = socket.CMSG_SPACE(TIMESPEC.size)
+# Two clocks that are read one after the other are a microsecond apart.
 APART_NS_MAX = 100_000
 AGE_NS_MAX = 5 * 10**9
 """Older ones come from a clock that has been set since."""
@@ -58,6 +59,7 @@ class BoundedSocket(socket.socket):
     def _before(self):
         if self._until_s is not None:
             left_s = self._until_s - time.monotonic()
+            # A timeout of 0 would make the socket non-blocking.
             if left_s <= 0:
                 raise socket.timeout("timed out")
             self.settimeout(left_s)
@@ -117,6 +119,7 @@ class _Transport(xmlrpc.client.Transport):
     def parse_response(self, response):
         try:
             if response.getheader("Content-Encoding", "identity") != "identity":
+                # A few compressed bytes could become any number of them.
                 raise xmlrpc_parser.Malformed("an encoded answer")
             data = response.read(ANSWER_BYTES_MAX + 1)
             if len(data) > ANSWER_BYTES_MAX:
@@ -207,7 +210,8 @@ def receive_into(sock, view):
 
 
 def _arrived_ns(notes):
-    """The kernel's time is the wall clock's: how long ago that was tells it on the arena's clock."""
+    """Return when the bytes arrived, on the arena's clock. The kernel's note is by the wall clock, so what is taken
+    from it is how long ago that was."""
     for level, kind, value in notes:
         if level == socket.SOL_SOCKET and kind == SO_TIMESTAMPNS and len(value) >= TIMESPEC.size:
             seconds, nanoseconds = TIMESPEC.unpack_from(value)

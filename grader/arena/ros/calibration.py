@@ -66,7 +66,7 @@ class Calibration:
             self._wire.messages(self._channel, [chunk[:whole]], time_ns)
 
     def stop(self):
-        """End it, with what it used: CPU seconds."""
+        """End its process; return the CPU seconds that it used."""
         with contextlib.suppress(ProcessLookupError):  # it has ended already
             os.kill(self._pid, signal.SIGKILL)
         with contextlib.suppress(ChildProcessError):  # others have waited for it
@@ -82,7 +82,9 @@ def _live(sock, parent):
         os.setsid()
         if sock.fileno() > 0:
             os.dup2(sock.fileno(), 0)
+        # Above all the arena's stdout: its reader waits for the end of it.
         os.closerange(1, 1 << 16)
+        # The parent may have ended before `prctl` took hold. The byte comes when the recorder is ready.
         if os.getppid() == parent and os.read(0, 1):
             _publish(0)
     finally:
@@ -107,6 +109,7 @@ def _connection():
         theirs.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         while True:
             mine, address = server.accept()
+            # Without a network of its own, another user's process could connect to the port first.
             if address == theirs.getsockname():
                 return mine, theirs
             mine.close()

@@ -7,7 +7,9 @@ MESSAGE_BYTES_MAX = 16 << 20
 READ_BYTES = 1 << 16
 LARGE_BYTES, LARGE_READ_BYTES = 1 << 14, 1 << 19
 """Longer messages are read into their own place, in pieces of so much."""
+# Of what is held until the channel opens: then the publisher waits.
 HELD_BYTES_MAX = 16 << 20
+# A little more than the recorder takes to ask (its `LATCHING_S`): after that the header's word counts.
 LATCHING_S = 6.0
 REST_S = 0.01
 BUSY_NS, BUSY_MESSAGES, BUSY_LOOKS = 250000, 4, 16
@@ -15,6 +17,7 @@ BREATH_S = 0.001
 """Where so many looks in a row find messages at more than 4 kHz, the next ones come together."""
 DROPPED_MAX = 2000
 """After so many that were dropped nothing is kept any more, only counted."""
+# One for all connections, since only the loop reads.
 _WASTE = memoryview(bytearray(1 << 20))
 
 
@@ -86,9 +89,10 @@ class Connection:
         return count > 0
 
     def _read(self):
-        """Read once, and say how many bytes that were."""
+        """Read once; return how many bytes that were. Raises what `recv` raises."""
         if self._waste is not None:
             return self._throw_away()
+        # The rest of a large message for which there was no room.
         if self._skip:
             count = self.sock.recv_into(_WASTE[: self._skip])
             self._skip -= count
@@ -101,6 +105,7 @@ class Connection:
         return len(chunk)
 
     def _throw_away(self):
+        # Looking at each length of a flood costs CPU. To estimate by bytes, at least one has to be known.
         self._waste.counts = self._recorder.counts or not self._waste.begun
         count = self.sock.recv_into(_WASTE[:READ_BYTES] if self._waste.counts else _WASTE)
         self._count(_WASTE[:count])
@@ -113,7 +118,7 @@ class Connection:
             self._invalid(too_long)
 
     def _fill(self):
-        """More of a large message."""
+        """Read on in a large message, and hand it on when it is whole; return how many bytes were read."""
         end = min(len(self._message), self._filled + LARGE_READ_BYTES)
         with memoryview(self._message) as view:
             count, time_ns = receive_into(self.sock, view[self._filled : end])
@@ -128,6 +133,7 @@ class Connection:
         """Cut whole messages off the stream, those for which there is room."""
         data = self._rest + chunk if self._rest else chunk
         ends, too_long = message_ends(data)
+        # The last end lies beyond the piece where its message has only begun.
         beyond = ends.pop() if ends and ends[-1] > len(data) else 0
         at = ends[-1] if ends else 0
         self._note_pace(len(ends), time_ns)
@@ -190,7 +196,7 @@ class Connection:
         self._broken = True
 
     def _hand_on(self, pieces, messages, time_ns):
-        """None of them is earlier than those before it."""
+        """Pass messages on to the grader, or hold them until the channel is open. Their times never go back."""
         time_ns = self._handed_on_ns = max(self._handed_on_ns, time_ns)
         self._messages += messages
         self._recorder.pass_on(self.topic, pieces)
@@ -251,8 +257,9 @@ class Connection:
 
 
 def message_ends(data, at=0):
-    """Where the messages end that begin in `data` from `at` on, the last one's end maybe beyond it; and the length of
-    one that is longer than any may be, or 0."""
+    """Return where the messages end that begin in `data` from `at` on, and the length of one that is longer than any
+    may be, or 0. The last end lies beyond the data if that message is not there as a whole."""
+    # The innermost loop of the recorder: a local name saves a look-up for each message.
     ends, last, unpack_from = [], len(data) - LENGTH.size, LENGTH.unpack_from
     while at <= last:
         (length,) = unpack_from(data, at)

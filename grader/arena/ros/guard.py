@@ -115,6 +115,7 @@ class Rules:
         if len(args) <= max(REGISTER[method]) or not all(isinstance(text, str) for text in args):
             return ""  # the master itself says what is wrong with it
         node, name = args[0], args[1]
+        # Names go into events and reports.
         if any(len(text) > NAME_CHARS_MAX or not text.isprintable() for text in args):
             return "registered {} with something that is not a name: {}".format(
                 shown(node), shown(max(args, key=len))
@@ -133,7 +134,9 @@ class Rules:
         return self._may_take(node, name, addresses[0], caller)
 
     def _may_take(self, node, name, address, caller):
-        """Another process's node gives way to one that is there, and to nothing else."""
+        """Return what is wrong with taking over a node's name, "" if nothing is: another process's node gives way only
+        to an address at which a process listens."""
+        # rosmaster tells the old node to shut down, so an address that no one has would end another process's node.
         known = self._registered(node)
         if known is None or known == address or self._owners.of(address) is not None:
             return ""
@@ -156,6 +159,7 @@ class Rules:
 
     def _other_owner(self, address, caller):
         """Return the process, other than the caller, that is at this address now; None where there is none."""
+        # What is known already decides most cases: a look at all processes is dear. Only a conflict is worth one.
         if self._owners.of(address) in (None, caller.process):
             return None
         owner = self._owners.look(address)

@@ -57,6 +57,7 @@ def launch(spec, stage, groups, scratches=()):
             env=HOST_ENV,
             cwd=stage.folder if gate is not None else NOWHERE,
             pass_fds=list(fds.values()),
+            # Signals for its group (Ctrl-C) reach the tree alone.
             start_new_session=True,
         )
         _go_first(popen.pid)
@@ -65,6 +66,7 @@ def launch(spec, stage, groups, scratches=()):
         if gate is not None:
             with contextlib.suppress(BrokenPipeError):  # it has ended already, and said why
                 os.write(gate, _join_words(arguments))
+        # Started: our ends stay open. On any error before this line they are closed with theirs.
         ours.pop_all()
     return Launched(popen, lifeline, info, collect, scratches)
 
@@ -78,6 +80,7 @@ def _go_first(pid):
 def _words(spec, fds):
     """Return how many variables there are, the variables, and what is to be run: `place.HEAD` reads it."""
     variables = ["{}={}".format(name, value) for name, value in spec["env"].items()]
+    # Only the grader's own commands have placeholders: a student's words are passed on as they are.
     argv = [_filled_in(word, fds) for word in spec["argv"]] if spec["collect"] else spec["argv"]
     return _join_words([str(len(variables)), *variables, *argv])
 

@@ -14,6 +14,7 @@ from bounded_sockets import ProtocolError, call, port_of, slave_api
 from guard import NAME_CHARS_MAX, OWN_NODE, ROSOUT, shown
 from quotas import Pool, cut
 
+# With less, a busy machine's late answer would count as no connection.
 BUS_INFO_S, ROUND_S = 1.5, 3.0
 CONNECTIONS_MAX = 2000
 UDP = "UDPROS"
@@ -67,8 +68,8 @@ class Links:
         return ties.joined(apis[node], apis[said.subscriber], said.transport) is not False
 
     def _is_made_up(self, node, said, apis, answers, ties):
-        """Whether it is not merely out of date: a node that does not answer says nothing, and a publisher that sends
-        nothing does not notice that its subscriber has gone."""
+        """Return whether what a node says is made up, and not merely out of date: a node that does not answer says
+        nothing, and a publisher that sends nothing does not notice that its subscriber has gone."""
         silent = said.subscriber in apis and said.subscriber not in answers
         return not silent and not ties.half_closed(apis[node])
 
@@ -84,7 +85,7 @@ class Links:
         deadline = time.monotonic() + ROUND_S
         found, answered, asked = {}, threading.Semaphore(0), 0
         for node, api in apis.items():
-
+            # Bound now: the loop's variables have moved on when a thread runs it.
             def ask(node=node, api=api):
                 if time.monotonic() < deadline:
                     answer = self._answer(api)
@@ -98,8 +99,8 @@ class Links:
         return {node: found[node] for node in apis if node in found}
 
     def _answer(self, api):
-        """What a node says of its connections; None where it says nothing. A subscriber names publishers by their
-        addresses, in which the host may have any name."""
+        """Return what a node says of its connections; None where it says nothing. A subscriber names publishers by
+        their addresses, in which the host may have any name."""
         try:
             entries = call(slave_api(api, BUS_INFO_S).getBusInfo, self._own)
         except (ProtocolError, ValueError):
@@ -139,26 +140,29 @@ class Ties:
                 self._half_closed |= pids[row.inode]
 
     def joined(self, publisher, subscriber, transport):
-        """Whether two processes, one of each node (an address), hold the ends of a connection; None where the kernel
-        does not say whose sockets they are. A node that has ended since it was asked, or is just ending, has none."""
+        """Return whether two processes, one of each node (an address), hold the ends of a connection; None where the
+        kernel does not say whose sockets they are. A node that has ended since it was asked, or is just ending, has
+        none."""
         key = publisher, subscriber, transport == UDP
         if key not in self._joined:
             self._joined[key] = self._join(port_of(publisher), port_of(subscriber), udp=transport == UDP)
         return self._joined[key]
 
     def half_closed(self, node):
-        """Whether the node (an address) has a connection whose other end is gone and may not have noticed; True where
-        that is not known."""
+        """Return whether the node (an address) has a connection whose other end is gone and may not have noticed; True
+        where that is not known."""
         pids = self._listening.get(port_of(node))
         return not pids or not pids.isdisjoint(self._half_closed)
 
     def _join(self, publisher, subscriber, *, udp):
         ours, theirs = self._listening.get(publisher), self._listening.get(subscriber)
         if not ours or not theirs:
+            # In a sandbox all that the run has is in its trees: who holds no socket there has ended.
             if self._rows and self._owners.whole:
                 return False
             unknown = [port for port, pids in ((publisher, ours), (subscriber, theirs)) if not pids]
             return None if all(port is None or sockets.listening(port) for port in unknown) else False
+        # UDP is rare: its table is read only where a node says that it uses it.
         if not udp:
             return self._streams.meet(ours, theirs, {publisher, subscriber})
         if self._datagrams is None:
@@ -179,8 +183,8 @@ class _Ends:
                 self._held[pid].add((row.near, row.far))
 
     def meet(self, ours, theirs, calls, *, receiver_is_connected=True):
-        """Whether a process of `ours` and another one of `theirs` hold two ends that belong together, on no port of
-        `calls`. The receiver of datagrams knows no sender."""
+        """Return whether a process of `ours` and another one of `theirs` hold two ends that belong together, on no port
+        of `calls`. The receiver of datagrams knows no sender."""
         for pid in ours:
             for near, far in self._held.get(pid, ()):
                 other = (far, near if receiver_is_connected else 0)

@@ -27,6 +27,7 @@ class Loop:
             os.set_blocking(fd, False)
         self.add_reader(self._wake_r, self._drain)
         signal.set_wakeup_fd(self._wake_w, warn_on_full_buffer=False)
+        # Without a handler of Python's, the kernel drops the signal and nothing is written to the pipe.
         signal.signal(signal.SIGCHLD, lambda *_: None)
 
     def add_reader(self, fileobj, callback):
@@ -41,6 +42,7 @@ class Loop:
         self._child_callbacks.append(callback)
 
     def call_later(self, delay_s, callback):
+        # The number keeps timers of the same moment in order: two functions cannot be compared.
         heapq.heappush(self._timers, (time.monotonic() + delay_s, next(self._order), callback))
 
     def call_soon(self, callback):
@@ -73,6 +75,7 @@ class Loop:
             woken_by = os.read(self._wake_r, 65536)
         except BlockingIOError:
             return
+        # A signal writes its number into the pipe, `call_soon` another byte.
         if signal.SIGCHLD in woken_by:
             for callback in self._child_callbacks:
                 callback()

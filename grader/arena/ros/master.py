@@ -37,8 +37,10 @@ METHODS = frozenset(
         "unregisterService", "unregisterSubscriber", "unsubscribeParam",
     )
 )  # fmt: skip
+# rosmaster's own proxies wait without a limit: one node that never answers would hold back all later news.
 _notified = functools.partial(slave_api, seconds=NOTIFY_S)
 rosmaster.master_api.xmlrpcapi = rosmaster.registrations.xmlrpcapi = _notified
+# Without a handler its warnings would go to stderr, whose last line the grader shows if the arena ends.
 logging.getLogger("rosmaster").setLevel(logging.CRITICAL)
 
 
@@ -50,6 +52,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
     """
 
     def __init__(self, loop, wire, recorder, own, *, guard, owners, own_ports=()):
+        # No worker threads of rosmaster's: its queue has no bound for each node, `Notifications` has.
         super().__init__(0)
         self.thread_pool = self.reg_manager.thread_pool = Notifications()
         self._owners = owners
@@ -99,6 +102,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
 
     def _node_address(self, node):
         """Return the address of a node, or None."""
+        # rosmaster changes these maps under this lock, in the threads of calls.
         with self.ps_lock:
             known = self.reg_manager.get_node(node)
         return known.api if known else None
@@ -106,6 +110,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
     def registerPublisher(self, caller_id, topic, topic_type, caller_api):
         answer = super().registerPublisher(caller_id, topic, topic_type, caller_api)
         self._owners.of(caller_api)
+        # What the arena itself publishes is recorded as it is sent.
         if answer[0] == 1 and self._caller is not None:
             held = self._recorder.connect(topic, caller_id, caller_api, self._process)
             if held:
@@ -113,8 +118,11 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         return self._note_arrival(answer)
 
     def _await_subscribers(self, topic, caller_id, caller_api):
-        """Those that are there already shall not miss the first message because the publisher counts the recorder
-        as one of them (`while pub.get_num_connections() == 0`)."""
+        """Wait until the subscribers that are there already are connected to a new publisher, or have had their time.
+
+        A node that waits for a first subscriber (`while pub.get_num_connections() == 0`) counts the recorder as one,
+        and would send before the others hear it.
+        """
         with self.ps_lock:
             there = {name for name, _ in self.subscribers.map.get(topic, ())}
         wanted = {n for n in there if n not in {caller_id, ROSOUT} and not OWN_NODE.fullmatch(n)}
@@ -138,6 +146,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         return self._after(super().unregisterSubscriber(caller_id, topic, caller_api))
 
     def registerService(self, caller_id, service, service_api, caller_api):
+        # One of the last things that rospy does in `init_node`: held here, no publisher made before sends unrecorded.
         if str(service).endswith("/get_loggers"):
             self._recorder.gate(caller_id)
         self._owners.of(caller_api)
@@ -147,13 +156,14 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         return self._note_arrival(answer)
 
     def lookupService(self, caller_id, service):
-        """What a client asks for is told once, and of what is not there, once more: `wait_for_service` asks again and
-        again."""
+        """Return the address of a service, and note who asked for it: once, or twice for one that is not there, since
+        `wait_for_service` asks again and again."""
         answer = super().lookupService(caller_id, service)
         self._note_lookup("lookup", caller_id, service, is_there=answer[0] == 1)
         return answer
 
     def getParam(self, caller_id, key):
+        # rospy asks for it in `init_node`, after it has registered what was made before.
         if key == "/use_sim_time":
             self._recorder.gate(caller_id)
         answer = super().getParam(caller_id, key)
@@ -166,7 +176,8 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         return answer
 
     def subscribeParam(self, caller_id, caller_api, key):
-        """What is read by `get_param_cached`, and by roscpp; of a name that is not there the answer is empty."""
+        """Return a parameter that the node will be told the changes of, as `get_param_cached` and roscpp read it. For a
+        name that is not there the answer is an empty map."""
         answer = super().subscribeParam(caller_id, caller_api, key)
         self._note_lookup("read", caller_id, key, is_there=answer[2] != {})
         return answer
@@ -174,8 +185,8 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
     def _note_lookup(self, action, caller_id, name, is_there):
         """Tell the first time that a node asks for a name, and the second for a service that is not there."""
         asked, key = self._told[action], (caller_id, str(name))
-        times = asked.get(key, 0)
-        if self._caller is None or times > (action == "lookup" and not is_there):
+        times, most = asked.get(key, 0), 2 if action == "lookup" and not is_there else 1
+        if self._caller is None or times >= most:
             return
         if times or len(asked) < TOLD_MAX:
             asked[key] = times + 1
@@ -317,16 +328,17 @@ class GraphLog:
         """Registrations come in bursts: tell once they pause. `by` is the process that made the change."""
         self._changes[by or ""] += 1
         self._arrivals = self._arrivals or arrival
+        # Calls come in threads of their own; timers are the loop's.
         self._loop.call_soon(self._schedule)
 
     def before_leaving(self):
-        """A node that comes and goes between two looks at the graph shall be seen all the same."""
+        """Tell the graph as it is before something leaves it, so that a node is seen however shortly it is there."""
         if self._arrivals:
             self._arrivals = False
             self.tell(self._look())
 
     def tell(self, record, *, last=False):
-        """As an event, where there is room for it."""
+        """Write the graph as an event; where there is no room for it, note whose changes are too many."""
         size = len(json.dumps(record))
         with self._lock:
             now_s = time.monotonic()
@@ -363,6 +375,7 @@ LEVELS_MAX = 24
 EVENTS_MAX, EVENTS_BYTES_MAX = 4000, 4 << 20
 VALUE_BYTES_MAX = 256 << 10
 LATEST_MAX = 200
+# Without it, no one could tell by which clock a run was timed: a flood of other parameters must not hide it.
 ALWAYS = "/use_sim_time"
 ALWAYS_MAX = 100
 LEFT_OUT = "(more than {} KB, left out)".format(VALUE_BYTES_MAX >> 10)
@@ -408,6 +421,7 @@ class ParamLog:
         )
         name = resolve_name(record["name"], record["caller_id"])
         with self._lock:
+            # Taken out first, so that the order is that of the last changes.
             self._latest.pop(name, None)
             if len(self._latest) < LATEST_MAX:
                 self._latest[name] = record
@@ -420,6 +434,7 @@ class ParamLog:
             self._wire.event("/grader/param", record)
 
     def _has_room(self, record):
+        # 200 for the record's other fields.
         size = 200 + weight(record["value"], VALUE_BYTES_MAX)
         with self._lock:
             if record["name"] == ALWAYS and self._always < ALWAYS_MAX:

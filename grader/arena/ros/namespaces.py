@@ -28,6 +28,7 @@ SIZE_BYTES = 512 << 20
 INODES = 100_000
 COPIED_BYTES = 1 << 20
 KEYCTL_JOIN_SESSION_KEYRING = 1
+# Neither Python nor the C library has a function for it: the call's number by processor (asm/unistd.h).
 KEYCTL = {
     "x86_64": 250,
     "aarch64": 219,
@@ -50,9 +51,11 @@ def enter_own_namespaces():
     else:
         uid, gid = os.geteuid(), os.getegid()
         _unshare(CLONE_NEWUSER | CLONE_NEWNET | CLONE_NEWNS)
+        # The kernel lets an unprivileged user map a group only after that (man 7 user_namespaces).
         _write("/proc/self/setgroups", "deny")
         _write("/proc/self/uid_map", "{0} {0} 1".format(uid))
         _write("/proc/self/gid_map", "{0} {0} 1".format(gid))
+    # Otherwise mounts made here would appear in the machine's own namespace.
     _mount("none", "/", None, MS_REC | MS_PRIVATE, None)
     _raise_loopback()
 
@@ -94,9 +97,8 @@ def _raise_loopback():
 
 
 def leave_keys_behind():
-    """Join a new, empty session keyring (man 7 keyrings), which all that the process starts inherits: what hangs on
-    the session of the person who grades is not for students. Where the kernel has no keys, or
-    does not let it, there is nothing that could be read either way."""
+    """Join a new, empty session keyring (man 7 keyrings), which all that the process starts inherits: the keys of the
+    person who grades are not for students. Where the kernel has no keys, or forbids this, none can be read anyway."""
     number = KEYCTL.get(os.uname().machine)
     if number is not None:
         LIBC.syscall(number, KEYCTL_JOIN_SESSION_KEYRING, None)
@@ -158,6 +160,7 @@ class Stage:
 
 def copy_tree(source, target):
     """Links as links, files with their modes, nothing else. What was written by a student is followed nowhere."""
+    # Not `shutil.copytree`, which looks at each file several times: every run copies a whole workspace.
     mode = os.lstat(source).st_mode
     if stat.S_ISLNK(mode):
         os.symlink(os.readlink(source), target)

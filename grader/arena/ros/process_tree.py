@@ -9,6 +9,7 @@ TICKS_HZ = os.sysconf("SC_CLK_TCK")
 PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 PROCESSES_MAX = 5000
 MAPS_MAX = 100000
+# So /proc names anonymous memory that is shared (man 2 mmap, MAP_SHARED | MAP_ANONYMOUS).
 SHARED = b" /dev/zero (deleted)\n"
 PIECE_BYTES = 64 << 20
 READ_BYTES = 1 << 16
@@ -18,6 +19,7 @@ KEYS = {
     ("pids", 1): "pids.max",
     ("pids", 2): "pids.max",
 }
+# Version 1 limits memory and swap together, version 2 swap alone.
 SWAP = {1: "memory.memsw.limit_in_bytes", 2: "memory.swap.max"}
 PEAK = "memory.max_usage_in_bytes"
 NEAR_BYTES = 4 << 20  # the kernel charges in pieces, the largest is a huge page
@@ -64,7 +66,7 @@ def _children_of_thread(pid, thread):
 
 
 def cpu_s(pid):
-    """Of a process and of the children that it waited for."""
+    """Return the CPU seconds of a process and of the children that it waited for."""
     return read_stat(pid)[1]
 
 
@@ -143,7 +145,8 @@ def _late_s(pid, thread):
 
 
 def shared_memory(pids):
-    """(bytes, maps): memory without a name that processes share, each piece once, and how many maps were looked at.
+    """Return (bytes, maps): the memory without a name that processes share, each piece once, and how many maps were
+    looked at.
 
     The kernel keeps a piece for as long as any of it is mapped, though no process is shown to hold what it let go: a
     piece counts up to the last byte that is mapped, and for no less than `PIECE_BYTES`.
@@ -173,6 +176,7 @@ PROGRAMS_MAX, THREADS_MAX = 30, 200
 ASLEEP_S = 0.8
 """`rospy.spin()` wakes every 0.5 s."""
 WORKING = 0.4
+# Twice a second, with room for what a callback or a log message wakes.
 SPIN_HZ = 3.2
 COMPUTES_S, STUCK_S = 0.6, 5.0
 """CPU seconds in one stretch, without new memory: so many, and a program computes; so many, and it does only that."""
@@ -213,6 +217,7 @@ class Rest:
         late_s = {thread: _late_s(self._pid, thread) for thread in threads[:THREADS_MAX]}
         waited_s = max((late_s[thread] - self._late_s.get(thread, 0.0) for thread in late_s), default=0.0)
         work_s = used_s - self._used_s + waited_s
+        # The first look has nothing to compare with. Waiting for a processor is work that others keep it from.
         working = self._late_s == {} or work_s > WORKING * (now_s - self._looked_s)
         sleeps, waits = now_s - self._woke_s > ASLEEP_S, "futex" in waits_in(self._pid, self._pid)
         if working or asleep or (sleeps and not (waits and self._rests_asleep(threads, now_s))):
@@ -223,6 +228,7 @@ class Rest:
         if self.since_s is not None:
             self._only_callbacks = self._only_callbacks and waits
             self._napping = self._napping or napping
+            # One more for a wake-up that falls on the edge of the time that is looked at.
             rarely = wakes - self._wakes_before <= SPIN_HZ * (now_s - self.since_s) + 1
             self.spins = not (self._napping or sleeps) and (rarely or self._only_callbacks)
         grows = pages - self._pages > GROWS
@@ -240,7 +246,7 @@ class Rest:
         )
 
     def _rests_asleep(self, threads, now_s):
-        """Whether a program whose main thread waits for its others does nothing by itself: none of them sleeps."""
+        """Return whether a program whose main thread waits for others does nothing by itself: none of these sleeps."""
         if _is_compiled(self._pid):
             return True
         awake = {}
@@ -256,7 +262,7 @@ class Rest:
         )
 
     def _others(self, threads, now_s):
-        """Whether one of the other threads sleeps for a time, and whether for long (a timer, say)."""
+        """Return whether one of the other threads sleeps for a time, and whether for long (a timer, say)."""
         naps = {}
         if len(threads) > THREADS_MAX:
             return True, True
@@ -285,6 +291,7 @@ class TreeRest:
         """Return (rest, programs): one of `KINDS`, and how many programs have no others below them."""
         if len(pids) > PROGRAMS_MAX:
             return None, PROGRAMS_MAX
+        # The kernel's function behind `wait` (man 2): a shell whose child runs.
         pids = [pid for pid in pids if not waits_in(pid, pid).startswith("do_wait")]
         seen = {pid: read_stat(pid) for pid in pids}
         self._programs = {pid: self._programs.get(pid) or Rest(pid, now_s) for pid in pids}
@@ -296,6 +303,7 @@ class TreeRest:
         above = [p for pid, p in self._programs.items() if pid in parents]
         if not last or any(program.kind is None for program in above):
             return None, len(last)
+        # One program that is not at rest keeps the tree from it.
         return min((self._programs[pid].kind for pid in last), key=KINDS.index), len(last)
 
 
@@ -329,7 +337,8 @@ class Groups:
                 _write(folder, SWAP[version], amount if version == 1 else 0)
 
     def _shared_groups(self, version, parent):
-        """Of version 2, a process is in one group only, which has all controllers."""
+        """Return the folder of the group to make. Of version 2, a process is in one group only, so that one has all
+        controllers."""
         made = [folder for known, folder in self._made.values() if known == version == 2]
         ours = "grader-{}-{}".format(os.getpid(), secrets.token_hex(6))
         return made[0] if made and os.path.dirname(made[0]) == parent else os.path.join(parent, ours)
@@ -354,8 +363,8 @@ class Groups:
         return []
 
     def memory_kills(self):
-        """How often the kernel killed a process because the tree had too much memory. What it kills because the whole
-        machine has too little counts here too: then this group never came to its own limit."""
+        """Return how often the kernel killed a process because the tree had too much memory. What it kills because the
+        whole machine has too little is counted in the same place; then this group never came to its own limit."""
         if "memory" not in self._made:
             return 0
         version, folder = self._made["memory"]
@@ -367,7 +376,7 @@ class Groups:
         return events.get("oom_kill", 0) if reached else 0
 
     def cpu_s(self):
-        """Of all that ever ran in the tree, waited for or not; None where no group counts it."""
+        """Return the CPU seconds of all that ever ran in the tree, waited for or not; None if no group counts them."""
         if "cpuacct" not in self._made:
             return None
         version, folder = self._made["cpuacct"]

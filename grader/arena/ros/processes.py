@@ -84,6 +84,7 @@ class Process:
             return
         self._stopped_by = "INT"
         computed = self._rest_told[0] in ("computes", "stuck")
+        # Counted anew from the signal on: what it computed before is no sign that it ignores it.
         self._rest = TreeRest()
         self._ends_within_s = int_s * (STILL_COMPUTES if computed else ENDS_COMPUTING)
         self._signal_group(signal.SIGINT)
@@ -96,6 +97,7 @@ class Process:
             self._signal_group(signal.SIGKILL)
             if self._status is None:
                 with contextlib.suppress(ProcessLookupError, PermissionError):  # already over
+                    # bubblewrap's own process stands outside of the namespace, in another group.
                     os.killpg(self.pid, signal.SIGKILL)
 
     def type(self, data):
@@ -115,6 +117,7 @@ class Process:
         namespace's init, which the arena inherits.
         """
         if self._status is None:
+            # Not `Popen.poll`: it would throw the usage away.
             pid, status, usage = os.wait4(self.pid, os.WNOHANG)
             if pid == 0:
                 return
@@ -122,7 +125,9 @@ class Process:
             self._status = status
             self._count(usage)
             if self._inner_pid is None:
+                # Without a sandbox no namespace ends with the first process: what it left in its group would go on.
                 self._signal_group(signal.SIGKILL)
+            # What still holds stdout open (a daemon, say) is not waited for.
             self.loop.call_later(WATCH_S, self._finish)
         if self._inner_pid is not None:
             try:
@@ -158,7 +163,7 @@ class Process:
             self._collected = Collected(self, launched.collect, **spec["collect"])
 
     def _give_leave(self, lifeline):
-        """The process is in its sandbox, which ends with the arena, and only now runs what it is to run."""
+        """Let the process run its program as soon as it says that it is in its sandbox, which ends with the arena."""
 
         def readable():
             self.loop.remove_reader(lifeline)
@@ -173,7 +178,7 @@ class Process:
         self.loop.add_reader(lifeline, readable)
 
     def _read_info(self, info_r):
-        """bubblewrap says which process is the first one of the new PID namespace."""
+        """Read from bubblewrap which process is the first one of the new PID namespace."""
         text = b""
 
         def readable():
@@ -190,7 +195,8 @@ class Process:
         self.loop.add_reader(info_r, readable)
 
     def _signal_group(self, number):
-        """The inner process leads a session of its own; its namespace's init ignores what it has no handler for."""
+        """Send a signal to the group of the inner process, which leads a session of its own. (The init of its
+        namespace, in the same group, ignores a signal that it has no handler for.)"""
         with contextlib.suppress(ProcessLookupError, PermissionError):  # already over
             os.killpg(self._inner_pid or self.pid, number)
 
@@ -198,6 +204,7 @@ class Process:
         if self.alive and self._stopped_by != "KILL":
             self._stopped_by = "TERM"
             self._rest, self._ends_within_s = TreeRest(), COMPUTES_BEHIND_TERM_S
+            # Each process, not the group: roslaunch starts its nodes in groups of their own.
             for pid in self._tree():
                 _kill(pid, signal.SIGTERM)
 
@@ -217,8 +224,8 @@ class Process:
         return [pid for pid in in_group if pid != self.pid] if self.pid in in_group else descendants(self.pid)
 
     def cpu_used_s(self):
-        """Of all its processes so far, also of what has ended. A control group also counts children never waited for,
-        too, and is asked faster than each process."""
+        """Return the CPU seconds of the whole tree so far, ended processes included. A control group also counts
+        children that nobody waited for, and is asked faster than each process."""
         counted_s = self._groups.cpu_s() if self._groups is not None else None
         if counted_s:
             return max(counted_s, self._cpu_s)
@@ -277,13 +284,14 @@ class Process:
         return None
 
     def _holds_too_much(self, tree, resident):
-        """Where no control group counts what is not a process's resident page: files in memory, and shared memory."""
+        """Return whether the tree has too much memory, where no control group counts it: besides the pages of its
+        processes, files in memory and shared memory."""
         shared, maps = shared_memory(tree)
         written = sum(self._stage.used_bytes(name) for name in self.scratches)
         return resident + written + shared > self._limits["memory_bytes"] or maps > MAPS_MAX
 
     def descriptors(self):
-        """Of the whole tree."""
+        """Return how many files, pipes and sockets the whole tree has open."""
         return sum(len(descriptors(pid)) for pid in self.tree())
 
     def _too_much_memory(self):
@@ -370,6 +378,7 @@ class Process:
     def _leave_groups(self):
         if self._groups is None:
             return
+        # The kernel may have ended the whole tree between two looks of `_watch`.
         if self._groups.memory_kills() and self._stopped_by != "KILL":
             self._stopped_by = "KILL"
             self._limit("stopped by the grader: {}".format(self._too_much_memory()))
@@ -389,6 +398,7 @@ def kill_orphans():
 
 def reap_all(patience_s):
     """Wait for every child that has been killed; one that the kernel holds on to is not waited for."""
+    # `sigtimedwait` sees only signals that are blocked.
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGCHLD})
     deadline = time.monotonic() + patience_s
     with contextlib.suppress(ChildProcessError):  # there is none left
@@ -400,14 +410,15 @@ def reap_all(patience_s):
 
 
 def _places(wall, scratches, stage):
-    """Where the scratches lie for the process, and where here. In `/dev/shm` lie no results."""
+    """Return the folders in which a process may leave files: by their paths in its sandbox, where they are outside of
+    it. Nothing in `/dev/shm` is a result."""
     inside = [wall[n + 1] for n, word in enumerate(wall) if isinstance(word, dict) and "scratch" in word]
     found = {path: os.path.join(stage.folder, scratches[n]) for n, path in enumerate(inside)}
     return {path: folder for path, folder in found.items() if not path.startswith("/dev/")}
 
 
 def _signal_of(code):
-    """A shell, and bubblewrap, give 128 + n for a child that died of signal n."""
+    """Return the signal that ended a process whose shell or bubblewrap exited with this code: they give 128 + n."""
     return code - 128 if code is not None and 128 < code < 160 else None
 
 
@@ -555,6 +566,7 @@ def _regular_files(top, inside):
 
 
 def _shows(below, name):
+    # rospack and rosstack write their caches into ROS_HOME in every run.
     hidden = name.startswith((".", "rospack_cache_", "rosstack_cache_")) and name != SHOWN
     return not hidden and not os.path.join(below, name).endswith(LEFT_OUT)
 

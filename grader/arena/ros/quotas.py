@@ -42,13 +42,14 @@ class Budget:
         self._lock = threading.Lock()
 
     def open(self, key, process):
-        """The account of a channel, made again where there is room for one more; else None. `key` is all that makes it
-        what it is, its definition too."""
+        """Return the account of a channel, a new one if there is room for it, else None. `key` is all that makes the
+        channel what it is: topic, publisher, type, MD5 sum and definition."""
         with self._lock:
             if key not in self._channels:
                 held = self._of_process.get(process, 0)
                 others = len(self._channels) - held
                 size = sum(map(len, key))
+                # Half of what is left: the first process to advertise many topics leaves room for the next.
                 if held >= (self.channels_max - others + 1) // 2 or size > self._shared_left:
                     return None
                 self._shared_left -= size
@@ -92,9 +93,8 @@ class Account:
 
 
 class Pool:
-    """Threads that wait for students' nodes. At most `workers_max` jobs at a time, and `each_max` of one key (a
-    process): a node that never answers takes no more than its
-    process's share. Jobs of one key start in order."""
+    """Threads that wait for students' nodes: at most `workers_max` jobs at a time, and `each_max` of one key (a
+    process). So a node that never answers takes no more than its process's share. Jobs of one key start in order."""
 
     def __init__(self, workers_max=WORKERS_MAX, each_max=EACH_MAX):
         self._workers_max = workers_max
@@ -111,23 +111,24 @@ class Pool:
             if len(jobs) >= WAITING_MAX:
                 return False
             jobs.append(job)
-            if self._idle:
-                self._changed.notify()
-            elif self._workers < self._workers_max:
+            # A worker that was woken counts as idle until it runs: it takes one job only, and that may wait for long.
+            if self._startable() > self._idle and self._workers < self._workers_max:
                 self._workers += 1
                 threading.Thread(target=self._work, daemon=True).start()
+            else:
+                self._changed.notify()
         return True
 
+    def _startable(self):
+        """Return how many of the jobs that wait may begin now, as far as their keys' shares go."""
+        return sum(min(len(jobs), self._each_max - self._busy[key]) for key, jobs in self._waiting.items())
+
     def _work(self):
-        try:
-            while self._work_once():
-                pass
-        finally:
-            with self._changed:
-                self._workers -= 1
+        while self._work_once():
+            pass
 
     def _work_once(self):
-        """Run one job; False where none came for a while."""
+        """Run one job; return False, and leave, where none came for a while."""
         with self._changed:
             found = self._next()
             if found is None:
@@ -135,20 +136,27 @@ class Pool:
                 self._changed.wait(IDLE_S)
                 self._idle -= 1
                 found = self._next()
-        if found is None:
-            return False
+            if found is None:
+                self._workers -= 1  # under the same lock: a job that comes next is not left to this one
+                return False
         key, job = found
         try:
             job()
+        except BaseException:
+            with self._changed:
+                self._workers -= 1
+            raise
         finally:
             self._finish(key)
         return True
 
     def _next(self):
+        # In order of their turns; a key with its share of threads is passed over.
         for key, jobs in self._waiting.items():
             if self._busy[key] < self._each_max:
                 job = jobs.popleft()
                 self._busy[key] += 1
+                # To the end of the queue, so that the keys take turns.
                 del self._waiting[key]
                 if jobs:
                     self._waiting[key] = jobs
@@ -174,9 +182,10 @@ class Notifications:
         self._large = Pool(workers_max=1)
 
     def queue_task(self, marker, task, args):
-        """`marker` is the address of the node that the task speaks to."""
+        """Queue a task of rosmaster's; `marker` is the address of the node that it speaks to."""
 
         def job():
+            # rosmaster's tasks raise whatever the node's answer makes them.
             with contextlib.suppress(Exception):  # whatever a node answers, or does not, is not waited for
                 task(*args)
 

@@ -63,6 +63,8 @@ class Recorder:
         with self._lock:
             self._pending.setdefault(caller_id, []).append(connected)
             self._processes[caller_id] = process
+            # A node that answered before serves its slave API. Another one may hold the lock that it needs to answer,
+            # and would wait for itself.
             serving = (caller_id, caller_api) in self._serving
         deadline = time.monotonic() + CONNECT_S
 
@@ -112,6 +114,7 @@ class Recorder:
             sock.close()
             return
         self.note("connected", topic, caller_id)
+        # This is a thread of the pool's, and connections belong to the loop.
         self.loop.call_soon(connection.watch)
 
     def _account(self, topic, caller_id, header):
@@ -135,6 +138,7 @@ class Recorder:
         """Read what has already arrived, then close every connection and give its totals."""
         with self._lock:
             connections = list(self._open.values())
+        # By turns, and not for ever: a node that still sends must not keep the others' last messages from being read.
         until_s, talking = time.monotonic() + LAST_READS_S, connections
         while talking and time.monotonic() < until_s:
             talking = [connection for connection in talking if connection.readable()]
@@ -159,6 +163,7 @@ class Recorder:
         except ProtocolError:
             sock.close()
             raise
+        # From here on the loop reads, and takes only what is there.
         sock.allow(None, 0)
         sock.setblocking(False)
         note_arrivals(sock)
@@ -169,6 +174,7 @@ class Recorder:
         sock = None
         try:
             sock = connect(port, max(0.05, seconds), LENGTH.size + HEADER_BYTES_MAX)
+            # Any type: what the publisher sends is recorded, whatever it registered.
             request = {"callerid": caller_id, "topic": topic, "md5sum": "*", "type": "*", "tcp_nodelay": "1"}
             write_header(sock, request)
             header = _answered_header(sock)
@@ -199,7 +205,7 @@ class Recorder:
         self._pool.submit(self._processes.get(connection.caller_id), work)
 
     def reserve(self, size):
-        """Reserve room in memory for a message that is still coming."""
+        """Reserve room in memory for a message that is still coming; return whether there is any."""
         with self._lock:
             if size and self._pending_bytes + size > PENDING_BYTES_MAX:
                 return False
@@ -219,7 +225,7 @@ class Recorder:
         self._to_count -= messages
 
     def overflows(self, connection, messages, time_ns):
-        """Its first message that is not recorded."""
+        """Note that from now on messages of this publisher are not recorded."""
         topic, caller_id = connection.topic, connection.caller_id
         self.note("limit", topic, caller_id, time_ns, messages=messages)
         detail = "sent more on {} than is recorded".format(shown(topic))
@@ -234,6 +240,7 @@ class Recorder:
 
     def note(self, event, topic, caller_id, time_ns=None, **fields):
         self._notes += 1
+        # The totals at the end are told even where all other notes were too many.
         if self._notes > (2 * NOTES_MAX if event == "closed" else NOTES_MAX):
             return
         record = {"event": event, "topic": topic, "callerid": caller_id}

@@ -29,5 +29,6 @@ def load_pythons_own_distutils():
 if __name__ == "__main__":
     load_pythons_own_distutils()
     sys.argv[0] = PROGRAM
+    # As Python itself would have set it for the real one.
     sys.path[0] = os.path.dirname(PROGRAM)
     runpy.run_path(PROGRAM, run_name="__main__")

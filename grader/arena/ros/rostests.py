@@ -55,6 +55,7 @@ class Answers:
     """Writes lines on stdout, which is not inherited: what tests print is not among them."""
 
     def __init__(self):
+        # What runs from here on inherits descriptor 1, which is then stderr.
         self._stdout = os.fdopen(os.dup(1), "w")
         os.dup2(2, 1)
 

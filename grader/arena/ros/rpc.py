@@ -21,7 +21,7 @@ LARGE_BYTES = 32 << 10
 HEAD_BYTES_MAX = 64 << 10
 CONNECTIONS_MAX = 256
 TURN_OF_THREADS_S = 0.001
-"""What is read and recorded does not wait long for threads that work on calls."""
+"""Python's own 5 ms would be too long for what is recorded beside threads that work on large calls."""
 REQUEST_S, IDLE_S, TURN_S = 8.0, 120.0, 8.0
 READ_AHEAD_BYTES = 8 << 10
 CALLS_HZ, CALLS_AT_ONCE, PAUSE_S = 1000.0, 2000, 3.0
@@ -136,6 +136,7 @@ class Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
 
 class _Handler(http.server.BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
+    # Head and body of an answer go out in one packet.
     wbufsize = -1
     disable_nagle_algorithm = True
 
@@ -148,6 +149,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         self.close_connection = True
         sock.allow(IDLE_S, HEAD_BYTES_MAX)
         self.server.waits(sock, True)
+        # The long limit is for a connection that is kept open between calls; from its first byte on, a call is short.
         if self.rfile.peek(1):
             sock.allow(REQUEST_S, HEAD_BYTES_MAX)
             super().handle_one_request()
@@ -165,6 +167,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
             self._refuse(TOO_LATE_CODE, "a call that did not end")
 
     def _refuse(self, code, what):
+        # A process that ended in the middle of a call has done nothing that is worth a remark.
         if self.caller.process is not None or not self._gone():
             self.server.guard.refused(self.caller.name, "sent {} {}".format(self.server.title, what))
         self.close_connection = True
@@ -192,6 +195,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
                 return
             self.server.waits(self.connection, False)
             result = self._result(body)
+            # Before the next large call has its turn: up to 8 MB.
             del body
             with self._turn(not turn and weight(result, LARGE_BYTES) > LARGE_BYTES):
                 self._reply(result)
@@ -205,6 +209,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
                 REFUSED_CODE, "an encoded call ({})".format(shown(self.headers["Content-Encoding"]))
             )
         text = self.headers.get("Content-Length", "")
+        # `int` takes other alphabets' digits, and its time grows with the square of their number.
         if not (text.isascii() and text.isdigit() and len(text) < 20):
             raise Refused(REFUSED_CODE, "a call without its length")
         if int(text) > BODY_BYTES_MAX:
@@ -213,7 +218,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
 
     @contextlib.contextmanager
     def _turn(self, large):
-        """Large ones take turns."""
+        """Wait for this call's turn if it is large, since one large call is worked on at a time. Raises Busy."""
         if not large:
             yield False
             return
@@ -289,8 +294,9 @@ def _ends(request):
 
 
 def serve(port, answer, guard, owners, title):
-    """Serve in a thread of its own; give the server, of which `uri` is what nodes are told."""
+    """Serve in a thread of its own; return the server, whose `uri` is what nodes are told."""
     sys.setswitchinterval(TURN_OF_THREADS_S)
     server = Server(port, answer, guard, owners, title)
+    # It is never told to stop, so it need not wake to look.
     threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 60.0}, daemon=True).start()
     return server

@@ -81,7 +81,7 @@ class Services:
 
     @contextlib.contextmanager
     def _count_connection(self, who):
-        """Inside, the connection counts as one of that process; how many these are."""
+        """Count a connection as one of that process's for as long as the block runs, and give their number."""
         with self._lock:
             self._open[who] += 1
             number = self._open[who]
@@ -110,6 +110,7 @@ class Services:
         again = True
         while again:
             sock.allow(None, 0)
+            # A persistent client may wait between its calls for as long as it likes.
             sock.settimeout(None)
             (length,) = LENGTH.unpack(read_exactly(sock, LENGTH.size))
             if length > REQUEST_BYTES_MAX:
@@ -120,6 +121,7 @@ class Services:
             number, answer = service.next_answer()
             if service.told:
                 self._tell(service, str(header.get("callerid", "")), request, number, who)
+            # In the connection's own thread, so no other client waits for this one.
             threading.Event().wait(service.delay_s)
             sock.allow(REQUEST_S, 0)
             sock.sendall(answer)

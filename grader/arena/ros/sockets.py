@@ -19,6 +19,7 @@ import time
 from bounded_sockets import port_of
 from process_tree import descriptors
 
+# As linux/netlink.h, linux/sock_diag.h, linux/unix_diag.h and linux/inet_diag.h number them.
 NETLINK_SOCK_DIAG = 4
 SOCK_DIAG_BY_FAMILY = 20
 UNIX_SHOW, UNIX_UNREAD, UNIX_MEMORY = 0x10 | 0x20, 4, 5
@@ -31,6 +32,7 @@ PAGES_NOT_ADDED = 256
 """Each processor may keep so many back from the machine's sum (net.core.mem_pcpu_rsv)."""
 REQUEST, DUMP = 0x1, 0x300
 ERROR, DONE = 2, 3
+# States as net/tcp_states.h numbers them, in sock_diag and in /proc/net/tcp alike.
 ESTABLISHED, CLOSE_WAIT, LISTEN, ALL_STATES = 1, 8, 10, 0xFFFFFFFF
 TABLES = ("/proc/net/tcp", "/proc/net/tcp6")
 DATAGRAM_TABLES = ("/proc/net/udp", "/proc/net/udp6")
@@ -60,7 +62,7 @@ Row = collections.namedtuple("Row", "state near far inode")
 
 
 def listening(port):
-    """Of those that listen on a port."""
+    """Return the inodes of the sockets that listen on a port."""
     try:
         rows = _dump_sockets(1 << LISTEN, port)
     except OSError:
@@ -69,7 +71,7 @@ def listening(port):
 
 
 def connected(near, far):
-    """Of the end `near` of a connection from `near` to `far`, both (IPv4 address, port)."""
+    """Return the inodes of the end `near` of a connection from `near` to `far`, both (IPv4 address, port)."""
     try:
         ends = [(socket.inet_aton(address), port) for address, port in (near, far)]
         found = _ask_kernel(socket.AF_INET, ALL_STATES, *ends)
@@ -96,7 +98,7 @@ def datagrams():
 
 
 def _dump_sockets(states, port, most=SOCKETS_MAX):
-    """Of both families, on a port, or on all where it is 0; raise OSError as below."""
+    """Return the TCP sockets of IPv4 and IPv6 in these states, on one port, or on all for 0. Raises OSError."""
     families = (socket.AF_INET, socket.AF_INET6)
     ends = (b"", port), (b"", 0)
     return [row for family in families for row in _ask_kernel(family, states, *ends, dump=True, most=most)]
@@ -129,11 +131,13 @@ def _internet_bytes_at_most():
             rows = [line.split() for line in file if line.startswith(("TCP:", "UDP:"))]
         return (pages + sum(int(row[row.index("mem") + 1]) for row in rows)) * PAGE_BYTES
     except (OSError, ValueError, IndexError):
+        # Then the kernel is asked about each socket, which is slow and right.
         return 1 << 62
 
 
 def _memory_bytes(question, answer_bytes, wanted):
-    """Of the sockets that the kernel answers with; 0 where it does not answer such questions."""
+    """Return the bytes in the buffers of the sockets that the kernel lists; 0 where it does not answer such
+    questions."""
     held = 0
     with contextlib.suppress(OSError):
         for body in _answers(question, dump=True):
@@ -150,7 +154,7 @@ def _memory_bytes(question, answer_bytes, wanted):
 
 
 def _ask_kernel(family, states, near, far, *, dump=False, most=SOCKETS_MAX):
-    """The rows of what the kernel answers; raise OSError where it does not answer such questions."""
+    """Return the TCP sockets that the kernel lists. Raises OSError where it does not answer such questions."""
     (source, port), (destination, far_port) = near, far
     identity = _ID.pack(port, far_port, source.ljust(16, b"\0"), destination.ljust(16, b"\0"), _NO_COOKIE)
     question = struct.pack("=BBBBI", family, socket.IPPROTO_TCP, 0, 0, states) + identity
@@ -161,7 +165,7 @@ def _ask_kernel(family, states, near, far, *, dump=False, most=SOCKETS_MAX):
 
 
 def _answers(question, *, dump):
-    """The body of each answer to a question about one socket, or with `dump` about all; raise OSError."""
+    """Yield the body of each answer to a question about one socket, or with `dump` about all. Raises OSError."""
     flags = REQUEST | (DUMP if dump else 0)
     with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, NETLINK_SOCK_DIAG) as sock:
         sock.settimeout(1.0)
@@ -174,20 +178,24 @@ def _answers(question, *, dump):
                 body = data[start + _HEADER.size : start + length]
                 if kind == ERROR:
                     (code,) = struct.unpack_from("=i", body)
+                    # No such socket is an answer, too: none.
                     if code != -errno.ENOENT:
                         raise OSError(-code, "sock_diag")
                 if kind in (DONE, ERROR):
                     return
                 yield body
+                # Netlink aligns each message to four bytes.
                 start += (length + 3) & ~3
+            # A question about one socket has one answer; a dump ends with DONE.
             more = dump
 
 
 def _list_sockets(tables, port=None, far_port=None):
-    """The same from /proc (man 5 proc); without a port, all."""
+    """Yield the sockets of these tables in /proc (man 5 proc), on one port or on all."""
     ending = ":" if port is None else ":{:04X}".format(port)
     for table in tables:
         with contextlib.suppress(OSError), open(table) as file:
+            # `ending in line` is much cheaper than to split a line, and leaves out nearly all.
             lines = itertools.islice(file, TABLE_ROWS_MAX)
             for row in (line.split(None, 10) for line in lines if ending in line):
                 if row[0] != "sl" and port in (None, _port(row[1])) and far_port in (None, _port(row[2])):
@@ -227,6 +235,7 @@ class Owners:
     def look(self, api):
         """Return the owner, looked up each time: ports are used again."""
         port = port_of(api)
+        # None does not overwrite: a node that is ending still belongs to its process.
         owner = self._holder(listening(port)) if port else None
         if owner is not None:
             self._known[api] = owner
@@ -250,7 +259,8 @@ class Owners:
             return {inode: self._pids.get("socket:[{}]".format(inode), frozenset()) for inode in inodes}
 
     def _may_look(self, api):
-        """Whether to look: an address without a listener costs a few looks, not one at every change of the graph."""
+        """Return whether to look: an address without a listener costs a few looks, not one at every change of the
+        graph."""
         now_s = time.monotonic()
         looks, last_s = self._asked.get(api, (0, 0.0))
         if looks >= LOOKS_MAX or now_s - last_s < AGAIN_S or len(self._asked) > ASKED_MAX:
@@ -259,7 +269,8 @@ class Owners:
         return True
 
     def _holder(self, inodes):
-        """The process that has one of these sockets open. Many who ask at once share one look at all processes."""
+        """Return the process that has one of these sockets open, or None. Threads that ask at the same time share one
+        look at all processes."""
         wanted = ["socket:[{}]".format(inode) for inode in inodes]
         if not wanted:
             return None
@@ -270,7 +281,8 @@ class Owners:
             return next((self._holders[link] for link in wanted if link in self._holders), None)
 
     def _look_at_all(self):
-        """Thousands of open files make looks rarer, not the arena slower."""
+        """Look at the open files of all processes, after a pause that grows with the time that the last look took:
+        thousands of open files must not make the arena slow."""
         pause_s = REST * self._look_took_s - (time.monotonic() - self._looked_s)
         if pause_s > 0:
             threading.Event().wait(pause_s)

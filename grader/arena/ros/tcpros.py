@@ -47,6 +47,7 @@ def check_fields(header):
 def read_exactly(sock, count):
     buffer = io.BytesIO()
     while buffer.tell() < count:
+        # Not the whole at once: a length that is only claimed must not take its memory.
         chunk = sock.recv(min(count - buffer.tell(), 1 << 16))
         if not chunk:
             raise Closed("connection closed in the header")

@@ -23,10 +23,12 @@ CHANNEL_ID = LENGTH = struct.Struct("<I")
 F_SETPIPE_SZ = 1031
 PIPE_BYTES = 1 << 20
 WRITE_BYTES = 256 << 10
+# Publishers that send much wait from the first on, so that the rest is left to all others.
 CONGESTED_BYTES, QUEUE_BYTES_MAX = 40 << 20, 48 << 20
 GATHER_S = 0.1
 """Messages wait so long for others to be written with them: each time that something comes, the grader looks at the
 whole run again. Their times are those of their arrival."""
+# More than a message (16 MB) or a kept file in base64 has: a longer length is a sign of damage.
 FRAME_BYTES_MAX = 24 << 20
 PATIENT = ("/grader/console", "/grader/host")
 
@@ -35,6 +37,7 @@ _offset_ns = time.time_ns() - time.monotonic_ns()
 
 def set_clock():
     """Start counting the arena's time."""
+    # The template may have been imported hours ago, and the wall clock set since.
     global _offset_ns  # noqa: PLW0603 - a process has one clock
     _offset_ns = time.time_ns() - time.monotonic_ns()
 
@@ -113,6 +116,7 @@ class Wire:
             self._queue += parts
             self._bytes += size
             self._urgent = self._urgent or urgent or self._bytes >= WRITE_BYTES
+            # While the writer gathers, only what is urgent wakes it before its time.
             if self._idle or self._urgent:
                 self._came.notify()
 
@@ -132,7 +136,7 @@ class Wire:
                 self._went.notify_all()
 
     def _take(self):
-        """Some of what waits: small parts together, a large one alone."""
+        """Return some of what waits: small parts together, a large one alone."""
         with self._lock:
             self._await_work()
             parts = [self._queue.popleft()]
@@ -213,8 +217,9 @@ def _messages(data, start, end):
 
 
 def _fields(payload):
-    """Halves of surrogate pairs, which no record can hold, become question marks."""
+    """Return the fields of a frame. Halves of surrogate pairs, which no record can hold, become question marks."""
     fields = json.loads(payload)
+    # Nearly every frame has neither, and is parsed only once.
     if b"\\ud" in payload or b"\xed" in payload:
         fields = json.loads(json.dumps(fields, ensure_ascii=False).encode(errors="replace"))
     return dict(fields)

@@ -12,6 +12,7 @@ from xml.parsers import expat
 ELEMENTS_MAX = 200000
 DEPTH_MAX = 120
 """Of elements: a value inside of a value takes four or five."""
+# `int` takes time with the square of the number of digits.
 DIGITS_MAX = 40
 TAG_BYTES_MAX = 200
 PIECE_BYTES = 1 << 16
@@ -32,6 +33,7 @@ def read(data):
     if b"<!" in data:
         raise Malformed("a document type, entities or comments")
     for start in range(0, len(data), PIECE_BYTES):
+        # The pieces overlap by one tag, so that none hides between two.
         if _LONG_TAG.search(data, start, start + PIECE_BYTES + TAG_BYTES_MAX):
             raise Malformed("an element with more than a name")
     target = _Unmarshaller()
@@ -64,9 +66,11 @@ def _parse(data, target):
         depth -= 1
         target.end(tag)
 
+    # The parser has turned everything into text already: no encoding is left to be applied.
     target.xml(None, None)
     parser = expat.ParserCreate("UTF-8")
     parser.buffer_text = True
+    # `read` has refused these already: a second wall, should expat know other ways to write them.
     parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = _refuse
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler = target.data

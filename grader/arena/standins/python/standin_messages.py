@@ -22,6 +22,7 @@ def define(namespace):
         if stem is None:
             raise AttributeError(f"module {package}.{kind} has no attribute {name}")
         made = _make(package, kind, stem, definitions[stem].read_text(encoding="utf-8"))
+        # As if genpy had written a file for it: `turtlesim.msg._Pose` is a module, too.
         setattr(sys.modules[namespace["__name__"]], "_" + stem, made)
         namespace.update({key: value for key, value in vars(made).items() if key.startswith(stem)})
         return namespace.get(name, made)
@@ -35,14 +36,14 @@ def _parts(kind):
 
 
 def _definition_of(name, definitions, kind):
-    """The definition that a name of the module comes from: `Spawn` for `SpawnRequest` and for `_Spawn`."""
+    """Return the definition that a name of the module comes from: `Spawn` for `SpawnRequest` and for `_Spawn`."""
     candidates = [name[1:]] if name.startswith("_") else [name]
     candidates += [name[: -len(part)] for part in _parts(kind) if part and name.endswith(part)]
     return next((stem for stem in candidates if stem in definitions), None)
 
 
 def _make(package, kind, stem, text):
-    """The module that genpy's programs would have written into a file."""
+    """Return the module that genpy's programs would have written into a file."""
     full_name = f"{package}/{stem}"
     context = genmsg.msg_loader.MsgContext.create_default()
     if kind == "srv":

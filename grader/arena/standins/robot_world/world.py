@@ -12,7 +12,7 @@ WALLS_MAX = 5000
 
 
 def walls_of(lines, boxes):
-    """The walls of `lines`, each through points [x, y], and of `boxes` [x0, y0, x1, y1], two opposite corners."""
+    """Return the walls of `lines`, each through points [x, y], and of `boxes`, each two corners [x0, y0, x1, y1]."""
     found = []
     for line in _items(lines, "walls"):
         points = [_point(point) for point in _items(line, "a wall")]
@@ -27,7 +27,7 @@ def walls_of(lines, boxes):
 
 
 def read_plan(path, parse):
-    """The walls of a YAML file: `walls` and `boxes`, or the `image` of a map. `parse` makes values of YAML's text."""
+    """Return the walls of a YAML file: `walls` and `boxes`, or the `image` of a map. `parse` reads YAML's text."""
     path = Path(path)
     plan = parse(path.read_text())
     if not isinstance(plan, dict) or not {"walls", "boxes", "image"} & set(plan):
@@ -40,8 +40,9 @@ def read_plan(path, parse):
 
 
 def read_pgm(data):
-    """The rows of a picture, from the top, each value from 0 (black) to 1 (white)."""
+    """Return the rows of a picture (PGM), from the top, each value from 0 (black) to 1 (white)."""
     fields, place = [], 0
+    # Kind, width, height and white, with any blanks and comments between them (man 5 pgm).
     while len(fields) < 4:
         place = _skip_blanks(data, place)
         end = place
@@ -61,7 +62,7 @@ def read_pgm(data):
 
 
 def map_walls(rows, about):
-    """The borders of what is occupied, by map_server's own rule; `about` are the keys of the map's YAML file."""
+    """Return the borders of what is occupied, by map_server's own rule; `about` are the keys of the map's YAML file."""
     size_m, threshold = (
         _number(about.get("resolution")),
         _number(about.get("occupied_thresh", OCCUPIED_THRESH)),
@@ -87,7 +88,8 @@ def map_walls(rows, about):
 
 
 def _borders(full):
-    """Between which rows, and from where to where, full cells meet free ones; outside of the picture all is free."""
+    """Yield where full cells meet free ones: between which rows, and from which column to which. Outside of the picture
+    all is free."""
     free = [False] * len(full[0])
     for at, (below, above) in enumerate(zip([free, *full], [*full, free])):
         start = None
@@ -100,7 +102,7 @@ def _borders(full):
 
 
 def _skip_blanks(data, place):
-    """Behind blanks and comments."""
+    """Return the place behind blanks and comments."""
     while place < len(data):
         if data[place : place + 1] == b"#":
             place = data.find(b"\n", place) + 1 or len(data)
@@ -166,6 +168,7 @@ class Robot:
                 self._wanted = (0.0, 0.0)
         forward, self.turning = self._wanted
         half = self.turning * STEP_S / 2
+        # The robot drives along an arc: the chord to its end is shorter by this factor.
         chord = forward * STEP_S * (sin(half) / half if abs(half) > 1e-9 else 1.0)
         x, y = self.x + chord * cos(self.theta + half), self.y + chord * sin(self.theta + half)
         theta = self.theta + 2 * half
@@ -176,18 +179,20 @@ class Robot:
             self.x, self.y = x, y
 
     def _is_blocked(self, x, y):
-        """Whether a wall is in the way, and nearer than before."""
+        """Return whether a wall is in the way, and nearer than before."""
         at = self._near_at
         if at is None or hypot(x - at[0], y - at[1]) > NEAR_M:
             self._near_at = (x, y)
             self._near = [w for w in self._walls if distance(x, y, w) <= 2 * NEAR_M + self.radius]
         return any(
-            distance(x, y, wall) < min(self.radius, distance(self.x, self.y, wall)) for wall in self._near
+            # Nearer than before: a robot that touches a wall may drive away from it.
+            distance(x, y, wall) < min(self.radius, distance(self.x, self.y, wall))
+            for wall in self._near
         )
 
 
 def distance(x, y, wall):
-    """From a point to a wall."""
+    """Return the distance of a point from a wall."""
     (x0, y0), (x1, y1) = wall
     dx, dy = x1 - x0, y1 - y0
     square = dx * dx + dy * dy
@@ -211,13 +216,14 @@ class Laser:
         self._walls, self._noise, self._random = walls, noise, random
 
     def scan(self, x, y, theta):
-        """What it sees from there. Of each wall, only the rays between its ends are looked at."""
+        """Return the ranges that it sees from there. Of each wall, only the rays between its ends are looked at."""
         ranges = [inf] * len(self._rays)
         ahead, aside = cos(theta), sin(theta)
         for (x0, y0), (x1, y1) in self._walls:
             ax, ay = ahead * (x0 - x) + aside * (y0 - y), ahead * (y0 - y) - aside * (x0 - x)
             bx, by = ahead * (x1 - x) + aside * (y1 - y), ahead * (y1 - y) - aside * (x1 - x)
             cross = ax * by - ay * bx
+            # The ends in the order in which the laser turns.
             if cross < 0:
                 ax, ay, bx, by, cross = bx, by, ax, ay, -cross
             dx, dy = bx - ax, by - ay
@@ -234,9 +240,11 @@ class Laser:
         return [self._reading(far) for far in ranges]
 
     def _between(self, ax, ay, bx, by):
-        """The numbers of the rays between two points, the second to the left of the first: once or twice a stretch."""
+        """Yield the numbers (first, last) of the rays between two points, the second to the left of the first: one
+        stretch, or two."""
         start = (atan2(ay, ax) - self.low) % TURN
         width = (atan2(by, bx) - atan2(ay, ax)) % TURN
+        # Angles are those of a circle: a wall may lie across the seam of the laser's range.
         for begin in (start, start - TURN):
             first = max(0, ceil(begin / self.increment - 1e-9))
             last = min(len(self._rays) - 1, floor((begin + width) / self.increment + 1e-9))

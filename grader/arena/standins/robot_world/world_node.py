@@ -20,6 +20,7 @@ RULE = "\n" + 80 * "=" + "\nMSG: "
 STILL_S = 1.0
 CATCH_UP_STEPS = 2000
 LINE_LIST = 5
+# The package visualization_msgs may be missing, and checks read the walls from such a message.
 MARKER = """uint8 ARROW=0
 uint8 CUBE=1
 uint8 SPHERE=2
@@ -145,14 +146,17 @@ class World:
         self._shown.publish(picture)
 
     def run(self):
-        """Until the node is shut down. Steps are counted by ROS's clock, so a world goes as fast as that does."""
+        """Move the robot until the node is shut down. Steps are counted by ROS's clock, so the world is as fast as
+        that."""
         simulated = not rospy.rostime.is_wallclock()
         began_s = None
         while not rospy.is_shutdown():
             now_s = rospy.get_time() if simulated else time.monotonic()
+            # With /use_sim_time, the time is 0 until a first message of /clock comes.
             if began_s is None and now_s:
                 began_s = now_s
             if began_s is not None:
+                # The small number makes up for what float sums fall short of a whole step.
                 due = int((now_s - began_s) / STEP_S + 1e-6) - self._steps
                 for _ in range(min(due, CATCH_UP_STEPS)):
                     self._step(
@@ -170,6 +174,7 @@ class World:
             self._robot.step()
         self._steps += 1
         robot = self._robot
+        # Once for each collision, not in each step of 10 ms.
         if robot.hits != self._hit:
             self._hit = robot.hits
             self._collision.publish(self._hit)
@@ -216,7 +221,7 @@ class World:
 
 
 def _settings():
-    """The private parameters, over what the robot of that name has."""
+    """Return the private parameters, and for those that are not set what the robot of that name has."""
     name = rospy.get_param("~robot", "turtlebot3")
     if name not in ROBOTS:
         raise ValueError(f"robot: {name}, but there is {', '.join(sorted(ROBOTS))}")
@@ -225,7 +230,7 @@ def _settings():
 
 
 def _walls():
-    """What the parameters `walls`, `boxes` and `map` say; `map` is a file's path or `package://<package>/<path>`."""
+    """Return the walls of the parameters `walls`, `boxes` and `map`; `map` is a file's path or `package://<package>/<path>`."""
     walls = walls_of(rospy.get_param("~walls", []), rospy.get_param("~boxes", []))
     path = rospy.get_param("~map", "")
     if path.startswith("package://"):
@@ -235,7 +240,7 @@ def _walls():
 
 
 def _generate_class(name, text, *parts):
-    """The class of a message whose package a machine may lack, made of its definition and those of its parts."""
+    """Return the class of a message whose package a machine may lack, made of its definition and those of its parts."""
     named = [f"{part._type}\n{part._full_text}" for part in parts]  # noqa: SLF001 - genpy's own names
     return generate_dynamic(name, RULE.join([text, *named]))[name]
 
@@ -262,7 +267,7 @@ def _quaternion(theta):
 
 
 def _await_tick(seen_s, patience_s):
-    """Until the simulated clock is no longer where it was seen, or `patience_s` of the wall's clock."""
+    """Wait until the simulated clock is no longer where it was seen, or for `patience_s` by the wall's clock."""
     ticked = rospy.rostime.get_rostime_cond()
     with ticked:
         if rospy.get_time() == seen_s:

@@ -100,7 +100,7 @@ def mimic():
 
 @contextlib.contextmanager
 def raw_keys():
-    """Keys as they are pressed, not by line; as it was at the end. What is not a terminal is left alone."""
+    """Have keys come as they are pressed, not by line, while the block runs. What is not a terminal is left alone."""
     try:
         before = termios.tcgetattr(STDIN)
     except termios.error:

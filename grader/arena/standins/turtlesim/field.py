@@ -8,7 +8,9 @@ from struct import pack, unpack
 
 SIZE = 500
 STEP_S = 0.016
+# As turtlesim's own: a turtle without a command for so long stops.
 HOLD_S = 1.0
+# The constant of turtlesim's source, not `math.pi`: a pose is to be the same to the last digit.
 PI = 3.14159265
 PIXELS_PER_METRE = 45.0
 PEN_COLOR = (179, 184, 255)
@@ -20,7 +22,7 @@ CATCH_UP_STEPS = 1000
 
 
 def as_float32(value):
-    """What is left of a number in a float32 field."""
+    """Return the number as a message's float32 field would keep it."""
     return unpack("<f", pack("<f", value))[0]
 
 
@@ -84,6 +86,7 @@ class Turtle:
         return color
 
     def _move(self):
+        # First the turn, then the way in the new direction, as turtlesim does.
         theta = self.theta + self.turning * STEP_S
         self.theta = theta - 2 * PI * floor((theta + PI) / (2 * PI))
         ahead, aside = self.forward * STEP_S, self.sideways * STEP_S
@@ -129,7 +132,7 @@ class Canvas:
         self._pixels = bytearray(bytes(color) * (SIZE * SIZE))
 
     def pixel(self, x, y):
-        """The colour of the pixel nearest to a point; black outside."""
+        """Return the colour of the pixel nearest to a point; black outside."""
         column, row = int(x + 0.5), int(y + 0.5)
         if not (0 <= column < SIZE and 0 <= row < SIZE):
             return 0, 0, 0
@@ -137,7 +140,7 @@ class Canvas:
         return tuple(self._pixels[start : start + 3])
 
     def line(self, start, end, width, color):
-        """A straight stroke with square ends, `width` pixels wide; of a point, it makes a dot."""
+        """Draw a straight stroke with square ends, `width` pixels wide; from a point to itself, a dot."""
         corners = _outline(start, end, width / 2)
         rows = [y for _, y in corners]
         for row in range(max(0, ceil(min(rows))), min(SIZE, ceil(max(rows)))):
@@ -149,7 +152,7 @@ class Canvas:
 
 
 def _outline(start, end, half):
-    """The corners of the rectangle that a stroke covers, in order."""
+    """Return the corners of the rectangle that a stroke covers, in order."""
     (x0, y0), (x1, y1) = start, end
     length = hypot(x1 - x0, y1 - y0)
     along_x, along_y = (half * (x1 - x0) / length, half * (y1 - y0) / length) if length else (half, 0.0)
@@ -162,7 +165,7 @@ def _outline(start, end, half):
 
 
 def _span(corners, row):
-    """Where a row crosses a convex outline: its first and last x."""
+    """Return the first and the last x at which a row crosses a convex outline."""
     crossed = []
     for (x0, y0), (x1, y1) in zip(corners, (*corners[1:], corners[0])):
         if min(y0, y1) <= row <= max(y0, y1):
@@ -192,7 +195,7 @@ class World:
         del self.turtles[name]
 
     def reset(self):
-        """All as in the beginning: one turtle in the middle. Its name."""
+        """Begin again with one turtle in the middle; return its name."""
         self.turtles.clear()
         self._number = 0
         return self.spawn("", MIDDLE_M, MIDDLE_M, 0.0)
@@ -232,7 +235,7 @@ class Background:
 
 
 def as_integer(value):
-    """As roscpp reads an integer parameter: a real number is rounded, all else is none."""
+    """Return the value as roscpp reads an integer parameter: a real number is rounded, all else is None."""
     if isinstance(value, bool) or not isinstance(value, (int, float)) or value != value or abs(value) > 2**31:  # noqa: PLR0124 - not a number
         return None
     return int(value // 1 + (value % 1 >= 0.5))
@@ -264,6 +267,7 @@ class Pace:
             self._moved_s = wall_s
         self._last_s = clock_s
         self._owed_s = self._owed_s + passed_s if passed_s >= 0 else 0.0
+        # The small number makes up for what float sums fall short of a whole step.
         steps = int(self._owed_s / self._step_s + 1e-6)
         self._owed_s -= steps * self._step_s
         return min(steps, CATCH_UP_STEPS)

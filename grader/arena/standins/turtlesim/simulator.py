@@ -95,7 +95,7 @@ class Simulator:
         self._offer("kill", srv.Kill, self._on_kill)
 
     def run(self):
-        """Until the node is shut down."""
+        """Move the turtles until the node is shut down."""
         pace = Pace(STEP_S)
         simulated = not rospy.rostime.is_wallclock()
         next_s = time.monotonic()
@@ -103,6 +103,7 @@ class Simulator:
             now_s = time.monotonic()
             for _ in range(pace.due(rospy.get_time() if simulated else now_s, now_s)):
                 self._step()
+            # A step that was late is not followed by hurried ones: `Pace` counts those that are due.
             next_s = max(next_s + STEP_S, now_s)
             pause_s = next_s - time.monotonic()
             if simulated:
@@ -187,7 +188,7 @@ class Simulator:
 
 
 def _await_tick(patience_s):
-    """Until the simulated clock moves, or `patience_s` of the wall's clock."""
+    """Wait until the simulated clock moves, or for `patience_s` by the wall's clock."""
     ticked = rospy.rostime.get_rostime_cond()
     with ticked:
         ticked.wait(patience_s)
