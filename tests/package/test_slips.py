@@ -183,6 +183,11 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("never-reached", 5, "the publish(…) on line 7")]),
         (node("    for i in range(9):\n        p.publish(1)\n") + CALLED,
          [("loop-left", 4, "write `while not rospy.is_shutdown():` on line 4")]),
+        *((f"def f(m):\n    for i in range(4):\n        pub.publish(1)\n{given}\nrospy.spin()\n", [])
+          for given in ("rospy.Subscriber('a', Bool, f)", "rospy.Subscriber('a', Bool, callback=f)",
+                        "rospy.Timer(rospy.Duration(1), f)")),
+        ("def f(m):\n    for i in range(4):\n        pub.publish(1)\nrospy.on_shutdown(g)\nf(0)\n",
+         [("loop-left", 2, "ends after a fixed number of rounds")]),
         ("def stop():\n    for i in range(4):\n        p.publish(1)\nrospy.init_node('a')\nstop()\nstop()\n", []),
         ("def side():\n    while n < 9:\n        p.publish(1)\nfor i in range(4):\n    side()\n", []),
         (node("    for i in range(4):\n        p.publish(1)\n        rospy.sleep(1)\n    p.publish(0)\n") + CALLED,

@@ -321,7 +321,10 @@ def _nothing_like_it(package: PackageFacts, node: LaunchNode, why: str) -> Slip:
     """The package has a program of nearly that name, or ROS has one, or the script was never written."""
     plain = PurePosixPath(str(node.type)).name
     suffix = PurePosixPath(plain).suffix
-    names = [n for n in _program_names(package) if n != node.type]
+    beside = {one.type for file in package.launch_files for one in file.brings if one.file == node.file}
+    names = [
+        n for n in _program_names(package) if n not in beside
+    ]  # what another <node> starts is not meant here
     near = near_names(plain, names) or [n for n in names if suffix and suffix != ".py" and n.endswith(suffix)]
     if near:
         return _slip(node, f"{why}; {there_is(near)}", f'write type="{near[0]}"')
