@@ -351,6 +351,10 @@ CASES = {
                        "`global count` comes after a line that uses count"),
     "beside-a-global": Case(swapped(TALKER, ("def main():", "count = 0\ndef main():\n    global count"),
                                 ("rate.sleep()", "rate.sleep")), ["missing-call"], "rate.sleep is named but not"),
+    "name-of-a-series": Case(
+        swapped(TALKER, ("    rate = ", f"    publisher2 = {OTHER}\n    rate = "),
+                ("        rate.sleep", "        publisher3.publish(1)\n        rate.sleep")), [],
+    ),
     "topic-between-two-other-scripts": Case(
         {"src/relay.py": SCRIPT.replace("'talker'", "'relay'").replace("numeric_chatter", "numeric_chatter2"),
          "src/echo.py": ECHO, LAUNCHED: LAUNCH_THREE}, [], wanted=asking(launch_files=("launch/lab.launch",)),

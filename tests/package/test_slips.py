@@ -336,6 +336,23 @@ def test_a_name_without_a_value_gets_one_by_what_it_is_used_for(lines: str, fix:
     assert found[:1] == [fix]
 
 
+@pytest.mark.parametrize(
+    ("given", "used", "kind"),
+    [
+        ("pub pub2", "pub3", "undefined"),
+        ("left1 left2", "left3", "undefined"),
+        ("value value2", "value1", "undefined"),
+        ("talker", "talker2", "misspelt"),
+        ("talker talker2", "talkr", "misspelt"),
+    ],
+)
+def test_the_next_name_of_a_series_means_none_of_the_others(given, used, kind, tmp_path):
+    lines = [f"{name} = rospy.Publisher('{name}', Int8, queue_size=1)\n" for name in given.split()]
+    (tmp_path / "a.py").write_text(f"import rospy\n{''.join(lines)}{used}.publish(1)\n")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.kind for s in slips if s.name == used] == [kind]
+
+
 def test_a_sum_of_numbers_is_no_text(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text("a = n * 2 + 10\nt = 'n is ' + str(n)\np.publish(a)\np.publish(t)\n")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "publishes"]
