@@ -100,6 +100,7 @@ def make_recorder(
         job.facts,
         scenarios,
         job.evidence,
+        whole=rubric,
         beside=job.rubric.path.parent,
         rates=rates_of(rubric),
         watched=watched_of(rubric),

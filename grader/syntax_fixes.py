@@ -99,6 +99,7 @@ class _Habit(NamedTuple):
     rewrites: tuple[tuple[str, str], ...] = ()
 
 
+_NEXT_NAME = r"(?!(?:as|and|from|import)\b)(?=[A-Za-z_])"
 _HABITS = (
     _Habit(MERGE_MARKER.pattern, MERGED, "keep one version"),
     _Habit(rf"^\s*(?:{_SHELL})",
@@ -114,6 +115,10 @@ _HABITS = (
            "", ((r"^(\s*from\s+\w+)[,;:]\s*(?=\w+\s+\w{5,7}\s)", r"\1."),)),
     _Habit(r"^\s*from\s+[\w.]+\s+(?!import\b)([A-Za-z]{5,7})\s+[\w*]", "Python writes `import`, not `{0}`",
            "", ((r"^(\s*from\s+[\w.]+\s+)[A-Za-z]{5,7}(?=\s+[\w*])", r"\1import"),)),
+    _Habit(rf"^\s*(?:from\s+[\w.]+\s+import\s+\(?\s*[A-Z]\w*(?:\s*,\s*[A-Z]\w*)*\s+(?=[A-Z])"
+           rf"|import\s+[\w.]+(?:\s*,\s*[\w.]+)*\s+{_NEXT_NAME})",
+           "a comma belongs between two names",
+           "", ((rf"(?<!\bimport)(?<!\bas)(?<!\bfrom)(?<=\w)\s+{_NEXT_NAME}", ", "),)),
     _Habit(r"^\s*(?!from\b)([A-Za-z]{3,5})\s+[\w.]+\s+import\s", "Python writes `from`, not `{0}`",
            "", ((r"^(\s*)[A-Za-z]{3,5}(?=\s+[\w.]+\s+import\s)", r"\1from"),)),
     _Habit(r"^\s*(?:while|if|elif)\s+(?!not\b)([notNOT]{2,4}|[a-z]ot|n[a-z]t|no[a-z])\s+[\w(]",

@@ -61,6 +61,7 @@ class Recorder:
 
     `rates` are judged, by scenario: a run that is to show them ends when they are clear. `watched` is how long nodes
     have to be seen (s), by scenario. `recorded` is evidence, by scenario, that stands for a run of it: it is copied.
+    `whole` is the rubric with the scenarios that are not run here: a script that one of them starts gets its repairs.
     `stop` ends the runs from another thread. `about` is metadata for all its evidence, `beside` the rubric's folder.
     """
 
@@ -73,6 +74,7 @@ class Recorder:
         *,
         mode: SandboxMode,
         progress: Progress,
+        whole: Rubric | None = None,
         beside: Path | None = None,
         rates: Mapping[str, tuple[RateBounds, ...]] | None = None,
         watched: Mapping[str, float] | None = None,
@@ -88,7 +90,7 @@ class Recorder:
         self._rates = rates or {}
         self._watched = watched or {}
         self._cancels = cancels or {}
-        self._rubric = rubric
+        self._rubric, self._whole = rubric, whole or rubric
         self._beside = beside
         self._progress = progress
         # The bytes of one submission's evidence are shared among its runs.
@@ -241,7 +243,7 @@ class Recorder:
         """Return the paths, in one of the packages, of the scripts that the scenarios start."""
         paths = [f.path for f in sorted(facts.files, key=lambda f: (f.path.count("/"), f.path))]
         package = facts.asked or self._rubric.package
-        starts = [start for scenario in self._rubric.scenarios.values() for start in scenario.start]
+        starts = [start for scenario in self._whole.scenarios.values() for start in scenario.start]
         wanted = {s.script for s in starts if s.script and self._rubric.package_of(s) == package}
         # Reversed, so that of several files of one name the shallowest stays.
         names = {Path(path).name: path for path in reversed(paths)}

@@ -184,6 +184,7 @@ def _wrong(package: PackageFacts, facts: CMakeFacts, names: tuple[str, str]) -> 
         yield _respell(slip, "catkin_package")
     elif _first(facts, "catkin_package") is None:
         above = next((c for c in packages if c.args[:1] == ("catkin",)), project)
+        above = _first(facts, "generate_messages") or above  # catkin refuses it the other way round
         why = "catkin_package(…) is missing"
         yield Wrong(why, "add catkin_package()", below=above, uncalled="catkin_package")
 

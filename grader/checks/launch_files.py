@@ -146,6 +146,8 @@ def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdic
     meant = (_slip_for(package, node, name) for node in file.brings if _is_meant(node, name))
     slip = next(filter(None, meant), None)
     built = starts_built(package, file, name)
+    if slip is None and not built:
+        slip = _of_its_words(package, file, name)
     if slip is None and built:
         message = (
             f"{file.path} has no <node> for {name}: line {built[0].line} starts {built[0].type}, which is C++"
@@ -156,6 +158,20 @@ def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdic
     ):  # what the program is shows once roslaunch starts it
         slip = slip._replace(fix="; ".join((slip.fix, *built_fixes(package, file, name))))
     return slip.verdict() if slip else _no_node(file, package.name, name)
+
+
+def _of_its_words(package: PackageFacts, file: LaunchFile, name: str) -> Slip | None:
+    """Return the slip of the only node whose program is missing, where its name is made of words of the script's, or
+    the other way round: `first_node` for `first_node_publisher`."""
+    absent = [(node, slip) for node in file.brings if (slip := node_slip(package, node)) and slip.lacks]
+    words = set(re.split(r"[\W_]+", PurePosixPath(name).stem.casefold()))
+    found = [
+        slip
+        for node, slip in absent
+        if (own := set(re.split(r"[\W_]+", PurePosixPath(node.type or "").stem.casefold()))) <= words
+        or words <= own
+    ]
+    return found[0]._replace(fix=f'write type="{name}"') if len(found) == 1 else None
 
 
 def _program(file: LaunchFile, program: str) -> Verdict | None:

@@ -8,7 +8,7 @@ import re
 import shlex
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
@@ -73,6 +73,19 @@ def choose_package(candidates: list[Candidate], wanted: WantedPackage) -> Choice
         return _best([c for c in bare if c.has_cmake] or bare, wanted)
     near = [c for c in seen if c.manifest is not None and is_slip(c.manifest, wanted.name)]
     return _best(near, wanted) if len({c.manifest for c in near}) == 1 else None
+
+
+def choose_loose(
+    root: Path, candidates: list[Candidate], wanted: WantedPackage, git_links: tuple[str, ...]
+) -> Choice | None:
+    """Return the only folder that has files of the lab and lacks no more than its manifest to be the package, where the
+    submission has no package at all, and nothing else says where that went."""
+    found = [c for c in candidates if _count_files(c.folder, wanted.files)]
+    found = [c for c in found if not any(_below(other, c) for other in found)]
+    elsewhere = wanted.asked or wanted.others or any(c.has_manifest for c in candidates)
+    if elsewhere or len(found) != 1 or _where_it_went(root, wanted.name, git_links):
+        return None
+    return _best([replace(found[0], manifest=wanted.name)], wanted)
 
 
 def _is_named(candidate: Candidate, wanted: str) -> bool:
@@ -166,7 +179,8 @@ def _files_of(folder: Path, names: frozenset[str]) -> frozenset[str]:
 def _name_hint(chosen: Candidate, lab: WantedPackage) -> str:
     folder, wanted = printable(chosen.folder.name), lab.name
     if not chosen.has_manifest:
-        return f"the folder {folder} has no {MANIFEST}: it was taken for the package {wanted} by its name"
+        why = "by its name" if _in_folder(chosen, wanted) else "because of the lab's files in it"
+        return f"the folder {folder} has no {MANIFEST}: it was taken for the package {wanted} {why}"
     if chosen.manifest is None:
         return f"no name can be read from the {MANIFEST} in {folder}: the folder's name was taken instead"
     if chosen.manifest in (wanted, lab.asked):

@@ -21,6 +21,7 @@ from grader.intake.choose import (
     Candidate,
     Choice,
     WantedPackage,
+    choose_loose,
     choose_package,
     enclosing_package,
     find_candidates,
@@ -241,6 +242,8 @@ def locate(opened: Opened, wanted: WantedPackage) -> Located:
     if located:
         return located
     candidates = find_candidates(opened.root, leave_out=opened.leave_out)
+    if loose := choose_loose(opened.root, candidates, wanted, opened.git_links):
+        return Located(opened=opened, candidates=candidates, choice=loose, also={})
     raise not_found(opened.root, candidates, wanted, opened.git_links)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import PurePath
 
@@ -13,6 +14,8 @@ from grader.rubric.model import Criterion, Rubric
 
 OF_CONNECTIONS = ("connected", "launch-connects", "launch-runs")
 """Checks of which nodes are connected, at whatever rate messages come."""
+OTHER_TYPE = re.compile(r"expected \[[^\]]*\] but got \[")
+"""What rospy says of a message that a Publisher is not made for."""
 
 
 class Requirements:
@@ -79,6 +82,8 @@ class Requirements:
         same_run = self._criteria[required].scenario == criterion.scenario
         if not verdict.status.is_lost or is_unmade(verdict):
             return False  # a program that the build did not make is no reason for the build to fail
+        if same_run and self._criteria[required].check == "topic-type" and OTHER_TYPE.search(found.message):
+            return True  # its process ended of the wrong type
         named = verdict.unjudged and any(text in found.message for text in _paths(self._criteria[required]))
         unbuilt = found.unbuilt and verdict.unbuilt
         if same_run and found.cause not in {"", verdict.cause} and not (named or same_line or unbuilt):

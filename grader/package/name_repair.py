@@ -11,6 +11,7 @@ import builtins
 import re
 from collections.abc import Collection, Iterator, Sequence
 from difflib import get_close_matches
+from string import digits
 
 from grader.package.syntax_repair import Step, edited, last_name, nodes_in, span_of, step_to, tree_of
 from grader.wording import is_one_edit
@@ -219,6 +220,9 @@ def _is_guard(node: ast.stmt) -> bool:
 def meant_by(name: str, own: set[str], unused: Collection[str] = ()) -> str:
     """Return the one name of the script's own that is meant by one that has no value; "" where there is not one. Of the
     `unused`, one that is nearly the same is meant before all others."""
+    stem = name.rstrip(digits)
+    if name[0].islower() and any(one != stem != name and one.rstrip(digits) == stem for one in own):
+        return ""  # the next of a series, `pub3` behind `pub` and `pub2`, means none of them
     if name[:1].isupper():  # a class is not meant by a variable with a name like it
         own = {one for one in own if one[:1].isupper() or one.lower() == name.lower()}
     always = ("__name__", "True", "False", "None", *({"self", "rospy", "sys"} & own))

@@ -188,6 +188,8 @@ from tests.checks.tracebacks import SCRIPT, explained, package_of
         (6, "b.sendTransform(t, r, now, 'a', 'b')",
          "TypeError: TransformBroadcaster.sendTransform() takes 2 positional arguments but 6 were given",
          "give it the TransformStamped alone, or make the broadcaster with `tf.TransformBroadcaster()`"),
+        (6, "pub.publish(student)", "TypeError: expected [string] but got [lab/Student]",
+         "name Student in `rospy.Publisher(…)`, and import it"),
         (1, "import std_msgs.msg.String",
          "ModuleNotFoundError: No module named 'std_msgs.msg.String'; 'std_msgs.msg' is not a package",
          "write `from std_msgs.msg import String`"),

@@ -164,6 +164,38 @@ def test_what_has_the_labs_files_is_named(files, message, hint, tmp_path):
     assert hint in caught.value.hint
 
 
+@pytest.mark.parametrize(
+    ("files", "path"),
+    [
+        (("scripts/talker.py", "README.md"), "."),
+        (("ws/src/week1/scripts/talker.py", "ws/src/week1/launch/a.launch"), "ws/src/week1"),
+        (("week1/src/listener.py", "week2/src/other.py"), "week1"),
+        (("week1/CMakeLists.txt", "week1/nodes/talker.py"), "week1"),
+    ],
+)
+def test_without_any_manifest_the_only_folder_with_the_labs_files_is_taken(files, path, tmp_path):
+    wanted = WantedPackage(name="lab1", files=frozenset({"talker.py", "listener.py"}))
+    found = opened(write(tmp_path / "repo", dict.fromkeys(files, "x")), tmp_path, package=wanted)
+    assert (found.package.path, found.package.name) == (path, "lab1")
+    assert "it was taken for the package lab1 because of the lab's files in it" in found.hints[0]
+
+
+@pytest.mark.parametrize(
+    "files",
+    [
+        {"a/scripts/talker.py": "x", "b/scripts/talker.py": "x"},
+        {"a/scripts/other.py": "x"},
+        {**tree("other"), "a/scripts/talker.py": "x"},
+        {"a/scripts/talker.py": "x", "a/package (1).xml": ""},
+        {"a/scripts/talker.py": "x", **tree("build/lab1")},
+    ],
+)
+def test_no_folder_without_a_manifest_is_taken_where_another_may_be_meant(files, tmp_path):
+    wanted = WantedPackage(name="lab1", files=frozenset({"talker.py", "listener.py"}))
+    with pytest.raises(PackageNotFound):
+        opened(write(tmp_path / "repo", files), tmp_path, package=wanted)
+
+
 def test_what_another_copy_has_and_the_graded_one_has_not_is_named(tmp_path):
     files = {**tree("src/lab1", "lab1"), "lab1/scripts/talker.py": "", "src/lab1/scripts/listener.py": ""}
     wanted = WantedPackage(name="lab1", files=frozenset({"talker.py", "listener.py"}))

@@ -388,6 +388,16 @@ CASES = {
         {**OWN, "msg/Level.msg": "Header header\ngeometry_msgs/Point at\n",
          CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES geometry_msgs)\ncatkin_p")}, [],
     ),
+    **{f"own-message-that-is-left-out-{name}": Case(
+        {**OWN, f"msg/{name}.msg": "geometry_msgs/Point at\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES std_msgs)\ncatkin_p")}, [],
+    ) for name in ("Old", "Track", "Pose2")},
+    "own-messages-of-a-folder": Case(
+        {**OWN, "msg/Old.msg": "geometry_msgs/Point at\n",
+         CMAKELISTS: OWN_CMAKE.replace("FILES Level.msg", "DIRECTORY msg")
+         .replace("catkin_p", "generate_messages(DEPENDENCIES std_msgs)\ncatkin_p")},
+        ["build-line"] * 2, "write geometry_msgs after DEPENDENCIES",
+    ),
     "messages-of-no-definition": Case(
         {CMAKELISTS: CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES std_msgs)\ncatkin_p")}, ["build-line"],
         "delete line 4, generate_messages(…)", after={CMAKELISTS: "rospy)\n\ncatkin_package()"},

@@ -7,7 +7,18 @@ from pathlib import Path
 import pytest
 
 from grader.package.repairs.python import ros_clock, turn_sign
-from tests.package.repairing import CMAKELISTS, MANIFEST, SCRIPT, TALKER, XML, Case, asking, check, swapped
+from tests.package.repairing import (
+    CMAKELISTS,
+    LAUNCHED,
+    MANIFEST,
+    SCRIPT,
+    TALKER,
+    XML,
+    Case,
+    asking,
+    check,
+    swapped,
+)
 
 pytestmark = pytest.mark.usefixtures("without_processes")
 
@@ -26,6 +37,16 @@ if __name__ == '__main__':
 TWICE = "class A:\n    n = 1\n    def g(self, x): return x\n"
 DEEPER = "        if late:\n            wait()\n"
 OTHER = "rospy.Publisher('numeric_chatter2', Int8, queue_size=10)"
+ECHO = (
+    SPINS.replace("numeric_chatter", "numeric_chatter2").replace("'talker'", "'echo'") + "    rospy.spin()\n"
+)
+LAUNCH_THREE = "".join(
+    [
+        "<launch>",
+        *(f'<node pkg="lab" type="{n}.py" name="{n}"/>' for n in ("talker", "relay", "echo")),
+        "</launch>",
+    ]
+)
 OWN_POINT = {"msg/Point.msg": "int8 X\n"}
 
 CASES = {
@@ -330,6 +351,23 @@ CASES = {
                        "`global count` comes after a line that uses count"),
     "beside-a-global": Case(swapped(TALKER, ("def main():", "count = 0\ndef main():\n    global count"),
                                 ("rate.sleep()", "rate.sleep")), ["missing-call"], "rate.sleep is named but not"),
+    "name-of-a-series": Case(
+        swapped(TALKER, ("    rate = ", f"    publisher2 = {OTHER}\n    rate = "),
+                ("        rate.sleep", "        publisher3.publish(1)\n        rate.sleep")), [],
+    ),
+    "topic-between-two-other-scripts": Case(
+        {"src/relay.py": SCRIPT.replace("'talker'", "'relay'").replace("numeric_chatter", "numeric_chatter2"),
+         "src/echo.py": ECHO, LAUNCHED: LAUNCH_THREE}, [], wanted=asking(launch_files=("launch/lab.launch",)),
+    ),
+    "topic-of-another-script-alone": Case(
+        {"src/echo.py": ECHO, LAUNCHED: LAUNCH_THREE}, ["topic-name"], "numeric_chatter2 should be /numeric_chatter",
+        asking(launch_files=("launch/lab.launch",)),
+    ),
+    "topic-of-another-script-while-the-labs-is-not-there": Case(
+        {"src/relay.py": SCRIPT.replace("'talker'", "'relay'").replace("numeric_chatter", "numeric_chatter2"),
+         "src/echo.py": ECHO, LAUNCHED: LAUNCH_THREE}, ["topic-name"] * 2, "should be /numeric_chatter",
+        asking(launch_files=("launch/lab.launch",), scripts=("src/talker.py", "src/counter.py")),
+    ),
     "topic": Case(swapped(TALKER, ("numeric_chatter", "numeric_chater")), ["topic-name"], "should be /numeric_chatter"),
     "node": Case(swapped(TALKER, ("'talker'", "'Talker'")), ["node-name"], "the node Talker should be talker"),
     "param": Case(swapped(TALKER, ("'~rate'", "'~rat'")), ["parameter-name"],

@@ -183,6 +183,11 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("never-reached", 5, "the publish(…) on line 7")]),
         (node("    for i in range(9):\n        p.publish(1)\n") + CALLED,
          [("loop-left", 4, "write `while not rospy.is_shutdown():` on line 4")]),
+        *((f"def f(m):\n    for i in range(4):\n        pub.publish(1)\n{given}\nrospy.spin()\n", [])
+          for given in ("rospy.Subscriber('a', Bool, f)", "rospy.Subscriber('a', Bool, callback=f)",
+                        "rospy.Timer(rospy.Duration(1), f)")),
+        ("def f(m):\n    for i in range(4):\n        pub.publish(1)\nrospy.on_shutdown(g)\nf(0)\n",
+         [("loop-left", 2, "ends after a fixed number of rounds")]),
         ("def stop():\n    for i in range(4):\n        p.publish(1)\nrospy.init_node('a')\nstop()\nstop()\n", []),
         ("def side():\n    while n < 9:\n        p.publish(1)\nfor i in range(4):\n    side()\n", []),
         (node("    for i in range(4):\n        p.publish(1)\n        rospy.sleep(1)\n    p.publish(0)\n") + CALLED,
@@ -329,6 +334,23 @@ def test_a_name_without_a_value_gets_one_by_what_it_is_used_for(lines: str, fix:
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "undefined"]
     found = [s.fix for s in slips if s.name not in {"rospy", "String"}]
     assert found[:1] == [fix]
+
+
+@pytest.mark.parametrize(
+    ("given", "used", "kind"),
+    [
+        ("pub pub2", "pub3", "undefined"),
+        ("left1 left2", "left3", "undefined"),
+        ("value value2", "value1", "undefined"),
+        ("talker", "talker2", "misspelt"),
+        ("talker talker2", "talkr", "misspelt"),
+    ],
+)
+def test_the_next_name_of_a_series_means_none_of_the_others(given, used, kind, tmp_path):
+    lines = [f"{name} = rospy.Publisher('{name}', Int8, queue_size=1)\n" for name in given.split()]
+    (tmp_path / "a.py").write_text(f"import rospy\n{''.join(lines)}{used}.publish(1)\n")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.kind for s in slips if s.name == used] == [kind]
 
 
 def test_a_sum_of_numbers_is_no_text(tmp_path: Path) -> None:

@@ -175,8 +175,12 @@ def is_of_robot(tree):
 
 
 def calls_made(tree):
-    """Return how often each name is called: what a loop calls counts twice, since it is called again and again."""
+    """Return how often each name is called: what a loop calls, or a topic, a service or a timer, counts twice, since it
+    is called again and again."""
     called = Counter(map(called_name, walk(tree)))
+    for call in calls_in(tree, *CALLED_BACK, "Timer"):
+        given = [*call.args, *(keyword.value for keyword in call.keywords)]
+        called.update(2 * [dotted(one).rpartition(".")[2] for one in given])
     for loop in walk(tree):
         called.update(map(called_name, ast.walk(loop)) if isinstance(loop, (ast.While, ast.For)) else ())
     return called

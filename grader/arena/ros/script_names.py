@@ -289,12 +289,18 @@ def imported_otherwise(tree, names):
     return {name for name in names if name.lower() in imported}
 
 
+DIGITS = "0123456789"
+
+
 def spelt_alike(name, own, attributes):
     """Return the name that is meant, "" where none is alike."""
     if "self." + name in attributes:
         return "self." + name
     if name.strip("_") == "name":
         return "__name__"
+    stem = name.rstrip(DIGITS)
+    if name[0].islower() and any(one != stem != name and one.rstrip(DIGITS) == stem for one in own):
+        return ""  # the next of a series, `pub3` behind `pub` and `pub2`, means none of them
     if name[:1].isupper():  # a class is not meant by a variable with a name like it
         own = {one for one in own if one[:1].isupper() or one.lower() == name.lower()}
     near = difflib.get_close_matches(name[:TEXT_LIMIT], sorted(own), 1, 0.8)

@@ -477,7 +477,12 @@ def imports(tree):
         if len(modules) > 1 or getattr(node, "level", 0) or module in PLAIN_MODULES - {"numpy"}:
             continue
         if not used.intersection(bound) and bound != ["*"] and "__all__" not in used:
-            fix = "delete line %d: nothing in the script uses `%s`" % (node.lineno, "`, `".join(bound))
+            why = (
+                "the script gives `%s` a value of its own"
+                if hidden & set(bound)
+                else "nothing in the script uses `%s`"
+            )
+            fix = "delete line %d: %s" % (node.lineno, why % "`, `".join(bound))
             yield slip(node.lineno, "unused-import", module, fix=fix, name=bound[0])
         if not is_there(module):
             whole = modules[0] if modules[0] != module else ""

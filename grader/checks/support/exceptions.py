@@ -300,6 +300,12 @@ def _no_number(message: str, source: str) -> Meaning | None:
         r"expected \[\w+\] but got \[std_msgs/\w+\]", message
     ):  # rospy's own words, of a service's request
         return "this is the whole message", "take its field, as in `msg.data`"
+    typed = re.match(r"expected \[\w+\] but got \[\w+/(\w+)\]", message)
+    if typed and "publish" in source:
+        return (
+            f"the Publisher is not for {typed[1]}",
+            f"name {typed[1]} in `rospy.Publisher(…)`, and import it",
+        )
     if re.search(r" of (?:'str' and '(?:int|float)|'(?:int|float)' and 'str)'", message):
         other = "leave out `str(…)`" if "str(" in source else "compare it with a text"
         return "text is compared with a number", f"turn the text into a number first, or {other}"

@@ -138,6 +138,14 @@ def _absent(package: PackageFacts, launch: str, wanted: set[str]) -> Verdict:
     if full and movable:
         fixes = [one for name in sorted(wanted) for one in built_fixes(package, files[movable[0]], name)]
         hint = f"{hint}; then {join_words(fixes)}" if fixes else hint
+    broken = [
+        f for f in package.launch_files if f.fault and wanted and wanted <= {one.type for one in f.readable}
+    ]
+    if len(broken) == 1 and broken[0].fault and not movable and not guessed:
+        fault = broken[0].fault
+        seen += f", and {broken[0].path}, which is not well-formed, is to start {join_words(sorted(wanted))}"
+        repair = fault.advice or f"make line {fault.line} well-formed"
+        hint = f"{move_hint(package, broken[0].path, path)}; then {repair}"
     if parts and set(parts.values()) == wanted and not movable:
         hint = f"{hint}, with the <node>s of {join_words(parts)} in it"
     verdict = failed(f"{launch} is not in the package{seen}", hint=hint)
@@ -315,7 +323,10 @@ def _nothing_like_it(package: PackageFacts, node: LaunchNode, why: str) -> Slip:
     """The package has a program of nearly that name, or ROS has one, or the script was never written."""
     plain = PurePosixPath(str(node.type)).name
     suffix = PurePosixPath(plain).suffix
-    names = [n for n in _program_names(package) if n != node.type]
+    beside = {one.type for file in package.launch_files for one in file.brings if one.file == node.file}
+    names = [
+        n for n in _program_names(package) if n not in beside
+    ]  # what another <node> starts is not meant here
     near = near_names(plain, names) or [n for n in names if suffix and suffix != ".py" and n.endswith(suffix)]
     if near:
         return _slip(node, f"{why}; {there_is(near)}", f'write type="{near[0]}"')

@@ -466,7 +466,8 @@ def lacking_too(place: FileCitation | None, package: PackageFacts) -> tuple[str,
 
 
 def unused_import(place: FileCitation, package: PackageFacts) -> str:
-    """Return that the import on that line is not needed; "" where it is, or another name of the file is not there."""
+    """Return that the import on that line is not needed, and which other lines import what is not needed and not there
+    either; "" where it is needed, or another name of the file is not there."""
     own = [s for s in package.slips if s.file == place.file]
     if any(s.kind in {"undefined", "misspelt"} for s in own):
         return ""
@@ -475,7 +476,10 @@ def unused_import(place: FileCitation, package: PackageFacts) -> str:
     needed = {module for line, module in lacking if line not in unused}
     if any(line == place.line and module in needed for line, module in lacking):
         return ""
-    return next((s.fix for s in own if (s.kind, s.line) == ("unused-import", place.line)), "")
+    spare = {line for line, module in lacking if module not in needed} | {place.line}
+    fixes = {s.line: s.fix for s in own if s.kind == "unused-import" and s.line in spare}
+    # from below, so that the lines above stay where they are
+    return join_words([fixes[line] for line in sorted(fixes, reverse=True)]) if place.line in fixes else ""
 
 
 def lacking_module(found: Traceback, package: PackageFacts) -> str:

@@ -11,6 +11,7 @@ line of Python for a kind that is there is a correction in `syntax_fixes.py`, or
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 from grader.model.package import MANIFEST, PackageFacts, SourceFile
@@ -43,7 +44,7 @@ from grader.package.repairs.names import (
     repair_yaml_names,
     wanted_of,
 )
-from grader.package.repairs.python import repair_python
+from grader.package.repairs.python import Name, repair_python
 from grader.package.repairs.yaml_files import repair_yaml_files
 
 __all__ = [
@@ -86,13 +87,43 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     for path in (f.path for f in package.files if f.path.endswith(CPP) and is_own(f.path)):
         repair_cpp(files, path)
         names[path] = names_in_cpp(files.text(path) or "")
+    links = _links_of_others(files, names, wanted)
     for script in names:
-        repair_script_names(files, script, names[script], wanted)
+        own = [name for name in names[script] if name not in links.get(script, ())]
+        repair_script_names(files, script, own, wanted)
     repair_yaml_files(files, package, wanted)
     repair_yaml_names(files, package, names, wanted)
     for script in names:
         repair_script_keys(files, package, script, names[script], wanted)
     return tuple(sorted(files.repairs, key=lambda repair: KINDS.index(repair.kind)))
+
+
+def _links_of_others(
+    files: Files, names: Mapping[str, Sequence[Name]], wanted: Wanted
+) -> dict[str, list[Name]]:
+    """Return the topics that scripts beside those of the lab share with another script, at its other end: where each of
+    the lab's scripts is there, such a topic is no slip of the lab's."""
+    asked = {PurePosixPath(script).name for script in wanted.scripts}
+    of_lab = [script for script in names if PurePosixPath(script).name in asked]
+    if len(of_lab) < len(asked):
+        return {}
+    imported = {
+        word.rpartition(".")[2] for script in of_lab for word in IMPORTED.findall(files.text(script) or "")
+    }
+    ends = [(script, one.role, one.value.strip("/")) for script in names for one in names[script]]
+    other = {"publisher": "subscriber", "subscriber": "publisher"}
+    return {
+        script: [
+            one
+            for one in names[script]
+            if any(
+                at != script and role == other.get(one.role) and topic == one.value.strip("/")
+                for at, role, topic in ends
+            )
+        ]
+        for script in names
+        if script not in of_lab and PurePosixPath(script).stem not in imported
+    }
 
 
 def apply_repair(folder: Path, repair: Repair) -> None:

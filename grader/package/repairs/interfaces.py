@@ -62,12 +62,12 @@ def make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Col
     _correct_types(files, package)
     _correct_dividers(files, package)
     _call_by_kind(files)
-    lacking = _generate(files, package)  # from below, so that the lines above stay where they are
     run = [path for path in code if path in scripts or path.endswith(CPP)]
     needed = {word for path in run for word in re.findall(r"\w+", files.text(path) or "")}
     needed |= {
         word for one in package.interfaces for field in one.fields for word in re.findall(r"\w+", field.type)
     }
+    lacking = _generate(files, package, needed)  # from below, so that the lines above stay where they are
     for call, names in reversed(made.items()):
         _name_definitions(files, call, names, needed)
     of_catkin, named = _components(files)
@@ -327,13 +327,27 @@ def _bring_std_msgs(names: Iterable[str]) -> bool:
     return not needing.isdisjoint(names)
 
 
-def _generate(files: Files, package: PackageFacts) -> list[str]:
+def _is_left_out(files: Files, path: PurePosixPath, needed: Collection[str]) -> bool:
+    """Return whether the build makes nothing of a definition, which is not named among the others, nor `needed`."""
+    calls = [
+        c
+        for name, folder in INTERFACE_FOLDERS.items()
+        if folder == path.parent.name
+        for c in calls_of(files, name)
+    ]
+    words = {token.value for call in calls for token in words_of(call)}
+    meant = any("$" in word or is_near(word, path.name) for word in words)
+    return "FILES" in words and path.name not in words and path.stem not in needed and not meant
+
+
+def _generate(files: Files, package: PackageFacts, used: Collection[str]) -> list[str]:
     """Call generate_messages(…) where nothing does, with the packages whose types are used, above catkin_package(…).
     Return those that find_package(catkin …) has to name with it."""
     calls, of_catkin = calls_of(files, GENERATE), calls_of(files, "catkin_package")
-    types = {field.type for one in package.interfaces for field in one.fields}
+    made = [one for one in package.interfaces if not _is_left_out(files, PurePosixPath(one.path), used)]
+    types = {field.type for one in made for field in one.fields}
     needed = {"std_msgs"} if types & {"Header", "Header[]"} else set[str]()
-    needed |= {"actionlib_msgs"} if any(one.path.endswith(".action") for one in package.interfaces) else set()
+    needed |= {"actionlib_msgs"} if any(one.path.endswith(".action") for one in made) else set()
     needed |= {name.partition("/")[0] for name in types if "/" in name} - {package.name}
     if not calls:
         line = f"{GENERATE}({' '.join(['DEPENDENCIES', *sorted(needed)] if needed else [])})"
