@@ -130,7 +130,9 @@ class Proposal:
     def _node(self, name: str, script: str, seen: Observed) -> None:
         file = PurePosixPath(script).name
         requires: list[str] = []
-        if script.endswith(".py"):
+        if (
+            script.endswith(".py") and script not in self._installed_scripts()
+        ):  # which needs no executable bit
             requires = [
                 self._add(
                     f"{name}-executable", f"{file} can be run", "executable", {"path": script},

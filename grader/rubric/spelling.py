@@ -109,8 +109,10 @@ def _misspelt_words(rubric: WrittenRubric, *, code: bool) -> Iterator[tuple[KeyP
     for path, text in rubric.texts:
         if path[0] != "criteria" or _key(path) not in WORDS or text == path[-1]:
             continue
+        hints = re.findall(r"\"([^\"]+)\"|`([^`]+)`", str(rubric.data["criteria"][path[1]].get("hint") or ""))
+        hinted = set(re.findall(_WORD, " ".join(map(" ".join, hints)))) if code else set[str]()
         for word in re.findall(rf"(?<![{{\w]){_WORD}(?![\w}}])", text):
-            near = next((one for one in sorted(known) if is_slip(word, one)), "")
+            near = next((one for one in sorted(known | hinted) if is_slip(word, one)), "")
             if near and _count(word, word, rubric.texts) == 1:
                 yield path, word, near
 

@@ -132,6 +132,18 @@ def test_a_build_that_failed_is_noted_first() -> None:
     assert note.endswith("--from FOLDER --package NAME")
 
 
+def test_a_script_that_is_installed_needs_no_executable_bit() -> None:
+    install = {"name": "catkin_install_python", "args": ["PROGRAMS", "src/node.py", "DESTINATION", "bin"]}
+    runs = build_runs({"runs": {}, "package": {"cmake": {"calls": [install]}}})
+    parts = Parts(nodes={"node": "src/node.py", "other": "src/other.py"}, launches={})
+    proposal = Proposal(
+        package_facts(runs["package"]), parts, dict.fromkeys(parts.nodes, observe(run_of())), runs
+    )
+    named = [one["with"] for one in proposal.criteria if one["check"] in {"executable", "cmake-install"}]
+    assert {"path": "src/node.py"} not in named
+    assert {"scripts": ["src/node.py"]} in named
+
+
 def test_nothing_to_see_twice():
     seen = {"node": observe(run_of(topics=[{"topic": "/c", "callerid": "/node"}]))}
     assert second_look("lab1", Parts(nodes={"node": "src/node.py"}, launches={}), seen) is None

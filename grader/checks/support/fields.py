@@ -98,6 +98,17 @@ def _reading(time_ns: int, message: Any, path: str, *, numbers: bool) -> Reading
     return Reading(time_ns, tuple(values), "")
 
 
+def join_items(found: Iterable[Reading], wanted: Sequence[object]) -> list[Reading]:
+    """Return the readings, those of `[*]` as one list where lists are wanted and the items are none: one value each."""
+    are_lists = any(isinstance(one, list | tuple) for one in wanted)
+    return [
+        one._replace(values=(list(one.values),))
+        if are_lists and one.values and not isinstance(one.values[0], list | tuple | bytes)
+        else one
+        for one in found
+    ]
+
+
 def set_beside(channels: Iterable[Channel], time_ns: int, path: str, wanted: object, tolerance: float) -> str:
     """Return the one other field of a message that has the value which is wanted of this one; "" for none or several,
     and for the values that every field begins with."""
