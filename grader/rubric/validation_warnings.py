@@ -501,7 +501,6 @@ def _launched_nodes(rubric: WrittenRubric) -> Iterator[Fault]:
             if owner and isinstance(package, str) and package != owner:
                 yield (*criterion.at, "nodes", node), f"is of {owner} elsewhere in the rubric"
         count = as_map(scenario.get("until")).get("nodes")
-        named = [*nodes, *as_list(criterion.given.get("programs")), *as_list(criterion.given.get("scripts"))]
-        if named and isinstance(count, int) and count > len(named) and len(starts_of(scenario)) == 1:
-            fault = f"{criterion.id} names {plural(len(named), 'node')}: the run waits for more than these"
+        if nodes and isinstance(count, int) and count > len(nodes) and len(starts_of(scenario)) == 1:
+            fault = f"{criterion.id} names {plural(len(nodes), 'node')}: the run waits for more than these"
             yield ("scenarios", criterion.run, "until", "nodes"), fault

@@ -77,14 +77,15 @@ class Reading(NamedTuple):
 def readings(channels: Iterable[Channel], path: str, *, numbers: bool = True) -> list[Reading]:
     """Return the field in each message by time; with `numbers`, any other value is a fault."""
     found = [
-        _reading(time_ns, value, path, numbers=numbers)
+        reading_of(time_ns, value, path, numbers=numbers)
         for channel in channels
         for time_ns, value in zip(channel.times_ns, channel.values, strict=True)
     ]
     return sorted(found, key=lambda one: one.time_ns)
 
 
-def _reading(time_ns: int, message: Any, path: str, *, numbers: bool) -> Reading:  # noqa: ANN401 - as above
+def reading_of(time_ns: int, message: Any, path: str, *, numbers: bool) -> Reading:  # noqa: ANN401 - as above
+    """Return the field in one message."""
     if message is None:
         return Reading(time_ns, (), "the message cannot be read")
     try:
