@@ -240,6 +240,8 @@ def _as_named(pattern: str, text: str) -> str:
         known := [f"{p}/{text}" for p, types in noetic_messages().items() if text in types]
     ):
         return f" (did you mean {join_words([json.dumps(one) for one in known[:3]], 'or')}?)"
+    if pattern == TYPE_PATTERN and text.startswith("/"):
+        return ", which is a name: a type has a package before it, and no slash at its beginning"
     ending = text.rpartition(".")[2]
     if pattern == FILE_PATTERN and ending in {"msg", "srv", "action"}:
         return f": write {ending}/{text.rpartition('/')[2]}"
