@@ -28,7 +28,7 @@ from grader.arena.served import ServedAction, ServedServices, call_functions
 from grader.arena.session import NS, ArenaSession
 from grader.errors import ArenaError, EvidenceError
 from grader.evidence.decode import FindText
-from grader.evidence.events import GOAL_STATUS, MISFIT, UNHEARD, UNSENDABLE, ActorEvent
+from grader.evidence.events import GOAL_STATUS, MISFIT, NOT_OFFERED, UNHEARD, UNSENDABLE, ActorEvent
 from grader.evidence.message_values import MessageType, Moment, ServiceTypes, md5_of
 from grader.model.message_definitions import other_fields
 from grader.rubric.scenario import Action, Call, Play, Publish, Scenario, Start, Step, Transform, Typed, Wait
@@ -449,6 +449,8 @@ class StepRunner:
             await arena.wait(lambda: not live.running, call.delay_s)
             self._tell(f"calling {service}")
             await self._ask(call)
+        else:
+            arena.note(ActorEvent(action="note", actor="grader", topic=service, detail=NOT_OFFERED))
 
     async def _ask(self, call: Call) -> None:
         text, fits = None, True

@@ -38,6 +38,8 @@ from grader.authoring.rubric_draft import (
 )
 from grader.checks.build import judge_build
 from grader.checks.package_files import RUNTIME_KINDS
+from grader.checks.stamps import StampsParams
+from grader.checks.stamps import stamps as judge_stamps
 from grader.errors import RosMissing, SubmissionError
 from grader.evidence.reader import load_evidence, package_facts
 from grader.evidence.run import Run
@@ -54,7 +56,7 @@ WEIGHTS = {
     "manifest": 1, "cmake": 1, "build": 1, "executable": 1, "node-lives": 1, "node-name": 1, "topic-type": 2, "rate": 3,
     "counter-start": 1, "counter-step": 1, "counter-wrap": 3, "message": 1, "hears": 2, "service": 2, "latched": 1,
     "cmake-install": 2, "launch-xml": 2, "launch-runs": 2, "reacts": 2, "definition": 1, "service-answers": 3,
-    "calls": 2, "prints": 2,
+    "calls": 2, "prints": 2, "stamps": 2,
 }  # fmt: skip
 WINDOW_S = 6
 WRAPS = 2
@@ -130,7 +132,9 @@ class Proposal:
     def _node(self, name: str, script: str, seen: Observed) -> None:
         file = PurePosixPath(script).name
         requires: list[str] = []
-        if script.endswith(".py"):
+        if (
+            script.endswith(".py") and script not in self._installed_scripts()
+        ):  # which needs no executable bit
             requires = [
                 self._add(
                     f"{name}-executable", f"{file} can be run", "executable", {"path": script},
@@ -270,6 +274,11 @@ class Proposal:
             parameters: RubricEntry = {"topic": topic.name, "rate_hz": format_number(topic.rate_hz)}
             hz = f"{topic.name} runs at {topic.rate_hz:g} Hz"
             self._add(f"{label}-rate", hz, "rate", parameters, **needs, reproduce=f"rostopic hz {topic.name}")
+        stamped = {"topic": topic.name}
+        run = self._runs.get(name)
+        if run and judge_stamps(self._facts, run, StampsParams.model_validate(stamped)).status is Status.PASS:
+            title = f"The messages on {topic.name} say when they were sent"
+            self._add(f"{label}-stamps", title, "stamps", stamped, **needs)
         if topic.latched:
             title = f"{topic.name} is latched"
             self._add(f"{label}-latched", title, "latched", {"topic": topic.name}, **needs)
@@ -368,7 +377,13 @@ class Proposal:
             "start": [{"name": name, "launch": launch}],
             "until": {"connected": list(seen.connected[:1])} if seen.connected else until,
         }
-        named = {"nodes": {str(n.name): str(n.pkg) for n in others}} if others else {}
+        nodes = {str(n.name): str(n.pkg) for n in others}
+        ours = [str(n.name) for n in file.nodes if n.pkg == self._facts.name]
+        if len(ours) > len(own):  # one script is several nodes
+            nodes |= {
+                f"/{one}": self._facts.name for one in sorted(seen.nodes) if one.rpartition("/")[2] in ours
+            }
+        named = {"nodes": nodes} if nodes else {}
         parameters = wanted | ({"topic": seen.connected[0]} if seen.connected else {}) | named
         self._add(
             f"{name}-runs", f"roslaunch brings up the nodes of {launch}", "launch-runs", parameters,

@@ -22,6 +22,7 @@ from grader.checks.support.fields import (
     has_hole,
     is_number,
     is_within,
+    join_items,
     no_field,
     readings,
     refuse_disorder,
@@ -361,7 +362,8 @@ class FieldEqualsParams(FieldParams):
     """A field and its value."""
 
     value: Any = None
-    """The right value, as in YAML: a number (also `.inf` or `.nan`), text, true or false, a list or a map."""
+    """The right value, as in YAML: a number (also `.inf` or `.nan`), text, true or false, a list or a map. Of a field
+    with `[*]`, a list has the value of each item, in their order: `transforms[*].child_frame_id` `[left, right]`."""
     values: tuple[Any, ...] = ()
     """In place of `value`: the right values of several messages, in their order. Messages between them do not
     matter."""
@@ -423,13 +425,13 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
     How it is measured
         The messages are decoded by the definition that their publisher sent. Numbers
         may differ by the tolerance; text, true and false have to be the same. Of a list with `[*]`, every
-        item counts.
+        item counts: each has to be the value, or the one in its place in a list of values.
 
     How to fix
         Set the field before you call `publish(…)`. `rostopic echo <topic>/<field>` shows it.
     """
     channels = sent_by(run, params.topic, params.of)
-    found = readings(channels, params.field, numbers=False)
+    found = join_items(readings(channels, params.field, numbers=False), (params.value, *params.values))
     if params.values and any(r.values for r in found):
         return _in_order(found, package, run, params)
     asked = {"first": found[:1], "last": found[-1:]}.get(params.when, found)

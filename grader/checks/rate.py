@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from grader.checks.reacts import ORDER_S, Condition, true_spans
+from grader.checks.reacts import ORDER_S, Condition, how_shown, true_spans
 from grader.checks.registry import Refers, check
 from grader.checks.support.clocks import Lateness, excused, lateness
 from grader.checks.support.exit_causes import explain_early_end
@@ -202,7 +202,7 @@ def _without_messages(
     elif is_all and any(map(cause.holds, cause.come_in(run))):
         yield grade_again(f"{cause.words} lasted too short a time to judge the rate of {params.topic}")
     elif is_all:
-        hint = f"`rostopic echo {cause.topic}` shows what comes while your node runs"
+        hint = f"{how_shown(run, cause)} while your node runs"
         yield unjudged(f"{cause.words} never came in this run", hint=hint).if_repeated()
 
 

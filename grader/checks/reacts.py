@@ -12,6 +12,7 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
+from grader.checks.services import exchanges, no_answer, not_offered, offers
 from grader.checks.support.clocks import excused, no_clock, run_seconds, why_late
 from grader.checks.support.fields import (
     FieldPath,
@@ -20,6 +21,7 @@ from grader.checks.support.fields import (
     differences,
     is_within,
     no_field,
+    reading_of,
     readings,
     refuse_disorder,
     value_text,
@@ -36,6 +38,7 @@ from grader.checks.support.topics import (
     refused_type,
     unheard,
 )
+from grader.evidence.events import NOT_OFFERED
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -54,7 +57,8 @@ class Condition(Record):
     """The messages that count: any on the topic, or those whose `field` is from `min` to `max`, or `value`."""
 
     topic: GlobalName
-    """The topic, with its slash: `/chatter`."""
+    """The topic, with its slash: `/chatter`. As a cause also a service that the scenario calls, `/pause`: then the
+    fields are those of its request, and count once it is answered."""
     field: FieldPath | None = None
     """As `rostopic echo` shows it: `linear.x`, `ranges[0]`, or `ranges[*]` for every item. Null: any message counts."""
     min: float | None = None
@@ -108,8 +112,21 @@ class Condition(Record):
         return sorted(Reading(t, (), "") for c in channels for t in c.times_ns)
 
     def come_in(self, run: Run) -> list[Reading]:
-        """Return the same of all messages on the topic, from any node."""
-        return self.read([c for c in run.channels if c.topic == self.topic])
+        """Return the same of all messages on the topic, from any node; or of the grader's calls of a service: one that
+        fits counts once it is answered, and ends when another one is made."""
+        channels = [c for c in run.channels if c.topic == self.topic]
+        if channels:
+            return self.read(channels)
+        asked = []
+        for one in exchanges(run, self.topic):
+            found = Reading(one.at_ns, (), "")
+            if self.field is not None:
+                found = reading_of(one.at_ns, one.request, self.field, numbers=self.value is None)
+            if not self.holds(found):
+                asked.append(found)
+            elif one.answered_ns is not None and one.response is not None:
+                asked.append(found._replace(time_ns=one.answered_ns))
+        return asked
 
     def holds(self, reading: Reading) -> bool:
         if self.field is None:
@@ -170,7 +187,7 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
     What it checks
         That each time the cause begins to be true on its topic, a message with the effect follows in time, and
         that none comes before. If the lab asks for silence: that no such message comes while the cause is true, or
-        in the whole run.
+        in the whole run. The cause may be a call of a service, by the fields of its request.
 
     Why it matters on a robot
         A robot that stops half a second late has hit the wall, and one that always stops never arrives.
@@ -195,6 +212,7 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
     verdict = (
         _nothing_to_judge(package, run, effects, own, params)
         or _early(causes, effects, run, params)
+        or _unanswered(package, run, causes, params)
         or _never_caused(causes, run, params)
         or _judge_unanswered(
             answers, run, params, _instead(causes, effects, params) or _other_answer(answers, effects, params)
@@ -208,8 +226,22 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
         measured=verdict.measured
         or f"{len(times)} of {plural(len(answers), 'answer')}"
         + (f", up to {max(times):.2f} s after" if times else ""),
-        citations=(cite(run, params.trigger.topic, *span), cite(run, params.effect.topic)),
+        citations=(cite(run, _shown_on(run, params), *span), cite(run, params.effect.topic)),
     )
+
+
+def _shown_on(run: Run, params: ReactsParams) -> str:
+    """Return where the evidence has the causes: a service's calls are among what the grader did."""
+    return "/grader/actor" if exchanges(run, params.trigger.topic) else params.trigger.topic
+
+
+def how_shown(run: Run, cause: Condition) -> str:
+    """Return what shows a student whether the cause comes."""
+    is_service = any(e.topic == cause.topic and e.action != "publish" for _, e in run.actors) and not any(
+        c.topic == cause.topic for c in run.channels
+    )
+    command = f"rosservice call {cause.topic}" if is_service else f"rostopic echo {cause.topic}"
+    return f"`{command}` shows what comes"
 
 
 def _causes(run: Run, params: ReactsParams) -> list[Reading]:
@@ -406,7 +438,29 @@ def _silent_without_reason(
         [to_s(until_ns) - to_s(from_ns) - params.within_s for from_ns, until_ns in spans] if to_s else []
     )
     unseen = params.cause is not None and max(silent_s, default=0) <= 0
-    return (_never_caused(causes, run, params) or _caused_too_late(params)) if unseen else None
+    return (
+        (
+            _unanswered(package, run, causes, params)
+            or _never_caused(causes, run, params)
+            or _caused_too_late(params)
+        )
+        if unseen
+        else None
+    )
+
+
+def _unanswered(
+    package: PackageFacts, run: Run, causes: Sequence[Reading], params: ReactsParams
+) -> Verdict | None:
+    """Return the verdict where the cause is a service's request, and no call that fits was answered."""
+    topic = params.trigger.topic
+    calls = [one for one in exchanges(run, topic) if one.response is None]
+    is_missing = any(e.topic == topic and e.detail == NOT_OFFERED for _, e in run.actors)
+    if any(map(params.trigger.holds, causes)) or not (calls or is_missing):
+        return None
+    is_there = topic in offers(run) and calls
+    why = no_answer(package, run, topic, calls[0]) if is_there else not_offered(package, run, topic)
+    return unjudged(f"nothing can be seen after a call of {topic}: {why.message}", hint=why.hint)
 
 
 def _caused_too_late(params: ReactsParams) -> Verdict:

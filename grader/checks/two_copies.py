@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import Annotated, NamedTuple
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from grader.checks.registry import ProcessName, check
 from grader.checks.support.console_output import LOOKED_AT, both_from_ns, heard_of, printed_times, sent_by
@@ -58,6 +58,12 @@ class CopiesParams(Record):
     """What the listener has to print for each message; `{value}` stands for the message's text."""
     taken_over_score: Annotated[float, Field(ge=0, le=1)] = 0.3333
     """The share that is earned if the second copy takes the name over and the first is shut down."""
+
+    @model_validator(mode="after")
+    def _are_two(self) -> CopiesParams:
+        if self.first == self.second:
+            raise ValueError("second: is the first, too: name the other process of the script")
+        return self
 
 
 class Trio(NamedTuple):

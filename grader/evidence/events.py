@@ -35,6 +35,8 @@ UNNAMED = "/unnamed"
 """As which rospy looks for services in a program that is no node."""
 UNHEARD = "nothing was published: no node has subscribed"
 """The detail of the note on a topic to which a step would have sent messages."""
+NOT_OFFERED = "not called: no node has offered it"
+"""The detail of the note on a service that a step would have called."""
 NO_ANSWER = "no answer within"
 """Begins the detail of the answer to a call that a service did not answer in time."""
 

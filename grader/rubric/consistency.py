@@ -13,6 +13,7 @@ from typing import Any
 from grader.checks.registry import Check
 from grader.checks.support.fields import is_number
 from grader.evidence.decode import definition, encode
+from grader.installable import noetic_messages
 from grader.rubric.fault_words import model_faults
 from grader.rubric.model import ManualParams
 from grader.rubric.references import reference_faults
@@ -114,7 +115,8 @@ def _check(criterion: WrittenCriterion, checks: Mapping[str, Check], *, complete
         yield from model_faults(ManualParams, criterion.given, criterion.at)
         return
     if name not in checks:
-        near = did_you_mean(name, [*checks, MANUAL])
+        part = next((one for one in checks if one in re.split(r"[-_ ]", name.lower())), "")  # `topic-rate`
+        near = f' (did you mean "{part}"?)' if part else did_you_mean(name, [*checks, MANUAL])
         # A broken file of checks may have a check of that name.
         if complete or near:
             yield (*criterion.place, "check"), f'there is no check "{name}"{near}'
@@ -391,9 +393,13 @@ def _probes(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
 
 def _contents(at: KeyPath, probe: dict[str, Any], kind: str) -> Iterator[Fault]:
     """Yield the faults of what is sent: it has to fit the type."""
-    values = list(enumerate(as_list(probe.get("values"))))
-    if values or (kind != STRING and kind not in INTEGERS):
-        yield from _misfits(at, kind, values)
+    try:
+        definition(kind)
+    except ValueError as error:
+        known = [f"{package}/{name}" for package, names in noetic_messages().items() for name in names]
+        yield (*at, "type"), f"{error}{did_you_mean(kind, known)}"
+        return
+    yield from _misfits(at, kind, list(enumerate(as_list(probe.get("values")))))
     if probe.get("text") and kind != STRING:
         yield (*at, "text"), f"is not for {kind}"
     for key in ("integers", "among"):
@@ -413,9 +419,6 @@ def _misfits(at: KeyPath, kind: str, values: list[tuple[int, Any]]) -> Iterator[
             return str(error)
         return ""
 
-    if unknown := misfit(lambda: definition(kind)):
-        yield (*at, "type"), unknown
-        return
     for position, value in values:
         if empty := empty_in(value):
             yield (*at, "values", position), f"{empty} is empty: give it a value"

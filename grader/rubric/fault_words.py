@@ -6,11 +6,12 @@ import json
 import re
 import types
 from collections.abc import Callable, Collection, Iterable, Iterator
-from typing import Annotated, Union, get_args, get_origin
+from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from grader.checks import CHECKS
 from grader.checks.interfaces import FILE_PATTERN
 from grader.checks.support.frames import FRAME_PATTERN
 from grader.installable import noetic_messages
@@ -21,6 +22,20 @@ from grader.wording import did_you_mean, join_words, shorten
 KEYS_LISTED = 6
 UNITS = {"hz": "Hz", "s": "seconds", "m": "metres", "deg": "degrees", "rad": "radians"}
 """By what a parameter's name ends in."""
+SIZES: dict[str, dict[str, float]] = {
+    "hz": {"khz": 1000},
+    "s": {"ms": 0.001, "s": 1, "sec": 1, "second": 1, "seconds": 1, "min": 60, "minutes": 60},
+    "m": {"mm": 0.001, "cm": 0.01, "m": 1, "metres": 1, "meters": 1},
+    "deg": {"deg": 1, "degrees": 1},
+    "rad": {"rad": 1, "radians": 1},
+}
+"""By these endings, units that are written behind a number, and how large they are."""
+USUAL_ELSEWHERE = {
+    "description": "title", "name": "title", "depends": "requires", "depends_on": "requires", "weight": "points",
+    "params": "with", "parameters": "with", "hidden": "visibility: hidden", "visible": "visibility: hidden",
+    "msg": "type", "data": "value, or values", "timeout": "limit_s", "sleep": "wait: {seconds: …}",
+}  # fmt: skip
+"""Words that other tools have for a key."""
 PATTERN_RULES = {
     NAME_PATTERN: "must be lower-case letters, digits and hyphens, beginning with a letter",
     TYPE_PATTERN: "must be a type like std_msgs/String",
@@ -73,12 +88,14 @@ def model_faults(model: type[BaseModel], data: object, base: KeyPath = ()) -> li
     try:
         model.model_validate_json(json.dumps(data), strict=True)
     except ValidationError as error:
-        found = _friendly(model, data, error.errors(include_url=False))
+        found = _friendly(model, data, error.errors(include_url=False), base)
         return [((*base, *path), message) for path, message in found]
     return []
 
 
-def _friendly(model: type[BaseModel], data: object, details: Iterable[ErrorDetails]) -> list[Fault]:
+def _friendly(
+    model: type[BaseModel], data: object, details: Iterable[ErrorDetails], base: KeyPath
+) -> list[Fault]:
     """Return one fault for each path: each member of a union complains, and these are joined by "or"."""
     by_path: dict[KeyPath, list[str]] = {}
     for detail in details:
@@ -86,6 +103,10 @@ def _friendly(model: type[BaseModel], data: object, details: Iterable[ErrorDetai
             continue  # pydantic counts only the items that are sound
         path = _data_path(data, detail)
         message = _message(model, path, detail)
+        if detail["type"] == "extra_forbidden":
+            message += _elsewhere(model, data, path, base) or _unknown(
+                str(path[-1]), detail["input"], _keys(model, path[:-1])
+            )
         by_path.setdefault(path, [])
         if message not in by_path[path]:
             by_path[path].append(message)
@@ -110,8 +131,28 @@ def _holds(data: object, part: str | int) -> bool:
     return isinstance(data, list) and isinstance(part, int) and part < len(data)
 
 
+def _elsewhere(model: type[BaseModel], data: Any, path: KeyPath, base: KeyPath) -> str:  # noqa: ANN401 - as above
+    """Return where a key belongs that is one level too deep, or not deep enough; "" where nothing there knows it."""
+    key = str(path[-1])
+    if not base and path[0] == "criteria" and len(path) == 3:
+        check = CHECKS.get(str(data["criteria"][path[1]].get("check")))
+        return ": it belongs into with" if check and key in check.params.model_fields else ""
+    for end in range(len(path) - 2, -1, -1):
+        if not isinstance(path[end], int) and key in _keys(model, path[:end]):
+            return f": it belongs beside {path[end]}, and not into it"
+    if base[-1:] == ("with",) and key in {"scenario", "requires", "points", "title", "hint", "reproduce"}:
+        return ": it belongs beside with, and not into it"
+    inside = {name for name, one in _fields(model, path[:-1]) if key in _keys_of(one)}
+    return f": it belongs into {inside.pop()}" if len(inside) == 1 else ""
+
+
 def _unknown(key: str, value: object, keys: Collection[str]) -> str:
     """Return what an unknown key may be: a slip, or the rest of a text that YAML has cut off at a comma."""
+    usual = USUAL_ELSEWHERE.get(key, "")
+    if re.split("[:,]", usual)[0] in keys:
+        return f": write {usual}"
+    if key.startswith("/") and {"name", "value"} <= {*keys}:
+        return f": write {{name: {key}, value: …}}"
     glued = re.match(r"(\w+)(?:\s*[:=]\s*|\s+)(?=\S)", key)
     if glued and glued[1] in keys:
         return f": write {glued[1]}, a colon and a blank before its value"
@@ -124,9 +165,7 @@ def _message(model: type[BaseModel], path: KeyPath, detail: ErrorDetails) -> str
     kind, context, value = detail["type"], detail.get("ctx", {}), detail["input"]
     words: dict[str, Callable[[], str]] = {
         "missing": lambda: "is missing",
-        "extra_forbidden": lambda: (
-            "is not known here" + _unknown(str(path[-1]), value, _keys(model, path[:-1]))
-        ),
+        "extra_forbidden": lambda: "is not known here",
         "string_pattern_mismatch": lambda: (
             f"{_pattern(context['pattern'])}, not {shown(value)}{_as_named(context['pattern'], value)}"
         ),
@@ -138,30 +177,51 @@ def _message(model: type[BaseModel], path: KeyPath, detail: ErrorDetails) -> str
     if kind in words:
         return words[kind]()
     if kind in MUST_BE:
-        return f"must be {MUST_BE[kind]}, not {shown(value)}{_remedy(path, kind, value)}"
+        return f"must be {MUST_BE[kind]}, not {shown(value)}{_remedy(model, path, kind, value)}"
     if kind in BOUNDS:
         key, bound = BOUNDS[kind]
-        return f"must be {bound} {context[key]:g}, not {shown(value)}"
+        is_percent = key == "le" and context[key] == 1 and isinstance(value, int | float) and value <= 100
+        share = f": it is a share, write {value / 100:g} for {value:g} %" if is_percent else ""
+        return f"must be {bound} {context[key]:g}, not {shown(value)}{share}"
     return str(context.get("error", detail["msg"])).removeprefix("Value error, ")
 
 
-def _remedy(path: KeyPath, kind: str, value: object) -> str:
+def _remedy(model: type[BaseModel], path: KeyPath, kind: str, value: object) -> str:
     """Return how to write what was meant."""
     if shape := _other_shape(path, kind, value):
         return shape
     if kind == "string_type" and isinstance(value, int | float):
         return ": put it in quotes"
-    number = _NUMBER_AND_UNIT.fullmatch(value) if isinstance(value, str) else None
-    if number and MUST_BE[kind].endswith("number"):
-        unit = UNITS.get(str(path[-1]).rpartition("_")[2], "") if path else ""
-        return f": write {number[1]}" + (f", the key says {unit}" if unit and number[2] else "")
+    if isinstance(value, str) and MUST_BE[kind].endswith("number"):
+        percent = re.fullmatch(r"(\d+(?:\.\d+)?) ?%", value)
+        if percent and _is_share(model, path):
+            return f": it is a share, write {float(percent[1]) / 100:g} for {percent[1]} %"
+        return _plain_number(str(path[-1]) if path else "", value)
     return ""
+
+
+def _plain_number(key: str, text: str) -> str:
+    """Return how a number is written that has its unit, or its exponent, behind it."""
+    if re.fullmatch(r"[-+]?\d+(?:\.\d*)?[eE][-+]?\d{1,2}", text):
+        return f": YAML takes this for text, write {float(text):.15g}"
+    number = _NUMBER_AND_UNIT.fullmatch(text)
+    if not number:
+        return ""
+    ending = key.rpartition("_")[2]
+    unit, size = UNITS.get(ending, ""), SIZES.get(ending, {}).get(number[2].lower())
+    if not unit or not number[2] or number[2].lower() == unit.lower():
+        size = 1
+    if size is None:
+        return f": it is a number of {unit}"
+    return f": write {float(number[1]) * size:g}" + (f", the key says {unit}" if unit and number[2] else "")
 
 
 def _other_shape(path: KeyPath, kind: str, value: object) -> str:
     """Return what is missing, or too much, where a list is a map, a map is a text, and the like."""
     is_map = kind in {"dict_type", "model_type"}
     if kind in {"tuple_type", "list_type"} and isinstance(value, dict | str):
+        if isinstance(value, dict) and value and all(str(key).startswith("/") for key in value):
+            return f": each is written {{name: {next(iter(value))}, value: …}}"
         return ": write a dash and a blank before each item, or [ and ] around them all"
     if is_map and isinstance(value, list) and all(isinstance(one, dict) for one in value):
         return ": its keys have no dash before them"
@@ -183,6 +243,8 @@ def _as_named(pattern: str, text: str) -> str:
         known := [f"{p}/{text}" for p, types in noetic_messages().items() if text in types]
     ):
         return f" (did you mean {join_words([json.dumps(one) for one in known[:3]], 'or')}?)"
+    if pattern == TYPE_PATTERN and text.startswith("/"):
+        return ", which is a name: a type has a package before it, and no slash at its beginning"
     ending = text.rpartition(".")[2]
     if pattern == FILE_PATTERN and ending in {"msg", "srv", "action"}:
         return f": write {ending}/{text.rpartition('/')[2]}"
@@ -210,10 +272,28 @@ def shown(value: object) -> str:
 
 def _keys(model: type[BaseModel], path: KeyPath) -> list[str]:
     """Return the keys that the record at `path` knows."""
+    return [name for name, _ in _fields(model, path)]
+
+
+def _keys_of(annotation: object) -> list[str]:
+    return [f.alias or n for m in _models(annotation) for n, f in m.model_fields.items()]
+
+
+def _fields(model: type[BaseModel], path: KeyPath) -> Iterator[tuple[str, object]]:
+    """Yield the fields of the record at `path`, and their types."""
     found: object = model
     for part in path:
         found = next(_inside(found, part), None)
-    return [f.alias or n for m in _models(found) for n, f in m.model_fields.items()]
+    yield from ((f.alias or n, f.annotation) for m in _models(found) for n, f in m.model_fields.items())
+
+
+def _is_share(model: type[BaseModel], path: KeyPath) -> bool:
+    """Return whether a field is between 0 and 1."""
+    found: object = model
+    for part in path[:-1]:
+        found = next(_inside(found, part), None)
+    fields = [m.model_fields[str(path[-1])] for m in _models(found) if path and path[-1] in m.model_fields]
+    return any(getattr(one, "le", None) == 1 for field in fields for one in field.metadata)
 
 
 def _inside(annotation: object, part: str | int) -> Iterator[object]:

@@ -55,6 +55,9 @@ _IN_TEXT = re.compile(r"\{made_up: ?([\w-]+)\}")
 _NEARLY = re.compile(r"\{ ?made[ _-]?up\b", re.IGNORECASE)
 
 
+_NEARLY_TOO = re.compile(r"\{\{ ?made_up\b|^made_up:? *[\w-]+$")
+
+
 class MadeUp(Record):
     """A value that is made up for each submission. Give `from` and `to`, `one_of`, `letters`, `sum`, `product`,
     `quotient` or `mean`.
@@ -379,7 +382,7 @@ def _no_names(part: object, path: KeyPath) -> Iterator[Fault]:
     """Yield places of made-up values that have no name."""
     if isinstance(part, dict) and part.keys() == {KEY} and not isinstance(part[KEY], str):
         yield (*path, KEY), "takes the name of one value: {made_up: rate}"
-    elif isinstance(part, str) and _NEARLY.search(_IN_TEXT.sub("", part)):
+    elif isinstance(part, str) and (_NEARLY.search(_IN_TEXT.sub("", part)) or _NEARLY_TOO.search(part)):
         yield path, "a made-up value is written {made_up: rate}, with its own name"
     elif isinstance(part, dict | list):
         for key, inner in part.items() if isinstance(part, dict) else enumerate(part):

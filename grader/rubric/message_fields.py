@@ -264,8 +264,9 @@ def _no_such(shape: Shape, path: object, given: dict[str, Any]) -> str:
         if field is None:
             return ""
         for value in judged:
-            if value is not None:
-                shape.compare(field, value, str(path))
+            is_each = isinstance(value, list) and "[*]" in str(path) and not field.array
+            for one in value if is_each else () if value is None else (value,):
+                shape.compare(field, one, str(path))
     except Misfit as error:
         return str(error)
     return _no_bounds(field, given, f"{path} of {shape.what} is")

@@ -51,6 +51,7 @@ PRIMITIVE = re.compile(r"(?:std_msgs/)?([Uu]?[Ii]nt|[Ff]loat)(8|16|32|64)")
 OLD_NAMES = {"byte": "int8", "char": "uint8"}
 TEXTS = {"prints": ("text", "template"), "logs": ("text", "template"), "definition": ("file",)}
 """By check, the parameters that the handout has as text."""
+NAME = re.compile(r"[~/\w.-]+")
 SENTENCE_END = re.compile(r"(?<=[.;])\s+")
 LEVEL = re.compile(
     r"\blog(info|warn|err|debug)|\blevel `?(info|warn|error|debug)|\bas an? (warning|error)\b|\b(warning|error) `…`",
@@ -73,12 +74,13 @@ def prose_warnings(rubric: WrittenRubric) -> Iterator[Fault]:
         at, given, check = criterion.at, criterion.given, criterion.check
         yield from _shifted_numbers(criterion, rubric)
         yield from _numbers_of_title(criterion, rubric)
+        yield from _other_range(criterion, handout)
         yield from _other_node(criterion, handout)
         yield from _other_types(at, given, handout)
         yield from _misspelt_keys(at, given, rubric)
         if check in {"node-lives", "node-name", "launch-runs"}:
             yield from _unsaid_node(at, given, rubric)
-        yield from _other_text(at, given, handout, TEXTS.get(check, VALUES))
+        yield from _other_text(criterion, rubric, TEXTS.get(check, VALUES))
         yield from _of_another_topic(criterion, rubric)
         if check == "logs":
             yield from _other_level(criterion, handout)
@@ -117,6 +119,19 @@ def _shifted_numbers(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iter
             if at[-1] != "tolerance" and (known is said or len(known) == 1):
                 fault = f"{number:g} is on no other line, and the rubric's text has {meant:g}"
                 yield (*criterion.at, *at), fault
+
+
+def _other_range(criterion: WrittenCriterion, handout: str) -> Iterator[Fault]:
+    """Yield bounds of a field, neither of which is one of the range that the handout's sentence about it has."""
+    given = criterion.given
+    low, high, field = given.get("min"), given.get("max"), str(given.get("field")).rpartition(".")[2]
+    if criterion.check != "field-bounds" or not is_number(low) or not is_number(high):
+        return
+    for sentence in SENTENCE_END.split(handout):
+        said = re.search(r"(-?\d+(?:\.\d+)?) (?:to|and) (-?\d+(?:\.\d+)?)(?![\w.]\d)", sentence)
+        is_about = said and re.search(rf"\b{re.escape(field)}s?\b", sentence)
+        if said and is_about and not {low, high} & {*map(float, said.groups())}:
+            yield (*criterion.at, "min"), f"to max is {low:g} to {high:g}, and the handout has {said[0]}"
 
 
 def _shifted_factors(made_up: dict[str, Any], handout: str) -> Iterator[Fault]:
@@ -328,6 +343,10 @@ def _numbers_of_title(criterion: WrittenCriterion, rubric: WrittenRubric) -> Ite
         rates = said_hz or rates  # the title agrees
     if any(is_number(rate_hz) and round(rate_hz / by, 9) in rates for by in SHIFTS):
         return  # said elsewhere
+    causes = [one for one in of_topic if "cause" in one and "rate_hz" in one]
+    if 1 < len(causes) == len(said_hz) and known == {rate_hz} and given is causes[-1] and rate_hz in said_hz:
+        others = join_words([f"{one:g}" for one in sorted(said_hz - known)])
+        yield (*criterion.at, "rate_hz"), f"is {rate_hz:g} for each cause, and the handout has {others}, too"
     if rates and is_number(rate_hz) and rate_hz not in rates:
         said = join_words([f"{one:g}" for one in sorted(rates)])
         where = "title" if _rates(title) - {rate_hz} else "handout"
@@ -350,26 +369,45 @@ def _numbers_within(value: object) -> set[float]:
     return inside | {abs(number) for _, number in numbers_in((), value)}
 
 
-def _other_text(at: KeyPath, given: dict[str, Any], handout: str, keys: tuple[str, ...]) -> Iterator[Fault]:
-    """Yield a text to print or to send that the handout has with other blanks or signs, or another case."""
+def _other_text(criterion: WrittenCriterion, rubric: WrittenRubric, keys: tuple[str, ...]) -> Iterator[Fault]:
+    """Yield a text to print or to send that the handout has with other blanks or signs, another case or word."""
+    at, given = criterion.at, criterion.given
+    said = re.sub(r"\s+", " ", rubric.handout)
+    quoted = [one.strip() for one in re.findall(r"`([^`]+)`", said)]
     asked = [one for key in keys for one in texts_in((key,), given.get(key))]
     for key in ("cause", "effect"):
         asked += [one for one in texts_in((key,), given.get(key)) if one[0][-1] == "value"]
     for path, text in asked:
-        if not _letters(text) or text == path[-1]:
+        if not _letters(text) or text == path[-1] or text in said or re.search(_as_pattern(text), said):
             continue
-        # `{number}` in a template stands for any number that the handout may have as an example.
-        pattern = r"[-+]?\d+(?:\.\d+)?".join(map(re.escape, text.split("{number}")))
-        quoted = [re.sub(r"\s+", " ", one) for one in re.findall(r"`([^`]+)`", handout)]
         alike = [one for one in quoted if _letters(one) == _letters(text) or _is_begun(one, text)]
         alike += [one for one in quoted if sorted(one.lower().split()) == sorted(text.lower().split())]
-        said = re.sub(r"\s+", " ", handout)
-        if alike and text not in said and not re.search(pattern, said):
-            is_same = alike[0].lower() == text.lower()
-            is_order = _letters(alike[0]) != _letters(text) and not _is_begun(alike[0], text)
+        others = [one for other in rubric.criteria for _, one in texts_in((), other.given) if one != text]
+        others = [one for one in others if not NAME.fullmatch(one)]
+        words = [one for one in quoted if _differ_in_a_word(one, text)]
+        words = [one for one in words if not any(re.search(_as_pattern(other), one) for other in others)]
+        if alike or words:
+            is_same = bool(alike) and alike[0].lower() == text.lower()
+            is_order = bool(alike) and _letters(alike[0]) != _letters(text) and not _is_begun(alike[0], text)
             how = "in another order" if is_order else "with other blanks or signs"
-            how = "in another case" if is_same else how
-            yield (*at, *path), f"the handout has `{alike[0]}`, {how}"
+            how = "in another case" if is_same else "with another word" if words else how
+            yield (*at, *path), f"the handout has `{(words or alike)[0]}`, {how}"
+
+
+def _as_pattern(text: str) -> str:
+    # `{number}` in a template stands for any number that the handout may have as an example.
+    return r"[-+]?\d+(?:\.\d+)?".join(map(re.escape, text.split("{number}")))
+
+
+def _differ_in_a_word(said: str, text: str) -> bool:
+    """Return whether two texts are the same but for one word; names alone, as all that is in backticks, are not."""
+    one, other = (
+        re.findall(r"#|[^\W\d_]+|[^\w\s]", re.sub(r"\{\w+\}|[-+]?\d+(?:\.\d+)?", "#", part))
+        for part in (said.lower(), text.lower())
+    )
+    differing = [pair for pair in zip(one, other, strict=False) if pair[0] != pair[1]]
+    is_text = len(one) == len(other) > 1 and len(differing) == 1 and not NAME.fullmatch(said)
+    return is_text and all(word.isalpha() for word in differing[0])
 
 
 def _is_begun(said: str, text: str) -> bool:

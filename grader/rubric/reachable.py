@@ -148,7 +148,7 @@ class TooShort(ValueError):
 
 
 def _sent_on(topic: str, scenario: dict[str, Any]) -> list[Any] | None:
-    """Return all that is sent on a topic; None where something else may be."""
+    """Return all that is sent on a topic, or asked of a service; None where something else may be."""
     parts = [one for _, kind, one in parts_of(scenario) if kind == "publish"]
     sent = [one for one in parts if one.get("topic") == topic]
     if "recording" in scenario or given_steps(scenario, "play"):
@@ -161,6 +161,8 @@ def _sent_on(topic: str, scenario: dict[str, Any]) -> list[Any] | None:
         for one in sent
         for value in (*as_list(one.get("values")), *([one["value"]] if "value" in one else []))
     ]
+    calls = [one for _, kind, one in parts_of(scenario) if kind == "call" and one.get("service") == topic]
+    values += [as_map(one.get("request")) for one in calls]
     return [value if isinstance(value, dict) else {"data": value} for value in values]
 
 

@@ -110,9 +110,11 @@ def _misspelt_words(rubric: WrittenRubric, *, code: bool) -> Iterator[tuple[KeyP
     for path, text in rubric.texts:
         if path[0] != "criteria" or _key(path) not in WORDS or text == path[-1]:
             continue
+        hints = re.findall(r"\"([^\"]+)\"|`([^`]+)`", str(rubric.data["criteria"][path[1]].get("hint") or ""))
+        hinted = set(re.findall(_WORD, " ".join(map(" ".join, hints)))) if code else set[str]()
         # No placeholders of templates: `{number}`.
         for word in re.findall(rf"(?<![{{\w]){_WORD}(?![\w}}])", text):
-            near = next((one for one in sorted(known) if is_slip(word, one)), "")
+            near = next((one for one in sorted(known | hinted) if is_slip(word, one)), "")
             # A word that is there twice was meant.
             if near and _count(word, word, rubric.texts) == 1:
                 yield path, word, near

@@ -116,6 +116,7 @@ def _is_own(topic: str, program: str) -> bool:
 
 
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")
+OPTION = re.compile(r"(--?([A-Za-z]\w*))(?:(:?=)(.*))?")
 SPECIAL = ("__name", "__ns", "__log", "__ip", "__hostname", "__master")
 
 
@@ -144,7 +145,8 @@ def argument_faults(scenario: dict[str, Any], rubric: WrittenRubric) -> Iterator
 
 
 def argument_warnings(rubric: WrittenRubric) -> Iterator[Fault]:
-    """Yield private parameters that nothing else in the rubric names, and decimal numbers with a comma."""
+    """Yield private parameters that nothing else in the rubric names, decimal numbers with a comma, and options where
+    parameters may be meant."""
     known = _known(rubric)
     # A handout that writes private parameters with ~ has them all so.
     named = known.params if re.search(r"~\w", rubric.handout) else known.params | known.words
@@ -154,6 +156,11 @@ def argument_warnings(rubric: WrittenRubric) -> Iterator[Fault]:
             at = (*place, "args", number)
             if re.fullmatch(r"-?\d+,\d+", value):
                 yield at, f"ROS reads {value} as text: a decimal number has a point, no comma"
+            elif start.get("script") and (option := OPTION.fullmatch(text)):
+                is_said = any(option[1] in one for path, one in rubric.texts if "args" not in path)
+                if not is_said and (option[3] or option[2] in known.params):
+                    fault = f"sets no parameter of a node, as _{option[2]}:={option[4] or '…'} does"
+                    yield at, f"{fault}: if the script reads {option[1]} itself, say so in the handout"
             elif start.get("script") and re.match(r"_(?!_)\w+:=", text) and name[1:] not in named:
                 said = join_words([f"~{one}" for one in sorted(known.params)])
                 fault = f"nothing else in the rubric names ~{name[1:]}"
@@ -171,8 +178,11 @@ def _blanks(text: str) -> str:
 
 
 def _no_colon(text: str, start: dict[str, Any], known: Known) -> str:
-    """Return that `_rate=5` and `_rate:5` set no parameter, `gui=false` no argument, and `chatter=talk` remaps
-    nothing."""
+    """Return that `_rate=5`, `_rate:5` and `rate=5` set no parameter, `gui=false` no argument, and `chatter=talk`
+    remaps nothing."""
+    plain = re.fullmatch(r"(?:([A-Za-z]\w*)=|~(\w+):=(?=-?\d))(.*)", text)  # `~color:=red` remaps a name
+    if plain and start.get("script") and (plain[1] or plain[2]) in known.params:
+        return f"sets no parameter of the node: write _{plain[1] or plain[2]}:={plain[3]}"
     cut = re.fullmatch(
         r"(_\w+):(?!=) *=? *([^:=].*)", text
     )  # of a private parameter only: other texts may have a colon

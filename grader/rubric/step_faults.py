@@ -328,7 +328,10 @@ def _wait(at: KeyPath, wait: dict[str, Any]) -> Iterator[Fault]:
 def slash(path: KeyPath, name: object, what: str) -> Iterator[Fault]:
     """Yield a fault for a name that does not begin with a slash, or that no one can have."""
     if isinstance(name, str) and not name.startswith("/"):
-        yield path, f'{what} begins with a slash: "/{name}"'
+        package, _, kind = name.partition("/")
+        swapped = f"is a type: are {path[-1]} and type swapped?"
+        is_type = kind in noetic_messages().get(package, ())
+        yield path, swapped if is_type else f'{what} begins with a slash: "/{name}"'
     elif isinstance(name, str) and (fault := odd_name(name)):
         yield path, fault
 

@@ -106,6 +106,11 @@ def _short_times(rubric: WrittenRubric) -> Iterator[Fault]:
         for at, given_s, least_s in times:
             if is_number(given_s) and given_s < least_s:
                 yield ("scenarios", name, *at), f"{given_s:g} s is {TOO_SHORT}"
+        first_s, limit_s = until.get("first_message_s"), until.get("limit_s")
+        if is_number(first_s) and is_number(limit_s) and first_s > limit_s:
+            fault = f"{first_s:g} s is longer than limit_s, {limit_s:g} s, after which the run is over"
+            yield ("scenarios", name, "until", "first_message_s"), fault
+        for at, given_s, _ in times:
             if is_number(given_s) and given_s > LONG_S and at[0] == "until":
                 fault = f"{given_s:g} s are {given_s / 60:.0f} minutes, which a package that never gets there takes"
                 yield ("scenarios", name, *at), fault
@@ -174,8 +179,14 @@ def _first_packages(rubric: WrittenRubric) -> Iterator[Fault]:
 
 
 def _same_criteria(rubric: WrittenRubric) -> Iterator[Fault]:
-    first: dict[str, str] = {}
+    first, titles = dict[str, str](), dict[str, str]()
     for criterion in rubric.criteria:
+        other = titles.setdefault(str(criterion.data.get("title")), criterion.id)
+        if other != criterion.id:
+            yield (
+                (*criterion.place, "title"),
+                f"is the title of {other}, too: nothing tells students which is which",
+            )
         # Sorted, since the order of keys makes no difference.
         judged = json.dumps([criterion.data.get(key) for key in JUDGED], sort_keys=True)
         other = first.setdefault(judged, criterion.id)
@@ -230,7 +241,9 @@ def _not_private(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield parameters without a node's name before them that the handout calls private."""
     for at, one in rubric.params():
         param = str(one.get("name"))
-        if param.count("/") == 1 and re.search(rf"~{re.escape(param[1:])}\b", rubric.handout):
+        word = re.escape(param[1:])
+        private = rf"~{word}\b|private parameters?\b[^.;]*`{word}`|`{word}`[^.;]*\bprivate parameter"
+        if param.count("/") == 1 and re.search(private, rubric.handout):
             fault = f"the handout has ~{param[1:]}, which is below the node's own name: /<node>{param}"
             yield (*at, "name"), fault
 
@@ -479,6 +492,9 @@ def _numbers_as_text(rubric: WrittenRubric) -> Iterator[Fault]:
         if isinstance(value, str) and NUMBER.fullmatch(value):
             fault = f'"{value}" in quotes is text: a node that reads a number needs {value}, without them'
             yield (*at, "value"), fault
+        elif isinstance(value, str) and re.fullmatch(r"None|[-+]?\d+(\.\d*)?[eE][-+]?\d{1,2}", value):
+            meant = "no parameter has this value" if value == "None" else f"write {float(value):.15g}"
+            yield (*at, "value"), f"{value} is text in YAML: {meant}"
 
 
 def _launched_nodes(rubric: WrittenRubric) -> Iterator[Fault]:

@@ -338,6 +338,11 @@ def _yaml_fault(error: yaml.YAMLError, text: str, name: str) -> str:
         if words.startswith(AT_BEGINNING):
             mark = begun
         problem = words.removeprefix(AT_BEGINNING).format(line=begun.line + 1 if begun else 1)
+        if "but got ':'" in str(error) and begun and mark and begun.line == mark.line:
+            problem = "text with a colon needs quotes; else a comma is missing"
+        lines = text.splitlines()[begun.line : mark.line + 1] if begun and mark else []
+        if "is not closed" in problem and any(re.search(r"[^\s#].*\s#", one) for one in lines):
+            problem += "; what comes after a blank and # is a comment: text with # needs quotes"
     return f"{name}:{mark.line + 1 if mark else 1}: {problem}"
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from grader.checks.support.processes import lives, observed_until_ns
+from grader.evidence.events import NOT_OFFERED
 from grader.evidence.message_values import MessageType, action_texts
 from grader.evidence.run import Run
 from grader.rubric.scenario import Scenario, Start, Until
@@ -217,6 +218,7 @@ def test_transforms_parameters_and_calls_in_time(tmp_path: Path) -> None:
             {"call": {**turn, "request": {"data": True}}},
             {"set_param": {"name": "/gain", "value": 3}},
             {"call": turn},
+            {"call": {**turn, "service": "/trun"}},
         ],
     )
     told = printed(seen, "frames")
@@ -232,6 +234,7 @@ def test_transforms_parameters_and_calls_in_time(tmp_path: Path) -> None:
     assert [v["message"] for _, v, _ in _did(seen, "answer")] == ["2", "3"]
     assert [(name, value) for name, value, _ in _did(seen, "set_param")] == [("/gain", 2), ("/gain", 3)]
     assert not _did(seen, "param")
+    assert ("/trun", None, NOT_OFFERED) in _did(seen, "note")
 
 
 COUNT = "int32 target\n---\nint32 total\nstring words\n---\nfloat32 share\n"

@@ -132,6 +132,40 @@ def test_a_build_that_failed_is_noted_first() -> None:
     assert note.endswith("--from FOLDER --package NAME")
 
 
+def test_a_script_that_is_installed_needs_no_executable_bit() -> None:
+    install = {"name": "catkin_install_python", "args": ["PROGRAMS", "src/node.py", "DESTINATION", "bin"]}
+    runs = build_runs({"runs": {}, "package": {"cmake": {"calls": [install]}}})
+    parts = Parts(nodes={"node": "src/node.py", "other": "src/other.py"}, launches={})
+    proposal = Proposal(
+        package_facts(runs["package"]), parts, dict.fromkeys(parts.nodes, observe(run_of())), runs
+    )
+    named = [one["with"] for one in proposal.criteria if one["check"] in {"executable", "cmake-install"}]
+    assert {"path": "src/node.py"} not in named
+    assert {"scripts": ["src/node.py"]} in named
+
+
+def test_stamps_and_a_script_that_is_two_nodes_are_asked_for() -> None:
+    stamp = {"header": {"stamp": {"secs": 1700000001, "nsecs": 0}}, "name": ["elbow"]}
+    later = {"header": {"stamp": {"secs": 1700000001, "nsecs": 500000000}}, "name": ["elbow"]}
+    joints = {"topic": "/joints", "type": "sensor_msgs/JointState", "callerid": "/node"}
+    run = run_of(topics=[{**joints, "times_s": [1.01, 1.51], "values": [stamp, later]}])
+    arms = [{"name": "node", "pkg": "lab1", "type": "node.py", "ns": ns} for ns in ("left", "right")]
+    launch = {"path": "launch/arms.launch", "nodes": arms}
+    runs = build_runs({
+        "runs": {"arms": {"processes": [{"name": "arms", "stopped_by": "INT"}],
+                          "graph": [{"at_s": 1, "nodes": ["/left/node", "/right/node"],
+                                     "processes": {"/left/node": "arms", "/right/node": "arms"}}]}},
+        "package": {"launch_files": [launch]},
+    })  # fmt: skip
+    parts = Parts(nodes={"node": "src/node.py"}, launches={"arms": "arms.launch"})
+    facts = package_facts(runs["package"]).model_copy(update={"name": "lab1"})
+    seen = {"node": observe(run), "arms": observe(runs["arms"])}
+    proposal = Proposal(facts, parts, seen, {**runs, "node": run})
+    by_check = {one["check"]: one.get("with", {}) for one in proposal.criteria}
+    assert by_check["stamps"] == {"topic": "/joints"}
+    assert by_check["launch-runs"]["nodes"] == {"/left/node": "lab1", "/right/node": "lab1"}
+
+
 def test_nothing_to_see_twice():
     seen = {"node": observe(run_of(topics=[{"topic": "/c", "callerid": "/node"}]))}
     assert second_look("lab1", Parts(nodes={"node": "src/node.py"}, launches={}), seen) is None

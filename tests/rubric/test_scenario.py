@@ -25,7 +25,7 @@ from tests.rubric.samples import faults, spoiled
         ("{topic: /x, type: std_msgs/UInt8, among: [-1]}", ".among[0]: an UInt8 holds 0 to 255, not -1"),
         (
             "{topic: /x, type: std_msgs/Strin, text: 1}",
-            ".type: ROS Noetic has no message type std_msgs/Strin",
+            '.type: ROS Noetic has no message type std_msgs/Strin (did you mean "std_msgs/String"?)',
         ),
         (
             "{topic: /x, type: Int8, integers: 1}",

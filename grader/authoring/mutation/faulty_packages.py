@@ -201,7 +201,7 @@ def plan_all(solution: Solution) -> list[Planned]:
             while unique in planned:
                 number += 1
                 unique = f"{name}-{number}"
-            edit = {"operator": operator.name, "at": site.at}
+            edit = {"operator": operator.name, **({"at": site.at} if site.at else {})}
             mutant = Mutant.model_validate({"edits": (edit,), "expect": {}})
             planned[unique] = Planned(name=unique, label=label, mutant=mutant, tree=site.tree)
     return list(planned.values())

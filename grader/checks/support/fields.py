@@ -77,14 +77,15 @@ class Reading(NamedTuple):
 def readings(channels: Iterable[Channel], path: str, *, numbers: bool = True) -> list[Reading]:
     """Return the field in each message by time; with `numbers`, any other value is a fault."""
     found = [
-        _reading(time_ns, value, path, numbers=numbers)
+        reading_of(time_ns, value, path, numbers=numbers)
         for channel in channels
         for time_ns, value in zip(channel.times_ns, channel.values, strict=True)
     ]
     return sorted(found, key=lambda one: one.time_ns)
 
 
-def _reading(time_ns: int, message: Any, path: str, *, numbers: bool) -> Reading:  # noqa: ANN401 - as above
+def reading_of(time_ns: int, message: Any, path: str, *, numbers: bool) -> Reading:  # noqa: ANN401 - as above
+    """Return the field in one message."""
     if message is None:
         return Reading(time_ns, (), "the message cannot be read")
     try:
@@ -96,6 +97,17 @@ def _reading(time_ns: int, message: Any, path: str, *, numbers: bool) -> Reading
     if numbers and not all(isinstance(value, int | float) for value in values):
         return Reading(time_ns, (), f"{path} is not a number")
     return Reading(time_ns, tuple(values), "")
+
+
+def join_items(found: Iterable[Reading], wanted: Sequence[object]) -> list[Reading]:
+    """Return the readings, those of `[*]` as one list where lists are wanted and the items are none: one value each."""
+    are_lists = any(isinstance(one, list | tuple) for one in wanted)
+    return [
+        one._replace(values=(list(one.values),))
+        if are_lists and one.values and not isinstance(one.values[0], list | tuple | bytes)
+        else one
+        for one in found
+    ]
 
 
 def set_beside(channels: Iterable[Channel], time_ns: int, path: str, wanted: object, tolerance: float) -> str:

@@ -275,7 +275,7 @@ Anonymous = Literal["allowed", "required", "forbidden"]
 _KINDS = {"allowed": "plain or anonymous", "required": "anonymous", "forbidden": "plain"}
 _SUFFIX = re.compile(r"_\d+_\d+$")
 _ANONYMOUS = r"(_\d+_\d+)?"
-_ODD = re.compile(r"[\s*?{}\[\]()#:,;=\"']")
+_ODD = re.compile(r"[\s*?{}\[\]()#:,;=\"'\\]|[^\x00-\x7f]")
 """What is in no name of the graph, and may have come into one from YAML or a shell."""
 TypeName = Annotated[str, Field(pattern=r"^[A-Za-z]\w*/[A-Za-z]\w*$")]
 

@@ -12,7 +12,7 @@ from typing import Literal
 from pydantic import AfterValidator
 
 from grader.untrusted_text import visible, without_colours
-from grader.wording import closest, is_one_edit, shorten
+from grader.wording import is_one_edit, shorten
 
 SIMILARITY = 0.8
 IN_OWN_WORDS = "in the handout's own words"
@@ -101,8 +101,8 @@ def refuse_others(place: str) -> AfterValidator:
     """Return what refuses a text with another word in braces that is meant to be `place`."""
 
     def checked(template: str) -> str:
-        for word in re.findall(r"\{\w*\}", template):
-            if word != place and (word in {"{}", *PLACES} or closest(word, [place], cutoff=0.7)):
+        for word in re.findall(r"\{(?:[A-Za-z_]\w*)?\}", template):
+            if word != place:
                 raise ValueError(f"{word} stands for nothing here: write {place}")
         if other := OTHER_PLACES.search(template):
             raise ValueError(f"{other[0]} stands for itself here, as the other letters do: write {place}")

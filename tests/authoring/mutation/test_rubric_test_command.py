@@ -171,6 +171,7 @@ def test_without_a_mutants_file_every_operator_is_tried_and_written(judge, capsy
     assert {m["state"] for m in data["mutants"]} == {"survived"}
     assert {m["expected"] for m in data["mutants"]} == {None}
     assert written.read_text().count("# costs nothing") == len(data["mutants"]) == 6
+    assert "at: {}" not in written.read_text()
 
 
 def test_a_solution_of_ones_own_may_lack_places(judge, capsys, tmp_path):
