@@ -60,6 +60,7 @@ _PLACES = {
     "grader.rubric.load": ("LoadedRubric",),
     "grader.rubric.model": ("Criterion", "Rubric", "Scenario"),
 }
+# turned round, since PEP 562's `__getattr__` below is asked by the name
 _MODULE_OF = {name: module for module, names in _PLACES.items() for name in names}
 
 

@@ -24,9 +24,8 @@ def main() -> int:
     from grader.cli.main import run  # noqa: PLC0415 - keeps `python -m grader --help` quick to import
 
     code = run(sys.argv[1:])
-    signal.signal(
-        signal.SIGINT, signal.SIG_IGN
-    )  # everything is printed: a late Ctrl-C does not change the outcome
+    # everything is printed: a late Ctrl-C does not change the outcome
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     gc.freeze()  # Python would look through all that is left for cycles, to free what ends with the process anyway
     return code
 

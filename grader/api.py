@@ -57,6 +57,7 @@ def load_rubric(id_or_path: StrPath) -> LoadedRubric:
     ('lab1', 100.0)
     """
     text = _text(id_or_path)
+    # a `Path` is made absolute, so that a file of that name in the current folder is never taken for an id
     return load_file(text if isinstance(id_or_path, str) else f"{Path(text).absolute()}")
 
 
@@ -178,7 +179,7 @@ def _run_beside_loop(work: Callable[[], T], stop: Callable[[], None]) -> T:
 
 def _loop_runs_here() -> bool:
     if "asyncio" not in sys.modules:  # slow to import, and there is no loop without it
-        return False
+        return False  # without the module there can be no loop in this thread
     import asyncio  # noqa: PLC0415
 
     try:

@@ -50,6 +50,7 @@ MACHINE = FULL | {
 }
 AGAIN = "fix that (`grader doctor` checks this machine), then grade again"
 NUMBER = re.compile(r"\[Errno (\d+)\]")
+# neither is expected in a grading: the evidence is what this grader has just written
 UNEXPECTED = {EvidenceError.kind, GraderError.kind}
 NO_THREAD = "can't start new thread"
 """What Python says where there is no memory for its stack, or too many run."""
@@ -94,6 +95,7 @@ def fault_of(error: BaseException) -> GraderError:
     """Return the error as one of the student's, the machine's or the grader's own."""
     if isinstance(error, MemoryError) or (isinstance(error, RuntimeError) and str(error) == NO_THREAD):
         return HostError("the grader ran out of memory", hint=MEMORY)
+    # an OutputError here means that the folder, which was checked at the start, can no longer be written
     if isinstance(error, GraderError) and not isinstance(error, (OutputError, SubmissionError)):
         return error if error.kind not in UNEXPECTED else _internal(error)
     machine = _machine_fault(error)
@@ -175,6 +177,7 @@ def _write_error_result(fault: GraderError, context: GradingContext) -> str:
                 return f"the result of an earlier run stays as it is: {folder / RESULT}"
             result = error_result(fault, submission, context.rubric, context.timing())
             result = result.model_copy(update={"rubric_origin": context.rubric_origin})
+            # an error has no evidence, and what an earlier run recorded goes with its result
             results.evidence.rmdir()
             rubric, hidden = context.rubric.rubric, context.keep_hidden
             write_reports(result, results.new, console="", rubric=rubric, keep_hidden=hidden)

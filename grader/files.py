@@ -85,14 +85,13 @@ def _new_beside(target: Path, folder: Path, *, public: bool = False) -> Iterator
 
     It is locked while its writer lives. What writers that were killed left for this target is removed.
     """
-    prefix = f".{target.name[:80]}."
+    prefix = f".{target.name[:80]}."  # a name may have 255 bytes, of which the letters can take three each
     _sweep_beside(folder, prefix)
     for _ in range(ATTEMPTS):
         beside = folder / f"{prefix}{secrets.token_hex(6)}"
         file = new_file(beside, public=public)
-        if (
-            try_lock(file.fileno()) and beside.exists()
-        ):  # else another writer has swept it before it was locked
+        # without the lock, or the file: another writer has swept it before it was locked
+        if try_lock(file.fileno()) and beside.exists():
             break
         file.close()
     try:
@@ -168,6 +167,7 @@ def open_untrusted(path: Path, *below: str) -> BinaryIO:
     """
     descriptor = os.open(path, READ | NOFOLLOW | (DIRECTORY if below else 0))
     try:
+        # `left` counts up to 0, at the last name: the only one that is no folder
         for left, name in enumerate(below, 1 - len(below)):
             inner = os.open(name, READ | NOFOLLOW | (DIRECTORY if left else 0), dir_fd=descriptor)
             os.close(descriptor)
@@ -211,6 +211,7 @@ def unwritable(path: Path, error: OSError) -> GraderError:
 
 def sync_tree(folder: Path) -> None:
     """Make everything in `folder` private to its owner, and flush it and the folder to the disk. Raises OSError."""
+    # from below, so that a folder is flushed after all that is in it
     for place, _, files in os.walk(folder, topdown=False):
         for path in (*(Path(place) / name for name in files), Path(place)):
             keep_private(path)
@@ -260,6 +261,7 @@ MARK = ".grader"
 Kind = Literal[
     "check", "download", "fetch", "gradebook", "lab", "mutants", "new", "repaired", "run", "source", "tests"
 ]
+# mkdtemp adds eight of these characters
 NAME = re.compile(rf"grader-({'|'.join(get_args(Kind))})-[a-z0-9_]{{8}}")
 ATTEMPTS = 10
 
@@ -297,6 +299,7 @@ def _sweep(folder: Path) -> None:
     with suppress(OSError):  # another grader sweeps here too, or it is someone else's
         if folder.lstat().st_uid != user_id():
             return
+        # its grader was killed before it could make the mark
         if not any(folder.iterdir()):
             folder.rmdir()
             return
@@ -315,6 +318,7 @@ def _new(prefix: str, place: Path) -> tuple[Path, int]:
             folder = Path(tempfile.mkdtemp(prefix=prefix, dir=place))
             with suppress(FileNotFoundError):
                 descriptor = os.open(folder / MARK, os.O_RDWR | os.O_CREAT | os.O_EXCL | CLOEXEC, 0o600)
+                # another grader may have swept the folder between the two calls
                 if try_lock(descriptor) and (folder / MARK).exists():
                     return folder, descriptor
                 os.close(descriptor)

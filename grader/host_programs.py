@@ -21,6 +21,7 @@ from functools import lru_cache
 from pathlib import Path
 
 LISTS = ("PATH", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "DYLD_FALLBACK_LIBRARY_PATH", "PYTHONPATH")
+# for a user whose own PATH has no entry that can be used
 _PATH = "/usr/bin:/bin"
 _SUFFIXES = (".exe", "") if sys.platform == "win32" else ("",)
 _MODULE = "import sys; sys.path[:] = filter(None, sys.path); from {} import main; sys.exit(main())"

@@ -145,6 +145,7 @@ def nearest_module(name: str, own: Collection[str]) -> str:
     """Return the module or package for which the name is a slip: capitals, underscores, one letter; "" for none."""
     plain = name.casefold().replace("_", "")
     first, last = (*own, "rospy", "roscpp", "catkin", *noetic_messages()), sys.stdlib_module_names
+    # in the order in which a student most likely means them; Python's own modules come last
     for one in (*first, *known_packages(), *sorted(last)) if name not in own else ():
         other = one.casefold().replace("_", "")
         same = other == plain and one not in known_packages()  # modules of PyPI may differ in capitals alone

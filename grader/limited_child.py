@@ -133,6 +133,7 @@ class Template:
         self, command: Sequence[str], env: Mapping[str, str], *, cwd: str | None = None, quiet: bool = False
     ) -> None:
         self._lock = threading.Lock()
+        # a socket that keeps messages apart: each `recv` gets one whole request or answer
         self._sock, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._sock.settimeout(TEMPLATE_S)
         self.ended = False
@@ -236,6 +237,7 @@ def stand_by(warm_up: str = "") -> bool:
     `warm_up` is a module, or a function without arguments (`module:name`), to be called before the first copy is made.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # it ends with its socket
+    # if an ignored SIGCHLD is inherited, the kernel keeps no exit code of the copies
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     _import(warm_up)
     with socket.socket(fileno=os.dup(0)) as sock:
@@ -244,6 +246,7 @@ def stand_by(warm_up: str = "") -> bool:
             if not request:
                 return False
             if request[:1] == STATUS:
+                # asked only once the copy's handle says that it has ended, so this does not wait
                 _, answer = os.waitpid(int.from_bytes(request[1:], "little"), 0)
             else:
                 _import(request[1:].decode())

@@ -110,8 +110,10 @@ def grade(
         open_source(source, rubric, options, progress) as submission,
     ):
         context.submission = submission_info(submission)
+        # from here on its made-up values are drawn, and all that follows sees plain ones
         rubric = rubric.of_submission(submission.digest, context.submission.package)
         context.rubric_origin = origin_of(rubric, (local_path(source), options.repository))
+        # before the folder is locked and prepared: a result that stays needs neither
         earlier = options.find_earlier(context.submission)
         if earlier is not None:
             return earlier
@@ -199,6 +201,7 @@ def open_source(
     with temporary_folder("source") as folder:
         submission_id = options.submission_id
         submission: Submission | RecordedSubmission | None
+        # first, since a recording needs no package, whatever the rubric is about
         submission = open_recording(source, submission_id=submission_id)
         if submission is None and needs_package(rubric):
             package = wanted_package(rubric.rubric, options.package)

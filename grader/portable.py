@@ -98,6 +98,7 @@ def on_interrupt(handler: Callable[[int, FrameType | None], Any] | signal.Handle
     try:
         yield
     finally:
+        # None: the handler is not Python's, and Python cannot put it back
         signal.signal(signal.SIGINT, signal.default_int_handler if before is None else before)
 
 
@@ -105,6 +106,7 @@ def on_interrupt(handler: Callable[[int, FrameType | None], Any] | signal.Handle
 def _interrupt_held() -> Iterator[None]:
     """Let a Ctrl-C that comes inside take effect at the end. Only the main thread is interrupted by one."""
     before = signal.getsignal(signal.SIGINT)
+    # where it is ignored, or left to the system, there is no Python handler to hold back
     if threading.current_thread() is not threading.main_thread() or not callable(before):
         yield
         return
@@ -114,7 +116,7 @@ def _interrupt_held() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
-        for number in came[:1]:
+        for number in came[:1]:  # several of them mean no more than one
             signal.raise_signal(number)
 
 
@@ -122,7 +124,7 @@ def _end_group(process: subprocess.Popen[bytes]) -> None:
     """Kill everything in the session of a process, and itself, and wait for it."""
     with suppress(ProcessLookupError):
         if sys.platform != "win32":
-            os.killpg(process.pid, signal.SIGKILL)
+            os.killpg(process.pid, signal.SIGKILL)  # not waited for yet, so its id is still its own
         elif process.poll() is None:
             process.kill()
     process.wait()

@@ -80,6 +80,7 @@ def make_recorder(
     make_folder(job.evidence)
     rubric, options = job.rubric.rubric, job.options
     scenarios = select_started(rubric, only)
+    # without ROS nothing is an error: the files are judged, and the rest is inconclusive
     reason = STATIC_ONLY if options.static_only or not needs_ros(job.rubric) else why_nodes_cannot_run()
     if reason:
         return StaticRecorder(
@@ -152,6 +153,7 @@ def judge_recorded(recorder: Recorder | StaticRecorder, evidence: Path, rubric: 
 
     runs, judged = judge_folder(evidence, rubric)
     for _ in range(RETRIES):
+        # what was recorded earlier and reused has been through this
         again = judged.undecided & {path.stem for path in recorder.recording.files}
         if not again:
             break
@@ -166,6 +168,7 @@ def record_other_runs(job: RecordingJob, recorder: Recorder | StaticRecorder, ju
     A run whose timing could have cost the mark is repeated. Where a mechanical repair could be the reason for the loss,
     a repaired copy is run.
     """
+    # nothing was run, so no run can be repeated
     if recorder.recording.sandbox is None and recorder.recording.ros is None:
         return False
     from grader import repaired_copy as copies  # noqa: PLC0415 - only a lost mark needs it
@@ -178,6 +181,7 @@ def record_other_runs(job: RecordingJob, recorder: Recorder | StaticRecorder, ju
         judgement.criteria,
         built=was_built(runs),
     )
+    # those scenarios are run with the repaired copy, which shows as much
     doubtful = sorted(judgement.doubtful - set(scenarios))
     if doubtful:
         recorder.repeat(doubtful, job.evidence / copies.REPEATED)
@@ -191,7 +195,7 @@ def record_other_runs(job: RecordingJob, recorder: Recorder | StaticRecorder, ju
             submission=copy,
             facts=read_packages(copy, job.rubric.rubric.launch_commands),
             evidence=job.evidence / copies.REPAIRED,
-            options=replace(job.options, reused={}),
+            options=replace(job.options, reused={}),  # earlier evidence is of the package as it is
             progress=copies.CopyProgress(job.progress),
         )
         about = {REPAIRS: copies.dump_repairs(repairs)}

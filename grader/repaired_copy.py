@@ -64,6 +64,7 @@ def choose_repairs(
     if not lost and not blocked:
         return (), ()
     found = _find_in_all(submission, facts, rubric)
+    # an `input()` waits for ever in a run in which nothing is typed
     typed = any(scenario.typed_to for scenario in rubric.scenarios.values())
     counting = [one for one in found if rubric.share_of(one.kind) > 0 and (typed or not one.asks_input)]
     built, launched = built or not needs_build(facts), launched_in(facts)
@@ -81,6 +82,7 @@ def choose_repairs(
     ]
     chosen = most_of(helping)
     scenarios = sorted(name for name in lost if any(uses(name, one) for one in chosen))
+    # only where nothing mechanical explains a loss is the logic of a script touched
     if not scenarios:
         logic, scenarios = _choose_logic(submission, rubric, criteria, lost)
         if not logic and not any(map(unblocks, chosen)):
@@ -168,7 +170,9 @@ def _of(submission: Submission, package: SourcePackage, repairs: Sequence[Repair
 def _repair_copy(package: SourcePackage, folder: Path, repairs: Sequence[Repair]) -> SourcePackage:
     """Return a copy of the package in `folder` with the repairs. Raises NotRepairable, OSError."""
     copy = folder / package.folder.name
+    # a link stays one: what a student's link points to is not theirs to copy
     shutil.copytree(package.folder, copy, symlinks=True, ignore=_left_out(package.folder, package.left_out))
+    # the bits on the disk may be lost; the runs set them from this list
     executable = dict(package.executable)
     for repair in repairs:
         apply_repair(copy, repair)

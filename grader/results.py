@@ -50,6 +50,7 @@ class Results:
         self.new = folder / NEW
 
     def __enter__(self) -> Self:
+        # before anything is made, to remove no more than that in the end
         self._made = [path for path in (self.folder, *self.folder.parents) if not path.exists()]
         with self._writable():
             self._lock = _locked(self.folder)
@@ -57,7 +58,7 @@ class Results:
             with self._writable():
                 _recover(self.folder)
                 make_folder(self.evidence)
-        except BaseException:
+        except BaseException:  # without `__enter__`, `__exit__` is not called
             self._leave()
             raise
         return self
@@ -86,6 +87,7 @@ class Results:
             if EVIDENCE in keep:
                 shutil.rmtree(self.evidence)
             names = sorted({*keep, *(path.name for path in self.new.iterdir())})
+            # the list tells a grader that has to finish this which parts belong to the new result
             (self.new / NAMES).write_text(json.dumps(names))
             sync_tree(self.new)
             self.new.rename(self.folder / READY)
@@ -94,6 +96,7 @@ class Results:
 
     def _leave(self) -> None:
         shutil.rmtree(self.new, ignore_errors=True)
+        # innermost first; a folder that holds anything stays
         for path in self._made:
             with suppress(OSError):  # not empty: it is in use
                 path.rmdir()
@@ -182,7 +185,7 @@ def _locked(folder: Path) -> int:
 
 
 def _is_at(descriptor: int, folder: Path) -> bool:
-    if descriptor < 0:
+    if descriptor < 0:  # a system where folders cannot be opened
         return True
     try:
         return os.path.samestat(os.fstat(descriptor), folder.stat())
@@ -203,6 +206,7 @@ def _roll_forward(folder: Path) -> None:
     if names.exists():
         coming = json.loads(names.read_text())
         _clear(folder, coming)
+        # the old result is gone from the disk before anything newer than it appears
         sync(folder)
         for name in (*(n for n in coming if n != RESULT), RESULT):
             if (ready / name).exists():
@@ -218,6 +222,7 @@ def _clear(folder: Path, coming: list[str]) -> None:
     for name in dict.fromkeys((*RESULT_FILES, *coming)):
         old = folder / name
         if os.path.lexists(old) and ((ready / name).exists() or name not in coming):
+            # a rename is whole or not at all, unlike removing a tree; what it held goes with `ready`
             if name == EVIDENCE:
                 shutil.rmtree(ready / REPLACED, ignore_errors=True)
                 old.rename(ready / REPLACED)

@@ -90,6 +90,7 @@ def _find(setup: str, conda: str) -> RosInstallation | None:
                 f"$GRADER_ROS_SETUP names no file: {setup}", hint="set it to a setup.bash, or unset it"
             )
         return _from_setup(Path(setup))
+    # the newest first: ROS names its distributions in the order of the alphabet
     for candidate in sorted(Path("/opt/ros").glob("*/setup.bash"), reverse=True):
         if (candidate.parent / "bin" / "rosmaster").exists():
             return _from_setup(candidate)
@@ -98,6 +99,7 @@ def _find(setup: str, conda: str) -> RosInstallation | None:
 
 def _from_setup(setup: Path) -> RosInstallation:
     script = 'source "$1" >/dev/null && env -0'
+    # without a home, so that no file of the user's has a say in it
     base = {"PATH": SYSTEM_PATH, "HOME": "/nonexistent"}
     done = subprocess.run(
         ["/bin/bash", "-c", script, "bash", str(setup)],
@@ -126,6 +128,7 @@ def _prefixes(setup: Path, env: Mapping[str, str]) -> tuple[str, ...]:
         *(Path(entry) for entries in named for entry in entries.split(os.pathsep) if entry),
     ]
     known = [path for path in paths if path.is_absolute() and path.is_dir()]
+    # a sandbox shows /usr anyway
     outside = dict.fromkeys(path for path in known if not path.resolve().is_relative_to("/usr"))
     return tuple(str(path) for path in outside if not outside.keys() & set(path.parents))
 
@@ -218,6 +221,7 @@ class RosPackages:
         """Return each package's folder; of two with one name, the one that ROS finds."""
         found: dict[str, Path] = {}
         for entry in (*self._entries("ROS_PACKAGE_PATH"), *(p / "share" for p in self._prefixes()), STANDINS):
+            # packages that are installed lie right below `share`; a workspace may have folders in between
             for folder in _packages_below(entry, 1 if entry.name == "share" else DEPTH_MAX):
                 found.setdefault(_name(folder), folder)
         return found
@@ -250,6 +254,7 @@ class RosPackages:
 
     def misspelt(self, package: str) -> str:
         """Return what is to be said of a dependency that is all but a ROS package; rosdep has many more names."""
+        # names with a hyphen are rosdep's or Debian's, not ROS's
         if "-" in package or package in COMMON:
             return ""
         known = {*known_packages(), *noetic_messages(), *COMMON}

@@ -61,6 +61,7 @@ def _copy_recording(found: list[Path], pattern: str, root: Path, target: Path) -
     try:
         _copy(found[0], target.with_name(target.name + _suffix(found[0])))
     except (EvidenceError, SubmissionError) as error:
+        # our temporary folder says nothing to a student
         return {RECORDING_PROBLEM: error.message.replace(f"{root}/", "")}
     return {}
 
@@ -79,6 +80,7 @@ def _suffix(path: Path) -> str:
     suffix = path.suffix.casefold()
     if suffix in SUFFIXES:
         return suffix
+    # by how the formats begin; what got this far and is neither of these is a bag
     with path.open("rb") as file:
         return {b"\x89MCAP": ".mcap", b"SQLit": ".db3"}.get(file.read(5), ".bag")
 

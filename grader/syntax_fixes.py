@@ -18,8 +18,9 @@ from typing import NamedTuple
 
 from grader.wording import is_one_edit
 
-LINE_CHARS_MAX = 300
+LINE_CHARS_MAX = 300  # nobody writes longer ones, and some patterns search a line again and again
 _PARSING = threading.Lock()
+# a process that is forked while a thread parses would inherit a lock that nothing releases
 os.register_at_fork(
     before=_PARSING.acquire, after_in_parent=_PARSING.release, after_in_child=_PARSING.release
 )
@@ -54,7 +55,7 @@ _STATEMENTS = (
     "assert", "break", "class", "continue", "def", "del", "elif", "else", "except", "finally", "for", "from", "global",
     "if", "import", "pass", "raise", "return", "try", "while", "with",
 )  # fmt: skip
-_RESERVED = "|".join(keyword.kwlist[3:])
+_RESERVED = "|".join(keyword.kwlist[3:])  # but False, None and True, which are values
 PLAIN = str.maketrans(
     {
         **dict.fromkeys("\u2018\u2019\u201a\u201b\u2032\u00b4", "'"),
@@ -282,12 +283,14 @@ def reason_of_line(line: str, message: str = "") -> Reason:
     if apart := next(_with_separator(code, texts), ""):
         sign = "%" if apart.count("%") > code.count("%") else ","
         return Reason(f"`{sign}` is missing between two values")
+    # a comma is missing on another line, or blocks above it: then nothing is wrong in this line itself
     last = () if "forgot a comma" in message else _HEADLESS if _parses(line) else _LAST_HABITS
     return _reason_in(last, code) or Reason()
 
 
 def _reason_in(habits: tuple[_Habit, ...], code: str, comment: str = "") -> Reason | None:
     for habit in habits:
+        # to Python, `#include <…>` is a comment
         if found := re.search(habit.pattern, code + comment if "include" in habit.pattern else code):
             word = next(iter(found.groups()), "") or ""
             return Reason(habit.why.replace("{0}", word), habit.fix.replace("{0}", word))
@@ -472,6 +475,7 @@ def _with_bracket(line: str, message: str, column: int | None) -> Iterator[str]:
         quotes = [found.start() for found in re.finditer("[\"']", line)]
         yield from (f"{line[:quote]}}}{line[quote:]}" for quote in reversed(quotes))
     code, comment, texts = _taken_apart(line)
+    # what closes the brackets that are open here, innermost first
     closing = ""
     for char in code:
         if char in _CLOSING:
@@ -539,6 +543,7 @@ def _with_quote(line: str, message: str, column: int | None) -> Iterator[str]:
     if column is None or not re.search("unterminated|EOL while", message):
         return
     at = column - 1
+    # the column may be that of the letter before the quote, as in `f"`
     quote = line[at : at + 1].strip("rbfu") or line[at + 1 : at + 2]
     other = {"'": '"', '"': "'"}.get(quote)
     if other is None:

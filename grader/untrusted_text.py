@@ -115,6 +115,7 @@ def clipped(data: Any, limit: int) -> Any:  # noqa: ANN401 - JSON
 def _fitting(text: str, limit: int, written: Callable[[str], str]) -> str:
     """Return the beginning of `text` that is written in `limit` characters."""
     head = text[:limit]
+    # at least one letter less each time, so that it ends
     while (length := len(written(head))) > limit:
         head = head[: min(len(head) - 1, len(head) * limit // length)]
     return head
@@ -141,6 +142,7 @@ def _json_escaped(text: str) -> str:
 
 def _json_escape(character: str) -> str:
     units = character.encode("utf-16-be", "surrogatepass")
+    # JSON writes a character beyond 16 bits as two surrogates
     return "".join(f"\\u{units[i]:02x}{units[i + 1]:02x}" for i in range(0, len(units), 2))
 
 

@@ -40,7 +40,7 @@ from grader.results import EVIDENCE, RESULT, SIGNATURE, SUMS, load_result
 from grader.rubric.load import LoadedRubric
 from grader.wording import number, plural
 
-NAMESPACE = "grader"
+NAMESPACE = "grader"  # ssh-keygen accepts no signature that was made for something else, as git's are
 BYTES_MAX, BLOCK_BYTES = 4 << 20, 1 << 20
 TIMEOUT_S = 60.0
 LINE = re.compile(r"(?P<sum>[0-9a-f]{64})  (?P<name>[^\n]+)")
@@ -68,6 +68,7 @@ def sign(folder: Path, key: Path) -> None:
             f"{key}: ssh-keygen cannot sign with it: {_printed_text(done)}",
             hint=f"chmod 600 {key}" if b"UNPROTECTED" in done.stderr else LOCKED_KEY,
         )
+    # the old one first: if this is killed, the result is unsigned, and not signed wrongly
     (folder / SIGNATURE).unlink(missing_ok=True)
     atomic_write(folder / SUMS, text)
     atomic_write(folder / SIGNATURE, done.stdout)
@@ -96,6 +97,7 @@ def _evidence_files(folder: Path) -> Iterator[str]:
     for place, _, files in os.walk(folder / EVIDENCE):
         for file in files:
             name = Path(place, file).relative_to(folder).as_posix()
+            # a name with a line end in it could pass for another line of SHA256SUMS
             if not name.isprintable():
                 raise EvidenceError(f"{name!r} is not a name that the grader gives to evidence")
             yield name
@@ -125,6 +127,7 @@ def read_signature(folder: Path, allowed: Path | None) -> Signature:
     if text is None or read_untrusted(folder / SIGNATURE, BYTES_MAX) is None:
         return Signature(state="unsigned")
     signature = ["-s", str((folder / SIGNATURE).absolute())]
+    # this one checks the signature without a list of signers, and says whose key it is
     checked = _ssh_keygen(["-Y", "check-novalidate", "-n", NAMESPACE, *signature], text)
     key = KEY.search(_printed_text(checked))
     if checked.returncode or key is None:
@@ -148,6 +151,7 @@ def _ssh_keygen(words: Sequence[str], data: bytes) -> subprocess.CompletedProces
     try:
         return subprocess.run(
             [program, *words],
+            # English, since its words are parsed
             env={**with_absolute_paths(os.environ), "LC_ALL": "C", "SSH_ASKPASS_REQUIRE": "never"},
             cwd="/",
             input=data,

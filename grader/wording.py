@@ -144,6 +144,7 @@ def is_one_edit(one: str, other: str) -> bool:
     if abs(len(one) - len(other)) > 1:
         return False
     start = next((i for i, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), None)
+    # one is the beginning of the other: one letter at its end makes them equal, unless they are
     if start is None:
         return len(one) != len(other)
     one, other = one[start:], other[start:]

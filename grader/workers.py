@@ -121,6 +121,7 @@ class Worker:
         """
         answer_type: TypeAdapter[Result] = _answer_type(_plain(function))
         if self._function[0] is not function:
+            # once for many jobs: a rubric may be bound to it
             self._function = function, pickle.dumps(function)
         while True:
             with self._lock:
@@ -224,6 +225,7 @@ def run_each(
     waiting = iter(jobs)
     template = _template(count, warm_up or _plain(function).__module__, env)
     workers = [Worker(limits, env, template) for _ in range(count)]
+    # the worker that was used last goes first: it is warm, and the others may end as idle
     idle: LifoQueue[Worker] = LifoQueue()
     for worker in workers:
         idle.put(worker)
@@ -255,6 +257,7 @@ def run_each(
 
 def _template(count: int, warm_up: str, env: Mapping[str, str] | None) -> Template | None:
     """Return a template for so many workers, where they need one and this system can have one."""
+    # a template takes as long to start as the one worker that it would save
     if count == 1 or not CAN_COPY:
         return None
     return Template([*module_command("grader.workers"), warm_up], _environment(env))
@@ -367,6 +370,7 @@ def _work() -> None:
     signal.signal(signal.SIGINT, _stop)
     signal.signal(signal.SIGTERM, _stop)
     jobs = os.fdopen(os.dup(0), "rb", buffering=0)
+    # a `print` in a job must not end up in the answers
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
@@ -380,6 +384,7 @@ def _work() -> None:
             told, job, now = pickle.loads(_receive(jobs))  # noqa: S301 - from the parent; see above
             _State.busy = True
             try:
+                # a signal that came before `busy` was set interrupts no job
                 if _State.stopped:
                     break
                 _limit(now, is_first=limits is None)
@@ -418,6 +423,7 @@ def _limit(limits: WorkerLimits, *, is_first: bool) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (most, most))
     if limits.cpu_s is not None:
         most = lower(resource.RLIMIT_CPU, int(time.process_time() + limits.cpu_s) + 1)
+        # the soft limit alone, since the next job's is higher and a hard one cannot be raised again
         resource.setrlimit(resource.RLIMIT_CPU, (most, resource.getrlimit(resource.RLIMIT_CPU)[1]))
 
 
@@ -449,8 +455,9 @@ def _stop(_number: int, _frame: FrameType | None) -> None:
 def _leave_with_parent(descriptor: int) -> None:
     """Clean up like an interrupted process once the parent, which holds the other end of the pipe, is gone."""
     poll = select.poll()
-    poll.register(descriptor, 0)
+    poll.register(descriptor, 0)  # asks for no event: a pipe's other end that closes is reported in any case
     poll.poll()
+    # as Ctrl-C would, so that a job leaves its `with` blocks; by force where that takes too long
     os.kill(os.getpid(), signal.SIGINT)
     threading.Event().wait(LEAVE_S)
     os._exit(1)

@@ -10,6 +10,7 @@ YAML_CHARS_MAX = 500
 """A line of more is not a student's."""
 _GOES_ON = ("|", ">", "{", "[", ",")
 """So ends a line whose value is in the lines below it."""
+# not `std::string`, `http://…` or `C:\…`, which are no keys
 _NO_SPACE = re.compile(r"""(?P<key>\s*(?:- )?["']?[A-Za-z_][\w-]*["']?):(?P<value>[^\s:/\\].*)""")
 _NO_COLON = re.compile(
     r"""(?P<key>\s*(?:- )?[A-Za-z_][\w-]*)(?:\s*(?P<sign>[=;,.])\s*|\s+)(?P<value>["'\w].*)"""
@@ -45,6 +46,7 @@ def slip_of_yaml(text: str, until: int) -> YamlSlip | None:
         code = re.sub(r"\s+#.*", "", line).rstrip()
         if not code.strip() or code.lstrip().startswith("#"):
             continue
+        # the lines below it are no `name: value`, and nothing is known of them
         if code.endswith(_GOES_ON):
             return None
         below = next((one for one in lines[number:] if one.strip()), "")

@@ -136,6 +136,7 @@ def status_of(course: CourseFile, name: str) -> LabStatus:
             one.late_days != two.late_days for one, two in zip(batch.run.entries, now, strict=True)
         ),
     )
+    # first of all: what the labs say now is not by today's rubric
     if loaded.digest != batch.run.rubric.digest:
         return replace(found, to_do=f"grader regrade {batch.path} (its rubric has changed since)")
     return _with_next_step(course, batch, found, ready=states["new"] + states["changed"])
@@ -300,11 +301,13 @@ def rounds(roster: Roster) -> tuple[Roster, ...]:
             entries.sort(key=lambda entry: str(entry.submitted_at))
     first_id = {key: entries[0].id for key, entries in by_student.items()}
     allowed = {entry.where for entry in roster.again}
+    # to stand in the roster twice is a fault only where there are no attempts
     faults = tuple(fault for fault in roster.faults if fault.where not in allowed)
     most = max(map(len, by_student.values()), default=1)
     found = []
     for number in range(most):
         these = tuple(
+            # one id in all batches, so that a student's attempts lie in folders of the same name
             entries[number].model_copy(update={"id": first_id[key]})
             for key, entries in by_student.items()
             if len(entries) > number

@@ -113,6 +113,7 @@ def check_package(chosen: Chosen, check: CheckSession) -> ExitCode:
         static = options.static_only
         unrun = "--static" if static else why_nothing_runs() if needs_ros(chosen.rubric) else ""
         report = None if check.as_json or check.staged or static or check.out else report_place(chosen)
+        # a report to keep needs the files that a mere check does without
         options = replace(options, files=options.files or report is not None)
         inquiry = GitInquiry(chosen.package, own / "git") if chosen.package is not None else None
         folder = check.out or own
@@ -229,10 +230,12 @@ def report_place(chosen: Chosen) -> Path | None:
 def keep_report(written: Path, place: Path) -> None:
     """Copy the report to its place, which git ignores; say so where it cannot be written."""
     folder = place.parent.parent
+    # a link in a student's repository could let us write anywhere
     if folder.is_symlink() or place.parent.is_symlink() or place.is_symlink():
         say_beside(f"{place} is a link: no report is kept there")
         return
     try:
+        # first, so that git never sees the report
         atomic_write(folder / ".gitignore", b"*\n")
         atomic_write(place, written.read_bytes())
     except (OutputError, HostError) as error:
@@ -274,6 +277,7 @@ def _parts(found: GitStatus, encoding: str) -> Iterator[RenderableType]:
 
 def _point(point: Point, encoding: str) -> Iterator[RenderableType]:
     yield Padding(Text(_fit_encoding(point.text, encoding)), (0, 0, 0, 2))
+    # each command of `a && b` on a line of its own, to be copied
     for is_between, words in groupby(shlex.split(point.fix), "&&".__eq__):
         if not is_between:
             yield Padding(Text(_fit_encoding(shlex.join(words), encoding), "bold"), (0, 0, 0, 6))

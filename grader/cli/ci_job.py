@@ -46,6 +46,7 @@ def run_job(system: str) -> ExitCode:
     teller = RUNNERS[system](variables)
     try:
         settings = read_settings(variables)
+        # what the package prints could command the runner (`::error::`) as the job does
         with teller.commands_stopped():
             graded = _grade(settings)
     except Exception as error:
@@ -69,6 +70,7 @@ def _grade(settings: JobSettings) -> JobResult:
     say_choice(chosen)
     if not settings.static:
         warn_without_sandbox(settings.sandbox, rubric)
+    # a runner that is used again may have reports of an earlier job there
     clear(settings.out)
     options = pipeline.GradeOptions(
         sandbox=settings.sandbox,

@@ -83,6 +83,7 @@ class BatchProgress:
         self.points_sum += outcome.points if outcome.status != "error" else 0.0
         if not outcome.kept:
             if not self._ends_s:
+                # the pace begins with the first one that was really graded
                 self._paced_s = self.clock() - outcome.wall_s
             self._ends_s = [*self._ends_s[-LATELY:], self.clock()]
 
@@ -207,7 +208,7 @@ class LiveClass(BatchProgress):
 
 
 def outcome_line(outcome: SubmissionOutcome) -> str:
-    """`ada  85/100  graded  8.1 s`."""
+    """Return `ada  85/100  graded  8.1 s`."""
     points = f"{number(outcome.points)}/{number(outcome.max_points)}" if outcome.status != "error" else "-"
     status = f"{outcome.status}, complete already" if outcome.kept else outcome.status
     parts = [line(outcome.id, NAME_CHARS), points, status, f"{outcome.wall_s:.1f} s"]

@@ -214,6 +214,7 @@ def grade_lab(
     graded: list[BatchFolder] = []
     for number, attempts in enumerate(rounds(roster), start=1):
         say_beside(f"attempt {number}: {plural(len(attempts.entries), 'submission')}")
+        # only what counts in the end is printed as JSON
         grade_class(attempts, source, loaded, options(attempt_folder(out, number)), None, as_json=False)
         graded.append(open_batch(attempt_folder(out, number)))
     whole = combine(out, graded, loaded, lab.attempts)
@@ -246,6 +247,7 @@ def print_status(path: Path, *, as_json: bool) -> ExitCode:
     table = Table(*COLUMNS, box=None, pad_edge=False)
     for one in found:
         table.add_row(*_cells(one))
+    # titles and names are no markup of rich's
     console = Console(markup=False, emoji=False, highlight=False)
     console.print(table)
     for one in found:
@@ -308,6 +310,7 @@ def _write_book(
     target = Path(wanted.out) if wanted.out else usual
     if wanted.template and wanted.out != STDOUT and target.exists() and target.samefile(wanted.template):
         raise UsageError(f"{target} is the template itself", hint="give another name with --out")
+    # a file that is written whole goes to stdout, or nothing does
     with temporary_folder("gradebook") as temporary:
         place = Path(temporary, usual.name) if wanted.out == STDOUT else target
         remarks = write_gradebook(
@@ -433,7 +436,7 @@ def _report(similarity: Similarity, names: Mapping[str, str]) -> Iterator[Render
 
 
 def _table(similarity: Similarity, names: Mapping[str, str]) -> Padding:
-    """Each pair on two lines and more: how alike, then where."""
+    """Return the table with each pair on two lines and more: how alike, then where."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for name in ("share", "lines", "submission", "where"):
         table.add_column(Text(name), justify="right" if name in {"share", "lines"} else "left", no_wrap=False)
@@ -445,7 +448,7 @@ def _table(similarity: Similarity, names: Mapping[str, str]) -> Padding:
 
 
 def _rows(pair: Pair, names: Mapping[str, str]) -> Iterator[tuple[str, str, str, str]]:
-    """The one, then the other."""
+    """Yield the one, then the other."""
     for name, share, lines, where in (
         (pair.a, pair.similarity_a, pair.lines_a, [(m.file_a, m.lines_a) for m in pair.files]),
         (pair.b, pair.similarity_b, pair.lines_b, [(m.file_b, m.lines_b) for m in pair.files]),

@@ -43,6 +43,7 @@ def completing_parser() -> argparse.ArgumentParser:
     parser = build_parser()
     for command in commands(parser):
         for action in options(command):
+            # what takes no value, or names its choices itself, needs no completer
             if action.nargs != 0 and action.choices is None:
                 completed: Any = action
                 completed.completer = completer_of(command.prog, action)
@@ -66,6 +67,7 @@ def paths(*, prefix: str, endings: Sequence[str] | None, **_asked: object) -> di
     found: dict[str, str] = {}
     with suppress(OSError, ValueError, RuntimeError), os.scandir(Path(shown or ".").expanduser()) as entries:
         for entry in sorted(entries, key=lambda entry: entry.name):
+            # hidden ones only once a dot is typed, as shells do it
             if not entry.name.startswith(begun) or (entry.name.startswith(".") and not begun.startswith(".")):
                 continue
             if entry.is_dir():

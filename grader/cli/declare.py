@@ -115,6 +115,7 @@ def command(
 
 def add_arguments(parser: argparse.ArgumentParser, function: Callable[..., ExitCode]) -> None:
     """Add every argument of a command's function to its parser."""
+    # every argument is keyword-only, so all defaults are here
     defaults = function.__kwdefaults__ or {}
     for name, annotation in function.__annotations__.items():
         origin: object = get_origin(annotation)
@@ -136,6 +137,7 @@ def _add(parser: argparse.ArgumentParser, name: str, kind: object, spec: Spec, d
         "metavar": spec.value or None,
         "choices": choices or None,
     }
+    # argparse compares choices with the text as it is typed
     if plain is not str and not choices:
         how["type"] = plain
     if isinstance(spec, Argument):
@@ -213,6 +215,7 @@ def minutes(most: int) -> Callable[[str], int]:
 
 
 def _whole(text: str, least: int, most: int, otherwise: str) -> int:
+    # `int` also takes other scripts' digits, and underscores
     number = int(text) if text.isascii() and text.isdecimal() else -1
     if not least <= number <= most:
         raise argparse.ArgumentTypeError(otherwise)

@@ -137,7 +137,7 @@ class LiveSteps(Steps):
         self, clock: Callable[[], float] = time.monotonic, *, rows: int = 100, tell: Tell | None = None
     ) -> None:
         super().__init__(clock, tell)
-        self.rows = max(rows, 3)
+        self.rows = max(rows, 3)  # one step, one that runs, and the total
 
     def __rich__(self) -> Table:
         now_s = self.clock()
@@ -164,6 +164,7 @@ class LiveSteps(Steps):
 def live_console() -> Console | None:
     """Return a console on stderr on which lines can be drawn again; None where stderr is none."""
     console = Console(file=sys.stderr, markup=False, emoji=False, highlight=False)
+    # the signs before the steps are not in other encodings
     live = console.is_terminal and not console.is_dumb_terminal and console.encoding == "utf-8"
     return console if live else None
 
@@ -178,6 +179,7 @@ def open_progress(*, early: bool = False) -> Iterator[Progress]:
     if console is None:
         yield PlainSteps(sys.stderr, tell=print_early if early else None)
         return
+    # stdout in a file or a pipe cannot get in the way of the display
     above = console.print if sys.stdout.isatty() else None
     tell = partial(print_early, above=above, width=console.width)
     steps = LiveSteps(rows=console.height - 1, tell=tell if early else None)
@@ -186,7 +188,7 @@ def open_progress(*, early: bool = False) -> Iterator[Progress]:
         console=console,
         refresh_per_second=REFRESH_HZ,
         transient=True,
-        redirect_stdout=False,
+        redirect_stdout=False,  # what is printed there is the report, and not a part of the display
         redirect_stderr=False,
     ):
         yield steps
@@ -200,7 +202,7 @@ def _fitting(steps: tuple[Step, ...], rows: int) -> tuple[Step, ...]:
 
 
 def _times(step: Step, now_s: float) -> str:
-    """`3.2 s of about 7 s`."""
+    """Return `3.2 s of about 7 s`."""
     elapsed_s = step.elapsed_s(now_s)
     if elapsed_s is None:
         return f"takes about {step.expected_s:.0f} s" if step.expected_s else ""
@@ -297,6 +299,7 @@ def worst(codes: Iterable[ExitCode]) -> ExitCode:
 def staged_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
     """Return the code of a pre-commit hook: any criterion that fails, fails it, whatever the pass mark is."""
     judged = judged_criteria(criteria)
+    # a package of which nothing could be judged without a run fails no commit
     counted = [c for c in judged if c.is_required or c.status is Status.ERROR]
     return exit_code(judged, rubric.model_copy(update={"pass_mark": None})) if counted else ExitCode.PASSED
 

@@ -95,7 +95,7 @@ def _criterion_lines(rubric: Rubric, criterion: Criterion) -> Iterator[Paragraph
 
 
 def worth_of(criterion: Criterion, rubric: Rubric) -> str:
-    """`10 of 100 points, the best 3 of 4 count`, `a bonus of 5 points`."""
+    """Return `10 of 100 points, the best 3 of 4 count`, or `a bonus of 5 points`."""
     if criterion.extra:
         return f"a {'bonus' if criterion.bonus else 'penalty'} of {number(abs(criterion.extra))} points"
     said = [f"{number(criterion.points)} of {number(rubric.max_points)} points"]

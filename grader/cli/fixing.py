@@ -50,6 +50,7 @@ def fix_packages(chosen: Sequence[Chosen], *, dry_run: bool, yes: bool) -> bool:
                 "This lab asks you to fix mistakes yourself",
                 hint="leave out --fix; grader explain CRITERION says how each repair is done",
             )
+    # both: an answer is typed, and the question has to be seen
     if not (dry_run or yes or (sys.stdin.isatty() and sys.stdout.isatty())):
         raise UsageError(
             "--fix asks before it changes your files, and there is no terminal to ask on",
@@ -91,6 +92,7 @@ def _packages(chosen: Chosen, work: Path) -> tuple[SourcePackage, ...]:
     if Path(chosen.source).is_dir():
         wanted = wanted_package(chosen.rubric.rubric, "")
         submission = open_submission(chosen.source, package=wanted, workdir=work)
+    # what was unpacked or cloned lies in our own folder: a repair there would be lost
     if submission is None or submission.package.folder.resolve().is_relative_to(work.resolve()):
         raise UsageError(
             f"{chosen.source} is not a folder on your disk", hint="give your package's folder to --fix"
@@ -102,6 +104,7 @@ def is_fixed(folder: Path, repair: Repair) -> bool:
     """Return whether `--fix` makes this repair: of Python, the indentation alone, and no bit that git alone lacks."""
     if repair.kind == "executable-bit":
         return MODES_ON_DISK and not is_executable(folder, repair.file)
+    # as they are without their indentation: if that makes them equal, nothing but it changes
     lines = [[row.lstrip(" \t") for row in text.split("\n")] for text in (repair.before, repair.after)]
     tabs = repair.kind == "python-syntax" and "\t" in repair.before and lines[0] == lines[1]
     return tabs or repair.kind in FIXED
@@ -113,11 +116,13 @@ def _diff(folder: Path, repairs: Sequence[Repair], preview: Path) -> str:
     preview.mkdir()
     for file in sorted(files):
         source = folder / file
+        # a link is not copied: what it points to may be outside the package
         if source.is_symlink() or not source.is_file():
             continue
         copy = preview / file
         copy.parent.mkdir(parents=True, exist_ok=True)
         copy.write_bytes(read_data(folder, file) or b"")
+        # the copies must be written to
         copy.chmod(S_IMODE(source.stat().st_mode) | 0o600)
     before = read_tree(preview)
     for repair in repairs:

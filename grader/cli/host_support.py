@@ -89,6 +89,7 @@ class DoctorRow(NamedTuple):
 
     def for_json(self) -> dict[str, str]:
         """Return the row as `--json` prints it."""
+        # the key is a part of the format
         return {"name": self.name, "state": self.state, "detail": self.detail, "mend": self.fix}
 
 
@@ -368,6 +369,7 @@ def _standins(ros: RosInstallation) -> DoctorRow:
 
 def _search_paths() -> DoctorRow:
     """Look for entries that are not absolute paths: they mean the current folder, which may be a student's."""
+    # without the variable, nothing is wrong with it
     odd = [name for name in LISTS if not all(map(os.path.isabs, os.environ.get(name, "/").split(os.pathsep)))]
     if not odd:
         return DoctorRow("search paths", "ok", "every entry is an absolute path")

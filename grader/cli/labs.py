@@ -84,6 +84,7 @@ def plan_test(
     picked = select_mutants(mutants, only)
     for place in filter(None, (out, everything and everything.absolute().parent)):
         check_writable(place)
+    # without an end of its own: what survived stays for a person to look at
     folder = out or Path(tempfile.mkdtemp(prefix="grader-mutants-"))
     return Plan(
         rubric=loaded,
@@ -165,7 +166,7 @@ def _reference(test: RubricTest) -> Iterator[Text]:
 
 
 def _open(mutant: MutantResult) -> Iterator[Text]:
-    """A mutant that was not killed."""
+    """Yield the lines of a mutant that was not killed."""
     yield Text(f"{mutant.state}: {visible(mutant.label)}", "bold red")
     if mutant.mistake:
         yield Text(f"  {visible(mutant.mistake)}")
@@ -297,7 +298,7 @@ def _find_mistake(planned: list[Planned], name: str) -> Planned:
 
 
 def _write(tree: Tree, folder: Path) -> None:
-    """Raises UsageError if the folder is not empty."""
+    """Write the files. Raises UsageError if the folder is not empty."""
     if folder.is_symlink() or (folder.exists() and (not folder.is_dir() or any(folder.iterdir()))):
         raise UsageError(f"{folder} is in use", hint="give a new or an empty folder")
     check_writable(folder.absolute())

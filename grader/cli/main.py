@@ -61,9 +61,8 @@ def _dispatch(argv: Sequence[str]) -> int:
     with loading():
         if runs_code and sys.platform == "linux":
             inherited = import_module("grader.arena.inherited_limits")
-            inherited.make_room(
-                begin=True
-            )  # before more is loaded: short limits would end that without a word
+            # before more is loaded: short limits would end that without a word
+            inherited.make_room(begin=True)
         if runs_code or command.looks_at_host:
             scope = import_module("grader.arena.control_groups")
     if runs_code or command.looks_at_host:
@@ -74,12 +73,13 @@ def _dispatch(argv: Sequence[str]) -> int:
 def _prepare_streams() -> None:
     """Escape characters that the terminal's encoding lacks; let a closed stream swallow everything."""
     for name in ("stdout", "stderr"):
+        # a program that was started with `>&-` has no such stream
         if getattr(sys, name) is None:
             descriptor = os.open(os.devnull, os.O_WRONLY)
             setattr(sys, name, os.fdopen(descriptor, "w", encoding="utf-8"))
         stream = getattr(sys, name)
         if isinstance(stream, TextIOWrapper):
-            with suppress(ValueError):
+            with suppress(ValueError):  # it is closed
                 stream.reconfigure(errors="backslashreplace")
 
 
@@ -139,6 +139,7 @@ class Parser(argparse.ArgumentParser):
     ) -> tuple[argparse.Namespace, list[str]]:
         """Parse as argparse does, but each command refuses what it does not know itself."""
         before_command = self._subparsers is not None
+        # of `grader` itself, only what stands before the command: the rest is the command's to refuse
         self.given = tuple(
             takewhile(lambda word: word != "--" and not (before_command and word[:1] != "-"), args or ())
         )

@@ -40,6 +40,7 @@ def say_json(data: object) -> None:
 def say_document(made: Callable[[bool], str]) -> None:
     """Print a document that is harmless already. `made` is told whether stdout takes only ASCII: a letter that the
     encoding lacks needs an escape of the document's own format."""
+    # Python calls one encoding by several names: `utf8`, `UTF-8`
     encoding = (sys.stdout.encoding or "ascii").lower().replace("-", "")
     sys.stdout.write(made(encoding != "utf8"))
 
@@ -94,7 +95,7 @@ def report(error: GraderError) -> None:
 
 
 def _wrap_for_terminal(text: str) -> str:
-    """The line as it is, or on a terminal in lines that end between words."""
+    """Return the line as it is, or on a terminal in lines that end between words."""
     if sys.stderr is None or not sys.stderr.isatty():
         return text
     width = max(shutil.get_terminal_size().columns, NARROWEST)

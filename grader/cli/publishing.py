@@ -251,6 +251,7 @@ def list_requests(folder: Path, forge: str | None, label: str, *, as_json: bool)
 
 def _fetch(session: ReviewSession, forge: str, label: str) -> list[SendFailure]:
     """Write what is asked on a forge into the class's folder. Whose repository fails keeps the rows of before."""
+    # `forge` is one of FORGES, whose senders can read, too
     sender = cast(Comments, FORMS[forge].open(SendSettings(folder=session.path, told=say_beside)))
     batch, path = session.submissions.batch(), session.path / f"requests-{forge}.csv"
     rows, failures = list[RequestRow](), list[SendFailure]()

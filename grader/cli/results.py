@@ -68,6 +68,7 @@ def judge_submissions(folders: Sequence[Path], loaded: LoadedRubric, out: str, j
     """Judge several submissions and write a list of them. One that cannot be judged is reported and does not affect the
     others. Return the exit code of the worst."""
     order = {folder: index for index, folder in enumerate(folders)}
+    # workers end in any order
     judged = sorted(judge_all(folders, loaded, jobs), key=lambda one: order[one.folder])
     found = [(one.folder.name, one.error if one.criteria is None else one.criteria) for one in judged]
     write_document(out, lambda ascii_only: judged_text(loaded.rubric, found, ascii_only=ascii_only))
@@ -125,7 +126,7 @@ def _channels(inspection: Inspection) -> Table:
 
 
 def _rate(channel: ChannelSummary) -> tuple[str, str]:
-    """Hertz, and the smallest, middle and largest gap."""
+    """Return the hertz, and the smallest, middle and largest gap."""
     rate = channel.rate
     hertz = "" if rate.mean_hz is None else f"{rate.mean_hz:.2f}"
     gaps_s = (rate.gap_min_s, rate.gap_median_s, rate.gap_max_s)
@@ -145,6 +146,7 @@ def export_bags(evidence: Path, out: Path | None, *, everything: bool) -> None:
     folder = out or Path()
     if folder.exists() and not folder.is_dir():
         raise UsageError(f"{folder} is not a folder", hint=f"{evidence} is one, so its bags go to a folder")
+    # a bag without messages would be of no use
     chosen = [r for r in runs.values() if everything or any(c.messages for c in r.channels)]
     if not chosen:
         raise EvidenceError(
@@ -161,6 +163,7 @@ def _target(run: Run, evidence: Path, out: Path | None) -> Path:
 
 
 def _free(path: Path, evidence: Path, *, named: bool) -> Path:
+    # a name that was given may be replaced, but not the evidence itself
     if path.exists() and (not named or path.samefile(evidence)):
         raise UsageError(f"{path} already exists", hint="choose another name with --out")
     return path
@@ -190,7 +193,7 @@ def verify_results(results: Sequence[Path], rubric: str | None, allowed: Path | 
 
 
 def _rubric_named(name: str, *, given: bool) -> LoadedRubric:
-    """Load it; what a result says must not lead to a file."""
+    """Load the rubric of that name; what a result says must not lead to a file."""
     if not given and not named_labs(name):
         raise UsageError(
             f"there is no lab {line(name, 100)} here", hint="give the course's rubric with --rubric"
@@ -288,6 +291,7 @@ def write_form(
         _say_others([folder.absolute().name], rubric)
     if form == "gradescope" and student:
         raise UsageError("Gradescope hides hidden criteria itself", hint="leave out --student")
+    # GitHub Classroom shows it to the student
     shown = without_hidden(result, rubric.rubric) if student or form == "classroom" else result
     if form == "terminal" and out == STDOUT:
         hidden = missing_hidden(shown, rubric.rubric)
@@ -304,6 +308,7 @@ def write_form(
         load_figures=lambda: figures_in(folder, shown, rubric.rubric),
     )
     data = FORMS[form].render(about)
+    # bytes, since UTF-8 is what the form says, whatever the terminal has
     if out == STDOUT:
         sys.stdout.buffer.write(data)
     else:

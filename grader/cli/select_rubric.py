@@ -74,6 +74,7 @@ def choose_all(path: Path, rubric: str | None, package: str = "") -> tuple[Chose
     found = find(path)
     if package:
         named = tuple(c for c in found.candidates if c.name == package)
+        # without one of that name, the intake says which there are
         found = replace(found, candidates=named or found.candidates)
     if rubric is not None:
         return (_choose_named(path, found, load_rubric(rubric)),)
@@ -163,6 +164,7 @@ def labs_of(found: FoundPackages) -> tuple[Lab, ...]:
     Raises UsageError if there is none: it says what is there, which labs there are, and which is most alike.
     """
     labs: dict[str, Lab] = {}
+    # a name in a manifest is surer than that of a folder
     for read in (_by_name, _by_folder):
         for candidate in found.packages:
             lab = read(candidate)
@@ -190,9 +192,8 @@ def _by_name(candidate: Candidate) -> Lab | None:
 
 
 def _by_folder(candidate: Candidate) -> Lab | None:
-    folder = re.sub(
-        r"-(main|master)$", "", printable(candidate.folder.resolve().name)
-    )  # as GitHub's zip names it
+    # without the branch that GitHub's zip adds to the name
+    folder = re.sub(r"-(main|master)$", "", printable(candidate.folder.resolve().name))
     rubric = find_rubric_for_package(folder)
     if rubric is None or (candidate.name.lower() == folder.lower() and candidate.has_manifest):
         return None
@@ -251,6 +252,7 @@ def _near(names: Iterable[str], known: dict[str, str]) -> str | None:
     """Return the lab whose package or own name is most like one of these."""
     words = {_plain(word): rubric for rubric, package in known.items() for word in (rubric, package)}
     for name in names:
+        # a shorter one is in too many names
         inside = [word for word in words if len(word) >= 4 and word in _plain(name)]
         near = closest(_plain(name), words, cutoff=ALIKE) or max(inside, key=len, default="")
         if near:
@@ -318,6 +320,7 @@ def find(path: Path) -> FoundPackages:
 def _find(path: Path) -> FoundPackages:
     here = path.resolve()
     outside, moved = _outside(here)
+    # as it was given: a path that is relative is shown so
     root = path if outside == here else outside
     candidates, whole = find_nearest(root)
     found = FoundPackages(root=root, candidates=tuple(candidates), moved=moved, whole=whole)
@@ -331,6 +334,7 @@ def _find(path: Path) -> FoundPackages:
 
 def _outside(here: Path) -> tuple[Path, str]:
     """Return the folder to search instead of one with copies of packages, or none, and why."""
+    # the outermost first: a build may have folders of these names within it
     for folder in (*reversed(here.parents), here):
         if folder.name == ".git":
             return folder.parent, "this folder belongs to git"
@@ -351,6 +355,7 @@ def _beside(here: Path) -> FoundPackages | None:
     repository = repository_around(here)
     workspace = next((f for f in here.parents if any(is_there(f / mark) for mark in WORKSPACE_MARKS)), None)
     for root, what in ((workspace, "workspace"), (repository, "repository")):
+        # never a whole disk
         if root is not None and root not in (here, Path(root.anchor)):
             candidates, whole = find_nearest(root)
             found = FoundPackages(

@@ -38,6 +38,7 @@ PACKINGS: dict[bytes, Callable[[Any], Any]] = {
     b"BZh": bz2.open,
     b"\xfd7zXZ\x00": lzma.open,
 }
+# what the standard library raises for an archive that is damaged or made to do harm
 DAMAGED = (
     zipfile.BadZipFile,
     tarfile.TarError,
@@ -54,9 +55,9 @@ DAMAGED = (
 )
 FOREIGN = {b"Rar!": "a rar archive", b"7z\xbc\xaf": "a 7z archive", b"\x28\xb5\x2f\xfd": "packed by zstd"}
 KINDS = "Hand in a .zip or a .tar.gz."
-UNIX = (3, 19)
-UTF8_NAME = 0x800
-ENCRYPTED = 0x41
+UNIX = (3, 19)  # `create_system`: Unix and macOS, whose modes are in the upper half of `external_attr`
+UTF8_NAME = 0x800  # bit 11 of the flags
+ENCRYPTED = 0x41  # bits 0 and 6: encrypted, and strongly encrypted
 LOCAL_HEADER_BYTES = 30
 ZIP_PACKINGS = {zipfile.ZIP_BZIP2: "bzip2", zipfile.ZIP_LZMA: "LZMA"}
 LINK_BYTES = 1 << 12
@@ -86,6 +87,7 @@ def unpack(path: Path, into: Path, limits: IntakeLimits) -> Unpacked:
     into.mkdir(parents=True)
     answer = run_limited(
         "grader.intake.archive:unpack_here",
+        # absolute, since the child's working folder is `/`
         *(str(path.absolute()), str(into.absolute()), asdict(limits)),
         limits=ChildLimits(
             memory_bytes=MEMORY_BYTES, cpu_s=CPU_S, wall_s=WALL_S, file_bytes=limits.total_bytes
@@ -165,6 +167,7 @@ def _looks_like_zip(path: Path, head: bytes) -> bool:
 def _looks_like_tar(head: bytes) -> bool:
     try:
         tarfile.TarInfo.frombuf(head, "utf-8", "surrogateescape")
+    # a block of zeros, with which an empty tar begins
     except tarfile.EOFHeaderError:  # type: ignore[attr-defined]
         return True
     except (tarfile.TarError, ValueError):
@@ -202,6 +205,7 @@ def _unpack_tar(path: Path, unpacker: Unpacker, name: str, limits: IntakeLimits)
         stream = _Counted(opener(packed) if opener else packed, name, limits.stream_bytes)
         with tarfile.open(
             fileobj=cast("IO[bytes]", stream),
+            # `|`: as a stream, since to seek back would be to unpack all before once more
             mode="r|",
             encoding="utf-8",
             errors="surrogateescape",
@@ -314,6 +318,7 @@ def _entry_name(info: zipfile.ZipInfo) -> str:
     name = info.filename
     if not info.flag_bits & UTF8_NAME:
         try:
+            # what `zipfile` takes a name for that is not marked as UTF-8
             name = name.encode("cp437").decode("utf-8")
         except UnicodeError:
             name = info.filename
@@ -354,6 +359,7 @@ class Unpacker:
         parts = [part for part in name.split("/") if part not in ("", ".")]
         if name.startswith("/") or ".." in parts or _OUTSIDE.search(name):
             self.refuse(f"the entry '{brief(name)}' leads outside of it")
+        # `._name` is where macOS keeps what other systems have no place for
         if not parts or NO_CONTENT.intersection(parts) or parts[-1].startswith("._"):
             return None
         path = "/".join(parts)
@@ -375,14 +381,16 @@ class Unpacker:
     def file(self, path: str, content: IO[bytes], *, executable: bool | None) -> None:
         """Write a file."""
         target = self._free(path)
+        # x: never into a file that is there already
         with target.open("xb") as out:
             shutil.copyfileobj(content, out, _CHUNK_BYTES)
             self._sizes[path] = out.tell()
+        # no other bits of the archive's: `setuid` and the like stay out
         target.chmod(0o755 if executable else 0o644)
         self.executable[path] = executable
 
     def hard_link(self, path: str, name: str) -> None:
-        """A second name for a file that the archive has already brought."""
+        """Make a second name for a file that the archive has already brought."""
         first = os.path.normpath(name)
         if first in self._links:
             self.link(path, self._links[first])
@@ -405,7 +413,7 @@ class Unpacker:
         self._links[path] = target
 
     def finish(self) -> list[str]:
-        """Makes the links and gives the hints on all that was left out.
+        """Make the links, and return the hints on all that was left out.
 
         A workspace holds links that point outside (`src/CMakeLists.txt` leads to `/opt/ros`): they are no offence.
         """

@@ -97,7 +97,7 @@ def _named_alike(candidate: Candidate, wanted: str) -> bool:
 
 
 def _in_folder(candidate: Candidate, wanted: str) -> bool:
-    """By the folder's name; a repository that was downloaded as a zip adds its branch."""
+    """Return whether its folder has the name; a repository that was downloaded as a zip adds its branch."""
     folder = candidate.folder.name.casefold()
     return wanted.casefold() in (folder, re.sub(r"-(main|master)$", "", folder))
 
@@ -121,10 +121,12 @@ def _best(matches: list[Candidate], wanted: WantedPackage) -> Choice:
     to the root; at one depth, a folder that is named like the package goes first."""
 
     def key(c: Candidate) -> tuple[bool, int, bool, int, bool, bytes]:
+        # only copies need to be told apart, and it takes a walk through each
         files = -_count_files(c.folder, wanted.files) if len(looked_at) > 1 else 0
         is_named = c.folder.name == (wanted.asked or wanted.name)
         return not _in_workspace(c), files, "src" not in _above(c), c.depth, not is_named, os.fsencode(c.path)
 
+    # an archive may hold thousands of copies
     looked_at = sorted(matches, key=lambda c: (not _in_workspace(c), c.depth))[:COPIES_LOOKED_AT]
     chosen, *others = sorted(looked_at, key=key)
     hints = [hint for hint in (_name_hint(chosen, wanted), _ignored_hint(chosen)) if hint]
@@ -216,6 +218,7 @@ def not_found(
 
 
 def _rename(root: Path, packages: list[Candidate], wanted: WantedPackage) -> str:
+    # reversed, so that of several with one name the nearest stays
     seen = {c.name: c for c in reversed(packages) if c.ignored_by is None and encodable(c.path)}
     if wanted.asked and packages:
         return "Give one of these names with --package, or leave it out."
@@ -227,6 +230,7 @@ def _rename(root: Path, packages: list[Candidate], wanted: WantedPackage) -> str
         return f"{told}: {made}." if loose else f"{told}: was it handed in (and pushed)?"
     counts = {c: _count_files(c.folder, wanted.files) for c in seen.values()}
     only = max(counts, key=lambda c: counts[c])
+    # it is sure if no other package has half as many of the lab's files
     is_only = len(counts) == 1 or sum(count * 2 >= max(1, counts[only]) for count in counts.values()) == 1
     name, named = only.name, named_at(only.folder, root=root)
     if not is_only or named is None:
@@ -272,6 +276,7 @@ def _windows(folder: Path, names: list[str]) -> str:
 def _where_it_went(root: Path, wanted: str, git_links: tuple[str, ...]) -> str:
     """What students do to a package so that it is there and cannot be seen."""
     links = [path for path in git_links if path.rpartition("/")[2].casefold() == wanted.casefold()]
+    # nothing else was handed in, so the package is behind one of the links, whatever its name
     if not links and not _has_files(root):
         links = list(git_links)
     if links:
@@ -377,7 +382,7 @@ def find_nearest(root: Path) -> tuple[list[Candidate], bool]:
 
 
 def _looked_at(root: Path, leave_out: Path | None) -> Iterator[tuple[Folder, Candidate | None]]:
-    """Each folder that catkin would look into, with the candidate that it is."""
+    """Yield each folder that catkin would look into, with the candidate that it is, or None."""
     ignored: dict[str, str] = {}
     for folder in walk(root, tolerant=True):
         hidden = ignored.get(folder.path) or _marker(folder)
@@ -496,13 +501,16 @@ def named_at(folder: Path, *, root: Path) -> tuple[str, int] | None:
 
 
 def _name(data: bytes) -> tuple[str, int] | None:
+    # a student's file may name entities that grow without end, or files and addresses to read
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, recover=True)
     try:
+        # an XML declaration must come first; `before` adds the lines again that this takes away
         root = etree.fromstring(data.lstrip(), parser)
     except (etree.XMLSyntaxError, ValueError):
         return None
     # An empty document gives no root at all in this mode.
     for child in root if root is not None else ():
+        # a comment has a function in place of a tag; a namespace stands in `{}` before the name
         if isinstance(child.tag, str) and child.tag.rpartition("}")[2] == "name":
             text = [child.text or "", *(part.tail or "" for part in child)]
             name = " ".join("".join(text).split())

@@ -19,6 +19,7 @@ from grader.host_programs import find_user_program, with_absolute_paths
 
 HELPER_S = 30
 USER, PASSWORD = "GRADER_LOGIN_USER", "GRADER_LOGIN_PASSWORD"
+# git runs what begins with `!` in a shell; `store` and `erase`, which it also asks for, do nothing
 _HELPER = (
     f'!f() {{ test "$1" = get || exit 0; printf "username=%s\\npassword=%s\\n" "${USER}" "${PASSWORD}"; }}; f'
 )
@@ -148,14 +149,16 @@ def _with(place: str, login: Login) -> Access:
     key = f"credential.{place}.helper"
     secrets = (password, login.user if not password else "")
     return Access(
+        # the empty one first makes git forget its own helpers, which would store the password
         options=("-c", f"{key}=", "-c", f"{key}={_HELPER}"),
         environment={USER: login.user, PASSWORD: password},
+        # to replace shorter ones would make a message unreadable
         secrets=tuple(secret for secret in secrets if len(secret) >= 4),
     )
 
 
 def _ask_helpers(place: str, user: str) -> Access:
-    """git's own helpers, asked for this user's password. git knows such settings in its environment since 2.31."""
+    """Return what makes git ask its own helpers for this user's password, by the environment (since git 2.31)."""
     count = os.environ.get("GIT_CONFIG_COUNT", "")
     number = int(count) if count.isdecimal() else 0
     return Access(
@@ -168,9 +171,10 @@ def _ask_helpers(place: str, user: str) -> Access:
 
 
 def _token(host: str) -> Login | None:
-    """The environment's token for that server, if it has one."""
+    """Return the environment's token for that server; None if it has none."""
     github = _https_host(os.environ.get("GITHUB_SERVER_URL") or "https://github.com")
     known = (
+        # the course's own setting wins over what a CI system sets
         (_named_host(), os.environ.get("GRADER_GIT_USER") or "oauth2", ("GRADER_GIT_TOKEN",)),
         (github, "x-access-token", ("GITHUB_TOKEN", "GH_TOKEN")),
         (_gitlab_host(), "oauth2", ("GITLAB_TOKEN",)),
@@ -197,14 +201,14 @@ def _gitlab_host() -> str:
 
 
 def _https_host(url: str) -> str:
-    """The server of an https address as it is compared, "" where it is none."""
+    """Return the server of an https address as it is compared; "" for any other address."""
     match = _URL.fullmatch(url.strip())
     return match["host"].lower().removesuffix(":443") if match and match["scheme"] == "https" else ""
 
 
 def without_password(source: str) -> str:
-    """SOURCE as it may be kept and shown: of `https://` nothing before the `@` of the server (a token may stand in
-    place of a user), of other schemes the user alone. What is not an address stays as it is."""
+    """Return SOURCE as it may be kept and shown: of `https://` nothing before the `@` of the server (a token may stand
+    in place of a user), of other schemes the user alone. What is not an address stays as it is."""
     return _TORN.sub(r"\g<scheme>://…", _AUTHORITY.sub(_without_secret, source, count=1))
 
 

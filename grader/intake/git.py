@@ -22,6 +22,7 @@ from grader.host_programs import find_user_program, git_setting, loading_environ
 from grader.intake.credentials import Access, is_refusal, scrubbed
 from grader.portable import own_session
 
+# no setting may run a program, change a file on its way to the disk, or leave a process behind
 _QUIET = {
     "core.hooksPath": os.devnull,
     "core.fsmonitor": "false",
@@ -50,6 +51,7 @@ _NETWORK_KEPT = re.compile(
 _ANSWER_BYTES = 16 << 20
 _SILENCE_S = 20.0
 _SAID_BYTES = 64 << 10
+# Windows has no such signal; a program that git starts reports it as 128 + its number
 _XFSZ = int(getattr(signal, "SIGXFSZ", 25))
 _TOO_LARGE = (-_XFSZ, 128 + _XFSZ)
 _TOO_MUCH = re.compile(r"File too large|signal 25\b|[Oo]ut of memory|cannot allocate|mmap failed")
@@ -121,6 +123,7 @@ class Git:
     ) -> bytes:
         if time.monotonic() >= self._deadline:
             raise GitTimeout(f"no answer within {self.timeout_s:g} s")
+        # files, because their size is limited (`_limits`), and no pipe can fill up
         with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
             whole = (*access.options, *_place(repository), *args)
             environment = self._environment(cwd, access) if remote else self._local_environment()
@@ -159,7 +162,8 @@ class Git:
                 raise GitFailed(f"git {args[0]} failed")
 
     def _read(self, descriptor: int) -> bytes:
-        """What there is, as soon as there is something. git can look through empty folders for years, in silence."""
+        """Return what there is, as soon as there is something; b"" at the end. Raises GitTimeout after a silence: git
+        can look through empty folders for years."""
         left_s = min(max(0.0, self._deadline - time.monotonic()), _SILENCE_S)
         if sys.platform == "win32":  # no pipe can be asked there; git's own end comes by `_ended_in_time`
             return os.read(descriptor, 1 << 16)
@@ -202,7 +206,7 @@ class Git:
             yield process
 
     def _local_environment(self) -> dict[str, str]:
-        """For repositories on this machine: no settings but ours, so no filter, no helper and no network."""
+        """Return the variables for repositories on this machine: no settings but ours, so no filter and no network."""
         return {
             **loading_environment(os.environ),
             **_ASK_NOTHING,
@@ -214,13 +218,14 @@ class Git:
         }
 
     def _environment(self, cwd: Path, access: Access) -> dict[str, str]:
-        """For servers: the user's settings hold the credentials, the proxy, perhaps a mirror on this disk."""
+        """Return the variables for servers: the user's settings hold the credentials, the proxy, perhaps a mirror."""
         kept = {
             key: value
             for key, value in with_absolute_paths(os.environ).items()
             if not key.startswith("GIT_") or _NETWORK_KEPT.fullmatch(key)
         }
         environment = {**kept, **_ASK_NOTHING, "GIT_ALLOW_PROTOCOL": "https:http:ssh:git:file"}
+        # git prefers GIT_SSH_COMMAND, so it may not take the place of a program that the user has chosen
         if "GIT_SSH" not in kept or "GIT_SSH_COMMAND" in kept:
             environment["GIT_SSH_COMMAND"] = self._ssh(kept, cwd)
         return {**environment, **access.environment}
@@ -237,6 +242,7 @@ class Git:
             program = Path(shlex.split(self._ssh_command)[0]).name
         except (ValueError, IndexError):
             return self._ssh_command
+        # PuTTY's plink and others do not know these options
         return (
             f"{self._ssh_command} -o BatchMode=yes -o ControlMaster=no"
             if program == "ssh"
@@ -251,7 +257,7 @@ _ASK_NOTHING = {
     "SSH_ASKPASS": "",
     "SSH_ASKPASS_REQUIRE": "never",
     "GCM_INTERACTIVE": "never",
-    "GIT_LFS_SKIP_SMUDGE": "1",
+    "GIT_LFS_SKIP_SMUDGE": "1",  # else a checkout would fetch what LFS's pointers stand for
     "GIT_OPTIONAL_LOCKS": "0",
 }
 
@@ -263,8 +269,8 @@ def _place(repository: Repository | None) -> tuple[str, ...]:
 
 
 def _limits() -> tuple[str, ...]:
-    """For git and all that it starts, and git ends when the grader is killed. Where there is no `prlimit`, there is no
-    ROS either, nor a sandbox."""
+    """Return the command that limits git and all that it starts, and ends git when the grader is killed. Where there is
+    no `prlimit`, there is no ROS either, nor a sandbox."""
     setpriv, prlimit = find_user_program("setpriv"), find_user_program("prlimit")
     if setpriv is None or prlimit is None:
         return ()

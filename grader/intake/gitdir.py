@@ -70,7 +70,8 @@ def link_repository(
 
 
 def _show(place: Path, at: Path) -> None:
-    """By a link; a copy where none may be made, as on Windows. There is no link in what `_is_plain` has seen."""
+    """Show a file or folder by a link; by a copy where no link may be made, as on Windows. `_is_plain` has looked for
+    links in it."""
     try:
         at.symlink_to(place)
     except OSError:
@@ -78,7 +79,7 @@ def _show(place: Path, at: Path) -> None:
 
 
 def _show_objects(place: Path, at: Path) -> None:
-    """As `_show`, but objects may be many: git itself is told where they are."""
+    """Do as `_show`, but objects may be many: where no link may be made, git itself is told where they are."""
     try:
         at.symlink_to(place)
     except OSError:
@@ -87,7 +88,9 @@ def _show_objects(place: Path, at: Path) -> None:
 
 
 def git_folder(top: Path, within: Path, git: Git) -> Path:
-    """`.git` is a folder, or a file that names one, as in a submodule or a further worktree."""
+    """Return where `.git` leads: it is a folder, or a file that names one, as in a submodule or a further worktree.
+
+    Raises Unfit where it leads out of `within`, to a repository that does not name `top` as its own."""
     place = top / ".git"
     mode = place.lstat().st_mode
     if stat.S_ISDIR(mode):
@@ -103,7 +106,7 @@ def git_folder(top: Path, within: Path, git: Git) -> Path:
 
 
 def _points_back(target: Path, top: Path, git: Git) -> bool:
-    """Whether the repository at `target` names `top` as its own: anybody can write a file that names a repository."""
+    """Return whether the repository at `target` names `top` as its own: anybody can write a file that names another."""
     with suppress(Unfit):
         if is_there(target / "gitdir"):
             place = os.fsdecode(_content(target / "gitdir", _POINTER_BYTES)).strip()
@@ -115,7 +118,7 @@ def _points_back(target: Path, top: Path, git: Git) -> bool:
 
 
 def _common(own: Path, within: Path) -> Path:
-    """Where refs and objects lie: two folders up for a further worktree."""
+    """Return the folder of refs and objects: `own`, or two folders up for a further worktree. Raises Unfit."""
     if not is_there(own / "commondir"):
         return own
     common = _real(own / os.fsdecode(_content(own / "commondir", _POINTER_BYTES)).strip())
@@ -147,7 +150,7 @@ def _content(path: Path, limit_bytes: int) -> bytes:
 
 
 def _settings(common: Path, git: Git) -> str:
-    """Settings of ours, and of the repository's the two that say in which form its data are."""
+    """Return a config of our own settings, and of the repository's the two that say in which form its data are."""
     _content(common / "config", _SETTINGS_BYTES)
     lines = ["[core]", "\tbare = true"]
     extensions = []
@@ -161,7 +164,7 @@ def _settings(common: Path, git: Git) -> str:
 
 
 def _setting(config: Path, key: str, git: Git) -> str:
-    """One setting of a file alone, "" where it has none; what the file includes is not read. Raises GitMissing."""
+    """Return one setting of a file, "" if it has none; what the file includes is not read. Raises GitMissing."""
     try:
         said = git.run("config", "--no-includes", "--file", str(config), "--get", key, cwd=git.home)
     except GitMissing:
@@ -279,6 +282,7 @@ def open_view(top: Path, into: Path, git: Git) -> View:
     settings = _parse(git.run("config", "--no-includes", "--file", str(common / "config"), "-lz", cwd=into))
     users = _user_settings(git)
     _copy_excludes(common / "info" / "exclude", into / "info" / "exclude")
+    # these values are single words that name no program, file or address
     safe = {key: value for key in SAFE if (value := settings.get(key, users.get(key, ""))).lower() in WORDS}
     excludes = users.get("core.excludesfile") or _default_excludes()
     if excludes:
@@ -350,6 +354,7 @@ def _open_index(top: Path, base: Path, index: str) -> View:
     view = open_view(top, base / "view", git)
     own = git_folder(top, top, git).resolve()
     place = Path(os.path.realpath(top / index)) if index else own / "index"
+    # any other file, even a student's, could be named as an index
     if place != own / "index" and place.parent == own and place.is_file():
         shown = view.repository.git_dir / "index"
         shown.unlink(missing_ok=True)
@@ -361,6 +366,7 @@ def _staged_paths(view: View, package: Path) -> list[str]:
     """Return the package's staged files, relative to its folder, without pointers to other repositories."""
     said = view.run("ls-files", "--stage", "-z", cwd=package)
     pairs = (record.partition(b"\t") for record in said.split(b"\0") if record)
+    # 160000 is the mode of a pointer to a submodule's commit
     paths = [os.fsdecode(path) for meta, _, path in pairs if not meta.startswith(b"160000")]
     if not paths:
         raise SubmissionError(

@@ -11,6 +11,7 @@ from grader.wording import first_few
 
 MAX_NAME = 100
 LONGEST_PACKAGE_NAME = 255
+# letters that Unicode does not take apart into a plain one and an accent
 _LETTERS = str.maketrans(
     {"ß": "ss", "æ": "ae", "Æ": "AE", "ø": "o", "Ø": "O", "œ": "oe", "Œ": "OE", "ł": "l", "Ł": "L"}
     | {"đ": "d", "Đ": "D", "ð": "d", "þ": "th", "\N{LATIN SMALL LETTER DOTLESS I}": "i"}
@@ -35,12 +36,13 @@ def safe_name(text: str) -> str:
     if not lost and len(name) <= MAX_NAME:
         return name or "submission"
     digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:8]
+    # nine less, for a hyphen and eight digits of the hash
     return f"{name[: MAX_NAME - 9].rstrip('.-') or 'submission'}-{digest}"
 
 
 @lru_cache(maxsize=20_000)
 def folder_key(name: str) -> str:
-    """What two names of the same folder have in common: some file systems take `A` for `a`."""
+    """Return what two names of the same folder have in common: some file systems take `A` for `a`."""
     return safe_name(name).casefold()
 
 
@@ -52,6 +54,7 @@ def printable(text: str) -> str:
 
 def brief(text: str) -> str:
     """Return `text` as `printable` shows it, cut in the middle where it is too long for a message."""
+    # cut before it is escaped, so that a name of megabytes costs nothing
     shown = printable(
         text[: _SHOWN_LETTERS * 2] + text[-_SHOWN_LETTERS:] if len(text) > 3 * _SHOWN_LETTERS else text
     )

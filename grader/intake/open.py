@@ -126,6 +126,7 @@ def open_recording(source: str | Source, *, submission_id: str | None = None) ->
     """
     parsed = _parse(source)
     try:
+        # any file is taken for an archive until it is read
         if parsed.kind != "archive" or parsed.path is None or not is_recording(parsed.path):
             return None
         submission = _one_recording(parsed, parsed.path)
@@ -177,7 +178,7 @@ def unreadable(given: str, error: OSError) -> GraderError:
 
 @contextmanager
 def new_folder(workdir: Path) -> Iterator[Path]:
-    """A new folder in `workdir`, of which nothing stays after an error."""
+    """Make a new folder in `workdir` for the block; nothing of it stays after an error. Raises OutputError."""
     try:
         workdir.mkdir(parents=True, exist_ok=True)
         folder = Path(tempfile.mkdtemp(prefix="source-", dir=workdir)).resolve()
@@ -194,7 +195,7 @@ def new_folder(workdir: Path) -> Iterator[Path]:
 
 @contextmanager
 def _base(workdir: Path) -> Iterator[Path]:
-    """A new folder, which stays where something was unpacked in it."""
+    """Make a new folder in `workdir` for the block. It stays if something was unpacked in it."""
     with new_folder(workdir) as base:
         yield base
     if not (base / "tree").exists():
@@ -202,7 +203,7 @@ def _base(workdir: Path) -> Iterator[Path]:
 
 
 def open_source(source: Source, git: Git, base: Path, limits: IntakeLimits) -> Opened:
-    """What `source` stands for, on disk. New folders are made below `base`, under the source's own name."""
+    """Return what `source` stands for, on disk. New folders are made below `base`, under the source's own name."""
     into = base / "tree" / safe_name(source.name)
     opened = Opened(source=source, name=source.name, root=into, leave_out=base)
     if source.kind == "repository":
@@ -252,6 +253,8 @@ def _locate(opened: Opened, wanted: WantedPackage) -> Located | None:
     chosen: dict[str, Choice] = {}
     for one in wanted.each:
         name, taken = one.asked or one.name, {choice.package.folder for choice in chosen.values()}
+        # a package that the manifest calls by another of the lab's names is that one, whatever its folder
+        # is called
         names = {other.asked or other.name for other in wanted.each if other is not one}
         free = [c for c in candidates if c.manifest not in names and c.folder not in taken]
         choice = choose_package(free, one)
@@ -259,6 +262,8 @@ def _locate(opened: Opened, wanted: WantedPackage) -> Located | None:
             choice = Choice(
                 package=linked, hints=(f"{printable(name)} is a link, followed to {printable(linked.path)}",)
             )
+        # only without the main package there is nothing to grade; criteria say which of the others is
+        # missing
         if choice is None and one is wanted:
             return None
         if choice is not None:
@@ -327,7 +332,7 @@ def _digest_of_all(digest: str, also: Mapping[str, _Read]) -> str:
 
 
 def _commit(opened: Opened, chosen: Candidate, modes: Modes, repositories: Repositories) -> str | None:
-    """A folder that merely lies somewhere in a repository, untracked, is not of that repository's commit."""
+    """Return the commit of the chosen package; None for a folder that merely lies in a repository, untracked."""
     if not opened.in_place:
         return opened.commit
     is_top = is_there(opened.root / ".git") or is_there(chosen.folder / ".git")
@@ -345,7 +350,7 @@ def _modes(opened: Opened, candidate: Candidate, entries: list[Entry], repositor
 def _others(
     opened: Opened, candidates: list[Candidate], repositories: Repositories, limits: IntakeLimits
 ) -> Iterator[SourcePackage]:
-    """The neighbours, but for those that are too much: nothing of theirs costs the lab's package anything."""
+    """Yield the neighbours but for those that are too much: nothing of theirs costs the lab's package anything."""
     for candidate in candidates:
         try:
             content = package_content(
@@ -365,7 +370,7 @@ def _right_in_git(opened: Opened, chosen: Candidate, content: Content, git: Git)
 def _package(
     candidate: Candidate, modes: Modes, content: Content, right: frozenset[str] = frozenset()
 ) -> SourcePackage:
-    """A name that is not UTF-8 fits no record; the digest counts its file all the same."""
+    """Return the record of a package. A name that is not UTF-8 fits none; the digest counts its file all the same."""
     return SourcePackage(
         name=candidate.name,
         folder=candidate.folder,
@@ -443,8 +448,10 @@ def find_recordings(root: Path, pattern: str) -> list[Path]:
         folder.folders[:] = [n for n in folder.folders if n not in NO_CONTENT and not n.startswith(".")]
         names = [entry.name for entry in folder.others if entry.is_file(follow_symlinks=False)]
         found += [root / path for path in map(folder.inside, names) if _fits(path, wanted)]
+    # files that are too large are refused later, and their digests would take long
     if len(found) < 2 or any(path.stat().st_size > IntakeLimits().recording_bytes for path in found):
         return found
+    # of equal contents, a dict keeps the last one: reversed, it is the nearest; then in order again
     return list({file_digest(path).hexdigest(): path for path in reversed(found)}.values())[::-1]
 
 

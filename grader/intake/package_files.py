@@ -61,6 +61,7 @@ def package_content(
         _refuse_closed(closed)
     large = _too_large(own, limits)
     others = [e.path for e in entries if e.kind == "other"]
+    # what a build left counts for nothing, but no giant among it is read either
     giants = (e.path for e in files if e.size_bytes > limits.file_bytes)
     left_out = frozenset((*closed, *large, *others, *giants))
     return Content(entries=entries, left_out=left_out, hints=tuple(_hints(closed, large, others)))
@@ -76,7 +77,7 @@ def _refuse_closed(paths: Iterable[str]) -> None:
 
 
 def _too_large(files: list[Entry], limits: IntakeLimits) -> list[str]:
-    """Each that is too large by itself, then the largest, until the rest is no more than a package may be."""
+    """Return each that is too large by itself, then the largest, until the rest is no more than a package may be."""
     total = sum(e.size_bytes for e in files)
     found = []
     for entry in sorted(files, key=lambda e: e.size_bytes, reverse=True):
@@ -177,8 +178,8 @@ def archive_modes(entries: Iterable[Entry], known: Mapping[str, bool | None], *,
 
 
 def folder_modes(entries: Iterable[Entry], folder: Path, repositories: Repositories) -> Modes:
-    """git's word where the folder has tracked files, the disk's for the rest and where there is no git. No one's where
-    the disk knows no modes."""
+    """Return the modes of a folder's files: git's word where it has tracked files, the disk's for the rest and where
+    there is no git. They are unknown where the disk knows no modes."""
     on_disk = {e.path: e.executable if MODES_ON_DISK else None for e in entries if e.kind == "file"}
     index, hints = _index(folder, repositories)
     tracked = {path: bit for path, bit in index.items() if path in on_disk}
@@ -201,7 +202,7 @@ def uploaded_modes(modes: Modes, given: GivenModes) -> Modes:
 
 
 def _index(folder: Path, repositories: Repositories) -> tuple[dict[str, bool], tuple[str, ...]]:
-    """The tracked files below the folder with git's executable bit, and a hint where git cannot be asked."""
+    """Return the tracked files below the folder with git's executable bit, and a hint where git cannot be asked."""
     try:
         repository = repositories.around(folder)
         return ({}, ()) if repository is None else (_tracked_modes(folder, repository, repositories.git), ())
@@ -220,6 +221,7 @@ def _tracked_modes(folder: Path, repository: Repository, git: Git) -> dict[str, 
     with closing(git.records(*listing_args, cwd=folder, repository=repository)) as records:
         for record in records:
             meta, _, path = record.partition(b"\t")
+            # 160000 is the mode of a pointer to a submodule's commit, of which nothing is here
             if not meta.startswith(b"160000"):
                 index[os.fsdecode(path)] = meta.startswith(b"100755")
             if len(index) > _MAX_TRACKED:
@@ -228,7 +230,7 @@ def _tracked_modes(folder: Path, repository: Repository, git: Git) -> dict[str, 
 
 
 def is_script(folder: Path, path: str) -> bool:
-    """Hints are for scripts of the student's own: on a disk of Windows every file is executable."""
+    """Return whether a hint on its bit is for the student: it is a script, and no copy that a build or a tool made."""
     if any(part in BUILD_SPACES or part.startswith((".", "__")) for part in path.split("/")[:-1]):
         return False
     if path.endswith(_SCRIPTS):
@@ -280,6 +282,7 @@ def right_in_git(folder: Path, entries: Iterable[Entry], git: Git, base: Path) -
     except (GitFailed, Unfit, OSError):
         return frozenset()
     pairs = (record.partition(b"\t") for record in said.split(b"\0") if record)
+    # `i/` is the index; `w/`, which is the disk, follows
     return frozenset(os.fsdecode(path) for about, _, path in pairs if about.split()[:1] == [b"i/lf"])
 
 

@@ -77,6 +77,7 @@ def clone(source: Source, git: Git, into: Path, limits: IntakeLimits) -> Clone:
     except GitFailed as failure:
         raise explained(failure, source) from None
     root = into / source.inside
+    # a folder in a commit may be a link that leads out
     if not root.is_dir() or not root.resolve().is_relative_to(into.resolve()):
         raise SubmissionError(
             f"{source.given}: there is no folder {source.inside} in that commit",
@@ -92,7 +93,8 @@ def clone(source: Source, git: Git, into: Path, limits: IntakeLimits) -> Clone:
 
 
 def served(source: Source, git: Git, view: Path) -> Source:
-    """A repository on this machine is served by its data alone: its settings could make git run programs."""
+    """Return the source with the address of a view of its data, if it is on this machine. Its settings are left out, as
+    they could make git run programs. Raises SubmissionError where it cannot be read."""
     if source.top is None:
         return source
     bare = not (source.top / ".git").exists() or source.top.name == ".git"
@@ -117,8 +119,10 @@ def _hints(wanted: WantedRevision, files: _Files) -> Iterator[str]:
 
 
 def _remote_refs(source: Source, git: Git, into: Path) -> dict[str, str]:
-    """Asked from inside the new repository: the folder one happens to stand in has settings of its own."""
+    """Return the server's refs. They are asked for from inside the new repository, since the folder in which the user
+    stands may be one with settings of its own."""
     into.mkdir(parents=True)
+    # without a template, which may bring hooks along
     git.run("init", "--quiet", "--template=", ".", cwd=into)
     listed = _ask(source, git, into, ("ls-remote", "--quiet"))
     refs = parse_refs(os.fsdecode(listed))
@@ -130,7 +134,7 @@ def _remote_refs(source: Source, git: Git, into: Path) -> dict[str, str]:
 
 
 def _fetch(source: Source, git: Git, into: Path, refs: dict[str, str], wanted: WantedRevision) -> str:
-    """The full hash of the commit, fetched alone where the server can do that, with all history if not."""
+    """Return the commit's full hash. It is fetched alone where the server can do that, with all history if not."""
     whole_hash = wanted.commit if wanted.commit and len(wanted.commit) in _FULL_HASHES else None
     one = wanted.refspec or whole_hash
     if one:
@@ -177,12 +181,13 @@ def ask(source: Source, git: Git, repository: Repository, command: tuple[str, ..
 
 
 def _commit_of(git: Git, into: Path, name: str) -> str:
+    # `^{commit}` makes of a tag the commit that it stands for
     args = ("rev-parse", "--verify", "--quiet", f"{name}^{{commit}}")
     return git.run(*args, cwd=into, repository=_own(into)).decode().strip()
 
 
 def _measure_files(source: Source, git: Git, into: Path, commit: str, limits: IntakeLimits) -> _Files:
-    """Counts the commit's files before they are written: a few objects can stand for any number of them."""
+    """Count the commit's files before they are written: a few objects can stand for any number of them."""
     meter = Meter(limits, name=source.given)
     git_links, left_out = [], []
     args = ("ls-tree", "-r", "-l", "-z", commit)
@@ -206,7 +211,7 @@ def _measure_files(source: Source, git: Git, into: Path, commit: str, limits: In
 
 
 def _checkout(source: Source, git: Git, into: Path, commit: str, files: _Files) -> None:
-    """Writes the files, but for those left out, as git itself can be told to."""
+    """Write the files, but for those left out, as git itself can be told to."""
     info = into / ".git" / "info"
     info.mkdir(exist_ok=True)
     (info / "attributes").write_text(_ATTRIBUTES, encoding="utf-8")
@@ -218,6 +223,7 @@ def _checkout(source: Source, git: Git, into: Path, commit: str, files: _Files) 
                 f"{source.given}: {brief(files.left_out[0])} is too large",
                 hint="Take it out of the repository.",
             )
+        # these lines are patterns, as in .gitignore
         lines = ["/*", *("!/" + re.sub(r"([\\*?\[\] ])", r"\\\1", path) for path in files.left_out)]
         (info / "sparse-checkout").write_bytes(os.fsencode("\n".join(lines) + "\n"))
         sparse = ("-c", "core.sparseCheckout=true")
@@ -234,7 +240,7 @@ class WantedRevision:
 
 
 def parse_refs(text: str) -> dict[str, str]:
-    """`git ls-remote`'s lines as ref to hash; `v1^{}` is the commit that the tag `v1` stands for."""
+    """Parse `git ls-remote`'s lines into ref to hash; `v1^{}` is the commit that the tag `v1` stands for."""
     pairs = (line.split("\t", 1) for line in text.splitlines() if "\t" in line)
     return {ref: commit for commit, ref in pairs}
 
@@ -288,6 +294,7 @@ def _by_hash(refs: dict[str, str], commit: str) -> WantedRevision:
     if len(commit) >= _TELLING_HASH:
         for name, tip in refs.items():
             if tip.startswith(commit):
+                # a server lists `v1^{}`, but sends it by no other name than `v1`
                 return WantedRevision(refspec=name.removesuffix("^{}"))
     return WantedRevision(commit=commit)
 

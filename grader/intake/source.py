@@ -27,6 +27,7 @@ _SCP = re.compile(
     r"(?P<host>(?:[\w.+-]+@)?(?:[\w.-]{2,}|\[[0-9a-fA-F:.]+\])):(?P<path>(?!:|//).+)", re.DOTALL
 )
 _HOST_AND_PATH = re.compile(r"(www\.|[\w-]+\.(com|org|edu|net|io|ac\.uk)/)")
+# what `git check-ref-format` refuses; a leading hyphen would be an option
 _NO_REF = re.compile(r"[\x00-\x20~^:?*\[\\\x7f]|\.\.|@\{|//|^[/-]|[/.]$")
 _SOURCES = "Give a folder, a .zip or .tar.gz, or a git URL with an optional @branch, @tag or @commit."
 
@@ -55,7 +56,7 @@ class Source:
 
 
 def parse_source(text: str) -> Source:
-    """SOURCE, read. A path that exists wins over every other reading of the same text.
+    """Parse SOURCE. A path that exists wins over every other reading of the same text.
 
     Raises UsageError for what is neither there nor a git URL, SubmissionError for what cannot be a source.
     """
@@ -69,6 +70,7 @@ def parse_source(text: str) -> Source:
     if match := _URL.fullmatch(text):
         return _from_url(text, match)
     splits = list(_splits(text))
+    # before the form `user@host:path`: what lies on this machine is meant by that
     for left, ref in splits:
         if _is_ref(ref) and (found := _existing(left)):
             return _local(found, ref, text)
@@ -108,7 +110,7 @@ def with_ref(source: Source, ref: str | None) -> Source:
 
 
 def as_repository(source: Source) -> Source:
-    """A folder that is a repository at its top, as what is committed there. Raises SubmissionError for another."""
+    """Return a folder that is a repository at its top as what is committed there. Raises SubmissionError otherwise."""
     assert source.path is not None  # noqa: S101 - folders have one
     return _local_repository(source.path, None, source.given)
 
@@ -123,7 +125,7 @@ def _existing(text: str) -> Path | None:
 
 
 def _splits(text: str) -> list[tuple[str, str]]:
-    """Every way to cut `text` in two at an `@`, the longest left side first."""
+    """Return every way to cut `text` in two at an `@`, the longest left side first."""
     cuts = [match.start() for match in re.finditer("@", text)]
     return [(text[:cut], text[cut + 1 :]) for cut in reversed(cuts)]
 
@@ -174,7 +176,7 @@ def _local_repository(path: Path, ref: str | None, given: str) -> Source:
 
 
 def _is_git_folder(path: Path) -> bool:
-    """A bare repository, or the `.git` of one that is not."""
+    """Return whether it is a bare repository, or the `.git` of one that is not."""
     return is_file(path / "HEAD") and is_there(path / "objects") and is_there(path / "refs")
 
 
@@ -205,6 +207,7 @@ def _from_url(text: str, match: re.Match[str]) -> Source:
 
 
 def _from_file_url(path: str, text: str) -> Source:
+    # as it stands first: a folder's name may have a `%` in it
     for candidate in dict.fromkeys((path, unquote(path))):
         whole: list[tuple[str, str | None]] = [(candidate, None)]
         for left, ref in whole + [(left, ref) for left, ref in _splits(candidate) if _is_ref(ref)]:
@@ -227,6 +230,7 @@ def _split_remote(path: str) -> tuple[str, str | None]:
     """Return the path of a remote repository and its ref. An `@` that begins a folder's name (`/@user/`) is none."""
     if path.rstrip("/").endswith(".git"):
         return path, None
+    # after `.git` an `@` is sure to begin the ref; elsewhere the first is taken that ends a folder's name
     cut = path.find(".git@") + 4 if ".git@" in path else -1
     if cut < 0:
         cut = next((at.start() for at in re.finditer(r"(?<=[^/])@", path)), -1)
@@ -244,7 +248,7 @@ def _last(path: str) -> str:
 
 
 def _without_password(scheme: str, authority: str) -> str:
-    """A token may stand in the place of the user of a web address, so nothing of that part is shown."""
+    """Return the server as it may be shown: of a web address without the user, in whose place a token may stand."""
     user, at, host = authority.rpartition("@")
     return host if scheme in ("http", "https") else f"{user.partition(':')[0]}{at}{host}"
 
@@ -258,6 +262,7 @@ def identify(source: str | Source, submission_id: str | None = None) -> tuple[st
         name, given = parsed.name, parsed.given
     except UsageError:
         return None
+    # it is meant as a source, and its result says what is wrong with it
     except (GraderError, OSError, ValueError):
         name, given = archive_stem(PurePath(source).name), printable(without_password(source))
     return safe_name(submission_id if submission_id is not None else name), given

@@ -123,6 +123,7 @@ def list_entries(
             if name not in NO_CONTENT and root / folder.inside(name) != leave_out
         ]
         found += [_entry(folder, other) for other in folder.others if other.name not in NO_CONTENT]
+    # by bytes, since a name need not be UTF-8; the digest depends on this order
     return sorted(found, key=lambda entry: os.fsencode(entry.path))
 
 
@@ -175,7 +176,8 @@ def tree_digest(
     executable: Mapping[str, bool | None],
     left_out: Collection[str] = frozenset(),
 ) -> str:
-    """sha256 over the entries' paths, executable bits, link targets and contents; of what is left out, the size.
+    """Return the sha256 over the entries' paths, executable bits, link targets and contents; of what is left out, its
+    size.
 
     Raises OSError for a file that cannot be read.
     """
@@ -191,7 +193,7 @@ def tree_digest(
 
 
 def _content(path: Path, entry: Entry) -> bytes:
-    """A file stands for its sha256. Nothing but files is opened: a pipe would never end."""
+    """Return what an entry adds to the digest: a file its sha256. Only files are opened: a pipe would never end."""
     if entry.kind == "link":
         return os.fsencode(path.readlink())
     if entry.kind == "other":

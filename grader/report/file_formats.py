@@ -156,14 +156,14 @@ def schema_of(name: str) -> Schema:
 
 
 def records_in(name: str, schema: Schema) -> Iterator[tuple[str, Schema]]:
-    """Every record that the schema of a format describes, by its name; first that of the file itself, if it is one."""
+    """Yield every record that a format's schema describes, by its name; first that of the file itself, if it is one."""
     if name in ROOTS:
         yield ROOTS[name].__name__, schema
     yield from schema.get("$defs", {}).items()
 
 
 def _describe(record: str, schema: Schema, about: Format) -> None:
-    """Each key's own text; what graders write may have more keys than a reader knows."""
+    """Add each key's own text; what graders write may have more keys than a reader knows."""
     if about.by == "grader" and schema.get("additionalProperties") is False:
         del schema["additionalProperties"]
     texts = field_docstrings(_RECORDS[record]) if record in _RECORDS else {}
@@ -185,7 +185,7 @@ def _of(record: type[Record]) -> Callable[[], Schema]:
 
 
 def _evidence() -> Schema:
-    """All JSON channels in one: their records have no name in common that means something else."""
+    """Return all JSON channels in one: their records have no name in common that means something else."""
     definitions: Schema = {}
     channels: Schema = {}
     records: Mapping[str, type[Record]] = {**TOPICS, PACKAGE_TOPIC: PackageFacts}
@@ -206,7 +206,7 @@ def _evidence() -> Schema:
 
 
 def _overrides() -> Schema:
-    """The file is a map, not a record. What may be left out may be left empty, too."""
+    """Return the schema of a map, which the file is. What may be left out may be left empty, too."""
     override = _with_empty(
         WrittenOverride, ("comment", "author", "comments", "answer", "answered", "together")
     )
@@ -215,7 +215,7 @@ def _overrides() -> Schema:
 
 
 def _comments() -> Schema:
-    """It is such a map, too."""
+    """Return the schema of such a map of comments."""
     says = "Comments that are used again and again: by criterion, then by id."
     return _two_levels("comments", says, _with_empty(BankComment, ()))
 

@@ -27,7 +27,7 @@ def result_bytes(result: GradingResult) -> bytes:
 
 
 def result_text(result: GradingResult, *, ascii_only: bool = False) -> str:
-    """`notes`, `overrides`, `handed_in`, `late`, `standing` and `error` are there only where there are any.
+    """Return the file's text. `notes`, `overrides`, `handed_in`, `late`, `standing` and `error` are there if not empty.
 
     What a person wrote is bounded by its record and stays whole: a later grading compares it. Criteria are written as
     `judging.summary.criteria_bytes` writes them.
@@ -37,6 +37,7 @@ def result_text(result: GradingResult, *, ascii_only: bool = False) -> str:
         if not data[name]:
             del data[name]
     data = clipped(data, text_limit(len(result.criteria), LIMIT))
+    # put back whole, after all texts have been cut
     for written, override in zip(data.get("overrides", ()), result.overrides, strict=False):
         written |= {"comment": override.comment, "author": override.author}
     return json_text(data, ascii_only=ascii_only)

@@ -64,7 +64,7 @@ class Finding:
 
 
 def findings(result: GradingResult, prefix: str = "") -> tuple[Finding, ...]:
-    """What was not reached, by its cost. `prefix` is the package's folder, relative to the repository's root.
+    """Return what was not reached, by its cost. `prefix` is the package's folder, relative to the repository's root.
 
     What could not be judged, and what another criterion explains, is none.
     """
@@ -106,7 +106,7 @@ def _severity(criterion: CriterionResult) -> Severity:
 
 
 def repository_path(prefix: str, file: str) -> str:
-    """`file` of the package in `prefix`, with `/` and without detours; empty where it is not inside.
+    """Return the path of the package's `file` with `/` and without detours; empty where it is not in the repository.
 
     Another of the lab's packages may lie beside that one: `../lab_msgs/package.xml`.
     """
@@ -120,6 +120,7 @@ def repository_path(prefix: str, file: str) -> str:
 EACH_MAX = 10
 """So many of each kind GitHub shows of one step."""
 TEXT_CHARS = 1000
+# as GitHub's own toolkit escapes them; a property ends at `,` or `:`
 _DATA = str.maketrans({"%": "%25", "\r": "%0D", "\n": "%0A"})
 _PROPERTY = str.maketrans({"%": "%25", "\r": "%0D", "\n": "%0A", ":": "%3A", ",": "%2C"})
 
@@ -178,7 +179,7 @@ SEVERITIES = {Severity.ERROR: "major", Severity.WARNING: "minor", Severity.NOTIC
 
 
 def render_code_quality(result: GradingResult, prefix: str = "") -> str:
-    """JSON, a list; empty where nothing was lost at a line. `prefix` is the package's folder in the repository."""
+    """Return JSON, a list; empty where nothing was lost at a line. `prefix` is the package's folder there."""
     return json_text([_issue(finding) for finding in findings(result, prefix) if finding.places])
 
 
@@ -205,7 +206,7 @@ Docs = Mapping[str, Mapping[str, str]]
 
 
 def render_sarif(result: GradingResult, prefix: str = "", *, docs: Docs | None = None) -> str:
-    """JSON, one run. `prefix` is the package's folder in the repository, `docs` what the rules' help is made of."""
+    """Return JSON, one run. `prefix` is the package's folder in the repository, `docs` what the rules' help says."""
     found = [finding for finding in findings(result, prefix) if finding.places]
     checks = list(dict.fromkeys(finding.criterion.check for finding in found))
     driver = {
@@ -251,5 +252,5 @@ def _location(place: SourceLine) -> dict[str, object]:
 
 
 def _escape_links(text: str) -> str:
-    """SARIF's own links, `[text](target)`, are escaped; brackets that make none stay as they are."""
+    """Return the text with SARIF's own links, `[text](target)`, escaped; other brackets stay as they are."""
     return text.replace("[", "\\[").replace("]", "\\]") if "](" in text else text

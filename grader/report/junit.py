@@ -70,6 +70,7 @@ class _Writer:
         self, criterion: CriterionResult, rubric_id: str, override: AppliedOverride | None
     ) -> etree._Element:
         cited = next((c for c in criterion.citations if isinstance(c, FileCitation)), None)
+        # the schema asks for a time, and a criterion has none
         attributes = {"classname": self._text(rubric_id), "name": self._text(criterion.id), "time": "0"}
         file = self._file(cited) if cited is not None else ""
         if cited is not None and file:
@@ -105,7 +106,7 @@ class _Writer:
         return "\n".join([self._text(criterion.message), self._lines(rows)]).rstrip("\n")
 
     def _lines(self, rows: dict[str, str]) -> str:
-        """`measured: 5 Hz`, a line each."""
+        """Return `measured: 5 Hz`, a line each."""
         return "\n".join(f"{name}: {self._text(value)}" for name, value in rows.items() if value)
 
     def _notes_text(self, notes: tuple[Note, ...]) -> str:

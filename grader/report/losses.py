@@ -51,8 +51,8 @@ class ReportView:
 
 
 def arrange(result: GradingResult, rubric: Rubric | None = None) -> ReportView:
-    """Losses by their cost, the rubric's order where they cost the same. Results of earlier graders need the `rubric`:
-    they do not say what blocked a criterion."""
+    """Return losses by their cost, in the rubric's order if they cost the same. Results of earlier graders need the
+    `rubric`: they do not say what blocked a criterion."""
     unreached = [c for c in result.criteria if c.status is not Status.PASS]
     roots = {c.id: root_of(c, result, rubric) for c in unreached}
     causes = {root for name, root in roots.items() if root != name}
@@ -60,6 +60,7 @@ def arrange(result: GradingResult, rubric: Rubric | None = None) -> ReportView:
     losses = [
         Loss(criterion=c, blocked=tuple(b for b in unreached if b is not c and roots[b.id] == c.id))
         for c in unreached
+        # what others come down to, and what comes down to nothing else and costs points, or may
         if c.id in causes or (roots[c.id] == c.id and (c.is_required or (c.counts and c.status.is_open)))
     ]
     losses.sort(key=lambda loss: -loss.points)
@@ -77,8 +78,9 @@ def arrange(result: GradingResult, rubric: Rubric | None = None) -> ReportView:
 
 
 def _told_once(losses: list[Loss]) -> tuple[Loss, ...]:
-    """One entry for all that one mistake costs: those with the same advice for the same line, or else in the same
-    words, and those of the same repairs. What costs most in all comes first."""
+    """Return one entry for all that one mistake costs: those with the same advice for the same line, or else in the
+    same words, and those of the same repairs. What costs most in all comes first."""
+    # the first of a group stands for it: the criterion that asks for what was repaired
     asked_first = sorted(
         losses, key=lambda loss: not (loss.criterion.repaired and loss.criterion.repaired.charged)
     )
@@ -141,14 +143,15 @@ def _joined(criterion: CriterionResult, scripts: Sequence[CriterionResult]) -> C
 
 
 def without_bit(paths: Sequence[str]) -> str:
-    """`src/a.py and src/b.py are not executable`."""
+    """Return `src/a.py and src/b.py are not executable`."""
     return f"{join_words(paths)} {'are' if len(paths) > 1 else 'is'} not executable"
 
 
 def _mistake(loss: Loss, charged: Mapping[Repair, tuple[Repair, ...]]) -> Hashable:
-    """`charged` says of a repair with which others it is charged."""
+    """Return what the same mistakes have in common. `charged` says of a repair with which others it is charged."""
     criterion = loss.criterion
     if missing_file(criterion):
+        # the same for all missing files, which are one entry
         return missing_file
     used = criterion.repaired
     if used is not None and (used.charged or criterion.points >= used.share * criterion.full - POINTS_EQUAL):
@@ -157,6 +160,7 @@ def _mistake(loss: Loss, charged: Mapping[Repair, tuple[Repair, ...]]) -> Hashab
     lines = tuple(c for c in criterion.citations if isinstance(c, FileCitation) and c.line is not None)
     if not criterion.hint:
         return criterion.id
+    # one mistake may be told with other numbers in each run
     said = NUMBERS.sub("", ON_COPY.sub("", criterion.message))
     if said.startswith("/"):  # how a topic behaves: of two topics, one loop is the reason
         said = NAMES.sub("", said)
@@ -201,7 +205,7 @@ def _fold(
     losses: list[Loss],
     key: Callable[[Loss], Hashable] = lambda loss: (loss.criterion.status, loss.criterion.hint),
 ) -> tuple[Loss, ...]:
-    """One entry for all that have the same key."""
+    """Return one entry for all that have the same key."""
     groups: dict[Hashable, list[Loss]] = {}
     for loss in losses:
         groups.setdefault(key(loss), []).append(loss)
@@ -216,11 +220,12 @@ def _fold(
 
 
 def root_of(criterion: CriterionResult, result: GradingResult, rubric: Rubric | None) -> str:
-    """The id of the criterion that a blocked one comes down to; its own id for any other."""
+    """Return the id of the criterion that a blocked one comes down to; its own id for any other."""
     by_id = {c.id: c for c in result.criteria}
     if criterion.blocked_by in by_id:
         return criterion.blocked_by
     requires = {c.id: c.requires for c in rubric.criteria} if rubric else {}
+    # a rubric that was changed since may lead in a circle
     seen = {criterion.id}
     while criterion.status is Status.BLOCKED:
         unmet = [by_id[i] for i in requires.get(criterion.id, ()) if i in by_id and i not in seen]

@@ -53,8 +53,8 @@ def render_markdown(
     figures: Figures | None = None,
     changes: tuple[str, ...] = (),
 ) -> str:
-    """The report as GitHub's and GitLab's Markdown, at most 60 kB. `hidden` is how many criteria are left out of it,
-    `changes` what has changed since it was first published.
+    """Return the report as GitHub's and GitLab's Markdown, at most 60 kB. `hidden` is how many criteria are left out of
+    it, `changes` what has changed since it was first published.
 
     Of a result with very long texts, less is said of each, and in the end the details are left out.
     """
@@ -75,7 +75,7 @@ def render_markdown(
 
 
 def _why_lost(loss: Loss) -> str:
-    """In a sentence; of several files that are not there, all of them."""
+    """Return why, in a sentence; of several files that are not there, all of them."""
     paths = list(dict.fromkeys(file.path for file in missing_files(loss)))
     if len(paths) > 1:
         return f"{len(paths)} files are not in the package: {join_words(paths)}"
@@ -173,7 +173,7 @@ class _Writer:
         yield ""
 
     def _list_losses(self, title: str, losses: tuple[Loss, ...]) -> Iterator[str]:
-        """A line each: what it is, what it cost, why."""
+        """Yield a line each: what it is, what it cost, why."""
         if not losses:
             return
         yield from (f"## {title}", "")
@@ -213,7 +213,7 @@ class _Writer:
             yield f"- Where: {', '.join(self._code(cited) for cited in places(criterion))}"
 
     def _files(self, files: Sequence[MissingFile]) -> Iterator[str]:
-        """Several files that are not there, each with what it costs and what has to be in it."""
+        """Yield several files that are not there, each with what it costs and what has to be in it."""
         for one in files:
             words = "; ".join(filter(None, [one.holds, one.says]))
             cost = f"{self._code(one.criterion.id)} {points_of(one.criterion)}"
@@ -246,7 +246,7 @@ class _Writer:
         yield ""
 
     def _graphs(self, graphs: dict[str, GraphFigure]) -> Iterator[str]:
-        """Runs in which the same was seen share their picture."""
+        """Yield the pictures; runs in which the same was seen share one."""
         seen: dict[str, list[str]] = {}
         for name, graph in graphs.items():
             if graph.nodes or graph.topics:
@@ -282,7 +282,7 @@ class _Writer:
         )
 
     def _fold(self, title: str, rows: Iterable[str]) -> Iterator[str]:
-        """What is shown when someone opens it. The empty lines make Markdown of what is inside."""
+        """Yield what is shown when someone opens it. The empty lines make Markdown of what is inside."""
         inside = list(rows)
         if inside:
             yield from ("<details>", f"<summary>{title}</summary>", "", *inside, "</details>", "")
@@ -337,4 +337,5 @@ def _rows(graph: GraphFigure) -> Iterator[str]:
 def _label(name: str) -> str:
     shown = line(name, NAME_CHARS) or "?"
     plain = {match.start() for match in _PLAIN.finditer(shown)}
+    # mermaid's way to write any character
     return "".join(c if i in plain else f"#{ord(c)};" for i, c in enumerate(shown))

@@ -44,6 +44,7 @@ def render_classroom(result: GradingResult, rubric: Rubric, *, passed: bool, pre
     """
     text = ""
     for limit in LIMITS:
+        # ASCII, so that a character is a byte
         text = json.dumps(_document(result, rubric, passed, prefix, limit), ensure_ascii=True)
         if len(text) <= JSON_BYTES_MAX:
             break
@@ -104,7 +105,7 @@ def _criterion(criterion: CriterionResult, prefix: str, limit: int) -> dict[str,
 
 
 def _message(criterion: CriterionResult, limit: int) -> str:
-    """The reporter prints it for errors alone, without the name."""
+    """Return a message. The reporter prints it for errors alone, without the name."""
     words = line(criterion.message, limit) if limit else ""
     if not criterion.status.is_open:
         return words
@@ -113,7 +114,7 @@ def _message(criterion: CriterionResult, limit: int) -> str:
 
 
 def _test_code(criterion: CriterionResult, limit: int) -> Iterator[str]:
-    """Below a test that has not passed the reporter prints what stands in the place of its code."""
+    """Yield what the reporter prints below a test that has not passed: what stands in the place of its code."""
     if criterion.status is Status.PASS or not limit:
         return
     points = f"{of_points(criterion)} points"
@@ -131,7 +132,7 @@ def _test(name: str, *, status: str, points: float, **more: object) -> dict[str,
 
 
 def _adding_up(scores: Sequence[float], total: float) -> list[float]:
-    """The scores, or such as hardly differ, whose sum by floating point, one after the other, is `total` and not
+    """Return the scores, or such as hardly differ, whose sum by floating point, one after the other, is `total` and not
     72.30000000000001."""
     if _sum(scores) == total or not any(scores):
         return list(scores)
@@ -141,7 +142,7 @@ def _adding_up(scores: Sequence[float], total: float) -> list[float]:
 
 
 def _sum(scores: Sequence[float]) -> float:
-    """As JavaScript adds; Python's own `sum` compensates."""
+    """Return the sum as JavaScript adds; Python's own `sum` compensates."""
     total = 0.0
     for score in scores:
         total += score
@@ -155,7 +156,7 @@ LOOK = "A PERSON MUST LOOK"
 
 
 def render_gradescope(result: GradingResult, rubric: Rubric) -> str:
-    """JSON. Raises GraderError (exit code 3) where nothing could be judged: there must be no file then."""
+    """Return JSON. Raises GraderError (exit code 3) where nothing could be judged: there must be no file then."""
     counting = [c for c in result.criteria if c.counts]
     if all(c.status.is_open for c in counting) and not is_students_fault(result):
         why = result.error.message if result.error else "no criterion could be judged"
@@ -174,7 +175,7 @@ class _Writer:
         self._decided = {c.id: override for override, c in sentences.decided_criteria(result)}
 
     def document(self) -> dict[str, object]:
-        """Formats are said everywhere: Gradescope's own for the page would read HTML."""
+        """Return the file's data. Formats are said everywhere: Gradescope's own for the page would read HTML."""
         result = self._result
         return {
             "score": result.points,
@@ -189,7 +190,7 @@ class _Writer:
         }
 
     def _page(self) -> Iterator[str]:
-        """What everybody sees at once: nothing in it tells of hidden criteria more than their number."""
+        """Yield what everybody sees at once: nothing in it tells of hidden criteria more than their number."""
         result = self._result
         shown = [c for c in result.criteria if c.id not in self._hidden]
         if result.error is not None and result.status == "error":
@@ -214,6 +215,7 @@ class _Writer:
         waits = criterion.status.is_open
         name = f"{criterion.id}: {criterion.title}"
         return {
+            # without a score Gradescope counts nothing for it; 0 would look like a judgement
             **({} if waits else {"score": criterion.points, "max_score": criterion.max_points}),
             "status": "passed" if criterion.status is Status.PASS else "failed",
             "name": self._text(f"{LOOK}: {name} ({number(criterion.missing)} points)" if waits else name),

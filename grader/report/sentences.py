@@ -83,6 +83,7 @@ def _repair_words(repairs: list[Repair], criteria: list[CriterionResult]) -> str
         earned = "" if share == 1 else f", for {share:.0%} of the points"
         were = "was" if len(names) == 1 else "were"
         words += f"; {join_words(names)} {were} judged with this repaired{earned}"
+    # the name of a file keeps its letters
     return words if words.startswith(repairs[0].file) else f"{words[:1].upper()}{words[1:]}"
 
 
@@ -112,7 +113,7 @@ def judged_repaired(result: GradingResult) -> dict[str, list[str]]:
 
 
 def late_words(result: GradingResult) -> tuple[str, ...]:
-    """Lines that say what being late cost, when it was handed in, and which commit counts; none where no one asked."""
+    """Return what being late cost, when it was handed in, and which commit counts, a line each; none if none asked."""
     late, known = result.late, result.late or result.handed_in
     attempts = (attempt_words(result),)
     if known is None:
@@ -126,7 +127,7 @@ def late_words(result: GradingResult) -> tuple[str, ...]:
 
 
 def attempt_words(result: GradingResult) -> str:
-    """`Attempt 2 of 3 counts, the one with the most points: 60, 85, 70`; empty where there was one."""
+    """Return `Attempt 2 of 3 counts, the one with the most points: 60, 85, 70`; empty where there was one."""
     attempts = result.attempts
     if attempts is None or len(attempts.points) < 2:
         return ""
@@ -140,7 +141,7 @@ def attempt_words(result: GradingResult) -> str:
 
 
 def when_words(result: GradingResult) -> str:
-    """`In time`, or what being late cost; empty where nobody asked."""
+    """Return `In time`, or what being late cost; empty where nobody asked."""
     late, known = result.late, result.late or result.handed_in
     if known is None or known.deadline is None or known.at is None:
         return ""
@@ -148,6 +149,7 @@ def when_words(result: GradingResult) -> str:
 
 
 def _times(known: HandedIn) -> str:
+    # in the zone of the deadline, so that both can be compared
     zone = (known.deadline or known.at).tzinfo if known.at else None
     at = f"submitted {_time(known.at.astimezone(zone))} ({BY[known.by]})" if known.at else ""
     days = known.extension_days
@@ -160,15 +162,15 @@ def _times(known: HandedIn) -> str:
 
 
 def _time(time: datetime) -> str:
-    """`2026-11-20 23:59 UTC+01:00`; seconds only where there are any."""
+    """Return `2026-11-20 23:59 UTC+01:00`; seconds only where there are any."""
     clock = f"{time:%Y-%m-%d %H:%M:%S}".removesuffix(":00")
     offset = f"{time:%z}"
     return f"{clock} UTC" + (f"{offset[:3]}:{offset[3:5]}" if int(offset) else "")
 
 
 def decision(override: AppliedOverride) -> str:
-    """`by A. Miller, 2026-11-02: clear names`, as far as it is known; `with a note by …` where the points are the
-    check's."""
+    """Return `by A. Miller, 2026-11-02: clear names`, as far as it is known; `with a note by …` where the points are
+    the check's."""
     who = ", ".join(part for part in (override.author or "a person", str(override.date or "")) if part)
     answer = f"to your request: {override.answer}" if override.answer else ""
     said = "; ".join(text for text in (override.comment, answer) if text)
@@ -176,7 +178,7 @@ def decision(override: AppliedOverride) -> str:
 
 
 def automatic_words(override: AppliedOverride, criterion: CriterionResult) -> str:
-    """`0/10 (to fix): 5 Hz, not 10 Hz`; empty where that counts, or the points are a person's to award anyway."""
+    """Return `0/10 (to fix): 5 Hz, not 10 Hz`; empty if that counts, or the points are a person's to award anyway."""
     if override.automatic.status is Status.MANUAL or not override.awards:
         return ""
     message = override.automatic.message
@@ -184,7 +186,7 @@ def automatic_words(override: AppliedOverride, criterion: CriterionResult) -> st
 
 
 def look_again(override: AppliedOverride, criterion: CriterionResult) -> str:
-    """Why a person should look again; empty where the check says what it said then."""
+    """Return why a person should look again; empty where the check says what it said then."""
     if not override.changed:
         return ""
     now, then = _automatic_text(override.automatic, criterion), _automatic_text(override.was, criterion)
@@ -218,7 +220,7 @@ def missing_hidden(result: GradingResult, rubric: Rubric) -> int:
 
 
 def visible_words(result: GradingResult, hidden: int) -> str:
-    """`12 visible checks passed; 5 more run at grading.`; empty where nothing is `hidden`."""
+    """Return `12 visible checks passed; 5 more run at grading.`; empty where nothing is `hidden`."""
     if not hidden:
         return ""
     good, many = sum(c.status is Status.PASS for c in result.criteria), len(result.criteria)
@@ -228,8 +230,8 @@ def visible_words(result: GradingResult, hidden: int) -> str:
 
 
 def verdict_words(result: GradingResult, rubric: Rubric, hidden: int) -> str:
-    """`Passed.` or `Not passed yet.`; empty where that is not known, because something is open or `hidden`, and for
-    lost points where no pass mark says how many are enough."""
+    """Return `Passed.` or `Not passed yet.`; empty where that is not known, because something is open or `hidden`, and
+    for lost points where no pass mark says how many are enough."""
     if hidden or not_graded(result) or result.status != "graded":
         return ""
     if passed(rubric, result):
@@ -242,13 +244,13 @@ COSTS_NOTHING = "None of this cost any points."
 
 
 def note_place(note: Note) -> str:
-    """`build`, or the scenario's name; with the process or node, where it is known and has another name."""
+    """Return `build`, or the scenario's name; with the process or node, where it is known and has another name."""
     run = "build" if note.scenario == PACKAGE_RUN else note.scenario
     return f"{run}, {note.actor}" if note.actor and note.actor.strip("/") != run else run
 
 
 def note_text(note: Note) -> str:
-    """`asked the master to shut down (refused)`."""
+    """Return `asked the master to shut down (refused)`."""
     return f"{note.text} ({'refused' if note.kind == 'refused' else 'over the limit'})"
 
 
@@ -260,7 +262,7 @@ ASKED = "--sandbox none"
 
 
 def without_sandbox(label: str) -> str:
-    """Of `environment.sandbox`: the sentence, or nothing where there was a sandbox, or nothing was run."""
+    """Return the sentence on `environment.sandbox`; nothing where there was a sandbox, or nothing was run."""
     found = LABEL.fullmatch(label)
     if found is None:
         return ""
@@ -328,7 +330,7 @@ FAULTS = {
 
 
 def count_points(value: float) -> str:
-    """`1 point`, `2.5 points`."""
+    """Return `1 point`, `2.5 points`."""
     return plural(value, "point")
 
 
@@ -350,7 +352,7 @@ def verdict(result: GradingResult, rubric: Rubric, hidden: int, to_fix: int) -> 
 
 
 def pass_mark(result: GradingResult, rubric: Rubric, hidden: int) -> str:
-    """What it takes to pass; empty where the rubric has no pass mark."""
+    """Return what it takes to pass; empty where the rubric has no pass mark."""
     if rubric.pass_mark is None:
         return ""
     mark = f"To pass, you need {count_points(rubric.pass_mark)} of {number(rubric.max_points)}"
@@ -367,7 +369,7 @@ def pass_mark(result: GradingResult, rubric: Rubric, hidden: int) -> str:
 
 
 def in_short(result: GradingResult, view: ReportView) -> str:
-    """What was lost, in one or two sentences."""
+    """Return what was lost, in one or two sentences."""
     lost = sum(loss.points for loss in view.lost)
     if not_graded(result):
         return "Nothing could be judged."
@@ -393,7 +395,7 @@ def in_short(result: GradingResult, view: ReportView) -> str:
 
 
 def points_line(result: GradingResult, view: ReportView) -> str:
-    """`95 of 100 points`; `20 of 100 points so far, 80 not decided yet` where not all is settled."""
+    """Return `95 of 100 points`, or `20 of 100 points so far, 80 not decided yet` where not all is settled."""
     still = sum(loss.points for loss in view.open)
     return f"{number(result.points)} of {number(result.max_points)} points" + (
         f" so far, {number(still)} not decided yet" if still else ""

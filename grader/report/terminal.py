@@ -37,7 +37,7 @@ PLAIN_LETTERS = str.maketrans({"…": "...", "→": "->", "±": "+/-", sentences
 
 
 def open_console(file: IO[str]) -> Console:
-    """A console that takes no text for markup. Colour on a terminal only; 80 columns where there is none."""
+    """Return a console that takes no text for markup. Colour on a terminal only; 80 columns where there is none."""
     terminal = file.isatty()
     return Console(
         file=file,
@@ -57,6 +57,7 @@ def emit(console: Console, parts: Iterable[RenderableType]) -> None:
     """
     with console.capture() as capture:
         for part in parts:
+            # `fold`, since a long path is to be copied whole
             console.print(part, overflow="fold", crop=False)
     text = without_ci_commands("\n".join(row.rstrip() for row in capture.get().split("\n")))
     console.file.write(text.encode(console.encoding, "backslashreplace").decode(console.encoding))
@@ -135,7 +136,7 @@ class Terminal:
         return text.append(f"\nRubric {self._show(sentences.rubric_words(result))}", "not bold dim")
 
     def _score(self, result: GradingResult, view: ReportView) -> RenderableType:
-        """`95 of 100 points, 1 thing to fix`."""
+        """Return `95 of 100 points, 1 thing to fix`."""
         if not_graded(result):
             text = Text("\nNot graded", "bold")
             return text.append(f"\n{self._show(result.error.message)}", "not bold") if result.error else text
@@ -165,7 +166,7 @@ class Terminal:
         return [Text(f"\nNothing was run ({unrun}): {still}.")]
 
     def _loss(self, loss: Loss, repaired: Sequence[str]) -> RenderableType:
-        """What was lost, as a compiler says it: the criterion and its place, the cause, the line of code, the fix."""
+        """Return what was lost, as a compiler says it: the criterion and its place, the cause, the code, the fix."""
         c = loss.criterion
         place, *others = file_places(c) or [""]
         code = [row for pair in pointed_at(c, self._source_chars) for row in self._code(*pair)]
@@ -187,19 +188,19 @@ class Terminal:
         return Group(head, self._words(said or c.title), *lacking, *code, *self._rows(rows))
 
     def _missing_file(self, file: MissingFile) -> RenderableType:
-        """`launch/a.launch (launch-xml 0/10): <launch> at its root, …`."""
+        """Return `launch/a.launch (launch-xml 0/10): <launch> at its root, …`."""
         cost = f"{file.criterion.id} {self._cost(file.criterion)}"
         words = "; ".join(filter(None, [file.holds, file.says]))
         return self._words(f"{file.path} ({cost}): {words}", indent=2 * INDENT)
 
     def _cost(self, criterion: CriterionResult) -> str:
-        """`-5`; `0/5` where the points are not lost for good."""
+        """Return `-5`, or `0/5` where the points are not lost for good."""
         if criterion.status.is_open or not criterion.missing:  # a gate may be a criterion that is not counted
             return points_of(criterion)
         return self._fit_encoding(sentences.minus(criterion.missing))
 
     def _total(self, loss: Loss) -> str:
-        """`-5`; `-25 in all` where the mistake costs more than its own criterion's points."""
+        """Return `-5`, or `-25 in all` where the mistake costs more than its own criterion's points."""
         cost = self._cost(loss.criterion)
         if loss.criterion.status.is_open or loss.points == loss.criterion.missing:
             return cost
@@ -236,9 +237,10 @@ class Terminal:
         return Group(line, self._words(said), *self._rows([("measured", measured)]))
 
     def _line(self, criterion: CriterionResult, *more: str) -> RenderableType:
-        """`✗ chatter-rate  -10  src/talker.py:17`; the last stands below where there is no room for it."""
+        """Return `✗ chatter-rate  -10  src/talker.py:17`; the last stands below where there is no room for it."""
         name = f"{mark(criterion.status, self.console.encoding)} {self._show(criterion.id)}"
         style, rest = sentences.STYLES[criterion.status], [self._show(one) for one in more if one]
+        # some letters are two columns wide
         below = rest != [] and cell_len("  ".join([name, *rest])) > self.console.width
         beside = "".join(f"  {one}" for one in (rest[:-1] if below else rest))
         text = Text.assemble((name, style), (beside, "bold"), no_wrap=True, overflow="ignore")
@@ -257,7 +259,7 @@ class Terminal:
 
     @property
     def _source_chars(self) -> int:
-        """How much of a line of code has room beside its number."""
+        """Return how much of a line of code has room beside its number."""
         return max(SOURCE_CHARS_MIN, self.console.width - INDENT - 12)
 
     def _code(self, text: str, carets: str) -> list[RenderableType]:
@@ -273,7 +275,7 @@ class Terminal:
         return [self._words(value, name=name) for name, value in rows if value]
 
     def _show(self, text: str, limit: int = LIMIT) -> str:
-        """Harmless, of bounded length, and in characters that the terminal's encoding has."""
+        """Return text that is harmless, of bounded length, and in characters that the terminal's encoding has."""
         return self._fit_encoding(line(text, limit))
 
     def _fit_encoding(self, text: str) -> str:
@@ -300,8 +302,9 @@ def fit_encoding(text: str, encoding: str) -> str:
 
 
 def mark(status: Status, encoding: str) -> str:
-    """The sign of a status, a plain one where the encoding has no ✓."""
+    """Return the sign of a status, a plain one where the encoding has no ✓."""
     look = sentences.LOOKS[status]
+    # all of them or none, so that signs of one kind stand together
     return look.sign if _can_encode("".join(sentences.SIGNS.values()), encoding) else look.plain
 
 

@@ -139,6 +139,7 @@ def open_batch(folder: Path) -> BatchFolder:
     path = folder / RUN
     finish_killed(folder)
     try:
+        # one that is too long is refused below: no bytes are no JSON
         data = path.read_bytes() if path.stat().st_size <= BYTES_MAX else b""
         return BatchFolder(folder, BatchRun.read_json(data))
     except FileNotFoundError as error:

@@ -147,6 +147,7 @@ def _grade(job: GradingJob, folder: Path) -> SubmissionOutcome:
         obtained = _fetch(job, folder)
     except Exception as error:
         fault = fault_of(error)
+        # it could be fetched then, so that it cannot be now is no fault of the submission
         if job.earlier is not None and job.earlier.status != "error" and not isinstance(fault, NothingInTime):
             return _outcome(job, job.earlier, kept=True, fault=fault)
         with classify_errors(_attempt(job)):
@@ -174,7 +175,7 @@ def _grade(job: GradingJob, folder: Path) -> SubmissionOutcome:
 
 
 def _fetch(job: GradingJob, folder: Path) -> Obtained:
-    """A missing source is the submission's fault here, not the command line's."""
+    """Return what is to be graded. A missing source is the submission's fault here, not the command line's."""
     rubric = job.rubric.rubric
     rule = Rule(
         deadline=rubric.deadline,
@@ -218,6 +219,7 @@ def _find_complete(job: GradingJob, about: SubmissionInfo) -> GradingResult | No
         (earlier.submission.commit, earlier.submission.digest) == (about.commit, about.digest)
         and earlier.rubric.digest == job.rubric.digest
         and earlier.environment.grader == __version__
+        # what was judged from the files alone is not enough for a batch that runs scenarios
         and (job.static_only or not static or not job.rubric.rubric.scenarios)
     )
     return earlier if is_same else None

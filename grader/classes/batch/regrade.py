@@ -119,6 +119,7 @@ def _replaced_before(journal: Path) -> dict[str, int]:
     with suppress(OSError), open_untrusted(journal) as file:
         for row in file:
             with suppress(ValidationError):  # the last one was being written
+                # the first counts: a later one is already what a regrade wrote
                 places.setdefault(GradingResult.read_json(row).submission.id, file.tell() - len(row))
     return places
 
@@ -161,12 +162,14 @@ def regrade(
         except KeyboardInterrupt:
             stopped(len(found), len(entries))
             raise
+        # results came as they were ready; the roster's order is restored
         regraded = tuple(found[entry.id] for entry in entries)
         run = folder.run.model_copy(update=describe_rubric(rubric, rubric_source) | {"grader": __version__})
         now = BatchFolder(folder.path, run)
         write_run(now.path, now.run)
         write_changes(folder.path / CHANGES, regraded)
         now = write_books(now, rubric.rubric, run.state, run.counts.kept, ended_at=run.ended_at)
+        # last: until all is written, it is what a regrade that goes on compares with
         journal.unlink(missing_ok=True)
         return now, regraded
 
@@ -264,6 +267,7 @@ def _keep(journal: Path, result: GradingResult) -> None:
     flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | CLOEXEC
     try:
         with os.fdopen(os.open(journal, flags, FILE), "ab") as file:
+            # a killed grader may have left half a line before it
             file.write(b"\n" + line + b"\n")
     except OSError as error:
         raise unwritable(journal, error) from error

@@ -93,6 +93,8 @@ def fitting_runs(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:
     return {
         name: run
         for name, run in runs.items()
+        # a repaired or repeated run is named `repaired-1/<scenario>`; what does not say how it was recorded
+        # fits
         if run.metadata.get(SCENARIO, wanted := digests.get(name.rpartition("/")[2])) == wanted
     }
 
@@ -165,6 +167,7 @@ def write_one(folder: Path, rubric: LoadedRubric) -> GradingResult:
     """
     result_in(folder, rubric)  # before anything is made there
     with Results(folder) as results:
+        # read again under the lock: it may have been replaced since
         result = result_in(folder, rubric)
         shown = ReportInput(
             result=result,

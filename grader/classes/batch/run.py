@@ -120,6 +120,7 @@ def run_batch(
     is_new = make_folder(options.out)
     with hold_folder(options.out):
         batch = _begin(roster, rubric_source, rubric, options, is_new=is_new)
+        # until the last outcome is there: whatever ends the loop, the gradebook says how far it came
         state: State = "interrupted"
         kept = 0
         try:
@@ -138,6 +139,7 @@ def _begin(
     """Take over the folder from an earlier batch, and write the `run.json` of one that is running."""
     out = options.out
     finish_killed(out)
+    # before anything is written: a faulty file refuses the batch and changes nothing
     overrides = read_overrides(out / OVERRIDES, rubric.rubric, ids_of(roster))
     own_folder = _keep_private(out, is_new=is_new)
     folder = BatchFolder(out, _describe_run(roster, rubric_source, rubric, options, own_folder=own_folder))
@@ -149,6 +151,7 @@ def _begin(
 
 def _keep_private(out: Path, *, is_new: bool) -> bool:
     """A folder that a batch made is for its owner alone; any other one keeps its mode. Return which of them it is."""
+    # there was no batch here, or its `run.json` cannot be read
     with suppress(UsageError):
         is_new = is_new or open_batch(out).run.own_folder
     if is_new:
@@ -163,6 +166,7 @@ def _grade_all(batch: _Batch, executor: Executor, watcher: Watcher) -> Iterator[
     watcher.planned(len(todo))
     if todo and not options.cluster:  # what is made here is of no use on the machines of a cluster
         prepare(GradeOptions(sandbox=options.sandbox, static_only=options.static_only))
+    # whatever is fetched from here on is fresh enough for every job
     since = time.time()
     entries = {entry.id: entry for entry, _ in todo}
     jobs = (_job(batch, entry, again=again, since=since) for entry, again in todo)
@@ -258,6 +262,7 @@ def _gradable(roster: Roster, out: Path) -> Roster:
     """Return the roster without the folder of results itself, and without ids that name the batch's own files."""
     entries, faults = [], list(roster.faults)
     for entry in roster.entries:
+        # a roster that is a folder of submissions may have the results in it
         if Path(entry.source) == out.absolute():
             continue
         if folder_key(entry.id) in RESERVED:

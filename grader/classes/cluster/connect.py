@@ -87,6 +87,7 @@ def _check_address_answers(address: str) -> None:
     """Dask's own client waits for ever if something else than a scheduler listens."""
     try:
         asyncio.run(asyncio.wait_for(_answer(address), CONNECT_S))
+    # two different exceptions before Python 3.11
     except (TimeoutError, asyncio.TimeoutError, OSError) as error:
         raise _no_scheduler(address) from error
     except Exception as error:
@@ -135,7 +136,7 @@ def _no_scheduler(address: str) -> HostError:
 
 
 def _check_scheduler(client: Any, address: str) -> None:  # noqa: ANN401 - Dask has no types
-    """The scheduler reads the tasks that it passes on, so it needs the same grader as the workers."""
+    """Raise HostError if the scheduler has another grader or Python: it reads the tasks that it passes on."""
     try:
         there = client.run_on_scheduler(worker.versions)
     except Exception as error:
@@ -217,6 +218,7 @@ class Recruits:
             self._forget(address)
         for address in threads.keys() - self._threads.keys():
             self._threads[address] = threads[address]
+            # a thread each, since asking waits for as long as a worker is silent
             threading.Thread(target=self._ask, args=(address,), daemon=True).start()
 
     def settle(self) -> None:
@@ -248,6 +250,7 @@ class Recruits:
         self.changed.set()
 
     def _take_in(self, address: str, answer: Answer) -> None:
+        # it left while it was asked
         if address not in self._threads:
             return
         if answer is None or isinstance(answer, OSError):

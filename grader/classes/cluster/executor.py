@@ -86,6 +86,7 @@ class ClusterExecutor:
     def run(self, jobs: Iterable[GradingJob], *, begun: Callable[[str], None]) -> Iterator[SubmissionOutcome]:
         """See `classes.batch.job.Executor.run`. Raises HostError if no scheduler can be reached, or it is lost."""
         waiting = iter(jobs)
+        # for no job at all, no cluster is needed
         first = next(waiting, None)
         if first is None:
             return
@@ -155,6 +156,7 @@ class _Tasks:
         waiting = iter(jobs)
         try:
             while True:
+                # before looking, so that an answer that comes in between ends the wait below
                 self._recruits.changed.clear()
                 yield from self._look()
                 more = self._submit(waiting, begun)
@@ -162,6 +164,7 @@ class _Tasks:
                     return
                 done = [task for task in self._running if task.future.done()]
                 self._running = [task for task in self._running if task not in done]
+                # again before results are unpacked, so that no thread of a worker waits for that
                 self._submit(waiting, begun)
                 for task in done:
                     outcome = self._finish(task)
@@ -196,7 +199,7 @@ class _Tasks:
             worker.perform,
             pickle.dumps(request),
             key=f"grade-{self._batch}-{self._count}",
-            pure=False,
+            pure=False,  # Dask may not take one task's result for another's
             retries=RETRIES,
             workers=list(task.workers),
             allow_other_workers=False,
@@ -218,6 +221,7 @@ class _Tasks:
         except (ParcelLost, CancelledError, KilledWorker) as error:
             if self._client.status != "running":
                 raise self._scheduler_lost() from error
+            # Dask gives this up only after it has lost several workers by it
             task.losses += LOSSES if isinstance(error, KilledWorker) else 0
             return self._repeat(task, error.message if isinstance(error, ParcelLost) else LOST)
         except GraderError as error:
@@ -273,6 +277,7 @@ class _Tasks:
         with suppress(Exception):  # it ends in any case
             self._client.cancel([task.future for task in self._running])
         if self._recruits.fit:
+            # in a thread, since a worker that hangs would never answer
             thread = threading.Thread(target=self._dismiss, daemon=True)
             thread.start()
             thread.join(LEAVE_S)
@@ -325,6 +330,7 @@ def _unpack(parcel: Parcel, exchange: Exchange, results: Results) -> None:
     except (HostError, OSError) as error:
         message = getattr(error, "message", "") or str(error)
         raise ParcelLost(message, hint=getattr(error, "hint", "")) from error
+    # of a submission that could not be graded: as if it had been graded here
     if not any(results.evidence.iterdir()):
         results.evidence.rmdir()
     if not (results.new / RESULT).is_file():

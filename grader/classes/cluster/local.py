@@ -67,7 +67,7 @@ def _nanny(security: Security, folder: Path) -> dict[str, Any]:
     options = {
         **_listening(security),
         "nthreads": THREADS_A_CORE,
-        "memory_limit": 0,
+        "memory_limit": 0,  # no limit: Dask's would end a worker with all that it grades
         "local_directory": str(folder),
         "silence_logs": logging.CRITICAL,
         "worker_class": LocalWorker,

@@ -151,6 +151,7 @@ class Exchange:
         try:
             if "://" in self.url:
                 files, root = fsspec.core.url_to_fs(self.url)
+                # a listing that is kept in memory lacks what other machines have written since
                 files.invalidate_cache()
                 yield files, root.rstrip("/")
             else:
@@ -198,7 +199,7 @@ def pack(folder: Path, file: Path) -> None:
     """Pack everything in `folder`, without the grader's own hidden files."""
     with tarfile.open(file, "x:gz", compresslevel=LEVEL) as archive:
         for path in sorted(folder.iterdir()):
-            if not path.name.startswith("."):
+            if not path.name.startswith("."):  # what is half written
                 archive.add(path, arcname=path.name)
 
 
@@ -209,6 +210,7 @@ def unpack(stream: BinaryIO, parcel: Parcel, folder: Path) -> None:
     try:
         with tarfile.open(fileobj=cast("BinaryIO", measured), mode="r|gz") as archive:
             _extract(archive, parcel, folder)
+        # to the end of the file, so that size and digest are those of all of it
         while measured.read(CHUNK_BYTES):
             pass
     except (tarfile.TarError, zlib.error, EOFError, ValueError, OSError) as error:
@@ -224,6 +226,7 @@ def _extract(archive: tarfile.TarFile, parcel: Parcel, folder: Path) -> None:
         if count > ENTRIES or size > UNPACKED_BYTES:
             raise _refuse(parcel, "it holds more than results ever are")
         if not (member.isreg() or member.isdir()):
+            # with neither links nor devices among them, no name leads anywhere but below `folder`
             raise _refuse(parcel, "it holds something that is neither file nor folder")
         archive.extract(member, folder, set_attrs=False, filter="data")
         archive.members = []  # type: ignore[attr-defined] # it would keep all of them in memory
@@ -273,6 +276,7 @@ async def describe(exchange: str, word: str) -> dict[str, str]:
 
 
 def _describe(exchange: str, word: str) -> dict[str, str]:
+    # now, since its files may be updated while it runs with those that it has loaded
     _Code.digest = _digest_code()
     ros = kept_out = ""
     with suppress(GraderError):
@@ -300,6 +304,7 @@ def _digest_code() -> str:
     digest = hashlib.sha256()
     for path in sorted(folder.rglob("*.py")):
         name = path.relative_to(folder)
+        # what a wheel brings along and a checkout has elsewhere
         if "_data" not in name.parts:
             digest.update(f"{name}\0{hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
     return digest.hexdigest()[:12]
@@ -333,6 +338,7 @@ def grade(request: GradeRequest, is_wanted: Callable[[], bool]) -> Report:
             outcome = _grade_in(folder, request.model_copy(update={"job": job}), is_wanted)
             if is_machines(outcome):
                 outcome = outcome.model_copy(update={"message": f"{outcome.message} (on {host})"})
+            # the client has no use for anything else, and would have to clear it away
             if not outcome.kept and outcome.kind != "interrupted" and is_wanted():
                 parcel = _deliver(folder, request)
     except (GraderError, OSError) as error:
@@ -395,6 +401,7 @@ def _interrupt_unwanted(process: Worker, is_wanted: Callable[[], bool]) -> Itera
 
 async def dismiss(batch: str) -> None:
     """Interrupt what is graded for that batch, wait until it has cleaned up, and end the idle processes."""
+    # in a thread, since Dask's own loop must not wait
     await asyncio.to_thread(_processes.dismiss, batch)
 
 
@@ -408,7 +415,7 @@ class _Processes:
 
     @contextmanager
     def borrow(self, batch: str) -> Iterator[Worker]:
-        """A process for one job; one that was interrupted is not used again."""
+        """Lend a process for one job; one that was interrupted is not used again."""
         with self._changed:
             process = self._idle.pop() if self._idle else Worker(WorkerLimits(idle_s=IDLE_S))
             self._busy[process] = batch
@@ -416,6 +423,7 @@ class _Processes:
             yield process
         finally:
             if process.stopped:
+                # outside the lock, since it may take a while
                 process.close()
             with self._changed:
                 del self._busy[process]

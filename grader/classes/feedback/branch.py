@@ -24,6 +24,7 @@ NAME = "feedback"
 TIMEOUT_S = 120.0
 TRAILER = "Grader-Feedback"
 _TRAILER = re.compile(rf"^{TRAILER}: [0-9a-f]{{64}}$", re.MULTILINE)
+# what every git and every server takes for a branch's name, and no option
 _BRANCH = re.compile(r"(?!.*(?:\.\.|//|@\{|\.lock(?:/|$)|/\.))[A-Za-z0-9_][A-Za-z0-9._/-]{0,100}(?<![./])")
 _IDENTITY = ("-c", "user.name=ros-lab-grader", "-c", "user.email=ros-lab-grader@localhost")
 # The settings of a repository on this machine may be a student's: those given to the command win over them.
@@ -107,6 +108,7 @@ class _Push:
         self._refuse_settings()
         tip = self._tip()
         if tip:
+            # one commit is enough: to see whose the branch is, and as the parent of the next
             self._ask("fetch", "--quiet", "--no-tags", "--depth=1", refspecs=(self._ref,))
             if not _TRAILER.search(self._run("show", "--no-patch", "--format=%B", tip)):
                 raise NotSent(
@@ -161,6 +163,7 @@ class _Push:
 
 
 def _refusal(failure: GitFailed, source: Source, branch: str) -> NotSent:
+    # GitHub refuses pushes with codes from GH001 on
     if re.search(r"\[(?:remote )?rejected\]|protected branch|denied|GH00[0-9]", failure.stderr):
         said = next((row for row in failure.stderr.splitlines() if "rejected" in row or "remote:" in row), "")
         return NotSent(

@@ -27,6 +27,7 @@ from grader.errors import NotSent, UsageError
 from grader.files import atomic_write, whole_file
 
 _TAR = re.compile(r"\.(?:tar|tar\.(?P<ending>gz|xz|bz2)|t(?P<short>gz|xz|bz2?))$", re.IGNORECASE)
+# what no disk takes in a name, and `_`, at which Moodle divides it
 _NO_NAME = re.compile(r'[_/\\:*?"<>|\x00-\x1f\x7f]+')
 _MODES: Mapping[str, Literal["w:", "w:gz", "w:bz2", "w:xz"]] = {
     "": "w:",
@@ -104,6 +105,7 @@ class Moodle(Archive):
             return named.name, named.id
         known = kinds(entry.extra, "moodle")
         for column in (column for column, kind in known.items() if kind == "platform"):
+            # Moodle's own column says `Participant 123`
             if found := re.search(r"\d+$", entry.extra[column].strip()):
                 return entry.name or entry.id, found.group()
         raise NotSent(

@@ -36,6 +36,7 @@ TIMEOUT_S = 60.0
 TRIES = 4
 PAUSE_S = 1.0
 """Between two things that are written: GitHub asks for it."""
+# GitHub's limits end within an hour; WAIT_MAX_S is a little more
 WAIT_S, WAIT_MAX_S = 60.0, 3900.0
 ANSWER_BYTES_MAX = 16 << 20
 SAID_CHARS = 300
@@ -93,7 +94,8 @@ class Api:
         self._next_write = 0.0
 
     def get(self, path: str) -> Any:  # noqa: ANN401 - JSON
-        """Return what is there. Raises Refused, Broken."""
+        """Return what is there. Raises Refused, NoAnswer."""
+        # only what reads is asked again: what writes may have been carried out
         for failed in range(1, TRIES):
             with suppress(NoAnswer):
                 return self._ask("GET", path, None)
@@ -109,10 +111,11 @@ class Api:
                 return
 
     def post(self, path: str, data: Mapping[str, object]) -> Any:  # noqa: ANN401 - JSON
-        """Return what was made. Raises Refused; Broken where nobody knows whether it was made."""
+        """Return what was made. Raises Refused; NoAnswer where nobody knows whether it was made."""
         self._sleep(max(0.0, self._next_write - time.monotonic()))
         try:
             return self._ask("POST", path, json.dumps(data).encode())
+        # after a failure too: the server counts every request
         finally:
             self._next_write = time.monotonic() + PAUSE_S
 
@@ -127,6 +130,7 @@ class Api:
                 continue
             wait_s = _wait_s(answer, limited)
             if wait_s is None or limited >= TRIES:
+                # a server that failed may have done it before
                 if answer.status >= 500:
                     raise NoAnswer(f"{answer.status} {_error_text(answer)}")
                 raise Refused(answer.status, _error_text(answer))
@@ -183,6 +187,7 @@ def _error_text(answer: _Answer) -> str:
 def _wait_s(answer: _Answer, times: int) -> float | None:
     """Return how long a server that has too much to do wants to be left alone; None if that is not what it says."""
     headers = answer.headers
+    # the names of these headers on GitHub, and on GitLab
     exhausted = "0" in (headers.get("x-ratelimit-remaining"), headers.get("ratelimit-remaining"))
     limited = "rate limit" in _error_text(answer).lower() or "retry-after" in headers or exhausted
     if answer.status != 429 and not (answer.status in (403, 503) and limited):
@@ -205,6 +210,7 @@ def token_for(server: str, name: str, *more: str) -> str:
             f"there is no token for {server}: {name} is not set, and git's credential helpers have none",
             hint=f"export {name}=… with the right to write comments",
         )
+    # anything else fits in no header of HTTP
     if not token.isascii() or not token.isprintable():
         raise UsageError(f"{name} holds no token", hint=f"export {name}=… with the right to write comments")
     return token
@@ -230,6 +236,7 @@ def host_and_path(address: str) -> tuple[str, str]:
     found = _SCP.fullmatch(source.url) if "://" not in source.url else None
     parts = urlsplit(source.url)
     host = found["host"] if found else parts.netloc.rpartition("@")[2]
+    # of an ssh address the port is the ssh server's, and not that of the pages
     if not found and parts.scheme not in ("http", "https"):
         host = parts.hostname or ""
     path = unquote(found["path"] if found else parts.path).strip("/").removesuffix(".git")
@@ -403,6 +410,7 @@ class Comments(Sender):
     def issues(self, path: str) -> Iterator[Post]:
         """Yield each issue; a pull request is none."""
         for one in self.api.pages(f"{self.repository(path)}/issues?{self.all_issues}"):
+            # GitHub lists pull requests among the issues
             if "pull_request" not in one:
                 yield _post(one, self.address(one, path, "issues"), self.issue_text)
 
@@ -458,6 +466,7 @@ class GitHubComments(Comments):
 
     def is_public(self, path: str) -> bool:
         """Return whether the repository is not private."""
+        # where it does not say, the safe answer is that everybody can read it
         return self.api.get(self.repository(path)).get("private") is not True
 
     def repository(self, path: str) -> str:
@@ -493,6 +502,7 @@ class GitLabComments(Comments):
         return str(self.api.get(self.repository(path)).get("visibility")) != "private"
 
     def repository(self, path: str) -> str:
+        # GitLab takes the whole path as one part of the address, so its slashes are written as %2F
         return f"/projects/{quote(path, safe='')}"
 
     def address(self, one: dict[str, Any], path: str, below: str) -> str:

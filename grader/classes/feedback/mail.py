@@ -34,8 +34,9 @@ USER, PASSWORD, FROM = "GRADER_SMTP_USER", "GRADER_SMTP_PASSWORD", "GRADER_SMTP_
 PORTS = {"smtps": 465, "smtp": 587}
 TIMEOUT_S = 60.0
 TRIES, WAIT_S = 3, 20.0
-REFUSED_LATER = range(400, 500)
+REFUSED_LATER = range(400, 500)  # by SMTP's codes, what may go well a little later
 SAID_CHARS = 300
+# less than RFC 5321 allows: what servers take in practice, and nothing that could end a header
 _ADDRESS = re.compile(
     r"[A-Za-z0-9!#$%&'*+/=?^_`{|}~.-]{1,64}@[A-Za-z0-9](?:[A-Za-z0-9.-]{0,252}[A-Za-z0-9])?"
 )
@@ -109,6 +110,7 @@ class Mail(Sender):
         message["Date"] = format_datetime(datetime.now(timezone.utc))
         domain = self.sender.rpartition("@")[2] or "localhost"
         message["Message-ID"] = f"<{feedback.publication.digest[:32]}.{feedback.name}@{domain}>"
+        # else a programme that answers for people on holiday would answer each (RFC 3834)
         message["Auto-Submitted"] = "auto-generated"
         message.set_content(letter(feedback))
         message.add_attachment(
@@ -151,6 +153,7 @@ class MailServer:
             port = parts.port
         except ValueError:
             port = -1
+        # a user's name is refused too: what comes with the command can be seen in the list of processes
         if (
             parts.scheme not in PORTS
             or not parts.hostname
@@ -186,6 +189,7 @@ class MailServer:
         smtp.ehlo_or_helo_if_needed()
         if smtp.has_extn("starttls"):
             smtp.starttls(context=context)
+            # what the server said before it was encrypted does not count (RFC 3207)
             smtp.ehlo()
         elif not _is_here(self.host):
             raise smtplib.SMTPNotSupportedError("the server offers no TLS, and marks are not sent without it")
@@ -204,6 +208,7 @@ class MailServer:
             try:
                 return self._send(to, data)
             except smtplib.SMTPResponseException as error:
+                # else the server would take the next mail for a part of this one
                 self._reset()
                 if error.smtp_code not in REFUSED_LATER or not left:
                     raise NotSent(f"{self.host} says: {_reply_text(error)}") from error
@@ -226,12 +231,13 @@ class MailServer:
     def _send(self, to: list[str], data: bytes) -> None:
         smtp = self._smtp
         assert smtp is not None  # noqa: S101 - connected before
+        # step by step, since only after DATA can it be unknown whether the mail was sent
         for code, said in (smtp.mail(self.sender), *map(smtp.rcpt, to)):
             if code not in (250, 251):
                 raise smtplib.SMTPResponseException(code, said)
         try:
             code, said = smtp.data(data)
-        except smtplib.SMTPDataError:
+        except smtplib.SMTPDataError:  # the server has answered, so it is known
             raise
         except (OSError, smtplib.SMTPException) as error:
             self.close()

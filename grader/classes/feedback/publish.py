@@ -39,7 +39,7 @@ from grader.wording import did_you_mean, join_words, number, plural
 from grader.workers import WorkerEnded, run_each
 
 FILE, FOLDER = "published.jsonl", ".published"
-NAME_CHARS = 16
+NAME_CHARS = 16  # of the digest: enough to tell one student's publications apart
 PublishState = Literal["new", "changed", "same", "draft"]
 WORDING = "the words of the report, and no points"
 
@@ -135,6 +135,7 @@ def plan(folder: BatchFolder, published: Published, only: Sequence[str] = ()) ->
             continue
         before = published.result(entry)
         changes = changes_between(before, result) if before else ()
+        # other words alone are no reason to publish again, unless this student is named
         if before and not changes and only and digest_of(before) != digest_of(result):
             changes = (WORDING,)
         state: PublishState = "changed" if changes else "same" if before else "new"
@@ -176,6 +177,7 @@ def publish(folder: BatchFolder, rubric: LoadedRubric, how: Publishing) -> tuple
     """
     refuse_other_rubric(folder, rubric)
     make_folder(folder.path / FOLDER)
+    # sending holds the second one alone, so that a class can be graded while it lasts
     with hold_folder(folder.path), hold_folder(folder.path / FOLDER, "feedback is being sent"):
         published = read_published(folder.path)
         steps = list(plan(folder, published, how.only))
@@ -191,6 +193,7 @@ def publish(folder: BatchFolder, rubric: LoadedRubric, how: Publishing) -> tuple
                     steps[place] = replace(steps[place], why=error, failed=True)
                 else:
                     done.append(jobs[place].publication)
+        # also after Ctrl-C: whatever is frozen by then is published, in the roster's order
         finally:
             _append(folder.path / FILE, sorted(done, key=[j.publication for j in jobs.values()].index))
     return tuple(steps)
@@ -279,6 +282,7 @@ def freeze(rubric: LoadedRubric, job: Freezing) -> None:
         changes=job.changes,
         load_figures=lambda: figures_in(job.evidence, shown, rubric.rubric),
     )
+    # the result last: where it is, the reports are whole
     for name, form in ((TEXT, "markdown"), (PAGE, "html")):
         atomic_write(job.into / name, FORMS[form].render(about))
     atomic_write(job.into / RESULT, result_bytes(job.result))

@@ -102,6 +102,7 @@ class SentLog:
     def _append(self, data: bytes) -> None:
         flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | CLOEXEC | NOFOLLOW | BINARY
         with os.fdopen(os.open(self.path, flags, PRIVATE), "r+b", buffering=0) as file:
+            # what a killed grader has begun is a line of its own, which is passed over when it is read
             if file.seek(0, os.SEEK_END) and file.seek(-1, os.SEEK_END) >= 0 and file.read(1) != b"\n":
                 data = b"\n" + data
             file.write(data)
@@ -175,9 +176,11 @@ def open_selection(
             hint=f"grader publish {folder.path}; or --drafts to return results as they are now",
         )
     check_only(folder, wanted.only)
+    # before the first publication there is no folder for these; drafts then hold the class's own
     place = folder.path / FOLDER if published.history else folder.path
     who = "other feedback is being sent, or a class published,"
     with hold_folder(place, who), temporary_folder("run") as room:
+        # read again, as another program may have published before the folder was held
         log, published = SentLog(folder.path, form.name), read_published(folder.path)
         if wanted.drafts is None:
             last = {name: history[-1] for name, history in published.history.items()}
@@ -300,6 +303,8 @@ def deliver(
                 delivery.failures.append(
                     SendFailure(id=publication.id, message=error.message, hint=error.hint)
                 )
+                # without that line, the last one says `sending`: the next run knows that it has to look, or
+                # to ask
                 if not isinstance(error, Unsure):
                     log.add([publication], "failed", message=error.message)
                 told(f"{publication.id}: not sent: {error.message}")
@@ -321,6 +326,7 @@ def _send(sender: Sender, feedback: Feedback, log: SentLog, *, again: bool) -> s
     is_unsure = log.state(publication) == "sending"
     if is_unsure and sender.unsure == "ask" and not again:
         raise Unsure(UNKNOWN, hint=f"ask the student; --only {publication.id} --again sends it once more")
+    # where sending twice does no harm, nobody needs to know that it was begun
     if sender.unsure != "again":
         log.add([publication], "sending")
     return sender.send(feedback, look=is_unsure)

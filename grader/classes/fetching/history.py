@@ -16,6 +16,7 @@ from grader.wording import join_words, plural
 
 _RECORD = re.compile(r"(?P<hash>[0-9a-f]{40,64}) (?P<seconds>-?\d+)?(?: (?P<zone>[+-]\d{4}))?")
 _EPOCH = datetime(1970, 1, 1, tzinfo=timezone.utc)
+# days from the ends of what Python can hold, so that no time zone leads beyond them
 _EARLIEST = datetime(1, 1, 3, tzinfo=timezone.utc)
 _LATEST = datetime(9999, 12, 29, tzinfo=timezone.utc)
 _ZONE_MAX = timedelta(hours=24)
@@ -74,7 +75,7 @@ class ChosenCommit(NamedTuple):
 
 
 def read_commit(record: str) -> Commit:
-    """A commit from `<hash> <seconds since 1970> <zone>`. Whatever its author wrote there becomes some time."""
+    """Parse `<hash> <seconds since 1970> <zone>` into a commit. Whatever its author wrote there becomes some time."""
     match = _RECORD.match(record)
     if match is None:
         return Commit(record[:40], _EPOCH)
@@ -89,7 +90,7 @@ def read_commit(record: str) -> Commit:
 def _zone(text: str | None) -> timezone:
     text = text or "+0000"
     offset = timedelta(hours=int(text[1:3]), minutes=int(text[3:5]))
-    if offset >= _ZONE_MAX:
+    if offset >= _ZONE_MAX:  # Python has no such zone
         return timezone.utc
     return timezone(-offset if text.startswith("-") else offset)
 
@@ -114,7 +115,7 @@ def limit_of(rule: Rule, entry: Entry) -> Limit | None:
 
 
 def later(time: datetime, days: float) -> datetime:
-    """`days` after it, or the end of time."""
+    """Return the time that many days later, or the end of time."""
     time = time.astimezone() if time.tzinfo is None else time
     try:
         return time + timedelta(days=days)
@@ -123,7 +124,7 @@ def later(time: datetime, days: float) -> datetime:
 
 
 def not_chosen(rule: Rule, entry: Entry, at: datetime | None = None, note: str = "") -> HandedIn:
-    """When it was handed in, for what is graded as it is; `at` is its commit's date."""
+    """Return when it was handed in, for what is graded as it is; `at` is its commit's date."""
     said = entry.submitted_at or at
     return HandedIn(
         at=said,
@@ -219,7 +220,7 @@ def _later_ones(count: int) -> str:
 
 
 def _beside(time: datetime, other: datetime) -> str:
-    """In the other's zone, so that both can be compared, and with seconds where it takes them."""
+    """Return the time in the other's zone, so that both can be compared, with seconds if they are close together."""
     try:
         time = time.astimezone(other.tzinfo)
     except OverflowError:
@@ -228,7 +229,7 @@ def _beside(time: datetime, other: datetime) -> str:
 
 
 def local_time(time: datetime, *, seconds: bool = False) -> str:
-    """`2026-10-30 21:14 +01:00`."""
+    """Return the time as `2026-10-30 21:14 +01:00`."""
     zone = time.strftime("%z")
     zone = f"{zone[:3]}:{zone[3:5]}" if zone else ""
     date = f"{time.year:04}-{time.month:02}-{time.day:02}"

@@ -59,7 +59,7 @@ class MirrorFolder:
     # Read and written by hand: names of refs may hold bytes that are no UTF-8, which pydantic refuses.
 
     def state(self) -> MirrorState | None:
-        """None where the mirror is not complete."""
+        """Return what the mirror was filled with; None where it is not complete."""
         try:
             data = json.loads((self.folder / "state.json").read_bytes())
             found = MirrorState(fetched_at=float(data["fetched_at"]), listing=str(data["listing"]))
@@ -100,7 +100,7 @@ def cache_folder() -> Path | None:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[MirrorFolder]:
-    """The place of a mirror, when no one else uses it. Raises OSError where it cannot be had or locked."""
+    """Hold the place of a mirror, once no one else uses it. Raises OSError where it cannot be had or locked."""
     descriptor = _take_lock(folder, wait=True)
     assert descriptor is not None  # noqa: S101 - waited for
     try:
@@ -117,6 +117,7 @@ def tidy(folder: Path, bytes_max: int = BYTES_MAX) -> None:
             known.append((*_used_and_size(Path(entry.path)), Path(entry.path)))
     left = sum(size for _, size, _ in known)
     for used_at, size, path in sorted(known):
+        # a fetch that was killed left it, or one that still runs, which is given time
         unfinished = size == 0 and used_at < time.time() - UNFINISHED_S
         if (left > bytes_max or unfinished) and _remove_unused(path):
             left -= size
@@ -127,7 +128,7 @@ class _Tidied:
 
 
 def tidy_now_and_then(folder: Path) -> None:
-    """Looking at all of them takes time, so not after each."""
+    """Do as `tidy`, if it was not done a moment ago: it takes time to look at all of them."""
     if time.monotonic() - _Tidied.at >= TIDY_EVERY_S:
         _Tidied.at = time.monotonic()
         with suppress(OSError):
@@ -135,7 +136,7 @@ def tidy_now_and_then(folder: Path) -> None:
 
 
 def _used_and_size(folder: Path) -> tuple[float, int]:
-    """Of one that is not complete, the size is 0."""
+    """Return when a mirror was used last, and its size in bytes, 0 if it is not complete."""
     state = folder / "state.json"
     try:
         return state.stat().st_mtime, max(1, int(json.loads(state.read_bytes())["bytes"]))
@@ -159,7 +160,8 @@ def _remove_unused(folder: Path) -> bool:
 
 
 def _take_lock(folder: Path, *, wait: bool) -> int | None:
-    """The descriptor of the lock, which may be taken away together with its folder before it is locked."""
+    """Return the descriptor of the lock; None if it is held and not waited for. The lock may be removed together with
+    its folder before it is locked: then a new one is made."""
     while True:
         with suppress(FileNotFoundError):
             folder.mkdir(mode=0o700, exist_ok=True)
@@ -196,17 +198,20 @@ def _is_own(folder: Path) -> bool:
 
 
 def _size(folder: Path) -> int:
-    """The room that it takes on the disk, in bytes."""
+    """Return the room that it takes on the disk, in bytes."""
     places = (Path(place) / name for place, _, names in os.walk(folder) for name in names)
     return sum(place.lstat().st_blocks * 512 for place in places)
 
 
 _EVERYTHING = ("+refs/heads/*:refs/heads/*", "+refs/tags/*:refs/tags/*")
+# `--update-head-ok`: a fetch writes to the branch of HEAD, too
 _FETCH = ("fetch", "--quiet", "--no-tags", "--no-recurse-submodules", "--update-head-ok")
 _WHOLE_HASHES = (40, 64)
 # A log of its refs would name the address.
+# a copy is made of one commit, by its hash (`Mirror.copy`)
 _SETTINGS = "[uploadpack]\n\tallowAnySHA1InWant = true\n[core]\n\tlogAllRefUpdates = false\n"
 _NO_COMMIT = re.compile(r"expected commit type|is ambiguous")
+# first parents are the states that the branch had; those that were merged into it are not
 _LOG = ("log", "--first-parent", "-z", "--date=raw", "--format=%H %cd")
 
 
@@ -223,6 +228,7 @@ class Listing:
     @property
     def head(self) -> str | None:
         """The branch that HEAD stands for (`refs/heads/main`)."""
+        # `ref: refs/heads/main<TAB>HEAD`, which `--symref` adds
         lines = (line.split("\t") for line in self.text.splitlines())
         return next(
             (line[0][5:] for line in lines if line[0].startswith("ref: ") and line[1:] == ["HEAD"]), None
@@ -244,7 +250,7 @@ class Mirror:
         return Repository(git_dir=self.path, top=self.path)
 
     def listing(self) -> Listing:
-        """What the server has now. It is asked from a new repository: where one stands may have settings."""
+        """Return what the server has. It is asked from a new repository: the folder one stands in may have settings."""
         asking = self.room / "asking.git"
         if not asking.exists():
             self._begin(asking, sha256=False)
@@ -254,7 +260,7 @@ class Mirror:
         )
 
     def fetch(self, listing: Listing) -> None:
-        """All heads and tags, and nothing that is no longer there."""
+        """Fetch all heads and tags, and remove those that are no longer there."""
         refs = listing.refs
         sha256 = any(len(commit) == _WHOLE_HASHES[1] for commit in refs.values())
         if sha256 != self._is_sha256() or not (self.path / "HEAD").is_file():
@@ -266,13 +272,13 @@ class Mirror:
             self._run("symbolic-ref", "HEAD", str(listing.head))
 
     def fetch_alone(self, listing: Listing, wanted: WantedRevision) -> None:
-        """One commit without its history."""
+        """Fetch one commit without its history."""
         sha256 = any(len(commit) == _WHOLE_HASHES[1] for commit in listing.refs.values())
         self._begin(self.path, sha256=sha256)
         self._fetch(("--depth=1",), str(wanted.refspec or wanted.commit))
 
     def commit(self, listing: Listing, wanted: WantedRevision) -> str | None:
-        """The full hash of what is wanted, fetched where no branch or tag reaches it; None where it is not there."""
+        """Return the full hash of what is wanted, fetched where no branch or tag reaches it; None if there is none."""
         name = listing.refs[wanted.refspec] if wanted.refspec else str(wanted.commit)
         found = self._commit_of(name)
         if found is None and (wanted.refspec or len(name) in _WHOLE_HASHES):
@@ -286,13 +292,13 @@ class Mirror:
 
     @contextmanager
     def history(self, commit: str) -> Iterator[Iterator[Commit]]:
-        """The commit and its first parents, the newest first."""
+        """Give the commit and its first parents, the newest first."""
         records = self.git.records(*_LOG, commit, "--", cwd=self.path, repository=self.repository)
         with closing(records):
             yield (read_commit(record.decode("ascii", "replace")) for record in records if record)
 
     def copy(self, commit: str, into: Path) -> None:
-        """That commit alone in a new repository, which reads and so proves every file of it."""
+        """Write that commit alone into a new repository, which reads and so proves every file of it."""
         self._begin(into, sha256=len(commit) == _WHOLE_HASHES[1])
         self.git.run(
             *(*_FETCH, "--depth=1", "--", self.path.as_uri(), f"{commit}:refs/heads/submission"),
@@ -322,12 +328,13 @@ class Mirror:
             ask(self.source, self.git, self.repository, (*_FETCH, "--update-shallow", *options), *refspecs)
         finally:
             with suppress(OSError):
-                (self.path / "FETCH_HEAD").unlink()
+                (self.path / "FETCH_HEAD").unlink()  # it names the address
 
     def _commit_of(self, name: str) -> str | None:
         try:
             return self._run("rev-parse", "--verify", "--quiet", f"{name}^{{commit}}")
         except GitFailed as failure:
+            # in silence it says that there is none; what it says aloud is of damage
             if failure.stderr.strip() and not _NO_COMMIT.search(failure.stderr):
                 raise
             return None
@@ -357,12 +364,13 @@ GIT_TIMEOUT_S = 120.0
 def bring_up_to_date(
     place: MirrorFolder, source: Source, room: Path, *, since: float, patience: Patience
 ) -> tuple[Mirror, Listing]:
-    """The mirror in `place`, as the server has it now, or had it after `since` (seconds since 1970).
+    """Return the mirror in `place`, as the server has it now, or had it after `since` (seconds since 1970).
 
     Raises GivenUp, or GitFailed where the mirror may be damaged as well.
     """
     state = place.state()
     mirror = Mirror(source=source, path=place.mirror, room=room, git=git_in(room))
+    # a time in the future is that of a wrong clock, and would be believed for ever
     if state is not None and since <= state.fetched_at <= time.time() + 1:
         place.used()
         return mirror, Listing(state.listing)
@@ -374,6 +382,7 @@ def bring_up_to_date(
         asked_at = time.time()
         listing = _listing(fresh)
         if listing.refs and (state is None or listing.text != state.listing):
+            # if this is killed while it fetches, the next one makes the mirror again
             place.incomplete()
             fresh.fetch(listing)
         return fresh, MirrorState(fetched_at=asked_at, listing=listing.text)
@@ -386,7 +395,7 @@ def bring_up_to_date(
 
 
 def _listing(mirror: Mirror) -> Listing:
-    """Raises GivenUp where asking again does not help: that is not a fault of the mirror's."""
+    """Ask the server what it has. Raises GivenUp where asking again does not help: no mirror is at fault then."""
     try:
         return mirror.listing()
     except GitFailed as failure:
@@ -396,7 +405,7 @@ def _listing(mirror: Mirror) -> Listing:
 
 
 def git_in(room: Path) -> Git:
-    """git with all its time before it."""
+    """Return a new git, with all its time before it."""
     return Git(room / "git-home", timeout_s=GIT_TIMEOUT_S)
 
 
@@ -423,7 +432,7 @@ class Patience:
     chance: Callable[[], float] = random.random
 
     def wait(self, failed: int) -> None:
-        """After that many failures."""
+        """Wait after that many failures."""
         self.sleep(self.wait_s * self.growth ** (failed - 1) * (0.5 + self.chance()))
 
 
@@ -452,7 +461,7 @@ def patiently(attempt: Callable[[], Answer], patience: Patience) -> Answer:
 
 
 def error_of(problem: GitFailed | GivenUp, source: Source) -> SubmissionError:
-    """The error to raise, which says how often it was tried."""
+    """Return the error to raise, which says how often it was tried."""
     if isinstance(problem, GitFailed):
         return explained(problem, source)
     error = explained(problem.failure, source)

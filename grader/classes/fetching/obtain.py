@@ -71,7 +71,7 @@ def obtain(
     patience: Patience | None = None,
     commit: str | None = None,
 ) -> Obtained:
-    """The source of `entry`, and when it was handed in. New folders are made in `workdir`, which is the caller's.
+    """Return the source of `entry`, and when it was handed in. New folders are made in `workdir`, the caller's.
 
     A repository that was fetched after `fetched_since` (seconds since 1970) is not fetched again; with 0 it is in any
     case. What the network fails at is tried again with `patience`. With `commit`, a full hash, that one counts of a
@@ -119,7 +119,7 @@ def source_of(entry: Entry) -> Source:
 
 @contextmanager
 def _room(workdir: Path) -> Iterator[Path]:
-    """A new folder in `workdir`, of which only `commit.git` stays, and nothing at all after an error."""
+    """Make a new folder in `workdir`, of which only `commit.git` stays, and nothing at all after an error."""
     with new_folder(workdir) as room:
         yield room
     for path in room.iterdir():
@@ -128,7 +128,7 @@ def _room(workdir: Path) -> Iterator[Path]:
 
 
 def _from_repository(task: Task, room: Path) -> Obtained:
-    """Raises _Unreadable for a folder with a `.git` that is not to be read."""
+    """Return what a repository holds. Raises _Unreadable for a folder with a `.git` that is not to be read."""
     try:
         here = _serve_local(task, room)
         return _through_mirror(replace(task, source=here), room)
@@ -150,13 +150,14 @@ def _serve_local(task: Task, room: Path) -> Source:
 
 
 def _through_mirror(task: Task, room: Path) -> Obtained:
-    """A mirror that seems to be damaged is made again."""
+    """Return the commit that counts, by way of a mirror. One that seems to be damaged is made again."""
     with ExitStack() as stack:
         place = _mirror_folder(task.source, room, stack)
         kept = place.state() is not None
         try:
             return _commit_of(place, task, room)
         except GitFailed as failure:
+            # none of these would go better with a new mirror
             if not kept or isinstance(failure, GitMissing | GitTimeout | GitTooMuch):
                 raise
         place.clear()
@@ -165,13 +166,13 @@ def _through_mirror(task: Task, room: Path) -> Obtained:
 
 
 def _mirror_folder(source: Source, room: Path, stack: ExitStack) -> MirrorFolder:
-    """In the cache for what is far away; in the room for what is here, and where there is no cache."""
+    """Return the mirror's place: in the cache for what is far away; else, and where there is no cache, in the room."""
     folder = cache_folder() if source.remote else None
     if folder is not None:
         tidy_now_and_then(folder)
         try:
             return stack.enter_context(locked(folder / place_name(source)))
-        except OSError:
+        except OSError:  # the cache only saves time
             pass
     alone = room / "mirror"
     alone.mkdir()
@@ -213,7 +214,7 @@ def _choose_commit(
 
 
 def branch_of(listing: Listing, ref: str | None, wanted: WantedRevision) -> str | None:
-    """The branch whose commits are looked at; None where someone chose a tag or a commit."""
+    """Return the branch whose commits are looked at; None where a tag or a commit is named."""
     refs = listing.refs
     if ref is None or ref == "HEAD":
         name = (listing.head if wanted.refspec == "HEAD" else wanted.refspec) or "HEAD"
@@ -227,7 +228,7 @@ def branch_of(listing: Listing, ref: str | None, wanted: WantedRevision) -> str 
 
 
 def _without_history(task: Task, room: Path) -> Obtained:
-    """What is too much with its history, without it."""
+    """Return what is too much with its history, without it."""
     local = task.source.top is not None
     source = replace(task.source, url=(room / "view").as_uri()) if local else task.source
     shutil.rmtree(room / "commit.git", ignore_errors=True)

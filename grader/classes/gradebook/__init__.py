@@ -87,24 +87,25 @@ OPTIONAL = {
 
 
 def write_csv(book: Book, rows: Iterable[GradebookRow], target: Path) -> None:
-    """UTF-8 without a mark, as programs read it; the workbook is for Excel."""
+    """Write UTF-8 without a byte order mark, as programs read it; the workbook is for Excel."""
     with whole_file(target) as path, path.open("w", encoding="utf-8", newline="") as file:
         file.write(csv_line(header(book)))
         file.writelines(csv_line(list(cells(book, row))) for row in rows)
 
 
 def write_jsonl(_book: Book, rows: Iterable[GradebookRow], target: Path) -> None:
-    """A line is what `result.json` says (`grader.result/1`), and what the roster says of it under `roster`."""
+    """Write a line for each row: what `result.json` says (`grader.result/1`), and the roster under `roster`."""
     with whole_file(target) as path, path.open("w", encoding="utf-8", newline="") as file:
         file.writelines(json_line(row) for row in rows)
 
 
 def json_line(row: GradebookRow) -> str:
-    """One line, with its end. Nothing in it steers or hides."""
+    """Return the row as one line of JSON, with its end. Nothing in it steers or hides."""
     result = row.result.model_dump(mode="json", by_alias=True)
     data = {key: value for key, value in result.items() if value or key not in OPTIONAL}
     data["roster"] = row.entry.model_dump(mode="json")
     text = json.dumps(data, ensure_ascii=False)
+    # `json_text` escapes, and takes several times as long
     if "##" not in text and not any(map(steers, set(text))):
         return text + "\n"
     return re.sub(r"\n *", "", json_text(data)) + "\n"
@@ -112,6 +113,7 @@ def json_line(row: GradebookRow) -> str:
 
 WIDTH_MIN, WIDTH_MAX, WIDTH_TEXT = 8, 40, 24
 WORKBOOK = {
+    # row by row to the disk, so that memory does not grow with the class
     "constant_memory": True,
     "strings_to_formulas": False,
     "strings_to_urls": False,
@@ -137,6 +139,7 @@ def write_workbook(book: Book, rows: Iterable[GradebookRow], target: Path) -> No
                 f"cannot write {target}: {error}", hint="choose another form with --form"
             ) from error
         finally:
+            # xlsxwriter closes these files of rows itself only when it writes the workbook
             for sheet in sheets:  # where something failed, the rows that are there already are still open
                 sheet.row_data_fh.close()
 

@@ -51,7 +51,7 @@ _OWN_ID: Mapping[Platform, str] = {
 
 
 def kinds(columns: Iterable[str], platform: Platform) -> dict[str, ColumnKind]:
-    """What each column says of a student, for those that say anything."""
+    """Return what each column says of a student, for those that say anything."""
     known: dict[str, ColumnKind] = {name: kind for kind, names in _KINDS.items() for name in names.split()}
     known |= dict.fromkeys(_OWN_ID[platform].split(), "platform")
     return {
@@ -60,15 +60,18 @@ def kinds(columns: Iterable[str], platform: Platform) -> dict[str, ColumnKind]:
 
 
 def letters_and_digits(text: str) -> str:
-    """Letters and digits only, small."""
+    """Return the letters and digits of a text alone, small."""
     folded = unicodedata.normalize("NFKC", text).casefold()
     return "".join(sign for sign in folded if sign.isalnum())
 
 
 def key(text: str) -> str:
-    """The same for all that is written alike: invisible signs, case and blanks do not tell students apart."""
+    """Return the same for all that is written alike: invisible signs, case and blanks do not tell students apart."""
     shown = "".join(
-        sign for sign in unicodedata.normalize("NFKC", text) if unicodedata.category(sign) != "Cf"
+        # Cf: signs that only format, and cannot be seen
+        sign
+        for sign in unicodedata.normalize("NFKC", text)
+        if unicodedata.category(sign) != "Cf"
     )
     return " ".join(shown.casefold().split())
 
@@ -82,7 +85,7 @@ class Identity:
 
 
 def row_identity(fields: Mapping[str, str], known: Mapping[str, ColumnKind]) -> Identity:
-    """Of a row of a platform's export, or of a roster's further columns."""
+    """Return who a row of a platform's export is about, or a roster's row by its further columns."""
     identity, first, last = Identity(), "", ""
     for column, kind in known.items():
         text = key(fields.get(column, ""))
@@ -101,7 +104,7 @@ def row_identity(fields: Mapping[str, str], known: Mapping[str, ColumnKind]) -> 
 
 
 def entry_identity(entry: Entry, platform: Platform) -> Identity:
-    """Of a submission. Its id may be any of the platform's."""
+    """Return who a submission is of. Its id may be any of the platform's."""
     identity = row_identity(entry.extra, kinds(entry.extra, platform))
     identity.sure |= {(kind, key(entry.id)) for kind in ("platform", "number", "login")}
     identity.name = _first_name_first(key(entry.name)) or identity.name
@@ -111,7 +114,8 @@ def entry_identity(entry: Entry, platform: Platform) -> Identity:
 
 
 def _sure(kind: ColumnKind, text: str) -> tuple[str, str]:
-    """Many log in by their address, so both are one kind. Moodle writes `Participant 123` for the number 123."""
+    """Return the kind and the text by which a person is known. Many log in by their address, so both are one kind;
+    Moodle writes `Participant 123` for the number 123."""
     if kind == "platform":
         number = re.search(r"\d+$", text)
         return kind, number.group() if number else text
@@ -119,7 +123,7 @@ def _sure(kind: ColumnKind, text: str) -> tuple[str, str]:
 
 
 def _first_name_first(name: str) -> str:
-    """`lovelace, ada` is `ada lovelace`."""
+    """Return `ada lovelace` for `lovelace, ada`."""
     last, comma, first = name.partition(",")
     return " ".join(f"{first} {last}".split()) if comma else name
 
@@ -133,7 +137,7 @@ class Matched:
 
 
 def match(ours: Sequence[Identity], theirs: Sequence[Identity]) -> Matched:
-    """By what belongs to one person only, and where nothing of that is known on one side, by name."""
+    """Return which belong together by what belongs to one person only; if one side has nothing of that, by name."""
     by_sure, by_name = defaultdict[tuple[str, str], set[int]](set), defaultdict[str, set[int]](set)
     for place, identity in enumerate(theirs):
         for sure in identity.sure:
@@ -157,10 +161,12 @@ def match(ours: Sequence[Identity], theirs: Sequence[Identity]) -> Matched:
 
 
 def _contradict(ours: Identity, theirs: Identity) -> bool:
-    """Whether only the platform's number says so, and the names have nothing in common: Moodle numbers teams too."""
+    """Return whether only the platform's number says so, and the names have nothing in common: Moodle numbers teams
+    too."""
     if not (ours.name and theirs.name) or any(kind != "platform" for kind, _ in ours.sure & theirs.sure):
         return False
     name = letters_and_digits(ours.name)
+    # an initial is in nearly every name
     return not any(letters_and_digits(word) in name for word in theirs.name.split() if len(word) > 1)
 
 
@@ -225,6 +231,7 @@ def _canvas(marks: Sequence[Mark], wanted: Sequence[PointsColumn], roster: _Rost
         yield csv_line(
             ["Student", "ID", "SIS User ID", "SIS Login ID", "Section", *(column.title for column in wanted)]
         )
+        # blanks before it: so Canvas writes this row, and so it finds it
         yield csv_line(["    Points Possible", "", "", "", "", *(column.max_points for column in wanted)])
         for mark in marks:
             entry = mark.entry
@@ -284,7 +291,7 @@ def _blackboard(marks: Sequence[Mark], wanted: Sequence[PointsColumn], roster: _
 
 
 def _names(entry: Entry, roster: _Roster) -> tuple[str, str]:
-    """Last and first name."""
+    """Return the last and the first name."""
     last, first = roster.text(entry, "last"), roster.text(entry, "first")
     if last or first:
         return last, first
@@ -334,7 +341,7 @@ class Mark:
 
 
 def wanted_columns(book: Book, column: str, *, per_criterion: bool) -> tuple[PointsColumn, ...]:
-    """One column for the points, or one for each criterion that is worth any."""
+    """Return one column for the points, or one for each criterion that is worth any."""
     base = column or book.title
     if not per_criterion:
         names = (column,) if column else (book.title, book.rubric_id)
@@ -343,6 +350,7 @@ def wanted_columns(book: Book, column: str, *, per_criterion: bool) -> tuple[Poi
     alike = Counter(criterion.title for criterion in worth)
     columns = []
     for one in worth:
+        # two criteria may have one title, and two columns may not
         title = f"{base} - {one.title}" + (f" ({one.id})" if alike[one.title] > 1 else "")
         called = (title, f"{base} - {one.id}", one.id)
         columns.append(PointsColumn(title=title, names=called, max_points=one.max_points))
@@ -350,13 +358,13 @@ def wanted_columns(book: Book, column: str, *, per_criterion: bool) -> tuple[Poi
 
 
 def marks_of(book: Book, rows: Iterable[GradebookRow], *, per_criterion: bool) -> list[Mark]:
-    """Every row's mark. Of a result of status `error` no points count, of an inconclusive one those that are sure."""
+    """Return every row's mark. Of a result of status `error` no points count, of an inconclusive one the sure ones."""
     worth = [criterion.id for criterion in book.criteria if criterion.max_points > 0 or criterion.extra]
     return [_mark(row, worth if per_criterion else None) for row in rows]
 
 
 def remarks_of(marks: Sequence[Mark], *, per_criterion: bool) -> Iterator[str]:
-    """Whose points are open, and whose criteria do not say what being late cost."""
+    """Yield whose points are open, and whose criteria do not say what being late cost."""
     for mark in marks:
         if mark.open:
             yield f"{mark.entry.id}: no grade ({mark.open})"
@@ -384,6 +392,7 @@ def _mark(row: GradebookRow, worth: Sequence[str] | None) -> Mark:
 def _points(result: GradingResult, worth: Sequence[str] | None) -> tuple[float | None, ...]:
     if worth is None:
         return (result.points if result.status == "graded" else None,)
+    # a criterion that was not judged is no criterion with 0 points
     if result.status == "error":
         return (None,) * len(worth)
     found = criterion_points(result)

@@ -61,10 +61,11 @@ def header(book: Book) -> tuple[str, ...]:
 
 
 def cells(book: Book, row: GradebookRow) -> Iterator[Cell]:
-    """What stands below each name of `header`."""
+    """Yield what stands below each name of `header`."""
     entry, result = row.entry, row.result
     yield from (entry.id, entry.name, entry.group, result.status)
     counting = [c for c in result.criteria if c.counts]
+    # if every criterion is open, 0 points would look like a mark
     graded = result.status != "error" and not (counting and all(c.status.is_open for c in counting))
     yield from (result.points if graded else None, result.max_points or book.max_points)
     yield (result.late.points_before if result.late else result.points) if graded else None
@@ -77,22 +78,22 @@ def cells(book: Book, row: GradebookRow) -> Iterator[Cell]:
 
 
 def criterion_points(result: GradingResult) -> dict[str, float | None]:
-    """Points by the criterion's id; None where they are still open."""
+    """Return the points by the criterion's id; None where they are still open."""
     return {c.id: None if c.status.is_open else c.points for c in result.criteria}
 
 
 def late_text(result: GradingResult) -> str:
-    """What being late cost, and why; empty for in time."""
+    """Return what being late cost, and why; empty for in time."""
     return result.late.text if result.late and result.late.late_s > 0 else ""
 
 
 def comment(result: GradingResult) -> str:
-    """What people said when they gave points themselves, or answered."""
+    """Return what people said when they gave points themselves, or answered."""
     return "; ".join(_override(override) for override in result.overrides)
 
 
 def error_text(result: GradingResult) -> str:
-    """Why it could not be graded, or what a person has to look at."""
+    """Return why it could not be graded, or what a person has to look at."""
     if result.error:
         return result.error.message
     waiting = [c.id for c in result.criteria if c.status.is_open and c.counts]
@@ -106,7 +107,7 @@ def _override(override: AppliedOverride) -> str:
 
 
 def _free(name: str, kind: str, taken: set[str]) -> str:
-    """`name`, or another one where it is taken."""
+    """Return `name`, or another one where it is taken."""
     free, number = name, 1
     while free.casefold() in taken:
         free = f"{kind} {name}" if number == 1 else f"{kind} {name} {number}"
@@ -126,12 +127,13 @@ _JOINERS = ("\u200c", "\u200d")
 
 
 def number_text(value: float) -> str:
-    """`87.5`, `100`: as every platform reads it."""
+    """Return a number as every platform reads it: `87.5`, `100`."""
+    # by `repr`, which has no more digits than the number needs; `f` writes no exponent
     return format(Decimal(repr(float(value))).normalize(), "f")
 
 
 def visible_text(text: str) -> str:
-    """One visible line. Where letters need joiners between them, those stay."""
+    """Return one visible line. Where letters need joiners between them, those stay."""
     return _restore_joiners(line(text, CELL_CHARS))
 
 
@@ -142,8 +144,9 @@ def harmless(cells: Sequence[Cell]) -> list[str]:
 
 
 def csv_line(cells: Sequence[Cell], *, quoted: bool = False) -> str:
-    """One row of CSV with its line end, made harmless. With `quoted`, every field is in quotation marks."""
+    """Return one row of CSV with its line end, made harmless. With `quoted`, every field is in quotation marks."""
     out = io.StringIO()
+    # as RFC 4180 has it
     writer = csv.writer(out, quoting=csv.QUOTE_ALL if quoted else csv.QUOTE_MINIMAL, lineterminator="\r\n")
     writer.writerow(harmless(cells))
     return out.getvalue()

@@ -27,6 +27,7 @@ from grader.wording import first_few
 
 KEPT = {"EX", "N/A"}
 """What Canvas writes for who is excused, and for who has not got the assignment."""
+# below the header, Canvas has a row that says how each column is posted
 _POSTING = re.compile(r"\s*(Muted|Manual Posting.*)?\s*", re.IGNORECASE | re.DOTALL)
 
 
@@ -75,6 +76,7 @@ def fill_template(
 
 def _is_student(record: TemplateRow) -> bool:
     values = [record.value(column) for column in range(len(record.cells))]
+    # an empty line, or Canvas's rows that belong to no student
     return "Points Possible" not in values[0] and not all(_POSTING.fullmatch(value) for value in values)
 
 
@@ -100,7 +102,7 @@ def _find_columns(work: _Work, *, named: bool) -> None:
 
 
 def _add_column(work: _Work, wanted: PointsColumn) -> int:
-    """A new column at the end of every row."""
+    """Add a column at the end of every row, and return its place."""
     place = len(work.sheet.header)
     points = number_text(wanted.max_points)
     new = f"{wanted.title} [Total Pts: {points} Score]" if work.platform == "blackboard" else wanted.title
@@ -121,7 +123,7 @@ def _add_column(work: _Work, wanted: PointsColumn) -> int:
 
 
 def _maxima(work: _Work, students: Sequence[TemplateRow]) -> Iterator[str]:
-    """Where the platform counts to another maximum, points stay as they are: that is for a person to settle."""
+    """Yield where the platform counts to another maximum. Points stay as they are: that is for a person to settle."""
     for wanted, place in zip(work.wanted, work.places, strict=True):
         said = _maximum(work, students, place)
         if said is not None and abs(said - wanted.max_points) > 1e-6:
@@ -167,6 +169,7 @@ def _unmatched_remarks(
 
 
 def _number(text: str) -> float | None:
+    # with a comma, as exports in other languages have it
     found = re.fullmatch(r"\s*(-?\d{1,12})(?:[.,](\d{1,12}))?\s*", text, re.ASCII)
     return float(f"{found[1]}.{found[2] or 0}") if found else None
 
@@ -186,7 +189,7 @@ def find_column(
     *,
     named: bool,
 ) -> int | None:
-    """Its place; None where there is none. With `named`, the instructor has said what it is called.
+    """Return the column's place; None where there is none. With `named`, the instructor has said what it is called.
 
     Raises UsageError where several columns could be it, or none is what was named.
     """
@@ -213,7 +216,7 @@ def find_column(
 
 
 def worksheet_columns(header: Sequence[str], known: dict[str, ColumnKind]) -> tuple[int, int | None] | None:
-    """The places of the grade and of its maximum in Moodle's offline grading worksheet; None where it is none."""
+    """Return the places of the grade and of its maximum in Moodle's offline grading worksheet; None in other files."""
     plains = [letters_and_digits(name) for name in header]
     grade = next((place for place, name in enumerate(plains) if name in _GRADE), None)
     if grade is None or "platform" not in known.values():
@@ -222,17 +225,19 @@ def worksheet_columns(header: Sequence[str], known: dict[str, ColumnKind]) -> tu
 
 
 def maximum_in(header: str) -> float | None:
-    """Blackboard says in a column's name how many points it has."""
+    """Return how many points Blackboard says in a column's name that it has; None where it says nothing."""
     found = re.search(r"\[Total Pts: (?:up to )?([\d.]+)", header)
     return float(found[1]) if found and found[1].count(".") < 2 else None
 
 
 def _titles(name: str, platform: Platform) -> set[str]:
-    """What the column may be called without what the platform adds."""
+    """Return what the column may be called without what the platform adds."""
+    # the assignment's number: `Lab 1 (12345)`
     if platform == "canvas":
         return {letters_and_digits(re.sub(r"\s*\(\d+\)\s*$", "", name))}
     if platform == "blackboard":
         return {letters_and_digits(re.sub(r"\s*\[Total Pts:.*$|\s*\|\s*\d+\s*$", "", name))}
+    # the kind of the grade, `Lab 1 (Real)`, and before it the kind of the item: `Assignment: Lab 1`
     bare = re.sub(r"\s*\([^()]*\)\s*$", "", name)
     return {letters_and_digits(bare), letters_and_digits(bare.partition(":")[2]) or letters_and_digits(bare)}
 
@@ -249,7 +254,7 @@ class TemplateRow:
     end: str
 
     def value(self, column: int) -> str:
-        """What a cell says; empty where the row has no such cell."""
+        """Return what a cell says; empty where the row has no such cell."""
         return _value(self.cells[column]) if column < len(self.cells) else ""
 
     @property
@@ -273,7 +278,7 @@ class Sheet:
         return [_value(cell) for cell in self.records[0].cells]
 
     def written(self, text: str, instead: str = "") -> str:
-        """A cell that says `text`, in quotation marks where the cell before had them, or else every column's name."""
+        """Return a cell that says `text`, quoted if the cell before was, or else if every column's name is."""
         quoted = instead.startswith('"') if instead else all(c.startswith('"') for c in self.records[0].cells)
         if quoted or any(sign in text for sign in (self.delimiter, '"', "\r", "\n")):
             return '"' + text.replace('"', '""') + '"'
@@ -286,8 +291,9 @@ class Sheet:
 
 
 def read_sheet(path: Path) -> Sheet:
-    """Raises UsageError for what is not a table of text."""
+    """Read the export. Raises UsageError for what is not a table of text."""
     data = read_given(path, BYTES_MAX, hint="give the platform's export")
+    # PK: a workbook is a zip file
     if not data or data.startswith(b"PK\x03\x04"):
         raise UsageError(f"{path}: this is not a CSV export", hint=_EXPORT)
     mark, encoding = encoding_of(data)
@@ -305,7 +311,8 @@ def read_sheet(path: Path) -> Sheet:
 
 
 def _records(text: str, delimiter: str) -> Iterator[TemplateRow]:
-    """Whatever is there becomes a cell; joined again, the records are the same text."""
+    """Yield the rows. Whatever is there becomes a cell; joined again, they are the same text."""
+    # a cell in quotation marks, where `""` stands for one, or one without; then what ends it
     cell = re.compile(
         rf'("[^"]*(?:""[^"]*)*"[^{delimiter}\r\n]*|[^{delimiter}\r\n]*)({delimiter}|\r\n|\n|\r|\Z)'
     )

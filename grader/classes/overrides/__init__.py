@@ -47,7 +47,7 @@ Written: TypeAlias = Mapping[str, Mapping[str, WrittenOverride]]
 
 
 def read_overrides(path: Path, rubric: Rubric, ids: Collection[str]) -> Overrides:
-    """What people decided about the submissions of these ids; nothing where there is no such file.
+    """Return what people decided about the submissions of these ids; nothing where there is no such file.
 
     In the file a submission may go by its id, or by the name of its folder of results. Comments that it names are those
     of `comments.yaml` beside it. Raises RubricError with every fault.
@@ -75,12 +75,13 @@ def read_written(path: Path, rubric: Rubric, ids: Collection[str], bank: Bank) -
     reading.read()
     if reading.faults:
         told = sorted(dict.fromkeys(reading.faults), key=lambda fault: source.line(fault[0]))
+        # a submission that stands there twice brings each fault twice
         raise RubricError([source.fault(*fault) for fault in told], hint=HINT)
     return reading.found
 
 
 def parse(raw: bytes, name: str) -> Source:
-    """Return the data of such a file, called `name`. Raises RubricError. The last ones are kept: who writes reads."""
+    """Return the data of such a file, called `name`. Raises RubricError. The last two are kept: writers read again."""
     try:
         return replace(_parse(raw), name=name)
     except RubricError:
@@ -132,6 +133,7 @@ class _Reading:
             faults = self._faults(key, criterion, given)
             self.faults += faults
             if not faults and name is not None:
+                # by JSON, in which a date may be a text although the model is strict
                 override = WrittenOverride.model_validate_json(json.dumps(_without_empty(given)), strict=True)
                 self.found.setdefault(name, {})[criterion] = override
 
@@ -159,12 +161,13 @@ class _Reading:
             if points > most:
                 found.append(((*path, "points"), f"{points:g} is more than the criterion has: {most:g}"))
             if points < least:
+                # before what the model says of a negative number
                 found.insert(0, ((*path, "points"), f"must be at least {least:g}, not {points:g}"))
         return found
 
 
 def _without_empty(value: object) -> object:
-    """Without what was left empty, as in a form that someone has begun to fill in."""
+    """Return the value without what was left empty, as in a form that someone has begun to fill in."""
     if not isinstance(value, dict):
         return value
     return {
@@ -248,5 +251,6 @@ def resolve(written: WrittenOverride, criterion: Criterion, bank: Bank) -> Overr
         whole = [one.points for one in used if one.points is not None]
         points = (whole[-1] if whole else criterion.points) + sum(one.change or 0.0 for one in used)
     texts = [*(one.text for one in used), *([written.comment] if written.comment else [])]
+    # the changes of several comments may add up to more than there is, or to less than nothing
     fields = written.model_dump() | {"points": None if points is None else min(most, max(least, points))}
     return Override(**fields | {"comment": "\n".join(texts)[:COMMENT_CHARS]})

@@ -52,6 +52,7 @@ def write_overrides(path: Path, changes: Iterable[OverrideChange]) -> None:
     # The lock is a file beside it, which stays: another writer may be waiting for it.
     with hold_lock(path.with_name(f".{path.name}.lock"), path, wait_s=WAIT_S):
         raw = (read_given(path) if os.path.lexists(path) else None) or b""
+        # the file may be one that others are allowed to read, and stays so
         mode = path.stat().st_mode & 0o777 if path.exists() else None
         wanted = {(name, criterion): given for name, criterion, given in changes}  # of two for one, the last
         data = _changed_text(path, raw, [(*of, _fields(given)) for of, given in wanted.items()]).encode()
@@ -86,7 +87,7 @@ def _wait(descriptor: int, path: Path, wait_s: float) -> None:
 
 
 def _fields(entry: Entry | None) -> Fields | None:
-    """As the file's data have them; what is empty is left out."""
+    """Return the entry as the file's data have it; what is empty is left out."""
     if entry is None:
         return None
     given = {name: getattr(entry, name) for name in type(entry).model_fields}
@@ -96,17 +97,19 @@ def _fields(entry: Entry | None) -> Fields | None:
 
 
 def _changed_text(path: Path, raw: bytes, changes: Sequence[tuple[str, str, Fields | None]]) -> str:
-    """The file's new text, which is read back and compared before it counts."""
+    """Return the file's new text, which is read back and compared before it counts."""
     before = _data(path, raw)
     if any(submission == SCHEMA_KEY for submission, _, _ in changes):
         raise UsageError(
             f"a submission cannot be called {SCHEMA_KEY} in {path}", hint="rename it in the roster"
         )
+    # reversed: of two the first counts
     called = {folder_key(key): key for key in reversed(before) if key != SCHEMA_KEY}
     edits = [
         OverrideEdit(called.setdefault(folder_key(submission), submission), criterion, fields)
         for submission, criterion, fields in changes
     ]
+    # an editor of Windows may have put a byte order mark before it
     new = edited(raw.decode("utf-8-sig"), before, edits)
     try:
         sound = _without_empty(_data(path, new.encode())) == _without_empty(_expected_data(before, edits))
@@ -122,7 +125,7 @@ def _changed_text(path: Path, raw: bytes, changes: Sequence[tuple[str, str, Fiel
 
 
 def _data(path: Path, raw: bytes) -> dict[str, Any]:
-    """Raises RubricError where the file is not a sound map."""
+    """Return the file's data. Raises RubricError where the file is not a sound map."""
     source = parse(raw, str(path))
     faults = [source.fault(*fault) for fault in source.faults]
     if not isinstance(source.data, dict):
@@ -137,6 +140,7 @@ def _expected_data(before: dict[str, Any], edits: Iterable[OverrideEdit]) -> dic
     for key, criterion, fields in edits:
         if fields is not None:
             there = as_map(as_map(after.get(key)).get(criterion))
+            # a field that a newer grader or a person has added stays
             others = {name: value for name, value in there.items() if name not in KNOWN}
             after[key] = {**as_map(after.get(key)), criterion: {**others, **fields}}
         elif criterion in as_map(after.get(key)):
@@ -145,7 +149,7 @@ def _expected_data(before: dict[str, Any], edits: Iterable[OverrideEdit]) -> dic
 
 
 def _without_empty(data: dict[str, Any]) -> dict[str, Any]:
-    """Without what is empty, which means nothing; the schema's line may be there or not."""
+    """Return the data without what is empty, which means nothing; the schema's line may be there or not."""
     plain = {key: _without_empty(value) if isinstance(value, dict) else value for key, value in data.items()}
     return {key: value for key, value in plain.items() if value not in (None, {}) and key != SCHEMA_KEY}
 
@@ -165,7 +169,7 @@ class OverrideEdit(NamedTuple):
 
 
 def edited(text: str, before: Mapping[str, Any], edits: Iterable[OverrideEdit]) -> str:
-    """`before` are the text's data.
+    """Return the text with all edits made. `before` are the text's data.
 
     Where the text uses what this does not know (anchors, say), the new one may hold other data than it should.
     """
@@ -188,6 +192,7 @@ def _pass(
     pairs = {key.value: (key, value) for key, value in root.value if isinstance(key, yaml.ScalarNode)}
     splices, new, later, done = list[Splice](), list[OverrideEdit](), list[OverrideEdit](), set[str]()
     for edit in edits:
+        # two changes in one place would overlap; after the first, the text is parsed again
         if edit.submission in done or (root.flow_style and done):
             later.append(edit)
             continue
@@ -208,6 +213,7 @@ def _without(text: str, root: yaml.MappingNode, submission: NodePair, criterion:
     found = _pair(of, criterion)
     if found is None or not isinstance(of, yaml.MappingNode):
         return []
+    # a submission without any override goes too
     return [drop_pair(text, of, found) if len(of.value) > 1 else drop_pair(text, root, submission)]
 
 
@@ -225,14 +231,14 @@ def _pair(node: yaml.Node, key: str) -> NodePair | None:
 
 
 def _first(text: str, edit: OverrideEdit) -> Splice:
-    """The first override of a file that is empty, or holds comments only."""
+    """Return the first override of a file that is empty, or holds comments only."""
     lines = _lines(edit)
     schema = COMMENTS if "text" in (edit.fields or {}) else OVERRIDES
     return block_lines(text, len(text), 0, lines if text.strip() else [f"{SCHEMA_KEY}: {schema}", *lines])
 
 
 def _add_entries(text: str, root: yaml.MappingNode, edits: Iterable[OverrideEdit]) -> Splice:
-    """More submissions."""
+    """Return the splice that adds submissions at the end."""
     if root.flow_style or not root.value:
         entries = [f"{_key(e.submission)}: {{{_entry(e.criterion, e.fields or {})}}}" for e in edits]
         return add_pairs(text, root, entries)
@@ -244,7 +250,7 @@ def _lines(edit: OverrideEdit) -> list[str]:
 
 
 def _update_entry(text: str, found: NodePair, now: object, fields: Fields) -> list[Splice]:
-    """Only what changed, so that comments inside of it stay; the whole where something is to go."""
+    """Return splices for what changed alone, so that comments inside of it stay; for all if something is to go."""
     node, current = found[1], as_map(now)
     gone = [name for name in current if current[name] is not None and name in KNOWN and name not in fields]
     if not isinstance(node, yaml.MappingNode) or not node.value or gone:
@@ -269,7 +275,7 @@ def _flow(fields: Fields) -> str:
 
 def _scalar(name: str, value: object) -> str:
     if isinstance(value, float):
-        return f"{Decimal(repr(value)).normalize():f}"
+        return f"{Decimal(repr(value)).normalize():f}"  # `7`, not `7.0`, and no exponent
     if isinstance(value, list):
         return f"[{', '.join(map(_key, value))}]"
     return str(value) if name == "date" else _quote(str(value))
@@ -277,13 +283,15 @@ def _scalar(name: str, value: object) -> str:
 
 @lru_cache(maxsize=4096)
 def _key(text: str) -> str:
-    """Plain where every reader of YAML takes it for a text."""
+    """Return the text as a key: plain where every reader of YAML takes it for a text."""
+    # `no`, `12` and `2026-11-02` are no texts without quotes
     plain = PLAIN_KEY.fullmatch(text) and yaml.safe_load(text) == text
     return text if plain else _quote(text)
 
 
 @lru_cache(maxsize=4096)
 def _quote(text: str) -> str:
+    # without a width, YAML would break a long text into lines
     return str(yaml.safe_dump(text, default_style='"', allow_unicode=True, width=10**9)).rstrip("\n")
 
 
@@ -308,11 +316,12 @@ def spliced(text: str, splices: Iterable[Splice]) -> str:
 
 
 def end_of(text: str, node: yaml.Node) -> int:
-    """Where what is written of a node ends, without the comments and blank lines that follow."""
+    """Return where what is written of a node ends, without the comments and blank lines that follow."""
     if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
         last = node.value[-1]
         key, value = last if isinstance(last, tuple) else (last, last)
         return max(end_of(text, key), end_of(text, value))
+    # PyYAML may put the end of a node behind the blanks and line ends that follow
     end = node.end_mark.index
     while end and text[end - 1].isspace():
         end -= 1
@@ -320,15 +329,16 @@ def end_of(text: str, node: yaml.Node) -> int:
 
 
 def set_value(text: str, pair: NodePair, written: str) -> Splice:
-    """`written` in place of the pair's value."""
+    """Return the splice that puts `written` in place of the pair's value."""
     start = pair[1].start_mark.index
     end = max(start, end_of(text, pair[1]))
-    return Splice(start, end, written if end > start else f" {written}")
+    return Splice(start, end, written if end > start else f" {written}")  # `name:` with nothing behind it
 
 
 def add_pairs(text: str, node: yaml.MappingNode, written: list[str]) -> Splice:
-    """These pairs at the end of a map, in its own style."""
+    """Return the splice that adds these pairs at the end of a map, in its own style."""
     if not node.value:
+        # `{}`: between its braces
         return Splice(node.end_mark.index - 1, node.end_mark.index - 1, ", ".join(written))
     end = end_of(text, node) if not node.flow_style else _end_of_pair(text, node.value[-1])
     if node.flow_style:
@@ -337,18 +347,19 @@ def add_pairs(text: str, node: yaml.MappingNode, written: list[str]) -> Splice:
 
 
 def block_lines(text: str, after: int, column: int, written: list[str]) -> Splice:
-    """Lines below the one in which `after` lies."""
+    """Return the splice that puts lines below the one in which `after` lies."""
     line_end = "\r\n" if "\r\n" in text else "\n"
     newline = text.find("\n", after)
     lines = "".join(f"{' ' * column}{line}{line_end}" for line in written)
     if newline < 0:
+        # the last line has no line end yet
         apart = line_end if text and not text.endswith("\n") else ""
         return Splice(len(text), len(text), apart + lines)
     return Splice(newline + 1, newline + 1, lines)
 
 
 def drop_pair(text: str, node: yaml.MappingNode, pair: NodePair) -> Splice:
-    """Nothing in place of a pair: its lines in a map of lines, the pair and a comma in a map in braces."""
+    """Return the splice that removes a pair: its lines in a map of lines, the pair and a comma in a map in braces."""
     start, end = pair[0].start_mark.index, _end_of_pair(text, pair)
     if not node.flow_style:
         newline = text.find("\n", end)

@@ -120,7 +120,7 @@ class _Views:
         self._session, self._default_author = review, author
 
     def listing(self) -> str:
-        """All submissions, or those that a filter shows."""
+        """Return the page of all submissions, or of those that a filter shows."""
         items = self._session.items()
         place = place_of(items, request.args)
         return render_template(
@@ -134,7 +134,7 @@ class _Views:
         )
 
     def criteria(self) -> str:
-        """Each criterion with how many submissions wait for a decision on it."""
+        """Return the page of the criteria, each with how many submissions wait for a decision on it."""
         items = self._session.items()
         named = [(c.id, c.title) for c in self._session.rubric.rubric.criteria]
         return render_template(
@@ -147,7 +147,7 @@ class _Views:
         )
 
     def submission(self, key: str) -> str:
-        """One submission with its report and its forms."""
+        """Return the page of one submission with its report and its forms."""
         item = self._item(key)
         drafts = {}
         if request.args.get("saved"):
@@ -177,7 +177,7 @@ class _Views:
         return self._saved_response(item, criterion, waits)
 
     def _saved_as(self, item: ListedSubmission, criterion: str, wanted: WrittenOverride | None) -> str:
-        """Save it for one, or for all that are alike; return what is to be said of that."""
+        """Save the decision for one, or for all that are alike; return what is to be said of that."""
         do, session = request.form.get("do"), self._session
         if do == "undo" and (one := session.decisions().written.get(item.entry.id, {}).get(criterion)):
             return f"{plural(session.undo_together(criterion, one.together), 'submission')} taken back"
@@ -187,7 +187,7 @@ class _Views:
         return session.save(item, criterion, wanted, seen, soon=do != "next")
 
     def comments(self) -> str:
-        """All comments of the bank, each with a form, and one for a new one."""
+        """Return the page of the bank's comments, each with a form, and one for a new one."""
         return self._bank_page(request.args.get("c", ""), "")
 
     def comment(self, criterion: str) -> AnyResponse:
@@ -230,7 +230,7 @@ class _Views:
         )
 
     def report(self, key: str, name: str) -> Response:
-        """One of the reports, for the frame in the page."""
+        """Return one of the reports, for the frame in the page."""
         item = self._item(key)
         if item.alias:
             return self._report_without_names(item, name)
@@ -239,8 +239,9 @@ class _Views:
         return response
 
     def evidence(self, key: str, name: str) -> Response:
-        """A recording, to be kept."""
+        """Return a recording, to be kept."""
         item = self._item(key)
+        # a recording names the repository, and its files may name the student
         if item.alias:
             raise NotFound(HIDDEN)
         file = open_evidence(self._session.path / item.key, name)
@@ -269,7 +270,7 @@ class _Views:
         return _cacheable(style() + _own("review.css"), "text/css")
 
     def script(self) -> Response:
-        """Saves without a reload, and keys."""
+        """Return the script, which saves without a reload and knows keys."""
         return _cacheable(_own("review.js"), "text/javascript")
 
     def _item(self, key: str) -> ListedSubmission:
@@ -343,7 +344,7 @@ class _Views:
     def _row(
         self, item: ListedSubmission, drafts: Mapping[str, Draft]
     ) -> tuple[GradebookRow, Cards, list[str]]:
-        """The submission as it counts now, its cards, and what is in the way of saving."""
+        """Return the submission as it counts now, its cards, and what is in the way of saving."""
         row = self._session.submissions.row(item.key) or GradebookRow(entry=item.entry, result=None)
         rubric = self._session.rubric.rubric
         try:
@@ -354,6 +355,7 @@ class _Views:
         except RubricError as error:
             known = Known(decided={o.criterion: as_written(o) for o in row.result.overrides}, bank={})
             troubles = ["Nothing can be saved until overrides.yaml is fixed:", *error.faults]
+            # the faults name submissions
             troubles = troubles[:1] if self._session.blind else troubles
         mask = self._session.mask(item, row.result.submission.commit)
         if mask:
@@ -377,6 +379,7 @@ class _Views:
 
     def _troubles(self) -> list[str]:
         faults = self._session.requests().faults
+        # their places name the students who asked
         found = [f"{len(faults)} requests are left out"] if faults and self._session.blind else [*faults[:10]]
         if self._session.batch_runs():
             found.append(
@@ -407,12 +410,13 @@ class _Views:
             said = f"saved {at}" + (f"; {waits}" if waits else "")
             return jsonify(self._parts(item, criterion, None) | {"said": said, "go": to})
         if to:
+            # 303: the browser asks for a page again, so that to reload it does not save once more
             return redirect(to, 303)
         back = url_for("submission", key=item.address, saved=criterion, at=at, **place.kept)
         return redirect(f"{back}#c-{criterion}", 303)
 
     def _parts(self, item: ListedSubmission, criterion: str, draft: Draft | None) -> dict[str, object]:
-        """What of a card changes, as a script puts it in place."""
+        """Return what of a card changes, as a script puts it in place."""
         row, _, _ = self._row(item, {})
         drafts = {criterion: draft} if draft else {}
         one = card(row, self._session.rubric.rubric, criterion, self._known_of(item), drafts)
@@ -459,7 +463,7 @@ SCRIPT = "X-Asked-By"
 
 
 def send_opened(file: BinaryIO | None, mimetype: str, *, download: str = "") -> Response:
-    """A file that is open; under the name `download` it is kept and not shown. Raises NotFound where there is none."""
+    """Return a file that is open; one with a `download` name is kept and not shown. Raises NotFound for None."""
     if file is None:
         raise NotFound("There is no such file.")
     return send_file(
@@ -474,7 +478,7 @@ def with_code(response: Response, code: int) -> Response:
 
 
 def show_grader_error(error: GraderError) -> AnyResponse:
-    """What the grader says is wrong."""
+    """Return the answer that says what the grader says is wrong."""
     blind = current_app.extensions["review"].blind
     text = (
         "The grader says why to those who see names." if blind else f"{error.message}. {error.hint}".strip()
@@ -483,8 +487,8 @@ def show_grader_error(error: GraderError) -> AnyResponse:
 
 
 def show_http_error(error: HTTPException) -> AnyResponse:
-    """Any other answer than a page. After a link of another site, browsers hold back the cookie that they have just
-    been given; the page itself asks once more, and that is no other site's request."""
+    """Return any other answer than a page. After a link of another site, browsers hold back the cookie that they have
+    just been given; the page itself asks once more, and that is no other site's request."""
     code = error.code or 500
     title = {403: "Not allowed", 404: "Not found", 413: "Too much text"}.get(code, "This did not work")
     cross = request.headers.get("Sec-Fetch-Site") == "cross-site"

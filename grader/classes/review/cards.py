@@ -170,7 +170,7 @@ def cards(row: GradebookRow, rubric: Rubric, known: Known, drafts: Mapping[str, 
 def card(
     row: GradebookRow, rubric: Rubric, criterion: str, known: Known, drafts: Mapping[str, Draft]
 ) -> Card:
-    """One of them; the result has a criterion of that id."""
+    """Return one of them; the result has a criterion of that id."""
     result = row.result
     asked = next((c for c in rubric.criteria if c.id == criterion), None)
     return Card(
@@ -186,17 +186,17 @@ def card(
 
 
 def _waits(card: Card, *, whole: bool) -> bool:
-    """Of what could not be graded at all, only what people decide anyway waits for one."""
+    """Return whether it waits for a person: of what could not be graded, only what people decide anyway does."""
     return card.criterion.counts and card.criterion.status.is_open and (whole or card.manual)
 
 
 def verdict(status: Status, points: float, most: float) -> str:
-    """`fail, 0 of 10`."""
+    """Return `fail, 0 of 10`."""
     return f"{status.value}, {number(points)} of {number(most)}"
 
 
 def form_number(value: float) -> str:
-    """As a field of a form has it: no digit is lost."""
+    """Return a number as a field of a form has it: no digit is lost."""
     return f"{value:.10f}".rstrip("0").rstrip(".")
 
 
@@ -219,8 +219,9 @@ def override_of(
     pointed: bool = False,
     answer: str = "",
 ) -> WrittenOverride:
-    """Raises Wrong. A `reason` is asked for where a check has judged; an `answer` is one, and comments of the bank are.
-    Points may be left out where there is an answer, and where comments stand for points (`pointed`)."""
+    """Return the decision of a form. Raises Wrong. A `reason` is asked for where a check has judged; an `answer` is
+    one, and so are comments of the bank. Points may be left out where there is an answer, and where comments stand for
+    points (`pointed`)."""
     written, answered = clean(comment), clean(answer)
     value = None if (answered or pointed) and not points.strip() else _points(points, least, most)
     if (many := max(len(written), len(answered))) > COMMENT_CHARS:
@@ -285,7 +286,7 @@ def points_words(comment: BankComment) -> str:
 
 
 def author_of(text: str) -> str:
-    """Raises Wrong."""
+    """Return a name as it was typed, on one line. Raises Wrong."""
     written = " ".join(clean(text).split())
     if len(written) > AUTHOR_CHARS:
         raise Wrong(f"A name has at most {AUTHOR_CHARS} characters.")
@@ -293,7 +294,7 @@ def author_of(text: str) -> str:
 
 
 def clean(text: str) -> str:
-    """Line ends as they are in files, and no control characters."""
+    """Return the text with line ends as they are in files, and without control characters."""
     lines = text.replace("\r\n", "\n").replace("\r", "\n").strip()
     return "".join(c for c in lines if c in "\n\t" or unicodedata.category(c) not in {"Cc", "Cs"})
 
@@ -343,6 +344,7 @@ def code_of(
     marks: dict[str, set[int]] = {}
     for citation in result.citations:
         if isinstance(citation, FileCitation):
+            # 0: the whole file is cited, and no line of it is marked
             marks.setdefault(citation.file, set()).add(citation.line or 0)
     paths = [path for path in marks if path in run.attachments]
     paths += [path for path in sorted(run.attachments) if path not in marks and _is_about(criterion, path)]
@@ -402,6 +404,7 @@ def _rows(
     if before is None:
         yield from (CodeLine(number=i, text=text, marked=i in marks) for i, text in enumerate(shown, start=1))
         return
+    # blanks at the end of a line are no difference that anyone sees
     plain = [[text.rstrip() for text in part] for part in (before, lines)]
     for kind, was, was_end, now, now_end in SequenceMatcher(None, plain[0], plain[1]).get_opcodes():
         if kind in ("delete", "replace"):
@@ -414,6 +417,7 @@ def _rows(
 
 def _handed_out(path: str, starter: Mapping[str, bytes]) -> list[str] | None:
     """Return the lines of the starter's file at that path of the package; None where it has none."""
+    # a file of another package of the lab: its path begins at the main one
     own = re.sub(r"^(\.\./)+", "", path)
     found = next((data for name, data in starter.items() if f"/{name}".endswith(f"/{own}")), None)
     return None if found is None else found.decode("utf-8", "replace").splitlines()
@@ -466,5 +470,6 @@ def highlighted(lines: Sequence[str], suffix: str) -> list[Markup]:
 
 def _mark_up(text: str, kind: str) -> str:
     """Return an element for each line of it."""
+    # the lines are taken apart below, and no element may reach from one into the next
     parts = escape(text).split("\n")
     return "\n".join(part and f'<span class="hl-{kind}">{part}</span>' for part in parts)

@@ -44,7 +44,7 @@ def guard(app: Flask, *, port: int, token: str) -> None:
         SECRET_KEY=secrets.token_bytes(32),
         SESSION_COOKIE_NAME=f"grader-review-{port}",  # cookies do not tell ports apart
         SESSION_COOKIE_HTTPONLY=True,
-        SESSION_COOKIE_SAMESITE="Strict",
+        SESSION_COOKIE_SAMESITE="Strict",  # no other site's page can ask with this cookie
         MAX_CONTENT_LENGTH=BODY_BYTES,
         MAX_FORM_MEMORY_SIZE=BODY_BYTES,
         MAX_FORM_PARTS=20,
@@ -52,6 +52,7 @@ def guard(app: Flask, *, port: int, token: str) -> None:
     hosts = {f"127.0.0.1:{port}", f"localhost:{port}"}
 
     def check() -> AnyResponse | None:
+        # another site's name may lead to this machine (DNS rebinding); its pages are not let in
         if request.headers.get("Host", "").lower() not in hosts:
             raise Forbidden("This page answers at 127.0.0.1 only.")
         if request.path == "/" and "token" in request.args and request.method == "GET":
@@ -67,7 +68,8 @@ def guard(app: Flask, *, port: int, token: str) -> None:
 
 
 def _enter(token: str) -> AnyResponse:
-    """The token of the address for a cookie, and an address without it. Tabs that are open already stay as they are."""
+    """Give a cookie for the address's token, and the address without it. Tabs that are open stay as they are."""
+    # a comparison that takes as long for a wrong token, however much of it is right
     if not compare_digest(request.args["token"].encode(), token.encode()):
         raise Forbidden(
             "This address belongs to another review. Open the one that `grader review` printed last."
@@ -77,8 +79,9 @@ def _enter(token: str) -> AnyResponse:
 
 
 def _check_form() -> None:
-    """Return whether a request that changes something comes from a page of ours."""
+    """Raise Forbidden unless a request that changes something comes from a page of ours."""
     origin = request.headers.get("Origin")
+    # an old browser sends no origin; then what the form carries has to be enough
     if origin is not None and origin != f"http://{request.headers['Host'].lower()}":
         raise Forbidden("This form does not belong to this page.")
     if not compare_digest(request.form.get("csrf", "").encode(), str(session["csrf"]).encode()):
@@ -88,6 +91,7 @@ def _check_form() -> None:
 
 
 def _with_headers(response: Response) -> Response:
+    # style and script of this review are the same to its end
     kept = response.headers.get("Cache-Control", "") if response.cache_control.immutable else ""
     for name, value in HEADERS.items():
         response.headers[name] = value
@@ -96,6 +100,7 @@ def _with_headers(response: Response) -> Response:
     return response
 
 
+# all but the page as plain text: whatever a student wrote there, no browser takes it for a page or a script
 REPORTS = {
     "report.html": "text/html",
     "report.md": "text/plain",
@@ -108,7 +113,7 @@ LISTED_MAX = 200
 
 
 def open_report(folder: Path, name: str) -> BinaryIO | None:
-    """One of `REPORTS`; None where there is none, or it is not a file."""
+    """Return one of `REPORTS`; None where there is none, or it is not a file."""
     return _open(folder, name) if name in REPORTS else None
 
 
@@ -118,12 +123,12 @@ def open_evidence(folder: Path, name: str) -> BinaryIO | None:
 
 
 def reports_of(folder: Path) -> list[str]:
-    """Those of `REPORTS` that are there."""
+    """Return those of `REPORTS` that are there."""
     return [name for name in REPORTS if _exists(open_report(folder, name))]
 
 
 def evidence_of(folder: Path) -> list[tuple[str, int]]:
-    """The names and sizes in bytes of what `open_evidence` opens."""
+    """Return the names and sizes in bytes of what `open_evidence` opens."""
     try:
         entries = [entry for entry in os.scandir(folder / EVIDENCE) if NAME.fullmatch(entry.name)]
         files = [entry for entry in entries if entry.is_file(follow_symlinks=False)]

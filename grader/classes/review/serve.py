@@ -46,7 +46,7 @@ def serve(
             create_app(review, port=number, token=token, author=author),
             sockets=[listening],
             threads=THREADS,
-            ident=None,
+            ident=None,  # no server's name in the headers
             max_request_body_size=2 * BODY_BYTES,
             max_request_header_size=2 * BODY_BYTES,
             clear_untrusted_proxy_headers=True,
@@ -68,6 +68,7 @@ def serve(
 def _bound(port: int) -> Iterator[socket.socket]:
     listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
+        # the port of a review that has just ended can be had at once
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listening.bind((HOST, port))
@@ -81,11 +82,12 @@ def _bound(port: int) -> Iterator[socket.socket]:
 
 @contextmanager
 def browser(address: str, *, wanted: bool) -> Iterator[bool]:
-    """Open the address in the person's browser, where there is one; whether it was tried.
+    """Open the address in the person's browser, where there is one, and give whether that was tried.
 
     The browser is given a file of this user's alone: all users of a machine may read the arguments of a program.
     """
     with ExitStack() as stack:
+        # without a screen, Python would start a browser in this terminal
         screens = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
         has_screen = sys.platform == "darwin" or any(os.environ.get(name) for name in screens)
         tried = wanted and has_screen
@@ -96,11 +98,13 @@ def browser(address: str, *, wanted: bool) -> Iterator[bool]:
                 tried = False
             else:
                 _write_page(page, address)
+                # in a thread, since some browsers are waited for until they end
                 threading.Thread(target=_open, args=(page,), daemon=True).start()
         yield tried
 
 
 def _write_page(page: Path, address: str) -> None:
+    # nobody may read the token between the two calls
     page.touch(mode=0o600)
     target = escape(address, quote=True)
     page.write_text(

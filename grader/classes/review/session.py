@@ -62,8 +62,8 @@ OLDER_RESULT = (
 
 
 def open_session(path: Path, pace: Pace | None = None) -> ReviewSession:
-    """The review of the class in `path`. Raises UsageError where there is none, and where its rubric has changed,
-    EvidenceError where a newer grader wrote results in it."""
+    """Return the review of the class in `path`. Raises UsageError where there is none, and where its rubric has
+    changed, EvidenceError where a newer grader wrote results in it."""
     batch = open_batch(path)
     batch.refuse_newer()
     run = batch.run
@@ -92,6 +92,7 @@ class ReviewSession:
         self.path, self.rubric = path, rubric
         self.submissions = Submissions(path)
         self.background = BackgroundWriter(self._follow, pace)
+        # for decisions, which are compared and written; for the class's results; for what is noted below
         self._saving, self._writing, self._guard = threading.Lock(), threading.Lock(), threading.Lock()
         self._decisions, self._requests = Remembered[Decisions](), Remembered[Requests]()
         self.share: Callable[[Entry], bool] = lambda _: True
@@ -111,6 +112,7 @@ class ReviewSession:
         if folder is None:
             return {}
         with suppress(RubricError):
+            # without the starter, the code is shown all the same
             files = read_beside_rubric(self.rubric)
             return {name: data for name, data in files.items() if name.startswith(f"{folder}/")}
         return {}
@@ -123,11 +125,11 @@ class ReviewSession:
         self.background.changed()
 
     def close(self) -> bool:
-        """Write what is left; whether all is written."""
+        """Write what is left; return whether all is written."""
         return self.background.close()
 
     def overrides(self) -> Overrides:
-        """What `overrides.yaml` and `comments.yaml` come to now. Raises RubricError where they have faults."""
+        """Return what `overrides.yaml` and `comments.yaml` come to now. Raises RubricError where they have faults."""
         return self.decisions().come_to
 
     def decisions(self) -> Decisions:
@@ -185,13 +187,14 @@ class ReviewSession:
             return tuple(items)
         called, published = self._names()[0], read_published(self.path)
         pairs = [(called[item.entry.id], item) for item in items]
+        # by the number in the alias, which says nothing of the place in the roster
         pairs.sort(key=lambda pair: int(pair[0].rpartition("-")[2]))
         return tuple(item if published.of(item.entry) else replace(item, alias=to) for to, item in pairs)
 
     def _names(self) -> tuple[Mapping[str, str], frozenset[str]]:
         """Return what each submission is called, and the words that most sources have."""
         batch = self.submissions.batch()
-        if self._aliases is None or self._aliases[0] is not batch:
+        if self._aliases is None or self._aliases[0] is not batch:  # a new one where the class changed
             entries, names = [item.entry for item in self.submissions.items()], Names()
             for entry in entries:
                 names.add(entry)
@@ -227,6 +230,7 @@ class ReviewSession:
         with self._saving, hold_review(self.path):
             found = self.decisions()
             now = found.come_to.get(name, {}).get(criterion)
+            # if someone else decided the same, nothing is lost
             if not same(now, resolve(wanted, asked, found.bank) if wanted else None):
                 if mark(now) != seen:
                     raise Conflict(now)
@@ -261,7 +265,7 @@ class ReviewSession:
                 item
                 for item in self.submissions.items()
                 if (one := written.get(item.entry.id, {}).get(criterion)) is not None
-                and word
+                and word  # what was decided one by one has no word
                 and one.together == word
             ]
             self._write_together(those, criterion, None)
@@ -305,14 +309,14 @@ class ReviewSession:
         return Settler(self.rubric.rubric, overrides).settle_again(result, item.entry.id, None)
 
     def waits(self, item: ListedSubmission) -> str:
-        """Why the files of a submission do not say yet what was decided; empty where they do."""
+        """Return why the files of a submission do not say yet what was decided; empty where they do."""
         with self._guard:
             pending = item.key in self._pending
         return self.background.trouble or "its report follows in a moment" if pending else ""
 
     def batch_runs(self) -> bool:
         """Return whether a batch works in the folder just now."""
-        if self.submissions.batch().run.state != "running" or self._writing.locked():
+        if self.submissions.batch().run.state != "running" or self._writing.locked():  # this review writes
             return False
         try:
             with hold_folder(self.path):
@@ -409,6 +413,7 @@ class ReviewSession:
 
     def _write_books(self, batch: BatchFolder) -> None:
         run = batch.run
+        # the folder's lock is ours, so the batch that says `running` was killed
         state: State = "interrupted" if run.state == "running" else run.state
         written = write_books(batch, self.rubric.rubric, state, run.counts.kept, ended_at=run.ended_at)
         write_run(self.path, written.run.model_copy(update={"ended_at": run.ended_at}))
@@ -460,7 +465,7 @@ def mark(override: Override | None) -> str:
 
 
 def override_as_written(override: Override) -> Override:
-    """What a person wrote of an override that was applied."""
+    """Return what a person wrote of an override that was applied."""
     return Override(**{name: getattr(override, name) for name in Override.model_fields})
 
 
@@ -505,19 +510,19 @@ class BackgroundWriter:
         self._thread.start()
 
     def changed(self) -> None:
-        """There is something to do."""
+        """Note that there is something to do."""
         with self._condition:
             self._last = time.monotonic()
             self._first = self._last if self._first is None else self._first
             self._condition.notify_all()
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait until all is done; whether it is."""
+        """Wait until all is done; return whether it is."""
         with self._condition:
             return self._condition.wait_for(lambda: self._first is None and not self._working, timeout_s)
 
     def close(self) -> bool:
-        """Do what is left at once and end; whether all is done. What is busy in the folder is waited for."""
+        """Do what is left at once and end; return whether all is done. What is busy in the folder is waited for."""
         with self._condition:
             self._closing, self._closed_at = True, time.monotonic()
             self._condition.notify_all()
@@ -540,12 +545,13 @@ class BackgroundWriter:
                 if trouble and self._closing:
                     self._first = self._first or time.monotonic()
                     left = self._closed_at + self._pace.closing_s - time.monotonic()
+                    # what is busy will end; any other trouble would only come again
                     if not is_busy or left <= 0:
                         return
                     self._condition.wait(min(left, self._pace.again_s))
                     continue
                 if trouble:
-                    self._first = self._last = time.monotonic() + self._pace.again_s
+                    self._first = self._last = time.monotonic() + self._pace.again_s  # so it is due later
                 self._condition.notify_all()
 
     def _wait_until_due(self) -> bool:

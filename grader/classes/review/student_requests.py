@@ -42,6 +42,7 @@ HEADINGS = {
 """In this order, words that a heading of each column can have; the first word that some heading has decides."""
 NEEDED = ("student", "criterion", "text")
 TEXT_CHARS, WHEN_CHARS, SOURCE_CHARS = 2000, 40, 300
+# a spreadsheet takes a cell that begins so for a formula, and runs it
 _FORMULA = re.compile(r"\s*[=+\-@]")
 
 
@@ -176,6 +177,7 @@ def read_requests(paths: Sequence[Path], entries: Sequence[Entry], criteria: Seq
 
 def criteria_named(text: str, criteria: Sequence[Criterion]) -> list[str]:
     """Return the ids of the criteria that a text names, by id or by its whole title."""
+    # a whole title first: a title may contain another criterion's id
     titles = [c.id for c in criteria if c.title.casefold() == text.strip().casefold()]
     return titles or [c.id for c in criteria if re.search(rf"(?<![\w-]){re.escape(c.id)}(?![\w-])", text)]
 
@@ -208,6 +210,7 @@ def _columns(headings: Sequence[str | None]) -> dict[str, tuple[str, ...]]:
     found: dict[str, tuple[str, ...]] = {}
     for column, words in {"source": ("source", "url"), **HEADINGS}.items():
         exact = [h for h in free if h.strip().casefold() == column]
+        # a heading may have an ending: `Criterion`, `criteria`
         having = [h for word in words for h in free if re.search(rf"\b{word}", h, re.IGNORECASE)]
         chosen = list(dict.fromkeys([*exact, *having]))[: None if column == "student" else 1]
         if chosen:
@@ -222,4 +225,5 @@ def _without_formula_sign(cell: str) -> str:
 
 
 def _text(path: Path) -> str:
+    # spreadsheets put a byte order mark before it
     return (read_untrusted(path) or b"").decode("utf-8-sig", "replace")

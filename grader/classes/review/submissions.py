@@ -48,7 +48,7 @@ FILTERS_OF_ONE = {
 """Those of a list of one criterion across the class."""
 ALL, ASKED, NOTED = "all", "asked", "noted"
 """The last one is not a filter: a person said something and left the points to the check."""
-HASH_CHARS = (7, 8, 10, 12)
+HASH_CHARS = (7, 8, 10, 12)  # to which git, GitHub and GitLab abbreviate a commit
 KEPT = frozenset(
     {
         *("check", "criterion", "digest", "id", "kind", "scenario", "schema", "status", "rubric"),
@@ -196,7 +196,7 @@ class Submissions:
         return self._read()[0]
 
     def items(self) -> tuple[ListedSubmission, ...]:
-        """Every submission; those that the roster itself keeps from being graded come last."""
+        """Return every submission; those that the roster itself keeps from being graded come last."""
         return tuple(self._item(key, one) for key, one in self._read()[1].items())
 
     def item(self, key: str) -> ListedSubmission | None:
@@ -232,6 +232,7 @@ def _each(batch: BatchFolder) -> Iterator[tuple[str, BatchFolder]]:
         *((fault.id, {"entries": (), "faults": (fault,)}) for fault in run.faults if fault.id is not None),
     ]
     known: set[str] = set()
+    # two ids that differ in capitals have one folder
     for name, update in ones:
         key = safe_name(name)
         if key.casefold() not in known:
@@ -240,7 +241,7 @@ def _each(batch: BatchFolder) -> Iterator[tuple[str, BatchFolder]]:
 
 
 def item_of(row: GradebookRow) -> ListedSubmission:
-    """What the list shows of a submission."""
+    """Return what the list shows of a submission."""
     result = row.result
     waiting = {
         status: sum(c.status is status and c.counts for c in result.criteria)
@@ -266,7 +267,7 @@ _diagnosis = lru_cache(maxsize=20_000)(reduced)
 
 
 def _lines(result: GradingResult) -> dict[str, ListedCriterion]:
-    """What is to be said of each criterion; of what could not be graded, only what a person has decided."""
+    """Return what is to be said of each criterion; of what could not be graded, only what a person has decided."""
     decided = awarded(result.overrides)
     found = {}
     for criterion in result.criteria:
@@ -309,7 +310,7 @@ def _kinds(result: GradingResult, waiting: dict[Status, int]) -> frozenset[str]:
 
 
 def stamp_of(path: Path | str) -> Stamp:
-    """Another one once the file is another one; None where there is none."""
+    """Return what is another one once the file is another one; None where there is none."""
     try:
         found = os.stat(path)  # noqa: PTH116 - a thousand paths for each page
     except OSError:
@@ -382,6 +383,8 @@ def place_of(items: Sequence[ListedSubmission], asked: Mapping[str, str], *, at:
     here = next((i for i, item in enumerate(items) if item.key == at), -1)
     ahead = {item.key for item in items[:here]} if here > 0 else set()
     left = [item.address for item in shown if item.key in ahead]
+    # the submission itself may have left the filter by what was decided, so its neighbours are found by the
+    # whole list
     right = [item.address for item in shown if item.key not in ahead and item.key != at]
     asked_page = asked.get("page", "")
     page = int(asked_page) if re.fullmatch(r"[0-9]{1,6}", asked_page) else 1

@@ -40,7 +40,7 @@ A new kind takes
 
 
 def read_roster(path: Path, local: Local = OWN_FOLDER) -> Roster:
-    """Every submission that the roster names, and every fault that it has, in the order of lines.
+    """Return every submission that the roster names, and every fault that it has, in the order of lines.
 
     `path` is a CSV file with the columns `id,source[,ref][,package][,name][,group][,submitted_at][,extension_days]`, an
     export of GitHub Classroom (CSV) or of a GitLab group (the JSON of its projects), or a folder with a submission

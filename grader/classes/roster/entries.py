@@ -56,7 +56,7 @@ class Table(NamedTuple):
 
 
 def read_table(path: Path) -> Table:
-    """Raises UsageError where the file is not a table of text at all; what is wrong with a row is said by the row."""
+    """Read a table. Raises UsageError where the file is none of text; what is wrong with a row is said by the row."""
     lines = list(io.StringIO(_text(path), newline=""))
     found = _rows(lines, *_delimiter(lines))
     header = next(found, None)
@@ -76,8 +76,8 @@ class _Fields(NamedTuple):
 
 
 def _rows(lines: Sequence[str], delimiter: str, start: int) -> Iterator[_Fields]:
-    """Each row that is not empty. After one that cannot be read, the next line begins a row again; of it there is the
-    first field at most."""
+    """Yield each row that is not empty. After one that cannot be read, the next line begins a row again; of it there is
+    the first field at most."""
     unreadable = 0
     while start < len(lines) and unreadable < UNREADABLE_MAX:
         # Python 3.10 reads no zero byte: its place is kept by a sign that says the same to a reader.
@@ -92,6 +92,7 @@ def _rows(lines: Sequence[str], delimiter: str, start: int) -> Iterator[_Fields]
                     yield _Fields(begins + 1, fields, ("a zero byte in it",) if zero else ())
                 begins = start + reader.line_num
         except csv.Error as error:
+            # a field with a quotation mark may be the one that does not end
             first = lines[begins].partition(delimiter)[0]
             yield _Fields(begins + 1, [] if '"' in first else [first], (_explain_csv(error),))
             start, unreadable = begins + 1, unreadable + 1
@@ -102,7 +103,7 @@ def _rows(lines: Sequence[str], delimiter: str, start: int) -> Iterator[_Fields]
 
 
 def _explain_csv(error: csv.Error) -> str:
-    said = str(error)
+    said = str(error)  # these words are Python's
     if said == "unexpected end of data":
         return "a quotation mark that never ends"
     if "expected after" in said:
@@ -122,12 +123,12 @@ def _row(columns: Sequence[str], line: int, fields: list[str], faults: tuple[str
 
 
 def _bare(field: str) -> str:
-    """Without blanks around it, nor the invisible signs that come along when text is copied into a spreadsheet."""
+    """Return a field without blanks around it, and without invisible signs that are copied into spreadsheets."""
     return field.strip().strip("\ufeff\u200b\u200e\u200f\u2060").strip()
 
 
 def _delimiter(lines: Sequence[str]) -> tuple[str, int]:
-    """What stands between fields, and how many lines come before the header: Excel may say `sep=;` in the first."""
+    """Return what stands between fields, and the lines before the header: Excel may say `sep=;` in the first."""
     if lines and (said := _SEPARATOR.fullmatch(lines[0])):
         return said[1], 1
     return delimiter_of(next((line for line in lines if line.strip()), "")), 0
@@ -135,7 +136,7 @@ def _delimiter(lines: Sequence[str]) -> tuple[str, int]:
 
 def delimiter_of(header: str) -> str:
     """Return what stands between the cells of a table, by the line that names its columns."""
-    return max(DELIMITERS, key=re.sub(r'"[^"]*"', "", header).count)
+    return max(DELIMITERS, key=re.sub(r'"[^"]*"', "", header).count)  # outside of quotation marks
 
 
 def _text(path: Path) -> str:
@@ -159,7 +160,7 @@ _SAVE = "save it as CSV UTF-8 (in Excel: 'CSV UTF-8', not 'CSV')"
 
 
 def text_of(data: bytes, path: Path) -> str:
-    """UTF-8, with or without its mark, or UTF-16. Raises UsageError with the line of what is neither."""
+    """Decode UTF-8, with or without its mark, or UTF-16. Raises UsageError with the line of what is neither."""
     workbook = next((what for magic, what in _WORKBOOKS.items() if data.startswith(magic)), None)
     if workbook:
         raise UsageError(f"{path}: this is {workbook}, not CSV", hint=_SAVE)
@@ -207,7 +208,7 @@ OWN_FOLDER = Local()
 
 
 def local_fault(source: str, base: Path, local: Local) -> str:
-    """Why nothing of this machine may be read for `source`, in which a path is absolute, of a roster in `base`; empty
+    """Return why nothing of this machine may be read for `source` (with an absolute path) of a roster in `base`; empty
     where it may, and where it lies elsewhere. Links are followed, and nothing is opened."""
     try:
         places = _places(source)
@@ -224,7 +225,7 @@ def local_fault(source: str, base: Path, local: Local) -> str:
 
 
 def _places(source: str) -> list[Path]:
-    """Where it lies, with the top of the repository that it is in; where nothing is there, where it would be."""
+    """Return where it lies, with the top of the repository that it is in; if nothing is there, where it would be."""
     try:
         read = parse_source(source)
     except GraderError:
@@ -236,6 +237,7 @@ def _paths_written(source: str) -> list[Path]:
     scheme, colon, rest = source.partition("://")
     if colon and scheme.lower() == "file":
         path = f"/{rest.partition('/')[2]}"
+        # as it stands, and as a URL: either may be a path that is there
         return [Path(path), Path(unquote(path))]
     return [Path(source)] if Path(source).is_absolute() else []
 
@@ -249,8 +251,8 @@ _NO_REF = re.compile(r"[\x00-\x20~^:?*\[\\\x7f]|\.\.|@\{|//|^[/-]|[/.]$")
 
 
 def source_fault(source: str, base: Path, local: Local = OWN_FOLDER) -> str:
-    """Why nothing can be had from `source`, a field of a roster in the folder `base`, or nothing may be by `local`;
-    empty where it may be."""
+    """Return why nothing can be had from `source`, a field of a roster in the folder `base`, or nothing may be by
+    `local`; empty where it may be."""
     try:
         there = _is_there(source, base)
     except (OSError, ValueError, RuntimeError):
@@ -277,10 +279,8 @@ def _address_fault(source: str) -> str:
         parse_source(source)
     except UsageError:  # as what git takes for the name of a program (`ext::`) or for an option of ssh
         return f"{_without_password(source)} is not the address of a repository"
-    except (
-        SubmissionError,
-        OSError,
-    ):  # a path on this machine that is not there is told when it is looked for
+    except (SubmissionError, OSError):
+        # a path on this machine that is not there is told when it is looked for
         return ""
     return ""
 
@@ -293,24 +293,25 @@ def whole_source(source: str, base: Path) -> str:
 
 
 def ref_fault(ref: str) -> str:
-    """Why `ref` names no branch, tag or commit; empty where it may."""
+    """Return why `ref` names no branch, tag or commit; empty where it may."""
     return f"{brief(ref)} cannot be the name of a branch, tag or commit" if _NO_REF.search(ref) else ""
 
 
 def _without_password(source: str) -> str:
-    """Without what may be a password: all that stands before an `@`."""
+    """Return the source without what may be a password: all that stands before an `@`."""
     return brief(source.rpartition("@")[2] if re.search(r":.*@", source, re.DOTALL) else source)
 
 
 def _is_there(source: str, base: Path) -> bool:
     """Return whether a path is, with or without the `@ref` behind it."""
     ends = [len(source), *(at.start() for at in re.finditer("@", source))]
+    # a field with thousands of `@` is not looked for as often
     home = [os.path.expanduser(source[:end]) for end in ends[:20] if end]  # noqa: PTH111 - as above
     return any(os.path.lexists(base / path) for path in home)
 
 
 def entries_of(table: Table, path: Path, local: Local) -> Roster:
-    """Raises UsageError where a column is missing, or is there twice."""
+    """Return the entries of a table. Raises UsageError where a column is missing, or is there twice."""
     names = known_columns(table, path)
     header = Entry(id="", source="", where=f"{path.name}:{table.line}")
     found = [FoundEntry(header, (meant,)) for _, meant in near_misses(table.columns)]
@@ -346,7 +347,7 @@ def _read_row(row: RosterRow, names: dict[str, str], table: Table, path: Path, l
 
 
 def _faults(fields: dict[str, str], base: Path, local: Local) -> Iterator[str]:
-    """What is wrong with one row."""
+    """Yield what is wrong with one row."""
     for name in REQUIRED:
         if not fields.get(name):
             yield f"no {name}"
@@ -376,7 +377,7 @@ class FoundEntry(NamedTuple):
 
 
 def gather(file: Path, found: Sequence[FoundEntry], *, columns: tuple[str, ...] = ()) -> Roster:
-    """The first of those that share an id stays; each later one is a fault that says where the first is."""
+    """Return the roster. The first of those that share an id stays; each later one is a fault that names the first."""
     keys = [folder_key(entry.id) if entry.id else "" for entry, _ in found]
     times = Counter(keys)
     first: dict[str, str] = {}
@@ -391,6 +392,7 @@ def gather(file: Path, found: Sequence[FoundEntry], *, columns: tuple[str, ...] 
         if is_again:
             wrong.append(f"id: {brief(entry.id)} is there already, in {first[key]}")
         first.setdefault(key, entry.where)
+        # an id that several share says of none whose row in the gradebook tells the fault
         own = entry.id if key and times[key] == 1 and not any(id_faults(entry.id)) else None
         about = {"name": entry.name, "group": entry.group, "extra": entry.extra}
         faults += [RosterFault(where=entry.where, id=own, text=text, **about) for text in wrong]
@@ -400,7 +402,7 @@ def gather(file: Path, found: Sequence[FoundEntry], *, columns: tuple[str, ...] 
 
 
 def id_faults(submission_id: str) -> Iterator[str]:
-    """Why `submission_id` can name no folder of results; nothing for an empty one, which is a fault of its own."""
+    """Yield why `submission_id` can name no folder of results; nothing for an empty one, a fault of its own."""
     if not submission_id:
         return
     if not encodable(submission_id):
@@ -425,7 +427,7 @@ NEARLY = 0.82
 
 
 def known_columns(table: Table, path: Path, required: Sequence[str] = REQUIRED) -> dict[str, str]:
-    """The name of each column that means something. Raises UsageError where one is missing, or is there twice."""
+    """Return the name of each column that means something. Raises UsageError if one is missing, or there twice."""
     names = {column: _plain(column) for column in table.columns}
     missing = [name for name in required if name not in names.values()]
     where = f"{path}:{table.line}"
@@ -446,11 +448,12 @@ def known_columns(table: Table, path: Path, required: Sequence[str] = REQUIRED) 
 
 
 def near_misses(columns: tuple[str, ...]) -> Iterator[tuple[str, str]]:
-    """Columns that are nearly one which means something and is not there, each with what was meant."""
+    """Yield columns that are nearly one which means something and is not there, each with what was meant."""
     plain = {_plain(column) for column in columns}
     missing = [name for name in KNOWN if name not in plain]
     for column in columns:
         near = difflib.get_close_matches(_plain(column)[:40], missing, n=1, cutoff=NEARLY)
+        # few mistype the first letter, and another one mostly makes another word
         if near and near[0][0] == _plain(column)[0] and _plain(column) not in KNOWN:
             yield column, f"the column {brief(column)} is not known here: did you mean {near[0]}?"
 
@@ -472,7 +475,7 @@ _DAYS = re.compile(r"\+?\d{1,5}([.,]\d{1,6})?", re.ASCII)
 
 
 def parse_time(text: str) -> datetime | None:
-    """An ISO 8601 time, also with blanks and slashes; without a zone, of this machine's. None for what is none."""
+    """Parse an ISO 8601 time, also with blanks and slashes; without a zone, of this machine's. None if it is none."""
     found = _TIME.fullmatch(text.strip())
     if found is None:
         return None
@@ -486,7 +489,7 @@ def parse_time(text: str) -> datetime | None:
 
 
 def time_fault(text: str) -> str:
-    """Why `text` is not a time; empty where it is one."""
+    """Return why `text` is not a time; empty where it is one."""
     if parse_time(text) is not None:
         return ""
     if _DAY_AND_MONTH.fullmatch(text.strip()):

@@ -42,7 +42,7 @@ RECORDINGS = (".bag", ".mcap", ".db3")
 
 
 def from_folder(folder: Path, local: Local) -> Roster:
-    """An entry for each folder, repository, archive or recording in it, in order of names; one for all files that
+    """Return an entry for each folder, repository, archive or recording in it, by name; one for all files that
     Moodle or Canvas has from one student.
 
     Raises UsageError where the folder cannot be read, is one submission, or `local` allows only what is fetched.
@@ -76,7 +76,7 @@ def _inside(folder: Path) -> list[Path]:
 
 
 def _check_links(found: FoundEntry, folder: Path, local: Local) -> FoundEntry:
-    """A link may lead out of the folder."""
+    """Return it with a fault if a link leads out of the folder."""
     fault = "" if found.faults else local_fault(found.entry.source, folder, local)
     return FoundEntry(found.entry, (fault,)) if fault else found
 
@@ -95,7 +95,7 @@ def _student(files: list[tuple[Path, Named | None]]) -> FoundEntry:
 
 
 def _from_download(files: list[tuple[Path, Named]]) -> FoundEntry:
-    """What a platform has from one student: the one folder, or the one archive among the files."""
+    """Return what a platform has from one student: the one folder, or the one archive among the files."""
     taken = [one for one in files if _can_be_graded(one[0]) and not one[1].is_text]
     path, named = (taken or files)[0]
     name = f"{named.name}-{named.id}"
@@ -118,6 +118,7 @@ def _entry(path: Path, named: Named, name: str, others: list[str]) -> Entry:
         "file": printable(file),
         "late": "yes" if named.late else "",
         "other files": ", ".join(printable(other) for other in others),
+        # these ids are no user's, so Canvas' own gradebook does not know them
         "Canvas anonymous id" if is_anonymous_canvas else f"{named.platform} id": named.id,
     }
     return Entry(
@@ -125,7 +126,7 @@ def _entry(path: Path, named: Named, name: str, others: list[str]) -> Entry:
         source=str(source.absolute()),
         name=f"{named.name} {named.id}" if named.is_blind else named.name,
         where=printable(path.name),
-        modes_lost=True,
+        modes_lost=True,  # platforms pack uploads again, without modes
         extra={key: text for key, text in extra.items() if text},
     )
 
@@ -135,7 +136,7 @@ def _can_be_graded(path: Path) -> bool:
 
 
 def _single_archive(path: Path) -> Path | None:
-    """The archive that is all that a student's folder holds."""
+    """Return the archive that is all that a student's folder holds."""
     try:
         inside = _inside(path) if path.is_dir() else []
     except UsageError:
@@ -180,7 +181,7 @@ class Named(NamedTuple):
 
 
 def platform_name(name: str) -> Named | None:
-    """What a file's or folder's name says; None where no platform made it."""
+    """Return what a file's or folder's name says; None where no platform made it."""
     if found := MOODLE.fullmatch(name) or MOODLE_BLIND.fullmatch(name):
         is_text = found["kind"] == "onlinetext"
         blind = found["name"] in BLIND
@@ -228,6 +229,7 @@ def unpack_download(path: Path, out: Path) -> Path:
                     f"{path}: this is one package, not a download of submissions",
                     hint="grader grade takes one submission",
                 )
+            # by its content: the same download is unpacked once, and a new one beside it
             folder = out.absolute() / FOLDER / _digest(members)
             if not folder.is_dir():
                 _unpack(download, members, folder)
@@ -250,11 +252,12 @@ def _unpack(download: zipfile.ZipFile, members: list[zipfile.ZipInfo], folder: P
     size_bytes = sum(member.file_size for member in members)
     if size_bytes > shutil.disk_usage(folder.parent).free:
         raise HostError(f"{folder.parent}: no room for {size_bytes >> 20} MB of submissions")
+    # beside it, and renamed when it is whole
     with temporary_folder("download", folder.parent) as new:
         place = new / "all"
         place.mkdir()
         for member in members:
-            download.extract(member, place)
+            download.extract(member, place)  # takes drives and `..` out of names
         _within_one_folder(place).rename(folder)
 
 
@@ -290,7 +293,7 @@ def refuse_classroom_roster(table: Table, path: Path) -> None:
 
 
 def with_roster_columns(table: Table) -> Table:
-    """The same with the columns of a roster. The id is the student's name on GitHub; a row without a repository is a
+    """Return the table with the columns of a roster. The id is the name on GitHub; a row without a repository is a
     student who has not accepted the assignment."""
     columns = tuple(COLUMNS.get(column, column) for column in table.columns)
     columns = columns if "id" in columns else (*columns, "id")
@@ -314,7 +317,7 @@ _BLANKS = re.compile(f"[{_BLANK}]*")
 
 
 def from_gitlab(path: Path, local: Local) -> Roster:
-    """The projects of a group (`GET /groups/:id/projects`), in one list, or in one after the other as pages come.
+    """Return the projects of a group (`GET /groups/:id/projects`): one list, or one after the other as pages come.
 
     Raises UsageError where the file is no such list.
     """
@@ -349,10 +352,11 @@ def _read_project(project: object, where: str, base: Path, local: Local) -> Foun
 
 
 def _told_apart(found: list[FoundEntry]) -> list[FoundEntry]:
-    """Projects of one name in several subgroups (`lab/ada/ros`, `lab/bob/ros`) are named by the subgroup too."""
+    """Name projects of one name in several subgroups (`lab/ada/ros`, `lab/bob/ros`) by the subgroup too."""
     sources = {(entry.id, entry.source) for entry, faults in found if not faults}
     shared = {name for name, times in Counter(name for name, _ in sources).items() if times > 1}
     paths = [path for entry, _ in found if (path := entry.extra.get("path_with_namespace"))]
+    # `commonpath` refuses a mixture of paths with and without a slash before them
     common = os.path.commonpath(paths) if paths and not any(path.startswith("/") for path in paths) else ""
     return [_by_path(one, common) if one.entry.id in shared else one for one in found]
 
@@ -372,6 +376,7 @@ def _projects(path: Path) -> list[object]:
         while at < len(text):
             page, at = decoder.raw_decode(text, at)
             projects += page if isinstance(page, list) else [_as_list(page, path)]
+            # it always matches, at least nothing
             at = _BLANKS.match(text, at).end()  # type: ignore[union-attr]
     except (ValueError, RecursionError) as error:
         raise UsageError(f"{path}: not JSON: {printable(str(error))[:200]}", hint=_HINT) from error
@@ -381,7 +386,7 @@ def _projects(path: Path) -> list[object]:
 
 
 def _as_list(page: object, path: Path) -> object:
-    """A project without a list around it, as `--output ndjson` writes one a line."""
+    """Return a project without a list around it, as `--output ndjson` writes one a line. Raises UsageError."""
     if isinstance(page, dict) and any(key in page for key in ADDRESSES):
         return page
     raise UsageError(f"{path}: not a list of projects", hint=_HINT)

@@ -96,6 +96,7 @@ def write_similarity(
     rows = [HEAD, *_rows(similarity, names or {})]
     files = {
         "similarity.json": json_text(similarity.model_dump(mode="json", by_alias=True)),
+        # with a byte order mark, by which Excel knows UTF-8
         "similarity.csv": "\ufeff" + csv_text(rows),
     }
     for name, text in files.items():
@@ -132,7 +133,7 @@ Language = Literal["python", "cpp"]
 _CPP: tuple[str, ...] = (".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp", ".hxx")
 SUFFIXES: dict[str, Language] = {".py": "python", **dict.fromkeys(_CPP, "cpp")}
 GENERATED = frozenset({"build", "devel", "install", "logs", "__pycache__", ".git"})
-ALIKE = frozenset({"setup.py", "__init__.py"})
+ALIKE = frozenset({"setup.py", "__init__.py"})  # what catkin's instructions make alike in every package
 _PYTHON = re.compile(rb"(\xef\xbb\xbf)?#![^\n]{0,200}python")
 PLACE = ("evidence", "package.mcap")
 EVIDENCE_BYTES_MAX = 128 << 20

@@ -158,7 +158,7 @@ def _try_read(name: str, file: ProgramText) -> Text | NotCompared:
 
 
 def _read_in_time(file: ProgramText) -> Text:
-    """Regular expressions look out for signals, so that even one without end is interrupted."""
+    """Read a file within `FILE_S`. Regular expressions look for signals, so that even an endless one is interrupted."""
     before = signal.signal(signal.SIGVTALRM, _interrupt)
     signal.setitimer(signal.ITIMER_VIRTUAL, FILE_S)
     try:
@@ -179,6 +179,7 @@ def read_text(path: str, code: str, language: Language) -> Text:
     prints = hashed_kgrams(signs, GRAM).astype(np.int64)
     skipped = len(plain) - len(plain.lstrip("\n"))  # pygments begins behind them
     places = np.arange(len(signs)) + _count_removed(offsets, len(signs)) + skipped
+    # four bytes for each character, so that places in the array are places in the text
     ends = np.flatnonzero(np.frombuffer(plain.encode("utf-32-le"), dtype=np.uint32) == ord("\n"))
     return Text(path=path, prints=prints, lines=np.searchsorted(ends, places).astype(np.int64) + 1)
 
@@ -197,6 +198,7 @@ def _without_comments(code: str, language: Language) -> str:
     Classes get names of one letter: `filter_code` counts their length wrongly."""
     code = code.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     if language == "python":
+        # line ends stay, so that the lines that are reported are those of the file
         code = _IMPORT.sub(lambda found: "\n" * found.group().count("\n"), code)
     parts = []
     for kind, text in _lexer(language).get_tokens(code):
@@ -329,6 +331,7 @@ def read_all(request: ComparisonRequest) -> _Class:
             )
             found.submissions |= {one.place.name: one.texts} if one.texts else {}
             held += size
+    # workers end in any order; the report has the order of the command line
     found.starter.sort(key=lambda one: places.index(one.place))
     found.submissions = dict(sorted(found.submissions.items()))
     return found
@@ -344,7 +347,7 @@ def _starter_notes(starter: Sequence[Fingerprints]) -> list[str]:
 
 
 def _pairs(works: Sequence[Work], request: ComparisonRequest) -> tuple[list[Pair], int, bool]:
-    """The pairs that a person should see, how many were left out for their group, and whether the rest was cut."""
+    """Return the pairs that a person should see, how many were left out for their group, and whether some were cut."""
     near, cut = candidates(works)
     found, same_group = [], 0
     for first, second in near:
@@ -428,8 +431,10 @@ def candidates(works: Sequence[Work]) -> tuple[list[tuple[int, int]], bool]:
     """Return the pairs that share enough fingerprints for a closer look, those that share most first, and whether some
     had to be left out."""
     shared = _shared_counts(works)
+    # by the smaller of both: a copy stays one if much is added to it
     sizes = np.array([max(len(work.prints), 1) for work in works])
     ratio = shared / np.minimum(sizes[:, None], sizes[None, :])
+    # above the diagonal: each pair once, and none with itself
     first, second = np.nonzero(np.triu(ratio >= NEAR, 1))
     order = np.argsort(-ratio[first, second], kind="stable")
     pairs = [(int(first[i]), int(second[i])) for i in order[:CANDIDATES_MAX]]
@@ -472,14 +477,16 @@ def _own(text: Text, taken_out: Numbers) -> Own:
 
 
 def _shared_counts(works: Sequence[Work]) -> np.ndarray:
-    """How many fingerprints each two share, a square. Never more than a strip of the table of all is in memory."""
+    """Return how many fingerprints each two share, a square. Only a strip of the whole table is in memory at a time."""
     prints = np.concatenate([_NONE, *(work.prints for work in works)])
     owners = np.repeat(np.arange(len(works)), [len(work.prints) for work in works])
     _, numbers, counts = np.unique(prints, return_inverse=True, return_counts=True)
+    # what one submission alone has can be in no pair, and is most of it
     several = counts[numbers] > 1
     columns, owners = np.unique(numbers[several], return_inverse=True)[1], owners[several]
     order = np.argsort(columns, kind="stable")
     columns, owners = columns[order], owners[order]
+    # float32 has fast products, and is exact up to 16 million
     shared = np.zeros((len(works), len(works)), dtype=np.float32)
     for begin in range(0, int(columns[-1]) + 1 if len(columns) else 0, MATRIX_COLUMNS):
         low, high = np.searchsorted(columns, [begin, begin + MATRIX_COLUMNS])
@@ -490,7 +497,7 @@ def _shared_counts(works: Sequence[Work]) -> np.ndarray:
 
 
 def _hits(work: Work, others: Numbers) -> list[BoolArray]:
-    """For each file, which of its own signs are in the other submission too."""
+    """Return for each file which of its own signs are in the other submission too."""
     return [
         file.signs & mark_covered(file.text, file.prints & np.isin(file.text.prints, others))
         for file in work.files
@@ -506,7 +513,7 @@ def _line_count(work: Work, hits: Sequence[BoolArray]) -> int:
 
 
 def _file_matches(a: Work, b: Work) -> Iterator[FileMatch]:
-    """Each file of a with the one of b that has most of it."""
+    """Yield each file of a with the one of b that has most of it."""
     for file in a.files:
         best = max(b.files, key=lambda other: _common(file, other), default=None)
         if best is None or not _common(file, best):
@@ -524,7 +531,7 @@ def _common(one: Own, other: Own) -> int:
 
 
 def _stretches(one: Own, other: Own) -> Lines:
-    """The lines of the one file that are in the other, neighbours joined."""
+    """Return the lines of the one file that are in the other, neighbours joined."""
     hits = mark_covered(one.text, one.prints & np.isin(one.text.prints, other.text.prints[other.prints]))
     lines = np.unique(one.text.lines[one.signs & hits])
     if not len(lines):

@@ -270,6 +270,7 @@ def report(
         from grader.classes.batch.folder import RUN, open_batch
         from grader.classes.batch.renew_results import has_result
         from grader.cli import results
+    # before anything is written
     batch = open_batch(folder) if (folder / RUN).is_file() else None
     if batch is not None:
         batch.refuse_newer()

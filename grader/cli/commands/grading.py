@@ -56,8 +56,10 @@ def grade(
     folder = out or DEFAULT_OUT
     check_writable(folder)
     options = pipeline.GradeOptions(sandbox=sandbox, submission_id=submission_id, package=package or "")
+    # a recording was made elsewhere: nothing runs
     if not is_recording(Path(source)):
         warn_without_sandbox(sandbox, loaded)
+    # with stdout in a file, all that counts is the report at the end
     with open_progress(early=sys.stdout.isatty() and not as_json) as progress:
         result = pipeline.grade(source, loaded, folder, options, progress)
     return show(result, loaded.rubric, folder / result.submission.id, as_json=as_json, full=full)
@@ -194,6 +196,7 @@ def sign(
         from grader.verification import result_folders
         from grader.verification import sign as sign_folder
     for folder in result_folders(list(results)):
+        # it raises for what is no result: that is not to be signed
         load_result(folder / RESULT)
         sign_folder(folder, key)
         say(f"{folder}: signed")

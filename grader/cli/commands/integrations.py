@@ -172,6 +172,7 @@ def schema(
         return ExitCode.PASSED
     width = max(map(len, KNOWN))
     for known in KNOWN.values():
+        # `is_` is the format with its version: the name, and at most nine characters
         say(f"{known.name:{width}}  {known.is_!s:{width + 9}}  {known.where}".replace("`", ""))
     return ExitCode.PASSED
 

@@ -223,6 +223,7 @@ def run_rubric_test(
     plan = shown.plan_test(rubric, solution, only=only, jobs=jobs, out=out, everything=write, sandbox=sandbox)
     warn_without_sandbox(sandbox, plan.rubric)
     tested = shown.run_plan(plan, temporary=out is None)
+    # what mutants of a package that is not correct cost says nothing
     if write is not None and not tested.reference.lost:
         shown.write_mutants(plan, tested, write)
     if as_json:

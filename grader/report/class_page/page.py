@@ -90,7 +90,7 @@ def write_class_page(
 
 
 def _page(run: BatchRun, found: Gathered, out: Path | None) -> str:
-    """Without `out`, nothing is said of where anything is."""
+    """Return the page. Without `out`, nothing is said of where anything is."""
     lines = found.lines
     judged = [one for one in lines if one.judged]
     heat = heat_map(lines, run.criteria)
@@ -120,7 +120,7 @@ def _page(run: BatchRun, found: Gathered, out: Path | None) -> str:
 
 
 def _list_diagnoses(run: BatchRun, found: Sequence[Diagnosis]) -> tuple[list[Listed], list[Listed]]:
-    """Diagnoses that several share, and those that one has alone."""
+    """Return the diagnoses that several share, and those that one has alone."""
     worth: Mapping[str, Any] = {criterion.id: criterion for criterion in run.criteria}
     shared = [one for one in found if len(one.members) > 1][:SHARED_MAX]
     alone = [one for one in found if len(one.members) == 1][:ALONE_MAX]
@@ -137,7 +137,7 @@ def _list_diagnoses(run: BatchRun, found: Sequence[Diagnosis]) -> tuple[list[Lis
 
 
 def _columns(lines: Sequence[SubmissionRow]) -> Iterator[tuple[str, str]]:
-    """The table's, as the script knows them and as they are called; what no one has is left out."""
+    """Yield the table's columns, as the script knows them and as they are called; what no one has is left out."""
     yield "id", "Submission"
     yield "points", "Points"
     if any(one.name for one in lines):
@@ -189,8 +189,8 @@ def page_data(
     costs: Iterable[MistakeCost],
     heat: HeatMap | None,
 ) -> Markup:
-    """`rows` (each as `COLUMNS` says), `criteria`, and by places in `rows` the members of diagnoses, costs and the heat
-    map, whose rows are places in `criteria`."""
+    """Return the page's data: `rows` (each as `COLUMNS` says), `criteria`, and by places in `rows` the members of
+    diagnoses, costs and the heat map, whose rows are places in `criteria`."""
     data = {
         "rows": [_row(one) for one in lines],
         "criteria": [[line(c.id, CHARS), line(c.title, CHARS), c.max_points] for c in criteria],
@@ -203,7 +203,7 @@ def page_data(
 
 
 def in_script(text: str) -> Markup:
-    """JSON as the content of a `<script>`: nothing in it ends the element or begins another one."""
+    """Return JSON as the content of a `<script>`: nothing in it ends the element or begins another one."""
     for sign in "<>&\u2028\u2029":
         text = text.replace(sign, f"\\u{ord(sign):04x}")
     return Markup(text)  # noqa: S704 - what HTML looks for is written out
@@ -216,6 +216,7 @@ def _row(one: SubmissionRow) -> list[object]:
         one.id,
         one.name,
         one.group,
+        # 1 for the usual one: a class of thousands makes a large page
         1 if usual else link or 0,
         one.state,
         one.points,
@@ -248,12 +249,12 @@ def grade_one(run: BatchRun) -> list[str]:
 
 
 def review(out: Path) -> Markup:
-    """Where a person gives points."""
+    """Return the command with which a person awards points."""
     return _command_line(["grader", "review", str(out.absolute())])
 
 
 def _command_line(words: list[str]) -> Markup:
-    """Whole, however long it is."""
+    """Return the whole command line, however long it is."""
     return Markup(html(shlex.join(words)))  # noqa: S704 - escaped
 
 
@@ -316,6 +317,7 @@ KINDS = (
         advice="These could not be judged this time, which costs no points. Grade only these again:",
         holds=lambda found: found.state == "inconclusive",
         text=lambda found: found.why,
+        # not from the files alone again: a run is what can decide it
         command=lambda run, out: again(run, out, "inconclusive", static=False),
     ),
     _Kind(
@@ -344,7 +346,7 @@ KINDS = (
 
 
 def todos(run: BatchRun, lines: Sequence[SubmissionRow], out: Path | None) -> Iterator[Todo]:
-    """Without `out`, nothing is said of where anything is: no commands, no faults of the roster."""
+    """Yield what is left to do. Without `out`, nothing is said of where anything is: no commands, no faulty rows."""
     for kind in KINDS:
         found = [one for one in lines if kind.holds(one)]
         if found:

@@ -37,7 +37,7 @@ class MistakeCost:
 
 
 def costs(lines: Iterable[SubmissionRow], criteria: Sequence[CriterionInfo]) -> list[MistakeCost]:
-    """Of each criterion, in the rubric's order."""
+    """Return the costs of each criterion, in the rubric's order."""
     found = [MistakeCost(place=place, criterion=criterion) for place, criterion in enumerate(criteria)]
     for place, line in enumerate(lines):
         if line.judged:
@@ -47,7 +47,7 @@ def costs(lines: Iterable[SubmissionRow], criteria: Sequence[CriterionInfo]) -> 
 
 
 def most_first(found: Iterable[MistakeCost]) -> list[MistakeCost]:
-    """Those that cost anything: most points first, then what most submissions lost by."""
+    """Return those that cost anything: most points first, then what most submissions lost by."""
     return sorted(
         (cost for cost in found if cost.by), key=lambda cost: (-cost.points, -len(cost.by), cost.place)
     )
@@ -98,7 +98,7 @@ class Spread:
 
 
 def spread_of(points: Sequence[float], most: float) -> Spread | None:
-    """None where nothing was judged."""
+    """Return how the points are spread; None where nothing was judged."""
     if not points:
         return None
     return Spread(
@@ -114,6 +114,7 @@ def spread_of(points: Sequence[float], most: float) -> Spread | None:
 
 def _bins(points: Iterable[float], most: float) -> tuple[Bin, ...]:
     width = next((step for step in STEPS if step * BINS_MAX >= most), most / BINS_MAX) if most > 0 else 1.0
+    # 1e-9: a border such as 0.3 is not exactly three times 0.1
     last = max(1, math.ceil(most / width - 1e-9)) - 1
     counts = [0] * (last + 1)
     for value in points:
@@ -156,6 +157,7 @@ def histogram(found: Spread) -> Markup:
 
 def _scale(bins: Sequence[Bin], step: float) -> list[Markup]:
     """Return the line below the bars, and where each second or fifth bar begins."""
+    # more numbers than that have no room
     every = 1 if len(bins) <= 10 else 2
     y = HEIGHT - BOTTOM
     line = svg.element("path", d=f"M{LEFT} {y}H{WIDTH - LEFT}", class_="axis")
@@ -184,7 +186,7 @@ class Timing:
 
 
 def timing(run: BatchRun, lines: Sequence[SubmissionRow]) -> Timing | None:
-    """None where no submission was timed."""
+    """Return how long gradings took; None where no submission was timed."""
     timed = [(place, line.wall_s) for place, line in enumerate(lines) if line.wall_s > 0]
     if not timed:
         return None
@@ -200,7 +202,7 @@ def timing(run: BatchRun, lines: Sequence[SubmissionRow]) -> Timing | None:
 
 
 def span(seconds: float) -> str:
-    """`0.4 s`, `48 s`, `12 min 3 s`, `2 h 5 min`, `3 days 4 h`."""
+    """Return a time as `0.4 s`, `48 s`, `12 min 3 s`, `2 h 5 min` or `3 days 4 h`."""
     if seconds < 59.5:
         return f"{seconds:.1f} s" if seconds < 9.95 else f"{seconds:.0f} s"
     whole = round(seconds)
@@ -243,13 +245,14 @@ class HeatMap:
 
 
 def heat_map(lines: Sequence[SubmissionRow], criteria: Sequence[CriterionInfo]) -> HeatMap | None:
-    """None where nothing was judged."""
+    """Return the map; None where nothing was judged."""
     order = sorted((p for p, line in enumerate(lines) if line.judged), key=lambda place: -lines[place].points)
     if not order or not criteria:
         return None
     columns = _columns(order)
     step = max(NARROW, WIDE // len(columns))
     lost = [sum(lines[p].letters[place] in LOST_LETTERS for p in order) for place in range(len(criteria))]
+    # what fewest lost comes first, as the submissions with most points do
     places = sorted(range(len(criteria)), key=lambda place: lost[place])
     rows = [
         svg.element("g", *_cells(lines, place, columns, step), transform=f"translate(0 {i * ROW})")
@@ -274,6 +277,7 @@ def _columns(order: Sequence[int]) -> list[Sequence[int]]:
 def _cells(
     lines: Sequence[SubmissionRow], row: int, columns: Sequence[Sequence[int]], step: int
 ) -> Iterator[Markup]:
+    # narrow cells would be all gap
     width = step - 1 if step >= 6 else step
     for i, column in enumerate(columns):
         letters = [lines[place].letters[row] for place in column]
@@ -282,15 +286,16 @@ def _cells(
 
 
 def _shade(letters: Sequence[str]) -> str:
-    """`q0` where no one lost anything, to `q5` where all did."""
+    """Return `q0` where no one lost anything, to `q5` where all did."""
     lost = sum(letter in LOST_LETTERS for letter in letters)
+    # rounded up, so that one loss in a hundred is not shown as none
     return f"q{-(-5 * lost // len(letters))}"
 
 
 def _ticks(
     lines: Sequence[SubmissionRow], columns: Sequence[Sequence[int]], step: int, y: float
 ) -> Iterator[Markup]:
-    """The points of the submission above, wherever there is room."""
+    """Yield the points of the submission above, wherever there is room."""
     for x in range(0, len(columns) * step - TICK // 2, TICK):
         points = lines[columns[x // step][0]].points
         yield svg.text(x, y, number(points), class_="label tick")

@@ -117,7 +117,7 @@ def passed_by_none(criteria: Sequence[CriterionInfo], letters: Iterable[str]) ->
 
 
 def line_of(entry: Entry, result: GradingResult, criteria: Sequence[CriterionInfo]) -> SubmissionRow:
-    """One submission and its result, as the page shows it."""
+    """Return one submission and its result, as the page shows it."""
     judged = _judged(result, criteria)
     late = result.late
     return SubmissionRow(
@@ -151,6 +151,7 @@ def _points_lost(result: GradingResult, criteria: Sequence[CriterionInfo]) -> di
 
 def link_to(one: SubmissionRow) -> str:
     """Return the submission's report; empty where it has none."""
+    # no slash and no `..` of an id may lead anywhere else
     return f"{quote(one.folder, safe='', errors='replace')}/{REPORT}" if one.folder else ""
 
 
@@ -164,12 +165,12 @@ def state_of(result: GradingResult) -> SubmissionState:
 
 
 def _still_open(criteria: Iterable[CriterionResult]) -> list[CriterionResult]:
-    """What another run could decide."""
+    """Return what another run could decide."""
     return [c for c in criteria if c.status.is_retryable and c.counts]
 
 
 def _open_words(criteria: Iterable[CriterionResult]) -> str:
-    """What is open, in a line."""
+    """Return what is open, in a line."""
     found = _still_open(criteria)
     if not found:
         return ""
@@ -204,7 +205,7 @@ class Gathered:
 
 
 def gather(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]]) -> Gathered:
-    """In the roster's order, by name."""
+    """Return them in the roster's order, by name."""
     lines, diagnoses = [], Diagnoses()
     for place, (entry, result) in enumerate(rows):
         lines.append(line_of(entry, result, run.criteria))
@@ -213,7 +214,7 @@ def gather(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]]) -> Gather
 
 
 def gather_anonymous(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]], salt: bytes) -> Gathered:
-    """By pseudonyms, in an order that depends on `salt`; nothing in it tells who anybody is."""
+    """Return them by pseudonyms, in an order that depends on `salt`; nothing in it tells who anybody is."""
     names, ids = Names(), []
 
     def read() -> Iterable[tuple[Entry, GradingResult]]:
@@ -234,7 +235,7 @@ def gather_anonymous(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]],
         Diagnosis(
             criterion=found.criterion,
             points=found.points,
-            wordings=Counter([withoutwords_in(found.message, words)]),
+            wordings=Counter([without_words(found.message, words)]),
             members=sorted(now[member] for member in found.members),
         )
         for found in named.diagnoses
@@ -245,8 +246,8 @@ def gather_anonymous(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]],
 def _anonymous_line(named: SubmissionRow, pseudonym: str, words: frozenset[str]) -> SubmissionRow:
     problem = named.problem
     if problem is not None:
-        problem = replace(problem, message=withoutwords_in(problem.message, words), hint="")
-    why = withoutwords_in(named.why, words)
+        problem = replace(problem, message=without_words(problem.message, words), hint="")
+    why = without_words(named.why, words)
     return replace(named, id=pseudonym, name="", group="", folder="", why=why, problem=problem)
 
 
@@ -262,7 +263,8 @@ _LIST = re.compile(r"(?P<one>…|N)(?:(?:, | and | or |, and )(?P=one))+")
 
 
 def reduced(message: str) -> str:
-    """A message without what is one submission's own: names and quoted words are `…`, numbers are `N`."""
+    """Return a message without what is one submission's own: names and quoted words are `…`, numbers are `N`."""
+    # in this order: what is quoted may contain names, and names may contain numbers
     text = _QUOTED.sub("…", message)
     text = _NAME.sub("…", text)
     text = _NUMBER.sub("N", text)
@@ -287,7 +289,7 @@ class Diagnosis:
         return self.wordings.most_common(1)[0][0]
 
     def add(self, place: int, message: str, points: float) -> None:
-        """One more submission."""
+        """Add one more submission."""
         self.members.append(place)
         self.points += points
         if message in self.wordings or len(self.wordings) < WORDINGS_MAX:
@@ -303,7 +305,7 @@ class Diagnoses:
         self._found: dict[tuple[str, str], Diagnosis] = {}
 
     def add(self, place: int, result: GradingResult) -> None:
-        """All mistakes of one submission. What only follows from another one is none of its own."""
+        """Add all mistakes of one submission. What only follows from another one is none of its own."""
         for criterion, message, points in _mistakes(result):
             text = line(message, MESSAGE_CHARS)
             key = criterion, reduced(text)
@@ -311,19 +313,20 @@ class Diagnoses:
             found.add(place, text, points)
 
     def largest_first(self) -> list[Diagnosis]:
-        """All of them; those of one size in the order in which they were found."""
+        """Return all of them; those of one size in the order in which they were found."""
         return sorted(self._found.values(), key=lambda found: (-len(found.members), -found.points))
 
 
 def _mistakes(result: GradingResult) -> Iterator[tuple[str, str, float]]:
-    """Of each mistake the criterion that asks for it, what its check said, and the points that it cost in all; or why
-    nothing could be graded, with no criterion. What a person decided keeps the words of the check."""
+    """Yield of each mistake the criterion that asks for it, what its check said, and the points that it cost in all; or
+    why nothing could be graded, with no criterion. What a person decided keeps the words of the check."""
     if result.error is not None:
         if result.error.kind not in {MISSING, ROSTER}:
             yield "", result.error.message, 0.0
         return
     said = {override.criterion: override.automatic.message for override in result.overrides}
     view = arrange(result)
+    # what costs nothing may still be the mistake of many
     advice = (Loss(criterion=criterion) for criterion in view.advice if criterion.status in LOST)
     for loss in (*view.lost, *advice):
         criterion = loss.criterion
@@ -359,12 +362,13 @@ def salt_in(folder: Path) -> bytes:
 
 def order(ids: Sequence[str], salt: bytes) -> list[int]:
     """Return the places of `ids`, shuffled: the same for the same salt."""
+    # keyed: who knows all ids, but not the salt, cannot work out the order
     keyed = [hashlib.blake2b(name.encode("utf-8", "surrogatepass"), key=salt).digest() for name in ids]
     return sorted(range(len(ids)), key=lambda place: keyed[place])
 
 
 def pseudonyms(ids: Sequence[str]) -> list[str]:
-    """`S001`, `S002`, …, in a form that no id has."""
+    """Return `S001`, `S002`, …, in a form that no id has."""
     taken = [name.casefold() for name in ids]
     free = (p for p in PREFIXES if not any(re.match(rf"{re.escape(p.casefold())}\d", name) for name in taken))
     prefix = next(free, PREFIXES[-1])
@@ -381,7 +385,7 @@ class Names:
         self._count = 0
 
     def add(self, entry: Entry, commit: str | None = None) -> None:
-        """One submission's."""
+        """Add the words of one submission."""
         self._count += 1
         self._own.update(words_in(entry.id, entry.name, entry.group, commit or ""))
         self._sources.update(set(words_in(entry.source, entry.ref or "")))
@@ -396,8 +400,8 @@ class Names:
         return frozenset(self._own).union(self._sources.keys() - self.common())
 
 
-def withoutwords_in(text: str, words: frozenset[str]) -> str:
-    """`text` with `…` for each of the words, and for names of files, what is quoted, and numbers."""
+def without_words(text: str, words: frozenset[str]) -> str:
+    """Return `text` with `…` for each of the words, and for names of files, what is quoted, and numbers."""
     return WORDS.sub(lambda found: LEFT_OUT if found[0].casefold() in words else found[0], reduced(text))
 
 

@@ -52,7 +52,7 @@ DRAWN: Mapping[str, Callable[..., Iterable[Figure]]] = {
 
 
 def figures_of(rubric: Rubric, runs: Mapping[str, Run], criteria: Sequence[CriterionResult]) -> Figures:
-    """Of these criteria, and of the rubric's scenarios; without hidden criteria, none are made for those.
+    """Return the figures of these criteria, and of the rubric's scenarios; none of hidden criteria that are left out.
 
     `runs` are the recorded runs by scenario, and `package`, as the judge takes them. A criterion without any figure, a
     scenario without nodes and one in which nothing was printed are not in it.
@@ -87,7 +87,7 @@ def _all_of(facts: Facts, criterion: Criterion, result: CriterionResult) -> tupl
 
 
 def _figures_of_check(facts: Facts, criterion: Criterion, result: CriterionResult) -> tuple[Figure, ...]:
-    """What shows the check's measurement; nothing where the check itself was given no run to judge. Where it is lost
+    """Return what shows the check's measurement; nothing if the check itself was given no run to judge. If it is lost
     all the same, how late the machine was has decided nothing."""
     found = _try_make(_from_facts, facts, criterion) or ()
     if not result.status.is_lost:
@@ -107,7 +107,7 @@ def _from_facts(facts: Facts, criterion: Criterion) -> tuple[Figure, ...]:
 
 
 def _graph(facts: Facts, criterion: Criterion, result: CriterionResult) -> tuple[Figure, ...]:
-    """Of what was lost in a run and has no measurement that can be drawn: who was joined with whom, and what is wrong
+    """Return for what was lost in a run, and has no measurement to draw, who was joined with whom, and what is wrong
     with that, if anything is."""
     run = facts.runs.get(criterion.scenario or "")
     graph = _try_make(graph_of, run) if run and result.status.is_lost else None
@@ -130,7 +130,7 @@ def _each(make: Callable[[Run], Made | None], runs: Mapping[str, Run]) -> dict[s
 
 
 def _try_make(make: Callable[Asked, Made], *args: Asked.args, **kwargs: Asked.kwargs) -> Made | None:
-    """None for what cannot be made: a report without a picture is better than none."""
+    """Return what is made; None for what cannot be made: a report without a picture is better than none."""
     try:
         return make(*args, **kwargs)
     except Exception:  # noqa: BLE001 - evidence holds anything, and no verdict hangs on a picture

@@ -79,19 +79,20 @@ Mark = tuple[int, str]
 
 
 def start_figures(run: Run, params: StartParams) -> Iterator[CounterFigure]:
-    """The beginning of the publisher that came first."""
+    """Yield the beginning of the publisher that came first."""
     for count in counts(run, params.topic)[:1]:
         wrong = judge_start(count, run, params).status is Status.FAIL
         marks = (
             [(0, f"the first value is {significant(count.values[0])}, not {params.start}")] if wrong else []
         )
+        # a turn; one less is a value that came twice
         steps = [s for s in count.steps[:FIRST_VALUES] if s.change < -1]
         first = range(len(count.values))[:FIRST_VALUES]
         yield _counter_figure(count, steps, marks, run=run, topic=params.topic, kept=first)
 
 
 def step_figures(run: Run, params: StepParams) -> Iterator[CounterFigure]:
-    """The publisher that sent most."""
+    """Yield the publisher that sent most."""
     count = longest(run, params.topic)
     if count is None:
         return
@@ -103,7 +104,7 @@ def step_figures(run: Run, params: StepParams) -> Iterator[CounterFigure]:
 
 
 def wrap_figures(run: Run, package: PackageFacts, params: WrapParams) -> Iterator[CounterFigure]:
-    """The publisher that sent most."""
+    """Yield the publisher that sent most."""
     count = longest(run, params.topic)
     if count is None:
         return
@@ -112,6 +113,7 @@ def wrap_figures(run: Run, package: PackageFacts, params: WrapParams) -> Iterato
     marks = [(s.number, _turn_text(s, found.every, count, run, params)) for s in goes_on]
     verdict, _ = judge_wraps(count, run, package, params)
     if not found.bad and verdict.status is Status.FAIL and not verdict.unjudged:
+        # no turn is wrong, and it fails: there was none at all, which shows at the end
         marks = [(len(count.values) - 1, verdict.message)]
     yield _counter_figure(count, found.good, marks, run=run, topic=params.topic)
 
@@ -179,17 +181,17 @@ def _how(run: Run, name: str, end: ProcessEvent) -> str:
 
 
 def _whole(value: float) -> float:
-    """Whole numbers as such: 127 rather than 127.0."""
+    """Return whole numbers as such: 127 rather than 127.0."""
     return int(value) if value == int(value) else value
 
 
 def _drawable(value: float) -> bool:
-    """What is not a number at all has no place; what is infinite is drawn as the largest."""
+    """Return whether it has a place: what is not a number has none; what is infinite is drawn as the largest."""
     return value == value  # noqa: PLR0124 - NaN is not itself
 
 
 def _shown_values(count: Count, marks: Sequence[int], turns: Sequence[Step]) -> Sequence[int]:
-    """All values, or of many: what is around the marks and the turns, both ends, and a fair choice of the others.
+    """Return all values, or of many: what is around the marks and turns, both ends, and a fair choice of the others.
 
     Of very many turns, only the values of the first ones and what is around the marks.
     """
@@ -203,7 +205,7 @@ def _shown_values(count: Count, marks: Sequence[int], turns: Sequence[Step]) -> 
 
 
 def _neighbours(numbers: Sequence[int], count: int, every: range) -> Iterator[int]:
-    """These values and so many before and behind each; of a step, that is from `count` before to `count` - 1 behind."""
+    """Yield these values and so many around each; of a step, that is from `count` before to `count` - 1 behind."""
     return chain.from_iterable(every[max(0, n - count) : n + count] for n in numbers)
 
 
@@ -217,8 +219,8 @@ COUNTED_NS = 100_000_000
 
 
 def rate_figures(run: Run, params: RateParams) -> Iterator[RateFigure]:
-    """All publishers of the student's together, as they are judged; then each of them, where there are several."""
-    if run.clock != "real":
+    """Yield all publishers of the student's together, as they are judged; then each of them, if there are several."""
+    if run.clock != "real":  # a rate is judged in real time alone
         return
     channels = [c for c in sent_by(run, params.topic, params.of) if c.messages]
     groups = [channels, *([c] for c in channels[:PUBLISHERS_MAX] if len(channels) > 1)]
@@ -229,6 +231,7 @@ def rate_figures(run: Run, params: RateParams) -> Iterator[RateFigure]:
 
 
 def _rate_figure(run: Run, params: RateParams, found: Rhythm, channels: Sequence[Channel]) -> RateFigure:
+    # a silence up to the end is a gap, too, though no message ends it
     silent = (found.until_ns,) if found.tail_ns else ()
     arrivals = (*found.times_ns[1:], *silent)
     kept = _shown_gaps(found.gaps_ns)
@@ -263,7 +266,7 @@ def _counts(times_ns: Sequence[int]) -> Iterator[int]:
 
 
 def _shown_gaps(gaps_ns: Sequence[int]) -> list[int]:
-    """The longest and the shortest gaps, the last one, and a fair choice of the others."""
+    """Return the longest and the shortest gaps, the last one, and a fair choice of the others."""
     every = range(len(gaps_ns))
     if len(gaps_ns) <= POINTS_MAX:
         return list(every)
@@ -276,7 +279,7 @@ def _shown_gaps(gaps_ns: Sequence[int]) -> list[int]:
 
 
 def _late(run: Run, params: RateParams, found: Rhythm) -> list[tuple[int, int]]:
-    """Stretches in which the machine was late, by the measure of the check; all of it where only the whole tells."""
+    """Return when the machine was late, by the measure of the check; all of the time if only the whole tells."""
     begin_ns, end_ns = found.times_ns[0], found.until_ns
     whole = lateness(run, begin_ns, end_ns)
     if whole is None:
@@ -298,7 +301,7 @@ ROWS_MAX = 60
 
 
 def heard_figures(run: Run, params: HearsParams) -> Iterator[HeardFigure]:
-    """Nothing where no one can tell what was printed of what."""
+    """Yield what was heard; nothing where no one can tell what was printed of what."""
     probes = probes_on(run, params.topic)
     lines = printed_lines(run)
     places = places_of(run, probes, lines, params.template) if probes else None
@@ -306,6 +309,7 @@ def heard_figures(run: Run, params: HearsParams) -> Iterator[HeardFigure]:
         return
     found = _lines_of(probes, lines, places, params.template)
     other: list[Line | None] = [None] * len(probes)
+    # the text was heard, and other words than asked for stand around it
     if params.template != VALUE and None in found and all(isinstance(p.value, str) for p in probes):
         other = _lines_of(probes, lines, text_places(probes, lines, VALUE), VALUE)
     kept = _shown_probes(found)
@@ -341,7 +345,7 @@ def _row(run: Run, topic: str, probe: Probe, right: Line | None, other: Line | N
 
 
 def _shown_probes(found: Sequence[Line | None]) -> list[int]:
-    """Of many, the first, and the first that are missing."""
+    """Return the probes to show: of many, the first, and the first that are missing."""
     every = range(len(found))
     if len(every) <= ROWS_MAX:
         return list(every)
@@ -355,7 +359,7 @@ CORNERS_MAX = 100
 
 
 def path_figures(run: Run, params: PathParams) -> Iterator[PathFigure]:
-    """Seen from its start where the points are."""
+    """Yield the path, seen from its start if the points are."""
     found = track(run, params.topic, params.hold_s, of=params.of)
     if found is None or not found.path:
         return
@@ -380,7 +384,7 @@ SIDES_MAX = 1000
 
 
 def end_figures(run: Run, params: EndsAtParams) -> Iterator[PlaceFigure]:
-    """The path from when the goal was asked for."""
+    """Yield the path from when the goal was asked for."""
     found, asked = track(run, params.topic, params.hold_s, params.fields), stretch_to_judge(run, params)
     if found is None or asked is None:
         return
@@ -394,7 +398,7 @@ def end_figures(run: Run, params: EndsAtParams) -> Iterator[PlaceFigure]:
 
 
 def region_figures(run: Run, params: StaysWithinParams) -> Iterator[PlaceFigure]:
-    """The path, and the border of where it may be."""
+    """Yield the path, and the border of where it may be."""
     found, region = track(run, params.topic, params.hold_s, params.fields), params.region(run)
     taken = placed(found, params) if found is not None and found.path else []
     if not taken:
@@ -402,6 +406,7 @@ def region_figures(run: Run, params: StaysWithinParams) -> Iterator[PlaceFigure]
     out = out_along(taken, region)
     worst = max(range(len(out)), key=out.__getitem__) if any(out) else None
     figure = _place_figure(run, params, taken, worst, params.walls)
+    # with both limits, or none, the number alone does not say on which side it is
     only = {(False, True): "too near", (True, False): "too far"}
     how = only.get((params.min_m is None, params.max_m is None), "outside")
     where = "" if worst is None else f"; it is {out[worst]:.2f} m {how} at {spot(taken[worst].point)}"
@@ -413,7 +418,7 @@ def region_figures(run: Run, params: StaysWithinParams) -> Iterator[PlaceFigure]
 def _place_figure(
     run: Run, params: Place, taken: Sequence[Pose], wrong: int | None, walls: Sequence[Polyline] = ()
 ) -> PlaceFigure:
-    """The path on the map that the simulator shows. Seen from its own start, a path has no place on a map."""
+    """Return the path on the map that the simulator shows. Seen from its own start, a path has no place on a map."""
     kept = _shown_poses(taken, wrong)
     shown = walls or (() if params.relative else shown_walls(run))
     return PlaceFigure(
@@ -428,7 +433,7 @@ def _place_figure(
 
 
 def _taken_from(run: Run, topic: str) -> int:
-    """How many messages of the submission the run holds of a topic: more than a figure has points."""
+    """Return how many messages of the submission the run holds of a topic: more than a figure has points."""
     return sum(len(c.messages) for c in run.channels if c.topic == topic and not c.by_grader)
 
 
@@ -437,7 +442,7 @@ def _spot(point: tuple[float, float]) -> tuple[float, float]:
 
 
 def _shown_poses(path: Sequence[Pose], strayed: int | None) -> list[int]:
-    """Its ends, what is around the place where it strays, and a fair choice of the others where it moves."""
+    """Return its ends, what is around the place where it strays, and a fair choice of the others where it moves."""
     every = range(len(path))
     spots = [_spot(pose.point) for pose in path]
     moves = [i for i in every[1:] if spots[i] != spots[i - 1]]

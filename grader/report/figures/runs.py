@@ -35,14 +35,15 @@ from grader.wording import shorten
 NAME_LETTERS = 200
 LINE_LETTERS = 300
 LARGEST = 2**64
+# the golden ratio: the fractions of its multiples are spread evenly, and repeat in no rhythm
 SPREAD = (math.sqrt(5) - 1) / 2
 
 
 def short(text: object, letters: int = LINE_LETTERS) -> str:
-    """Its beginning, with a mark where it goes on."""
+    """Return its beginning, with a mark where it goes on."""
     whole = text if isinstance(text, str) else str(text)
     cut = shorten(whole, letters)
-    return cut if cut.isascii() else cut.encode(errors="replace").decode()
+    return cut if cut.isascii() else cut.encode(errors="replace").decode()  # a lone surrogate is no UTF-8
 
 
 def short_name(text: object) -> str:
@@ -51,7 +52,7 @@ def short_name(text: object) -> str:
 
 
 def finite(value: float) -> float:
-    """A number that can be drawn and written as JSON; what is none is 0."""
+    """Return a number that can be drawn and written as JSON; what is none is 0."""
     return max(-LARGEST, min(LARGEST, value)) if value == value else 0.0  # noqa: PLR0124 - NaN is not itself
 
 
@@ -61,13 +62,13 @@ def is_drawn(name: str) -> bool:
 
 
 def second(run: Run, time_ns: int) -> float:
-    """Since the run began."""
+    """Return the seconds since the run began."""
     return round((time_ns - run.start_ns) / 1e9, 6)
 
 
 def thin_out(indices: Sequence[int], count: int) -> Iterable[int]:
-    """About `count` of them, one from each of as many parts, at another place in each: so that no rhythm of theirs
-    meets one of the parts'."""
+    """Return about `count` of them, one from each of as many parts, at another place in each: so that no rhythm of
+    theirs meets one of the parts'."""
     if len(indices) <= count:
         return indices
     size = len(indices) / max(1, count)
@@ -121,7 +122,10 @@ def _wrong_nodes(graph: GraphFigure, check: str, params: object) -> Iterator[tup
         return
     names = [f"/{name.strip('/')}" for name in getattr(params, "names", ())]
     if names and not any(
-        re.fullmatch(rf"{re.escape(name)}(_\d+)*", node) for name in names for node in graph.nodes
+        # rospy adds numbers to the name of an anonymous node
+        re.fullmatch(rf"{re.escape(name)}(_\d+)*", node)
+        for name in names
+        for node in graph.nodes
     ):
         yield from ((node, f"not {names[0]}") for node in graph.nodes)
 
@@ -133,11 +137,12 @@ class _Edge(NamedTuple):
 
 
 def graph_of(run: Run) -> GraphFigure | None:
-    """None where no node was there."""
+    """Return who was joined with whom; None where no node was there."""
     states = _states(run)
     edges = list(dict.fromkeys(_edges(run, states)))
     nodes = list(dict.fromkeys(_nodes(states, edges)))
     shown = set(nodes[:NODES_MAX])
+    # topics of the nodes that are shown come first, and so keep their place
     topics = list(dict.fromkeys([*(e.topic for e in edges if e.node in shown), *(e.topic for e in edges)]))
     drawn = set(topics[:TOPICS_MAX])
     if not nodes:
@@ -157,7 +162,7 @@ def graph_of(run: Run) -> GraphFigure | None:
 
 
 def _states(run: Run) -> list[GraphEvent]:
-    """All of the master's states, or some and the last of very many."""
+    """Return all of the master's states, or some and the last of very many."""
     events = [event for _, event in run.graph]
     if len(events) <= STATES_MAX:
         return events
@@ -165,7 +170,7 @@ def _states(run: Run) -> list[GraphEvent]:
 
 
 def _edges(run: Run, states: Sequence[GraphEvent]) -> Iterator[_Edge]:
-    """In the order of their appearance; another tool's recording knows of publishers alone."""
+    """Yield them in the order of their appearance; another tool's recording knows of publishers alone."""
     for state in states:
         for publishes, ends in ((True, state.publishers), (False, state.subscribers)):
             for topic, nodes in ends.items():
@@ -196,7 +201,7 @@ LETTERS_MAX = 24_000
 
 
 def console_of(run: Run) -> ConsoleFigure | None:
-    """None where nothing was printed. Colours are left out."""
+    """Return what was printed, without colours; None where nothing was."""
     own = {event.name for _, event in run.processes if event.role == "grader"}
     printed = [(time_ns, line) for time_ns, line in run.console if line.process not in own]
     if not printed:
@@ -226,7 +231,7 @@ FIGURES_MAX = 6
 
 
 def code_figures(build: Run, citations: Sequence[Citation]) -> Iterator[CodeFigure]:
-    """A figure for each place of each file that was kept; places near each other are one."""
+    """Yield a figure for each place of each file that was kept; places near each other are one."""
     cited = [c for c in citations if isinstance(c, FileCitation) and c.line is not None]
     left = FIGURES_MAX
     for file in dict.fromkeys(c.file for c in cited):
@@ -241,7 +246,7 @@ def code_figures(build: Run, citations: Sequence[Citation]) -> Iterator[CodeFigu
 
 
 def _groups(marks: Sequence[int]) -> Iterator[list[int]]:
-    """Marks whose surroundings meet, or nearly."""
+    """Yield the groups of marks whose surroundings meet, or nearly."""
     group: list[int] = []
     for mark in marks:
         far = group and mark - group[-1] > 2 * AROUND + 1 + APART_MAX
@@ -276,11 +281,11 @@ STRETCHES_MAX = 120
 RUN_PARTS = 400
 """Messages that are nearer to each other than such a part of the run are drawn as one stretch."""
 SAYS_LETTERS = 120
-QUIET = frozenset({"clock", "interrupt", "open", "note", "left", "lookup", "read"})
+QUIET = frozenset({"clock", "open", "note", "left", "lookup", "read"})
 
 
 def timeline_of(run: Run) -> TimelineFigure | None:
-    """None where no process and no node was there: another tool's recording knows of messages alone."""
+    """Return the run's lanes; None if no process and no node was there: other tools' recordings have messages alone."""
     lanes = [
         *_processes(run),
         *_node_lanes(run),
@@ -337,7 +342,7 @@ def _has_failed(event: ProcessEvent) -> bool:
 
 
 def _node_lanes(run: Run) -> Iterator[Lane]:
-    """From the first of the master's states that has a node up to the first that has it no longer."""
+    """Yield each node, from the first of the master's states that has it up to the first that has it no longer."""
     for node in filter(is_drawn, (*run.student_nodes(), *sorted(run.grader_nodes - {"/rosout"}))):
         yield from _lane("node", node, _node_stretches(run, node))
 
@@ -363,7 +368,7 @@ def _topics(run: Run) -> Iterator[Lane]:
 
 
 def _message_stretches(run: Run, times: Sequence[int], size_ns: int) -> Iterator[Stretch]:
-    """Of very many, the stretches are longer."""
+    """Yield stretches of messages; of very many, they are longer."""
     while len(found := list(_join_close(times, size_ns))) > STRETCHES_MAX:
         size_ns *= 2
     for begin, end, count in found:
@@ -390,12 +395,12 @@ def _errors(run: Run) -> Iterator[Stretch]:
 
 def _actions(run: Run) -> Iterator[Stretch]:
     for time_ns, event in run.actors:
-        if event.action not in QUIET or event.action == "interrupt":
+        if event.action not in QUIET:
             yield _stretch(run, time_ns, time_ns, _action_text(event))
 
 
 def _action_text(event: ActorEvent) -> str:
-    """`publish /chatter "abc"`; `Ctrl-C`."""
+    """Return `publish /chatter "abc"`, or `Ctrl-C`."""
     if event.action == "interrupt":
         return "Ctrl-C"
     value = "" if event.value is None else f"{event.value!r}"

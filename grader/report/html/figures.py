@@ -89,7 +89,7 @@ class Drawer:
     _seen: list[tuple[Figure, Drawn]] = field(default_factory=list)
 
     def draw(self, figure: Figure) -> Drawn:
-        """The figure made ready, or where it was drawn before."""
+        """Return the figure made ready, or where it was drawn before."""
         earlier = next((drawn for seen, drawn in self._seen if seen == figure), None)
         if earlier is not None:
             return Drawn(title=earlier.title, kind=figure.kind, same_as=earlier.name)
@@ -108,6 +108,7 @@ class Drawer:
 
     def _console(self, figure: ConsoleFigure) -> Drawn:
         first, last = self._room(figure.lines)
+        # not `[-last:]`, which is all of them where `last` is 0
         shown = [*figure.lines[:first], *figure.lines[len(figure.lines) - last :]]
         errors = sum(printed.stream == "stderr" for printed in figure.lines)
         left = figure.left_out + len(figure.lines) - len(shown)
@@ -128,7 +129,7 @@ class Drawer:
         if len(lines) > CONSOLE_FIRST + CONSOLE_LAST:
             first, last = CONSOLE_FIRST, CONSOLE_LAST
         for place, line in enumerate([*lines[:first], *lines[len(lines) - last :]]):
-            self.console_chars -= min(len(line.text), LINE_CHARS) + 30
+            self.console_chars -= min(len(line.text), LINE_CHARS) + 30  # and about so much markup
             if self.console_chars < 0:
                 return min(first, place), max(0, place - first)
         return first, last
@@ -183,9 +184,10 @@ def _draw_heard(figure: HeardFigure, _name: str) -> Drawn:
 
 
 def _first(rows: tuple[Heard, ...], missed: list[Heard]) -> list[Heard]:
-    """In their order; of too many, those that were missed come before those that were heard."""
+    """Return rows in their order; of too many, those that were missed come before those that were heard."""
     if len(rows) <= HEARD_MAX:
         return list(rows)
+    # by identity, since two rows may be equal
     kept = {id(row) for row in [*missed, *(row for row in rows if row.heard is not None)][:HEARD_MAX]}
     return [row for row in rows if id(row) in kept]
 
@@ -234,6 +236,7 @@ def _parts(text: str, column: int | None, end: int | None) -> tuple[str, str, st
     if column is None or column <= indent:
         return "", "", text[indent:]
     begin = column - 1
+    # without an end, the word that begins there is meant, or else one letter
     word = re.compile(r"\w+").match(text, begin)
     at_end = end - 1 if end and end > column else word.end() if word else column
     return text[indent:begin], text[begin:at_end], text[at_end:]
@@ -284,7 +287,7 @@ DRAWN: dict[str, Callable[..., Drawn]] = {
 
 
 def code_places(figures: Iterable[Figure]) -> frozenset[tuple[str, int]]:
-    """The lines that are shown with the code around them."""
+    """Return the lines that are shown with the code around them."""
     return frozenset(
         (figure.file, line) for figure in figures if isinstance(figure, CodeFigure) for line in figure.marked
     )
@@ -340,7 +343,7 @@ def timeline(figure: TimelineFigure) -> Timeline:
 
 
 def timeline_words(figure: TimelineFigure) -> str:
-    """What the drawing shows, in a sentence."""
+    """Return what the drawing shows, in a sentence."""
     kinds: list[str] = [lane.kind for lane in figure.lanes]
     counted = [plural(kinds.count(kind), kind, "processes" if kind == "process" else "") for kind in KINDS]
     return f"{', '.join(counted)} over {number(figure.length_s, 1)} s."

@@ -16,7 +16,7 @@ from grader.wording import shorten
 
 MOST = 40
 HEIGHT, ROW, COLUMN_GAP, EDGE = 44.0, 66.0, 40.0, 8.0
-LETTER, SMALL_LETTER = 8.2, 6.6
+LETTER, SMALL_LETTER = 8.2, 6.6  # pixels: there is nothing here that could measure a text
 NAME_CHARS = 32
 ANONYMOUS = re.compile(r"_\d+_\d{10,}$")
 Place = tuple[float, float, float]
@@ -49,7 +49,7 @@ def graph_faults(figure: GraphFigure) -> list[str]:
 
 
 def graph_rows(figure: GraphFigure) -> Iterator[tuple[str, str, str, str]]:
-    """The same as rows: the topic, its type, who publishes, who listens."""
+    """Yield the same as rows: the topic, its type, who publishes, who listens."""
     for topic in figure.topics:
         edges = [edge for edge in figure.edges if edge.topic == topic]
         publishers = dict.fromkeys(edge.node for edge in edges if edge.publishes)
@@ -137,7 +137,7 @@ def _heads(name: str) -> Markup:
 
 
 def _draw_arrow(arrow: Arrow, layers: Layers, places: dict[str, Place], name: str) -> Markup:
-    """A curve to the right through all that it passes; one that leads back hangs below."""
+    """Return a curve to the right through all that it passes; one that leads back hangs below."""
     route = layers.routes[arrow]
     stops = [places[vertex] for vertex in route]
     if arrow in layers.back:
@@ -172,7 +172,7 @@ class Layers:
 
 
 def layered(vertices: Sequence[Vertex], arrows: Sequence[Arrow]) -> Layers:
-    """Every arrow leads to the right, but for those that close a circle. `arrows` join `vertices`."""
+    """Return the layers: every arrow leads to the right, but for those that close a circle."""
     back = _closing(vertices, arrows)
     forward = {arrow: (arrow[::-1] if arrow in back else arrow) for arrow in dict.fromkeys(arrows)}
     depth = _depths(vertices, list(forward.values()))
@@ -181,6 +181,7 @@ def layered(vertices: Sequence[Vertex], arrows: Sequence[Arrow]) -> Layers:
         columns[depth[vertex]].append(vertex)
     routes: dict[Arrow, tuple[Vertex, ...]] = {}
     for number, (arrow, (begin, end)) in enumerate(forward.items()):
+        # no name of ROS has a NUL in it
         between = [f"\0{number}.{column}" for column in range(depth[begin] + 1, depth[end])]
         for place, column in zip(between, range(depth[begin] + 1, depth[end]), strict=True):
             columns[column].append(place)
@@ -195,7 +196,7 @@ def is_bend(vertex: Vertex) -> bool:
 
 
 def _closing(vertices: Sequence[Vertex], arrows: Sequence[Arrow]) -> set[Arrow]:
-    """The arrows that close a circle, met depth first, from where nothing leads to."""
+    """Return the arrows that close a circle, met depth first, from where nothing leads to."""
     following: dict[Vertex, list[Vertex]] = defaultdict(list)
     reached = set()
     for begin, end in arrows:
@@ -203,6 +204,7 @@ def _closing(vertices: Sequence[Vertex], arrows: Sequence[Arrow]) -> set[Arrow]:
         reached.add(end)
     closing: set[Arrow] = set()
     done: set[Vertex] = set()
+    # what is in a circle alone comes last: nothing else leads there
     for root in sorted(vertices, key=lambda vertex: vertex in reached):
         trail, on_trail = [(root, iter(following[root]))], {root}
         while trail and root not in done:
@@ -222,8 +224,9 @@ def _closing(vertices: Sequence[Vertex], arrows: Sequence[Arrow]) -> set[Arrow]:
 
 
 def _depths(vertices: Sequence[Vertex], arrows: Sequence[Arrow]) -> dict[Vertex, int]:
-    """The longest way from the left; what nothing leads to stands just before what it leads to."""
+    """Return the longest ways from the left; what nothing leads to stands just before what it leads to."""
     depth = dict.fromkeys(vertices, 0)
+    # so many rounds are enough for the longest way
     for _ in vertices:
         moved = False
         for begin, end in arrows:
@@ -241,7 +244,7 @@ def _depths(vertices: Sequence[Vertex], arrows: Sequence[Arrow]) -> dict[Vertex,
 
 
 def _order(columns: list[list[Vertex]], routes: list[tuple[Vertex, ...]]) -> None:
-    """Each vertex near the middle of those that it is joined with, to the right and back again."""
+    """Sort each vertex near the middle of those that it is joined with, to the right and back again."""
     before: dict[Vertex, list[Vertex]] = defaultdict(list)
     after: dict[Vertex, list[Vertex]] = defaultdict(list)
     for route in routes:

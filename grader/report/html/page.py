@@ -116,14 +116,14 @@ def _head(result: GradingResult, rubric: Rubric, hidden: int, to_fix: int) -> di
 
 
 def _parts(result: GradingResult) -> dict[str, float]:
-    """Points that were reached, are open, and are lost (what being late cost among them)."""
+    """Return the points that were reached, are open, and are lost (what being late cost among them)."""
     still = sum(c.max_points - c.points for c in result.criteria if c.status.is_open)
     lost = result.max_points - result.points - still
     return {"reached": result.points, "lost": max(lost, 0.0), "open": still}
 
 
 def _sections(result: GradingResult, page: Page) -> Iterator[tuple[str, str]]:
-    """The ids of the page's parts, and what they are called in its list of parts."""
+    """Yield the ids of the page's parts, and what they are called in its list of parts."""
     if page.lost:
         yield "lost", f"To fix ({len(page.lost)})"
     if page.open:
@@ -296,7 +296,7 @@ class Maker:
         )
 
     def _with_graph(self, criterion: CriterionResult) -> list[Figure]:
-        """What was lost in a run, and has no plot, shows who was joined with whom in it."""
+        """Return its figures; what was lost in a run, and has no plot, shows who was joined with whom in it."""
         figures = list(self._figures.by_criterion.get(criterion.id, ()))
         graph = self._figures.graphs.get(criterion.scenario or "")
         if graph and graph.nodes and all(figure.kind == "code" for figure in figures):
@@ -345,7 +345,7 @@ class Maker:
         return (*([(where, False)] if where else []), *commands_in(criterion.reproduce))
 
     def _where(self, criterion: CriterionResult) -> list[str]:
-        """Places that no code beside them shows."""
+        """Return the places that no code beside them shows."""
         shown = code_places(self._figures.by_criterion.get(criterion.id, ()))
         cited = criterion.citations
         return [
@@ -361,6 +361,7 @@ class Maker:
         titles = {name: scenario.title for name, scenario in self._rubric.scenarios.items()}
         names = dict.fromkeys([PACKAGE_RUN, *titles, *self._figures.graphs, *self._figures.consoles])
         used = {c.scenario for c in self._result.criteria} | {PACKAGE_RUN}
+        # a scenario that hidden criteria alone are about stays hidden, too
         for i, name in enumerate((n for n in names if n in used or n not in titles), start=1):
             graph, console = self._figures.graphs.get(name), self._figures.consoles.get(name)
             graph = graph if graph and graph.nodes else None

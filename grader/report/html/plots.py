@@ -24,7 +24,7 @@ FAR = 10**15
 
 
 def counter_plots(figure: CounterFigure, name: str) -> list[Markup]:
-    """Where it is long, the surroundings of the first wrong step, or of the first wrap; then the whole of it."""
+    """Return the surroundings of the first wrong step, or of the first wrap, of a long one; then the whole of it."""
     count = len(figure.values)
     if count < 2:
         return []
@@ -41,7 +41,7 @@ def counter_plots(figure: CounterFigure, name: str) -> list[Markup]:
 
 
 def counter_words(figure: CounterFigure) -> str:
-    """What the plot shows, in words."""
+    """Return what the plot shows, in words."""
     if not figure.values:
         return f"No number was seen on {figure.topic}."
     low, high = min(figure.values), max(figure.values)
@@ -56,7 +56,7 @@ def counter_words(figure: CounterFigure) -> str:
 
 
 def wrong_steps(figure: CounterFigure) -> Iterator[str]:
-    """`#1, at 12.8 s: …`, as the circles are numbered; the first few."""
+    """Yield `#1, at 12.8 s: …`, as the circles are numbered; the first few."""
     texts = (*figure.texts, *[""] * len(figure.wrong))
     for index, (i, said) in enumerate(zip(figure.wrong[:LABELS_MAX], texts, strict=False), start=1):
         yield f"#{index}, at {number(figure.times_s[i], 2)} s: {said or _step(figure, i)}"
@@ -78,6 +78,7 @@ def _plot(figure: CounterFigure, name: str, shown: range, size: svg.Point, title
     values = [float(max(-FAR, min(FAR, figure.values[i]))) for i in shown]
     times = [figure.times_s[i] for i in shown]
     low, high = min(values), max(values)
+    # the whole is seen from 0, so that its slope is not taken for more than it is
     if size == WHOLE:
         low, high = min(low, 0.0), max(high, 1.0)
     pad = (high - low) * 0.14 or 1.0
@@ -115,13 +116,13 @@ def _has_dwarfed(values: Sequence[float]) -> bool:
 
 
 def _visible_ends(died: Sequence[tuple[float, str]], from_s: float, to_s: float) -> list[tuple[float, str]]:
-    """Those ends that lie in a plot, or not far behind what it shows."""
+    """Return those ends that lie in a plot, or not far behind what it shows."""
     beyond = to_s + max(0.5 * (to_s - from_s), 1.0)
     return [(at, words) for at, words in died if from_s <= at <= beyond][:1]
 
 
 def _deaths(died: Sequence[tuple[float, str]], frame: svg.Frame) -> Iterator[Markup]:
-    """Where a process ended by itself: nothing comes after that."""
+    """Yield where a process ended by itself: nothing comes after that."""
     for at, words in died:
         x = frame.x(at)
         yield svg.element("line", x1=x, x2=x, y1=svg.TOP, y2=frame.bottom, class_="died")
@@ -136,7 +137,7 @@ def _beside(x: float, y: float, words: str, gap: float, *, most: float, class_: 
 
 
 def _whole(figure: CounterFigure, at: dict[int, svg.Point]) -> Iterator[list[svg.Point]]:
-    """The points in pieces, broken where values between them are left out."""
+    """Yield the points in pieces, broken where values between them are left out."""
     numbers = figure.numbers or range(len(figure.values))
     piece: list[svg.Point] = []
     for i, point in at.items():
@@ -176,7 +177,7 @@ CORNER_LABELS_MAX = 20
 
 
 def path_plot(figure: PathFigure, name: str) -> Markup | None:
-    """Seen from above, as wide as it is high for the same metres; None for a robot that stood still."""
+    """Return the path from above, as wide as it is high for the same metres; None for a robot that stood still."""
     if len(figure.points) < 2 and not figure.corners:
         return None
     frame, scale = _frame((*figure.points, *figure.corners), figure.tolerance_m)
@@ -196,7 +197,7 @@ def path_plot(figure: PathFigure, name: str) -> Markup | None:
 
 
 def path_words(figure: PathFigure) -> str:
-    """What the plot shows, in words."""
+    """Return what the plot shows, in words."""
     words = f"{figure.topic} passed {figure.reached} of {plural(len(figure.corners), 'point')} in order; "
     words += f"{number(figure.tolerance_m)} m off the path is allowed"
     if figure.strayed is None:
@@ -206,7 +207,7 @@ def path_words(figure: PathFigure) -> str:
 
 
 def place_plot(figure: PlaceFigure, name: str) -> Markup:
-    """Seen from above, with walls, the border of the region and the goal."""
+    """Return the path from above, with walls, the border of the region and the goal."""
     goal = [figure.goal] if figure.goal else []
     around = [spot for line in figure.walls for spot in line]
     frame, scale = _frame((*figure.points, *figure.area, *around, *goal), figure.tolerance_m)
@@ -231,7 +232,7 @@ def place_plot(figure: PlaceFigure, name: str) -> Markup:
 
 
 def _frame(spots: Sequence[svg.Point], room: float) -> tuple[svg.Frame, float]:
-    """The frame, and how many pixels a metre has in it."""
+    """Return the frame, and how many pixels a metre has in it."""
     x_low, x_high = _edges([x for x, _ in spots], room)
     y_low, y_high = _edges([y for _, y in spots], room)
     wide, high = x_high - x_low, y_high - y_low
@@ -277,7 +278,7 @@ FASTEST_S = 1e-5
 
 
 def rate_plots(figure: RateFigure, name: str) -> list[Markup]:
-    """How fast they came and how long the gaps are, or the messages of a flood; none where there is no gap."""
+    """Return how fast they came and how long the gaps are, or the messages of a flood; nothing without a gap."""
     if not figure.gaps_s:
         return []
     if len(figure.counts) > 1:
@@ -286,7 +287,7 @@ def rate_plots(figure: RateFigure, name: str) -> list[Markup]:
 
 
 def rate_words(figure: RateFigure) -> str:
-    """What the plots show, in words."""
+    """Return what the plots show, in words."""
     if not figure.gaps_s:
         return f"Too few messages on {figure.topic} to draw a rate."
     if len(figure.counts) > 1:
@@ -353,7 +354,7 @@ def _over_time(figure: RateFigure, name: str) -> Markup:
 
 
 def _flood(figure: RateFigure, name: str) -> Markup:
-    """A column for each tenth of a second, on a logarithmic axis: beside so many, the few that pass are a line."""
+    """Return a column for each tenth of a second, on a logarithmic axis: else the few that pass would not show."""
     hz = [count / figure.slice_s for count in figure.counts]
     begin = max(0.0, figure.times_s[0] - figure.gaps_s[0])
     end = begin + figure.slice_s * len(hz)

@@ -41,7 +41,7 @@ class Bytecode(FileSystemBytecodeCache):
 
 @cache
 def environment() -> Environment:
-    """The templates. A text that a template puts out is one visible line of at most `limit` characters, escaped."""
+    """Return the templates. A text that one puts out is one visible line of at most `limit` characters, escaped."""
     made = Environment(
         autoescape=True,
         bytecode_cache=Bytecode(str(Path(__file__).with_name("__pycache__"))),
@@ -80,6 +80,7 @@ def script(name: str) -> Markup:
 
 def policy(*scripts: str) -> str:
     """Return the Content-Security-Policy of a page that loads nothing and runs these scripts alone."""
+    # by their digests: no other script runs, whatever gets into the page
     digests = (base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in scripts)
     allowed = " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"
     return (
@@ -98,7 +99,7 @@ def _templates() -> dict[str, str]:
 
 
 def _unindent(text: str) -> str:
-    """Without the blanks that lines begin with: no page of ours needs them."""
+    """Return a text without the blanks that lines begin with: no page of ours needs them."""
     return "\n".join(row.strip() for row in text.splitlines())
 
 
@@ -130,6 +131,7 @@ def _join_signs(context: Context, text: str) -> Markup:
     """Return a line of code in which no arrow and no end of a comment is broken where the line is."""
     parts = re.split("(<!--|-+>)", line(text, context.get("limit", LIMIT)))
     return Markup("").join(
+        # every second part is one that the pattern has found
         Markup('<span class="join">{}</span>').format(part) if i % 2 else escape(part)
         for i, part in enumerate(parts)
     )
@@ -142,7 +144,7 @@ def _code(context: Context, text: str) -> Markup:
 
 @pass_context
 def _make_visible(context: Context, value: Any) -> Any:  # noqa: ANN401 - whatever a template puts out
-    """Foreign text made visible. Markup that was drawn here and what is not text stay as they are."""
+    """Return foreign text made visible. Markup that was drawn here and what is not text stay as they are."""
     if isinstance(value, str) and not isinstance(value, Markup):
         return line(value, context.get("limit", LIMIT))
     return value

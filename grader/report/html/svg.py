@@ -16,19 +16,19 @@ Point = tuple[float, float]
 
 
 def element(name: str, *children: Markup, **attributes: str | float) -> Markup:
-    """`<name …>children</name>`. An attribute `class_` is `class`, `stroke_width` is `stroke-width`."""
+    """Return `<name …>children</name>`. An attribute `class_` is `class`, `stroke_width` is `stroke-width`."""
     given = "".join(f' {_name(key)}="{_value(value)}"' for key, value in attributes.items())
     inside = "".join(children)
     return Markup(f"<{name}{given}>{inside}</{name}>" if inside else f"<{name}{given}/>")  # noqa: S704 - escaped
 
 
 def text(x: float, y: float, words: str, class_: str = "label", **attributes: str | float) -> Markup:
-    """Words at a place; `text_anchor` says which end of them."""
+    """Return words at a place; `text_anchor` says which end of them."""
     return element("text", escaped(words), x=x, y=y, class_=class_, **attributes)
 
 
 def escaped(words: str) -> Markup:
-    """One visible line, of the length that a plot has room for."""
+    """Return one visible line, of the length that a plot has room for."""
     return Markup(html(line(words, TEXT_CHARS)))  # noqa: S704 - escaped
 
 
@@ -38,7 +38,7 @@ def path(points: Iterable[Point]) -> str:
 
 
 def dots(points: Iterable[Point]) -> str:
-    """A dot at each point, for the `d` of a path with round ends."""
+    """Return a dot at each point, for the `d` of a path with round ends."""
     return "".join(f"M{short(x)} {short(y)}h0" for x, y in points)
 
 
@@ -113,7 +113,7 @@ class Frame:
         return LEFT + _share(value, self.xs, log=self.log_x) * (self.right - LEFT)
 
     def y(self, value: float) -> float:
-        """As `x`, from the bottom up."""
+        """Return the pixel as `x` does, from the bottom up."""
         return self.bottom - _share(value, self.ys, log=self.log_y) * (self.bottom - TOP)
 
     def at(self, points: Iterable[Point]) -> list[Point]:
@@ -127,7 +127,7 @@ class Frame:
         return element("rect", x=left, y=top, width=wide, height=high, **attributes)
 
     def axes(self, x_label: str, y_label: str) -> list[Markup]:
-        """Lines across at the ticks, their numbers, and what they are numbers of."""
+        """Return lines across at the ticks, their numbers, and what they are numbers of."""
         parts = []
         for value in (log_ticks if self.log_y else ticks)(*self.ys):
             y = self.y(value)
@@ -163,7 +163,7 @@ def _share(value: float, edges: Point, *, log: bool) -> float:
 
 
 def log_ticks(low: float, high: float) -> list[float]:
-    """Powers of ten from `low` to `high`, at most about `TICKS`, 0 and their negatives."""
+    """Return powers of ten from `low` to `high`, at most about `TICKS`, 0 and their negatives."""
     most = max(abs(low), abs(high), 1.0)
     powers = range(int(math.log10(most)) + 1)
     sizes = [10.0**power for power in powers[:: len(powers) // TICKS + 1]]
@@ -171,12 +171,13 @@ def log_ticks(low: float, high: float) -> list[float]:
 
 
 def ticks(low: float, high: float) -> list[float]:
-    """About `TICKS` round values from `low` to `high`: 0, 0.5, 1 …"""
+    """Return about `TICKS` round values from `low` to `high`: 0, 0.5, 1 …"""
     span = high - low
     if span < TINY or not math.isfinite(span):
         return []
     rough = span / TICKS
     size = 10.0 ** math.floor(math.log10(rough))
     step = next(factor * size for factor in (1, 2, 5, 10) if factor * size >= rough)
+    # 1e-9: what is a multiple of the step may come out a little beside one
     first = math.ceil(low / step - 1e-9)
     return [i * step for i in range(first, math.floor(high / step + 1e-9) + 1)]
