@@ -298,7 +298,8 @@ def rounds(roster: Roster) -> tuple[Roster, ...]:
         by_student.setdefault(folder_key(entry.id), []).append(entry)
     for entries in by_student.values():
         if all(entry.submitted_at for entry in entries):
-            entries.sort(key=lambda entry: str(entry.submitted_at))
+            # as moments: the texts of times in several zones have another order
+            entries.sort(key=lambda entry: entry.submitted_at.timestamp() if entry.submitted_at else 0.0)
     first_id = {key: entries[0].id for key, entries in by_student.items()}
     allowed = {entry.where for entry in roster.again}
     # to stand in the roster twice is a fault only where there are no attempts

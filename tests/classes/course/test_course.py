@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from grader.classes.course import rounds
+from grader.classes.roster import read_roster
 from grader.cli.main import run
 from grader.errors import RubricError, UsageError
 from grader.judging.settle import lateness
@@ -347,3 +349,11 @@ def test_a_lab_without_a_roster(course: Path, capsys) -> None:
     (course / "course.yaml").write_text(COURSE.replace("    roster: lab1.csv\n", ""))
     assert grade("lab1") == 2
     assert "lab1 has no roster" in capsys.readouterr().err
+
+
+def test_attempts_are_in_the_order_of_their_moments_whatever_their_zones(tmp_path: Path) -> None:
+    for name in ("early", "late"):
+        (tmp_path / name).mkdir()
+    write_roster(tmp_path / "r.csv", "ada,late,2026-11-01T09:30:00Z", "ada,early,2026-11-01T10:00:00+01:00")
+    first, second = rounds(read_roster(tmp_path / "r.csv"))
+    assert [Path(one.entries[0].source).name for one in (first, second)] == ["early", "late"]
