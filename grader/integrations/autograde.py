@@ -41,6 +41,7 @@ AGAIN = "your teachers can see why; submit again, or ask them to grade it again"
 
 def main() -> int:
     """Return 0 if something was graded, 3 if results.json says that nothing was."""
+    # so that the student gets an answer when the container is stopped
     signal.signal(signal.SIGTERM, _interrupt)
     warnings.simplefilter("ignore")  # Python's warnings about a student's code are of no use here
     platform, folder = sys.argv[1:]
@@ -74,7 +75,7 @@ def _interrupt(_number: int, _frame: FrameType | None) -> None:
 
 
 def _write(results: Path, document: dict[str, object]) -> None:
-    """Write it readable as the umask says: the platform may read it as another user than the one that grades."""
+    """Write results.json as readable as the umask says: the platform may read it as another user than the grader's."""
     atomic_write(results / "results.json", json_text(document).encode(), public=True)
 
 
@@ -111,6 +112,7 @@ def find_upload(folder: Path, modes: LostModes) -> Source:
     files = [path for path in entries if path.is_file() and not path.is_symlink()]
     archives = [path for path in files if path.name.lower().endswith(ARCHIVES)]
     folders = [path for path in entries if path.is_dir()]
+    # with anything beside it, the archive belongs to the package and is not the package
     single = len(archives) == 1 and not folders and not (folder / "package.xml").exists()
     chosen = archives[0] if single else folder
     source = parse_source(str(chosen))

@@ -190,6 +190,7 @@ def _files(source: Path, target: str) -> Iterator[tuple[str, Path]]:
         yield target, source
     for file in sorted(source.rglob("*")):
         inside = file.relative_to(source)
+        # what Python compiled has times and paths of this machine in it
         if file.is_file() and file.suffix != ".pyc" and "__pycache__" not in inside.parts:
             yield f"{target}/{inside.as_posix()}", file
 
@@ -203,10 +204,12 @@ def _metadata(installed: Distribution) -> Iterator[tuple[str, str]]:
 
 def _record(bundle: Bundle, own: str) -> bytes:
     lines = [f"{path},sha256={_digest(data)},{len(data)}" for path, data, _ in bundle.entries()]
+    # RECORD cannot list its own sum; the specification of wheels leaves it empty
     return "".join(f"{line}\n" for line in [*lines, f"{own},,"]).encode()
 
 
 def _digest(data: bytes) -> str:
+    # as the specification of wheels asks for
     return base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
 
 
@@ -215,6 +218,7 @@ def add_lab(bundle: Bundle, rubric: LoadedRubric, folder: str) -> str:
     path = f"{folder}/{rubric.path.name}"
     bundle.add(path, rubric.path.read_bytes())
     for name, data in read_beside_rubric(rubric).items():
+        # the course's copy may have lost its modes on the way
         bundle.add(f"{folder}/{name}", data, executable=data.startswith(b"#!"))
     return path
 
@@ -233,6 +237,8 @@ def needs_script(needs: Needs) -> bytes:
     apt += ["python3-pip"] if pip else []
     lines = [template("needs.sh").decode(), f"apt-get install -y --no-install-recommends {shlex.join(apt)}\n"]
     if pip:
+        # the variable, as Debian's pip refuses to install beside apt's packages (PEP 668); the container is
+        # ours alone
         lines.append(f"PIP_BREAK_SYSTEM_PACKAGES=1 python3 -m pip install --no-cache-dir {shlex.join(pip)}\n")
     lines += [f"echo 'setup: install the ROS package {name} here yourself' >&2\n" for name in unknown]
     return "".join(lines).encode()

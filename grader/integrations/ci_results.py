@@ -147,9 +147,11 @@ def clear(out: Path) -> None:
     try:
         names = {entry.name for entry in out.iterdir()} if out.is_dir() else set()
         if out.is_symlink() or (out.exists() and not out.is_dir()) or names - REPORT_NAMES:
+            # the folder is in a checkout, into which the student may have put anything
             raise OutputError(f"{out} is in the way of the results", hint="remove it from the repository")
         for name in names:
             path = out / name
+            # a link is removed itself, never what it leads to
             shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
         make_folder(out)
     except OSError as error:
@@ -194,9 +196,10 @@ def _hidden_scenarios(rubric: Rubric) -> frozenset[str]:
 
 
 def _without(console: str, unseen: frozenset[str]) -> str:
-    """Return the console log without the sections of the runs `unseen`; every other line begins with a time."""
+    """Return the console log without the sections of the runs `unseen`."""
     kept, shown = [], True
     for row in console.splitlines(keepends=True):
+        # nothing that a node prints begins so: every other line begins with a time
         if row.startswith(SECTION):
             shown = row.removeprefix(SECTION).strip() not in unseen
         if shown:

@@ -98,6 +98,7 @@ def read_settings(variables: Mapping[str, str]) -> JobSettings:
         sandbox=_sandbox(given("SANDBOX")),
         out=Path(given("OUT") or OUT),
         repository=Path(workspace) if workspace else None,
+        # the first is set by one system, the second by the other
         attempt=next((int(text) for name in COUNTERS if (text := variables.get(name, "")).isdecimal()), None),
         attempts=_attempts(given("ATTEMPTS")),
     )
@@ -188,6 +189,7 @@ def with_pass_mark(loaded: LoadedRubric, mark: PassMark | None) -> LoadedRubric:
             f"pass-mark: {number(mark.value)} points, but {rubric.id} has {number(most)} visible ones",
             hint=MARK_HINT,
         )
+    # the submission is marked by all points, and its mark was given in visible ones
     share = mark.value / (100 if mark.percent else most or 1)
     return loaded.model_copy(
         update={"rubric": rubric.model_copy(update={"pass_mark": share * rubric.max_points})}
@@ -207,6 +209,7 @@ class GitHubRunner:
     @contextmanager
     def commands_stopped(self) -> Iterator[None]:
         """Keep the runner from taking anything printed in this block for a command."""
+        # one that a student's code cannot guess, and so cannot print to end the block
         token = secrets.token_hex(20)
         _print(f"::stop-commands::{token}\n")
         try:
@@ -219,7 +222,7 @@ class GitHubRunner:
         result = graded.counted.model_copy(update={"error": None})  # it is in `text`, with whose fault it is
         text = "\n".join(part for part in (graded.message, graded.hint) if part)
         _print(github_annotation(_severity(graded), graded.title, text))
-        _print(render_annotations(result, graded.prefix, each_max=EACH_MAX - 1))
+        _print(render_annotations(result, graded.prefix, each_max=EACH_MAX - 1))  # the outcome is one of them
         self._add(self._summary, f"{_heading(graded.title, graded.message)}\n\n{summarize(graded)}\n")
         self._write_outputs(_values(graded))
 
@@ -237,7 +240,7 @@ class GitHubRunner:
     def _write_outputs(self, values: Mapping[str, str]) -> None:
         rows = []
         for name, value in values.items():
-            end = f"end-{secrets.token_hex(20)}"
+            end = f"end-{secrets.token_hex(20)}"  # a value that ends early could set other outputs
             rows.append(f"{name}<<{end}\n{value}\n{end}\n")
         self._add(self._outputs, "".join(rows))
 
@@ -245,6 +248,7 @@ class GitHubRunner:
         if not file:
             return
         try:
+            # others have written to it: the workflow's earlier commands
             with Path(file).open("a", encoding="utf-8", errors="backslashreplace") as stream:
                 stream.write(text)
         except OSError as error:
@@ -282,6 +286,7 @@ def _heading(title: str, text: str) -> str:
 
 def _print(text: str) -> None:
     """Print at once, in order with the report on the terminal."""
+    # what the log's encoding lacks must not end the job
     encoding = sys.stdout.encoding or "ascii"
     sys.stdout.write(text.encode(encoding, "backslashreplace").decode(encoding))
     sys.stdout.flush()
@@ -315,6 +320,7 @@ class GitLabRunner:
 
     def tell_error(self, error: GraderError) -> None:
         """Write the outcome where there is no result. Raises OutputError."""
+        # a link of the student's repository is not followed
         if not self._out.is_symlink() and (self._out.is_dir() or not self._out.exists()):
             self._write({"GRADER_STATUS": OF_CODE[error.exit_code].value})
 

@@ -152,6 +152,7 @@ def _prairielearn_results(result: GradingResult, rubric: LoadedRubric) -> dict[s
     """Return the points, or that the submission cannot be graded: then no attempt is used up."""
     if result.error is not None:
         return _invalid(result.error.message, result.error.hint)
+    # without any that counts, too: there is nothing to give points for
     counting = [c for c in result.criteria if c.counts]
     if all(c.status.is_open for c in counting):
         return _invalid("no criterion could be judged", "submit again")
@@ -163,6 +164,7 @@ def _prairielearn_results(result: GradingResult, rubric: LoadedRubric) -> dict[s
         tests.append(_unseen(unseen))
     return {
         "gradable": True,
+        # a bonus gives no more than all, and penalties no less than none
         "score": round(min(1.0, max(0.0, result.points / (result.max_points or 1.0))), 6),
         "message": "\n".join(_message(result, shown)),
         "tests": tests,

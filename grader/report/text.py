@@ -39,10 +39,11 @@ __all__ = [
 
 
 def html(text: str) -> str:
-    """`text` for an element's content or for an attribute in quotes.
+    """Return `text` for an element's content or for an attribute in quotes.
 
     Not for `<script>` and `<style>`, whose content HTML reads otherwise.
     """
+    # old browsers took a backtick, too, for an attribute's quote
     return escape(visible(text), quote=True).replace("`", "&#96;")
 
 
@@ -78,7 +79,7 @@ _ENTITIES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
 
 
 def markdown(text: str, *, cell: bool = False) -> str:
-    """One line of Markdown that reads as `text`, wherever it stands: at a line's start, in a list, in a table's `cell`.
+    """Return one line of Markdown that reads as `text`, wherever it stands: at a line's start, in a list, in a `cell`.
 
     No markup, link, mention, emoji, formula or HTML of it takes effect, but for `code` between two single backticks
     and for what shows by itself that it is code.
@@ -89,13 +90,14 @@ def markdown(text: str, *, cell: bool = False) -> str:
 
 
 def markdown_code(text: str, *, cell: bool = False) -> str:
-    """A code span that shows `text` as it is. A bar is escaped in a table's `cell`, and only there."""
+    """Return a code span that shows `text` as it is. A bar is escaped in a table's `cell`, and only there."""
     return _code(visible(text), cell=cell)
 
 
 def markdown_block(lines: Iterable[str]) -> str:
-    """A block of code that shows these lines as they are."""
+    """Return a block of code that shows these lines as they are."""
     rows = [visible(row) for row in lines]
+    # longer than any within: a fence ends at one as long as that which began it
     fence = "`" * max(3, 1 + _longest_run("".join(rows)))
     return "\n".join((fence, *rows, fence))
 
@@ -108,15 +110,17 @@ def _code(text: str, *, cell: bool) -> str:
     if not text.strip():
         return ""
     fence = "`" * (1 + _longest_run(text))
+    # CommonMark takes one blank off each side, and backticks at an end would belong to the fence
     pad = " " if text[0] in "` " or text[-1] in "` " else ""
     return f"{fence}{pad}{text.replace('|', chr(92) + '|') if cell else text}{pad}{fence}"
 
 
 def _with_code(word: str, *, cell: bool) -> str:
-    """A word of which parts may be code; those parts stand apart from what is made code for another reason."""
+    """Return the word with its spans of code; what is made code for another reason becomes one span as a whole."""
     plain = _SPAN.split(word)
     if len(plain) == 1:
         return _word(word, cell=cell)
+    # every other part stands outside of the spans
     if any(_LINKED.search(part) for part in plain[::2]):
         return _code("".join(plain), cell=cell)
     return "".join(_code(part, cell=cell) if i % 2 else _escape(part) for i, part in enumerate(plain))
@@ -134,7 +138,7 @@ def _word(word: str, *, cell: bool) -> str:
 
 
 def _close_brackets(rest: str, middle: str) -> str:
-    """With the brackets that close what was opened in it: `rate.sleep()`."""
+    """Return `middle` with the brackets that close what was opened in it: `rate.sleep()`."""
     closing = re.match(r"\)*", rest[len(middle) :])
     missing = middle.count("(") - middle.count(")")
     return middle + ")" * min(max(missing, 0), len(closing.group()) if closing else 0)
@@ -146,7 +150,7 @@ def _escape(text: str) -> str:
 
 
 def _escape_line_start(shown: str) -> str:
-    """What would make a heading, a list or a quotation of the line is no more than a sign."""
+    """Return the line so that it begins no heading, list or quotation."""
     if _FIRST.match(shown):
         return f"\\{shown}"
     return _NUMBERED.sub(r"\1\\\2", shown, count=1) if _NUMBERED.match(shown) else shown
@@ -212,6 +216,7 @@ def code_parts(text: str) -> Iterator[tuple[str, bool]]:
 
 def _mark_code(text: str) -> str:
     """Return the text with backticks round what shows by itself that it is code; as it is where one has no partner."""
+    # with a backtick of its own left over, the added ones would pair with it
     if "`" in _CODE.sub("", text):
         return text
     marked, end, last = "", 0, -1
@@ -219,6 +224,7 @@ def _mark_code(text: str) -> str:
         beside = text[max(0, found.start() - 1) : found.start()] + text[found.end() : found.end() + 1]
         is_found = found["found"] is not None and "`" not in beside
         marked += text[end : found.start()]
+        # two pieces of code that touch are one: two backticks between them would be a fence of two
         if is_found and found.start() == last:
             marked = f"{marked[:-1]}{found[0]}`"
         else:
@@ -247,5 +253,5 @@ def csv_cell(value: Cell) -> str:
     if value is None:
         return ""
     if not isinstance(value, str):
-        return str(value) if math.isfinite(value) else ""
+        return str(value) if math.isfinite(value) else ""  # a spreadsheet reads inf and nan as text
     return _FORMULA.sub(r"\1'\2", line(value, CELL_CHARS))

@@ -29,12 +29,12 @@ def not_graded(result: GradingResult) -> bool:
 
 
 def is_students_fault(result: GradingResult) -> bool:
-    """Whether nothing could be graded because of what was submitted, not because of the machine or the grader."""
+    """Return whether nothing could be graded because of what was submitted, not because of machine or grader."""
     return result.error is not None and blame(result.error.kind) == "submission"
 
 
 def blame(kind: str) -> str:
-    """Whose fault an error of this kind is: `submission`, `machine` or `grader`."""
+    """Return whose fault an error of this kind is: `submission`, `machine` or `grader`."""
     return next((found.blame for found in _kinds(GraderError) if found.kind == kind), "grader")
 
 
@@ -45,12 +45,12 @@ def _kinds(error: type[GraderError]) -> Iterator[type[GraderError]]:
 
 
 def points_of(criterion: CriterionResult) -> str:
-    """`5/10`; `+5/+10` of a bonus, `-5` of a penalty, `not counted` of what its group leaves out."""
+    """Return `5/10`; `+5/+10` of a bonus, `-5` of a penalty, `not counted` of what its group leaves out."""
     return of_points(criterion).replace(" of ", "/")
 
 
 def of_points(criterion: CriterionResult) -> str:
-    """`5 of 10`; `+5 of +10` of a bonus, `-5` of a penalty, `not counted` of what its group leaves out."""
+    """Return `5 of 10`; `+5 of +10` of a bonus, `-5` of a penalty, `not counted` of what its group leaves out."""
     if criterion.left_out is not None:
         return "not counted"
     if criterion.extra > 0:
@@ -63,12 +63,12 @@ def of_points(criterion: CriterionResult) -> str:
 
 
 def places(criterion: CriterionResult) -> list[str]:
-    """Where it was seen: `src/talker.py:17`, `real.mcap /chatter, 6.0 s`; the first twenty."""
+    """Return where it was seen: `src/talker.py:17`, `real.mcap /chatter, 6.0 s`; the first twenty."""
     return [clip(_place(citation), PLACE_CHARS) for citation in criterion.citations[:CITATIONS_MAX]]
 
 
 def file_places(criterion: CriterionResult) -> list[str]:
-    """Those of `places` that are files of the student's: `src/talker.py:17`."""
+    """Return those of `places` that are files of the student's: `src/talker.py:17`."""
     return [clip(_place(citation), PLACE_CHARS) for citation in _cited_files(criterion)]
 
 
@@ -130,6 +130,7 @@ def headline(text: str) -> tuple[str, str]:
     ]
     if text.endswith(")"):
         stops += [at for at in _outside(text, LAST_BRACKET) if HEADLINE_LEAST <= at.start() <= HEADLINE_CHARS]
+    # a semicolon separates more than a colon; of the same kind, the last
     best = max(stops, key=lambda at: (at[0] == "; ", at.start()), default=None)
     if best is None:
         return text, ""
@@ -164,6 +165,7 @@ def _outside(text: str, wanted: re.Pattern[str]) -> Iterator[re.Match[str]]:
             yield found[i]
         if quoted:
             quoted = "" if letter == quoted else quoted
+        # an apostrophe within a word opens no quotation
         elif letter in '`"' or (letter == "'" and not text[i - 1 : i].isalnum()):
             quoted = letter
         else:
@@ -229,7 +231,7 @@ TAB = " " * 4
 
 
 def pointed_at(criterion: CriterionResult, chars: int = SOURCE_CHARS) -> list[tuple[str, str]]:
-    """Each line of a file whose text is known, behind its number, and carets below what is meant:
+    """Return each line of a file whose text is known, behind its number, and carets below what is meant:
     `12 | print "hello"` and `   |       ^`."""
     found = []
     for citation in _cited_files(criterion):
@@ -247,6 +249,7 @@ def caret(citation: FileCitation, chars: int = SOURCE_CHARS) -> tuple[str, str] 
     if not raw.strip():
         return None
     column = (citation.column or len(raw) - len(raw.lstrip()) + 1) - 1
+    # columns count a tab as one character, as the parsers do
     end_column = (
         citation.end_column - 1 if citation.end_column else column + 1 if citation.column else len(raw)
     )
@@ -264,6 +267,7 @@ def caret(citation: FileCitation, chars: int = SOURCE_CHARS) -> tuple[str, str] 
 def _cells(text: str) -> int:
     """Return how many columns of a terminal the visible text takes."""
     shown = visible(text)
+    # these letters are two columns wide
     return len(shown) + sum(east_asian_width(letter) in "WF" for letter in shown)
 
 
@@ -277,13 +281,13 @@ def _place(citation: Citation) -> str:
 
 
 def hidden_ids(rubric: Rubric) -> frozenset[str]:
-    """The ids of the criteria that `grader check` does not show."""
+    """Return the ids of the criteria that `grader check` does not show."""
     return frozenset(c.id for c in rubric.criteria if c.visibility == "hidden")
 
 
 def without_hidden(result: GradingResult, rubric: Rubric) -> GradingResult:
-    """The result as if the hidden criteria were not in the rubric: points, maximum, status and what being late costs
-    follow, and what people decided about hidden criteria is left out."""
+    """Return the result as if the hidden criteria were not in the rubric: points, maximum, status and what being late
+    costs follow, and what people decided about hidden criteria is left out."""
     hidden = hidden_ids(rubric)
     shown = tuple(c for c in result.criteria if c.id not in hidden)
     if len(shown) == len(result.criteria):
@@ -291,6 +295,7 @@ def without_hidden(result: GradingResult, rubric: Rubric) -> GradingResult:
     decided = tuple(o for o in result.overrides if o.criterion not in hidden)
     visible = rubric.model_copy(update={"criteria": tuple(c for c in rubric.criteria if c.id not in hidden)})
     points = total_points(visible, shown)
+    # a part of the points that show, not of all
     late = lateness(points, visible, result.late) if result.late else None
     update = {
         **total_fields(visible, shown),
@@ -315,6 +320,7 @@ def for_student(result: GradingResult, hidden: frozenset[str]) -> GradingResult:
     """
     unseen = [c for c in result.criteria if c.id in hidden]
     shown = [_unlink(c, hidden) for c in result.criteria if c.id not in hidden]
+    # a note about such a run would tell what is hidden
     runs = {c.scenario for c in unseen} - {c.scenario for c in shown}
     gate = result.gate
     update = {

@@ -31,10 +31,12 @@ NAMED_AT_MOST = 4
 LAST_FETCH = "as of the last fetch or push"
 CI = ("CI", "GITHUB_ACTIONS", "GITLAB_CI", "JENKINS_URL", "TF_BUILD", "BUILDKITE", "TEAMCITY_VERSION")
 NO = ("", "0", "false", "no")
+# the format for programs, which later versions of git keep; `-z` leaves names unquoted
 STATUS = (
     *("status", "--porcelain=v2", "-z", "--branch", "--no-renames", "--ignore-submodules=all"),
     *("--untracked-files=all", "--ignored=traditional", "--", "."),
 )
+# of ordinary and of unmerged records: the fields before the path, which may have blanks
 FIELDS = {"1": 8, "u": 10}
 GITLINK = "160000"
 TRACKING = "refs/remotes/"
@@ -90,6 +92,7 @@ class RemoteBranch:
 def read_environment(variables: Mapping[str, str], here: Path) -> Environment:
     """Return what the variables that CI systems, git and pre-commit set say."""
     ci = any(variables.get(name, "").lower() not in NO for name in CI)
+    # pre-commit sets the former for what it runs, git the latter for a commit's hooks
     committing = not ci and bool(variables.get("PRE_COMMIT") or variables.get("GIT_INDEX_FILE"))
     return Environment(here=here, ci=ci, committing=committing)
 
@@ -142,6 +145,7 @@ class _Advice:
         if self._files.hidden:
             names = listing(list(self._files.hidden))
             return _unknown(f"git was told not to look at {names} (assume-unchanged, skip-worktree)")
+        # in CI the commit was pushed; before a commit there is none to push
         early = self._environment.ci or self._environment.committing
         points = [*self._in_git()]
         if early:
@@ -233,22 +237,24 @@ class Commands:
         return " ".join(shlex.quote(printable(word)) for word in (*self._git, *words))
 
     def add_and_commit(self, paths: Sequence[str], *, force: bool = False) -> str:
-        """Name the package's folder in place of more than a few files, or of one that cannot be typed."""
+        """Return the commands. The package's folder stands for many files, or for one that cannot be typed."""
         commit = self.git("commit", "-m", "Lab")
         if not paths:
             return commit
+        # what is ignored must be named: with -f, the folder would bring in what builds leave, too
         typed = all(path.isprintable() and encodable(path) for path in paths[:NAMED_AT_MOST])
         few = typed and (force or len(paths) <= NAMED_AT_MOST)
         named = self._paths(paths) if few else [_relative(self._package, self._base)]
         return f"{self.git('add', *(('-f',) if force else ()), *named)} && {commit}"
 
     def make_executable(self, paths: Sequence[str]) -> str:
-        """Set the executable bit in the index, which works with `core.fileMode=false` too."""
+        """Return commands that set the executable bit in the index, which works with `core.fileMode=false` too."""
         change = self.git("update-index", "--chmod=+x", *self._paths(paths))
         return f"{change} && {self.git('commit', '-m', 'Lab')}"
 
     def rename(self, in_git: str, on_disk: str) -> str:
-        """Have git call a file as the disk does."""
+        """Return commands that have git call a file as the disk does."""
+        # without -f git refuses: on this disk the new name exists
         return f"{self.git('mv', '-f', *self._paths((in_git, on_disk)))} && {self.git('commit', '-m', 'Lab')}"
 
     def _paths(self, paths: Sequence[str]) -> list[str]:
@@ -288,6 +294,7 @@ def read_files(view: View, package: Path) -> tuple[str | None, str | None, Uncom
     branch, commit = heads.get("branch.head"), heads.get("branch.oid")
     files = UncommittedFiles(
         changed=tuple(changed),
+        # the second sign is for the disk against the index: a dot if they are the same
         staged=frozenset(p for p, fields in changed.items() if fields[0] == "1" and fields[1][1] == "."),
         conflicts=any(fields[0] == "u" for fields in changes),
         renamed=renamed,
@@ -319,10 +326,10 @@ def _files_on_disk(package: Path) -> set[str]:
 
 
 def _case_advice(index: Iterable[str], on_disk: set[str]) -> Iterator[tuple[str, str]]:
-    """Where a file system knows no case, git keeps the name that it was first given."""
+    """Yield names of files in git and on the disk that only differ in case: such a disk keeps the one it has."""
 
     def composed(path: str) -> str:
-        return unicodedata.normalize("NFC", path)
+        return unicodedata.normalize("NFC", path)  # macOS takes the accents of names apart
 
     by_folded = {composed(path).casefold(): path for path in on_disk}
     for path in index:
@@ -332,7 +339,8 @@ def _case_advice(index: Iterable[str], on_disk: set[str]) -> Iterator[tuple[str,
 
 
 def _missing_modes(package: Path, index: Mapping[str, tuple[str, str]]) -> Iterator[str]:
-    """Scripts that are executable here and not in git. A disk on which everything is executable says nothing."""
+    """Yield scripts that are executable here and not in git."""
+    # where package.xml is executable, so is everything (a Windows share), and the bit says nothing
     if MODES_ON_DISK and not _is_executable(package / "package.xml"):
         for path, (_, mode) in index.items():
             if mode == "100644" and _is_executable(package / path) and is_script(package, path):
@@ -368,6 +376,7 @@ def read_server(view: View, package: Path, branch: str | None, commit: str | Non
     """Return what is known of the server. Raises GitFailed."""
     names, settings = view.remote_names, view.settings
     refs = _remote_branches(view)
+    # in the order in which `git push` itself looks for the remote
     candidates = (
         settings.get(f"branch.{branch}.pushremote"),
         settings.get("remote.pushdefault"),
@@ -416,6 +425,7 @@ def _default_branch(name: str, refs: Mapping[str, str]) -> str | None:
     link = refs.get(f"{name}/HEAD")
     if link in refs:
         return link
+    # only a clone has the remote's HEAD, not `git remote add`: the usual names are a guess
     own = [ref for ref in refs if ref.startswith(f"{name}/") and ref != f"{name}/HEAD"]
     usual = [ref for ref in own if ref in (f"{name}/main", f"{name}/master")]
     found = usual if len(usual) == 1 else own
@@ -427,6 +437,7 @@ def _has_head(view: View) -> bool:
     try:
         return bool(view.run("for-each-ref", "--count=1", "--contains=HEAD", TRACKING).strip())
     except GitTimeout:
-        raise
+        raise  # the time is over for what follows, too
+    # HEAD names no commit yet
     except GitFailed:
         return False

@@ -49,6 +49,7 @@ from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
 from grader.wording import first_few, number
 
+# a save shows within a quarter of a second, and a thousand files are looked at for little
 POLL_S = 0.25
 AGAIN_S = 0.4
 GONE_S = 1.0
@@ -130,12 +131,14 @@ class Grading:
                 options = replace(self.options, stop=stop)
                 result = pipeline.grade(self.source, self.rubric, self.out, options, progress)
         except GraderError as error:
+            # at the start nobody has seen a result yet, and a save does not repair the machine
             if isinstance(error, UsageError) or (error.blame != "submission" and not self._begun):
                 raise
             result = self._error_result(error)
         self._begun = True
         undecided = not self.options.static_only and any(c.status.is_retryable for c in result.criteria)
         shown = without_hidden(result, self.rubric.rubric)
+        # what failed may have been a file half-written, or Docker not yet there
         if shown.status == "error":
             return WatchedResult(result=shown, code=ExitCode.NOT_GRADED, undecided=True)
         return WatchedResult(result=shown, code=self.code(shown), undecided=undecided)
@@ -196,6 +199,7 @@ class Watch:
         except Stopped:
             self._saved |= self._saves.wait(0)
             return False
+        # an error may come of an editor that was still writing
         saved_since = self._saves.wait(AGAIN_S if outcome.result.error is not None else 0)
         if saved_since and self._look() != snapshot:
             self._saved |= saved_since
@@ -222,7 +226,7 @@ class Watch:
         return False
 
     def _look(self) -> Snapshot | None:
-        """The package now; None where it cannot be read, even after a second look: an editor may be replacing it."""
+        """Return the package now; None where it cannot be read, even after a second look: an editor may replace it."""
         for _ in range(LOOKS):
             self._check_folder()
             try:
@@ -238,6 +242,7 @@ class Watch:
 
     def _check_folder(self) -> None:
         until_s = time.monotonic() + GONE_S
+        # some editors and `git switch` remove a folder for a moment
         while not self._folder.is_dir():
             if time.monotonic() > until_s:
                 raise SubmissionError(f"{self._folder} was deleted or renamed while it was watched")
@@ -277,6 +282,7 @@ class Saves:
         until_s = time.monotonic() + timeout_s
         while not self._poll() and (left_s := until_s - time.monotonic()) > 0:
             time.sleep(min(POLL_S, left_s))
+        # an editor's "save all" and `git switch` write many files: one run for all of them
         while timeout_s and self._saved:
             known = len(self._saved)
             time.sleep(POLL_S / 2)
@@ -303,12 +309,12 @@ class Saves:
             yield
         finally:
             end.set()
-            thread.join()
+            thread.join()  # the thread writes what `wait` reads
 
     def _poll(self) -> bool:
         """Note what was saved; return whether there is any."""
         now = dict(self._stamps())
-        self._saved |= {name for name, _ in now.items() ^ self._seen.items()}
+        self._saved |= {name for name, _ in now.items() ^ self._seen.items()}  # what is new, gone or changed
         self._seen = now
         return bool(self._saved)
 
@@ -318,6 +324,7 @@ class Saves:
                 here = Path(place)
                 folders[:] = [n for n in folders if not is_ignored(n) and here / n != self._without]
                 for name in names:
+                    # suppressed: a file may vanish between walk and stat
                     with suppress(OSError):
                         if not is_ignored(name):
                             yield str(here / name), _stamp(here / name)
@@ -460,7 +467,7 @@ class TerminalScreen(Screen):
         yield from Terminal(self._console).losses(TO_FIX, view.lost)
 
     def _saved_text(self, saved: tuple[str, ...]) -> str:
-        """`saved src/talker.py at 12:03:04`."""
+        """Return `saved src/talker.py at 12:03:04`."""
         names = first_few([self._show(name, NAME_CHARS) for name in saved], NAMES_SHOWN)
         return f"saved {names} at {self._at:%H:%M:%S}"
 
@@ -488,6 +495,7 @@ class JsonLines(Screen):
 
     def end(self, outcome: WatchedResult, _saved: tuple[str, ...]) -> None:
         ascii_only = (self._stream.encoding or "ascii").lower().replace("-", "") != "utf8"
+        # the document is indented for readers; no text in JSON holds a raw line end
         rows = result_text(outcome.result, ascii_only=ascii_only).split("\n")
         self._stream.write(f"{' '.join(row.strip() for row in rows).strip()}\n")
         self._stream.flush()

@@ -87,6 +87,7 @@ def load_mutants(path: Path, rubric: Rubric) -> LoadedMutants:
     if found:
         ordered = sorted(dict.fromkeys(found), key=lambda fault: source.line(fault[0]))
         raise RubricError([source.fault(*fault) for fault in ordered])
+    # through JSON: only there a list may stand for a tuple in strict mode
     records = MutantsFile.model_validate_json(json.dumps(source.data), strict=True)
     return LoadedMutants(mutants=records.mutants, source=source)
 
@@ -105,6 +106,7 @@ def _cross_faults(data: dict[str, Any], rubric: Rubric) -> Iterator[Fault]:
         edits = as_map(mutant).get("edits")
         for position, edit in as_maps(edits):
             yield from _operator_faults(("mutants", key, "edits", position), edit)
+        # two mutants of the same edits test one thing twice
         same = first.setdefault(json.dumps(edits, sort_keys=True), key)
         if same != key and edits:
             yield ("mutants", key), f"has the same edits as mutants.{same}"
@@ -136,6 +138,7 @@ def mutants_text(rubric: str, mutants: dict[str, Mutant], results: Sequence[Muta
 
 
 def _mutant_text(name: str, mutant: Mutant, costs: dict[str, str]) -> str:
+    # what was given alone: the file shall read as if written by hand
     edits = [edit.model_dump(by_alias=True, exclude_unset=True) for edit in mutant.edits]
     made = [f"      - {dump_flow(edit)}" for edit in edits]
     lines = [f"    expect: {dump_flow(costs)}", "    edits:", *made]
@@ -196,8 +199,10 @@ def plan_all(solution: Solution) -> list[Planned]:
     for operator in OPERATORS.values():
         for site in operator.sites(solution):
             label = _label(operator.name, site.at)
+            # of letters that any disk takes, and short enough beside what the path has already
             name = unique = re.sub(r"[^a-z0-9.]+", "-", label.lower()).strip("-.")[:80]
             number = 1
+            # two places may differ only in what the name leaves out
             while unique in planned:
                 number += 1
                 unique = f"{name}-{number}"
@@ -242,6 +247,7 @@ def build_tree(solution: Solution, mutant: Mutant) -> Tree:
     """Return the package with all of the mutant's edits. Raises DoesNotFitError."""
     for edit in mutant.edits:
         if edit.operator is not None:
+            # each edit applies to what the ones before it made
             solution = solution.then(_find_site(solution, edit.operator, edit).tree)
             continue
         (kind,) = edit.kinds
@@ -280,6 +286,7 @@ def _place(at: Place) -> str:
 
 
 def _replace(tree: Tree, edit: ReplaceText) -> None:
+    # surrogateescape brings bytes that are no UTF-8 through unchanged
     text = tree[edit.file].data.decode(errors="surrogateescape")
     if text.count(edit.old) != edit.times:
         raise DoesNotFitError(
@@ -303,7 +310,7 @@ def _link(tree: Tree, edit: SymbolicLink) -> None:
 
 
 def _move(tree: Tree, edit: MoveFiles) -> None:
-    moved = [name for name in tree if name.startswith(edit.old)]
+    moved = [name for name in tree if name.startswith(edit.old)]  # a folder moves with all that is below it
     if not moved:
         raise KeyError(edit.old)
     for name in moved:

@@ -75,6 +75,7 @@ def launch_type_without_py(document: Document, node: Element) -> list[TextEdit]:
 def launch_malformed(document: Document) -> list[TextEdit]:
     """Forgets to close a node's tag."""
     for node in document.elements("node"):
+        # an empty element has no closing tag that could be removed
         if document.data[node.inner - 2 : node.inner] == b"/>":
             return [TextEdit(node.inner - 2, node.inner, ">")]
         return [TextEdit(document.data.rfind(b"</", 0, node.end), node.end, "")]
@@ -125,6 +126,7 @@ def launch_root_misspelt(document: Document) -> list[TextEdit]:
     close = document.data.rfind(b"</launch") if root is not None and root.tag == "launch" else -1
     if root is None or close < 0:
         return []
+    # seven and eight letters on: `<` and `</`, then `launch`
     return [TextEdit(root.start + 1, root.start + 7, "lauch"), TextEdit(close + 2, close + 8, "lauch")]
 
 
@@ -168,8 +170,9 @@ YAML = (".yaml", ".yml")
 
 
 def leaves(text: str) -> list[Leaf]:
-    """Every value that is neither a map nor a list: its key's path (`details/name/first`), the key, the value."""
+    """Return every value that is neither map nor list: its key's path (`details/name/first`), the key, the value."""
     try:
+        # composed, not loaded: nodes know where they stand in the text
         node = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.YAMLError:
         return []
@@ -188,7 +191,7 @@ def _leaves(node: yaml.Node, path: str) -> Iterator[Leaf]:
 
 
 def own_lines(text: str) -> list[Leaf]:
-    """Those that have a line for themselves, in block style."""
+    """Return the leaves that have a line for themselves, in block style."""
     return [leaf for leaf in leaves(text) if _has_line(text, *leaf[1:])]
 
 
@@ -221,6 +224,7 @@ def _yaml_keys(solution: Solution) -> Iterator[tuple[CodePlace, str, yaml.Scalar
 def yaml_tabs(values: list[Leaf]) -> list[TextEdit]:
     """Indents the YAML file with a tab."""
     marks = [key.start_mark for name, key, _ in values if "/" in name and key.start_mark.column]
+    # one tab makes the whole file unreadable
     return [TextEdit(mark.index - mark.column, mark.index, "\t") for mark in marks[:1]]
 
 
@@ -270,7 +274,7 @@ def _reads(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.expr, ya
 
 
 def param_path(script: Script, node: ast.AST) -> str:
-    """The parameter that an expression reads, by calls, subscripts and variables; empty where it is none."""
+    """Return the parameter that an expression reads, by calls, subscripts and variables; "" where it is none."""
     if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant):
         base = param_path(script, node.value)
         return f"{base}/{node.slice.value!s}" if base else ""
@@ -281,6 +285,7 @@ def param_path(script: Script, node: ast.AST) -> str:
     if isinstance(node, ast.Name | ast.Attribute):
         variable = ast.unparse(node)
         values = [a.value for a in script.of(ast.Assign) if variable in {ast.unparse(t) for t in a.targets}]
+        # assigned once, and not in terms of itself: else its value depends on the way there
         is_itself = len(values) == 1 and node not in set(ast.walk(values[0]))
         return param_path(script, values[0]) if is_itself and _is_deeper(values[0]) else ""
     return ""
@@ -325,6 +330,7 @@ def parameter_clobbered(script: Script, call: ast.Call, name: ast.Constant) -> l
     """Sets a whole branch of parameters where one was meant, so that its neighbours are gone."""
     head, _, tail = str(name.value).rpartition("/")
     value = argument(call, 1, "param_value")
+    # a private name has no branch above it, and a keyword cannot be replaced with what follows it
     if not head.strip("/~") or value is None or name not in call.args:
         return []
     start, end = script.span(call.args[0])[0], script.span(value)[1]
