@@ -12,10 +12,10 @@ from grader.checks.registry import Refers, check
 from grader.checks.support.clocks import excused, run_seconds, why_late
 from grader.checks.support.exit_causes import explain_early_end, explain_error
 from grader.checks.support.fields import Difference, differences, fields_text
-from grader.checks.support.processes import GlobalName, lives
-from grader.checks.support.text import action_client, near_names, service_client, shown
+from grader.checks.support.processes import LOGGERS, GlobalName, lives
+from grader.checks.support.text import action_client, both, near_names, service_client, shown
 from grader.checks.support.topics import cite, no_node, nodes_on, topics_with
-from grader.evidence.events import MISFIT, OTHER_TYPE
+from grader.evidence.events import MISFIT, OTHER_TYPE, ActorEvent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -173,7 +173,7 @@ def _fault(
     if (came >= len(params.wanted) or is_over) and (other := _in_another_order(params, wanted, made)):
         return other
     if left and (came >= len(params.wanted) or not error):
-        return _other_request(params, wanted, left)
+        return _other_request(params, wanted, left, run)
     with_fields = f" with {fields_text(wanted)}" if wanted else ""
     what = f"{params.service} is called {plural(came, 'time')}, but there was no other call{with_fields}"
     if end := end or error:
@@ -195,7 +195,9 @@ def _in_turn(calls: Sequence[str]) -> str:
     return ", ".join([*calls[:CALLS_SHOWN], *(["…"] if len(calls) > CALLS_SHOWN else [])])
 
 
-def _other_request(params: CallsParams, wanted: dict[str, Any], left: tuple[Request, ...]) -> Verdict:
+def _other_request(
+    params: CallsParams, wanted: dict[str, Any], left: tuple[Request, ...], run: Run
+) -> Verdict:
     """It is called with other values, judged by the call that comes nearest."""
     nearest = min(left, key=lambda one: len(list(_differences(one, wanted, params))))
     found = list(_differences(nearest, wanted, params))
@@ -206,7 +208,21 @@ def _other_request(params: CallsParams, wanted: dict[str, Any], left: tuple[Requ
         hint = f"pass the request's fields by name, so that none is swapped: ({by_name})"
         return failed(message, hint=hint)
     hint = f"set {join_words(one.path for one in found)} of the request to what the handout asks for"
+    given = [one for life in lives(run) for one in life.start.argv[1:] if ":=" not in one]
+    values = [str(wanted.get(one.path)) for one in found]
+    if len(lives(run)) == 1 and set(values) <= set(given):
+        places = [given.index(one) + 1 for one in values]
+        read = (f"{d.path} from {_argument(n, wanted[d.path])}" for d, n in zip(found, places, strict=True))
+        text += f"; the run starts it with {plural(len(given), 'argument')}: {shown(' '.join(given))}"
+        hint = f"take {join_words(read)}, where the program gets its arguments"
     return failed(f"{params.service} is called with {text}", hint=hint)
+
+
+def _argument(number: int, value: object) -> str:
+    """Return what reads an argument of the command line as a value of this kind."""
+    python = f"{type(value).__name__}(sys.argv[{number}])"
+    cpp = {int: "atoll({})", float: "atof({})"}.get(type(value), "{}").format(f"argv[{number}]")
+    return both(f"sys.argv[{number}]" if isinstance(value, str) else python, cpp)
 
 
 def _swapped(one: Request, wanted: dict[str, Any], params: CallsParams) -> list[str]:
@@ -242,14 +258,26 @@ def _never(package: PackageFacts, run: Run, params: CallsParams) -> Verdict:
         return end.verdict(unjudged, f"{what}: {end.cause}")
     if service in looked:
         hint = f"waiting for it is not enough: {_call(run, service)} calls it"
-        return _unless_over(
-            unjudged(f"{looked[service]} looks {service} up, but never calls it", hint=hint), run
-        )
+        verdict = unjudged(f"{looked[service]} looks {service} up, but never calls it", hint=hint)
+        return _waits_for_another(run, asked, what) or _unless_over(verdict, run)
     if absent := no_node(package, run, what):
         return absent
     others = f"; it asks for {join_words(looked)}" if looked else ""
     verdict = unjudged(f"{what}{others}", hint=f"{_call(run, service)} calls it")
     return verdict if any(e.detail for e in asked) else _unless_over(verdict, run)
+
+
+def _waits_for_another(run: Run, asked: Sequence[ActorEvent], what: str) -> Verdict | None:
+    """The last service for which a node asks, again and again, is another one, and nothing offers it."""
+    offered = {name for _, event in run.graph for name in event.services if not name.endswith(LOGGERS)}
+    name = (asked[-1].topic or "") if asked else ""
+    again = [e for e in asked if e.detail and e.topic == name]
+    if len(again) < 2 or asked[-1] != again[-1] or name in offered:
+        return None
+    hint = f"delete the line that waits for {name}, or offer it yourself"
+    if right := near_names(name, sorted(offered)):
+        hint = f"write {right[0]} instead of {name}"
+    return unjudged(f"{what}: {asked[-1].actor} waits for {name}, which nothing offers", hint=hint)
 
 
 def _clients(run: Run) -> dict[str, str]:

@@ -407,13 +407,22 @@ def _names_of_objects(tree: ast.Module) -> Iterator[Argument]:
                 n for n in nodes_in(method) if isinstance(n, ast.Name) and n.id in attributes - known
             ):
                 yield Argument([(name, f"self.{name.id}")], f"`{name.id}` belongs to the class {one.name}")
-    used = {ast.unparse(n.value) for n in nodes_in(tree) if isinstance(n, ast.Attribute)}
+    read = [n for n in nodes_in(tree) if isinstance(n, ast.Attribute)]
+    used = {ast.unparse(n.value) for n in read}
+    owners = [ast.unparse(n.value).split(".") for n in read if isinstance(n.ctx, ast.Store)]
+    given = {".".join(names[:end]) for names in owners for end in range(1, len(names) + 1)}
     made = {one.name for one in classes if not one.bases}
+    of_messages = {
+        alias.asname or alias.name
+        for n in tree.body
+        if isinstance(n, ast.ImportFrom) and re.search(r"\.(msg|srv)$", n.module or "")
+        for alias in n.names
+    }
     for node in (n for n in nodes_in(tree) if isinstance(n, ast.Assign) and len(n.targets) == 1):
         if (
             isinstance(node.value, ast.Name)
-            and node.value.id in made
-            and ast.unparse(node.targets[0]) in used
+            and node.value.id in made | of_messages
+            and ast.unparse(node.targets[0]) in (used if node.value.id in made else given)
         ):
             edit = (node.value, f"{node.value.id}()")
             yield Argument(

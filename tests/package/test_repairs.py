@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from grader.model.message_definitions import parse_definition
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.repair import BY_HAND, DEFAULT_SHARES, KINDS, Repair
 from grader.model.submission import chmod_hint
@@ -15,13 +16,16 @@ from grader.package.repairs.editing import changed_lines
 from grader.package.repairs.names import is_near, is_one_edit
 from grader.repaired_copy import REPAIRS_MAX, most_of
 from tests.package.repairing import (
+    CMAKE,
     CMAKELISTS,
     LAUNCHED,
     MANIFEST,
     SCRIPT,
     TALKER,
     WANTED,
+    Case,
     asking,
+    check,
     package,
     repair_all,
     swapped,
@@ -29,6 +33,65 @@ from tests.package.repairing import (
 from tests.package.trees import facts_of
 
 pytestmark = pytest.mark.usefixtures("without_processes")
+
+
+def making(kind: str, file: str) -> str:
+    """Return a CMakeLists.txt that makes this definition."""
+    line = f"message_generation actionlib_msgs rospy)\nadd_{kind}_files(FILES {file})\n"
+    return CMAKE.replace("rospy)\n", line + "generate_messages(DEPENDENCIES actionlib_msgs std_msgs)\n")
+
+
+TWO_FIELDS = tuple(parse_definition("int64 a\n---\nint64 sum", ".srv"))
+GO_FIELDS = tuple(parse_definition("int32 n\n---\nbool there\n---\nint32 left\n", ".action"))
+# fmt: off
+NAMES_OF_FILES = {
+    "own-service-with-other-capitals": Case(
+        {"srv/tWo.srv": "int64 a\n---\nint64 sum\n",
+         "src/level.py": "from lab.srv import tWo, tWoResponse\nrospy.Service('tWo', tWo, lambda q: tWoResponse(2))\n",
+         "src/two.cpp": '#include "lab/tWo.h"\nlab::tWo::Request one;\nlab::tWoResponse two;\nint tWos;\n',
+         CMAKELISTS: making("service", "tWo.srv")},
+        ["file-name"], "write Two.srv in CMakeLists.txt, and Two instead of tWo in src/level.py and src/two.cpp",
+        asking(definitions=(("srv/Two.srv", TWO_FIELDS),), files=("srv/Two.srv",)),
+        {CMAKELISTS: "FILES Two.srv",
+         "src/level.py": "import Two, TwoResponse\nrospy.Service('tWo', Two, lambda q: TwoResponse(2))",
+         "src/two.cpp": '#include "lab/Two.h"\nlab::Two::Request one;\nlab::TwoResponse two;\nint tWos;'},
+    ),
+    "own-action-called-by-its-class": Case(
+        {"src/go.py": "import lab.msg\nkind = lab.msg.GoActionAction\nresult = lab.msg.GoActionResult()\n",
+         "action/GoAction.action": "int32 n\n---\nbool there\n---\nint32 left\n",
+         CMAKELISTS: making("action", "GoAction.action")},
+        ["file-name"], "action/GoAction.action should be called Go.action",
+        asking(definitions=(("action/Go.action", GO_FIELDS),), files=("action/Go.action",)),
+        {CMAKELISTS: "FILES Go.action", "src/go.py": "kind = lab.msg.GoAction\nresult = lab.msg.GoResult()"},
+    ),
+    "program-beside-a-script-of-its-name": Case(
+        {"src/adder.py": "import rospy\n", "src/adder.cpp": "int main() {}\n",
+         CMAKELISTS: CMAKE + "add_executable(adder src/adder.cpp)\n"
+                             "target_link_libraries(adder ${catkin_LIBRARIES})\n"},
+        [], "", asking(scripts=("adder",)),
+    ),
+    "script-that-is-asked-for-without-its-ending": Case(
+        {"src/adder.py": SCRIPT + "print 1\n"}, ["python-syntax"], "print(1)", asking(scripts=("adder",)),
+    ),
+    "own-service-with-another-word": Case(
+        {"srv/my_sum.srv": "int64 a\n---\nint64 sum\n",
+         "src/level.py": "from lab.srv import my_sum\n", CMAKELISTS: making("service", "my_sum.srv")},
+        ["file-name"], "srv/my_sum.srv should be called Two.srv",
+        asking(definitions=(("srv/Two.srv", TWO_FIELDS),), files=("srv/Two.srv",)),
+        {CMAKELISTS: "FILES Two.srv", "src/level.py": "from lab.srv import Two\n"},
+    ),
+    "another-service-than-the-labs": Case(
+        {"srv/other.srv": "int64 b\n---\nint64 sum\n",
+         "src/level.py": "from lab.srv import other\n", CMAKELISTS: making("service", "other.srv")},
+        [], "", asking(definitions=(("srv/Two.srv", TWO_FIELDS),), files=("srv/Two.srv",)),
+    ),
+}
+# fmt: on
+
+
+@pytest.mark.parametrize("name", NAMES_OF_FILES)
+def test_what_is_called_otherwise_is_renamed_in_the_code_too(name: str, tmp_path: Path) -> None:
+    check(NAMES_OF_FILES[name], tmp_path)
 
 
 def test_a_script_by_another_word_for_its_role_needs_the_topics_of_the_lab(tmp_path: Path) -> None:

@@ -167,11 +167,22 @@ def never_defined(own, name, line):
 
 
 def classes_as_objects(classes, tree):
-    """Yield where a method is called of a class, or of a name that was given the class, in place of an object."""
+    """Yield where a method is called of a class, or of a name that was given the class, in place of an object, and
+    where a field is set of one that was given a class of messages."""
     values = {}
     for n in walk(tree):
         for target in n.targets if isinstance(n, ast.Assign) else ():
             values.setdefault(dotted(target), []).append(n)
+    imports = [n for n in walk(tree) if isinstance(n, ast.ImportFrom)]
+    imports = [n for n in imports if (n.module or "").endswith((".msg", ".srv"))]
+    of_messages = {one.asname or one.name for n in imports for one in n.names}
+    stored = [n for n in walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)]
+    stored = [dotted(n.value).split(".") for n in stored]
+    for owner in sorted({".".join(parts[:end]) for parts in stored for end in range(1, len(parts) + 1)}):
+        for given in (n for n in values.get(owner, ()) if dotted(n.value) in of_messages):
+            kind, message = dotted(given.value), "`%s` is the class itself, not an object of it" % owner
+            fix = "on line %d, write `%s = %s()`" % (given.lineno, owner, kind)
+            yield slip(given.lineno, "object", message, fix=fix, name=kind)
     for n in walk(tree):
         if not isinstance(n, ast.Call) or not isinstance(n.func, ast.Attribute) or n.args:
             continue

@@ -50,28 +50,30 @@ from grader.checks.support.scripts import (
     path_in_package,
     without_git,
 )
-from grader.checks.support.text import LOOP, RATE_SLOT, SPIN, VALUE_SLOT, shown
+from grader.checks.support.text import (
+    ARGUMENT_HINT,
+    LOOP,
+    RATE_SLOT,
+    SPIN,
+    VALUE_SLOT,
+    as_number,
+    explain_arguments,
+    shown,
+)
 from grader.evidence.events import STOPPED
 from grader.evidence.run import Run
-from grader.installable import (
-    NOTHING_TO_DO,
-    ON_THE_MACHINE,
-    install_hint,
-)
+from grader.installable import NOTHING_TO_DO, ON_THE_MACHINE, install_hint
 from grader.model.package import Fault, PackageFacts, SourceFile
 from grader.model.python_slip import PythonSlip
 from grader.model.verdict import Citations, FileCitation, Span, Verdict, machine_lacks
 from grader.syntax_fixes import COMMENTED_OUT, corrected, without_brace
-from grader.wording import join_words, on_lines, plural
+from grader.wording import join_words, on_lines
 
 OTHER_NAMES_SHOWN = 3
 """Names of the same script that are not defined either."""
 MAIN = "`if __name__ == '__main__':`"
 RUN_IT = "run it by itself with rosrun, and read what it prints last"
 RACES = ("publish() to a closed topic", "topic was closed during publish()")
-ARGUMENT_HINT = (
-    "put the value in the code, or use a default where `len(sys.argv)` is 1: nothing passes arguments"
-)
 NO_INPUT = f"write {VALUE_SLOT} in place of `input()`"
 PAUSE = f"write `rate = {RATE_SLOT}` above it and `rate.sleep()` as its last line"
 PRINTED_ERROR = re.compile(
@@ -187,10 +189,9 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
     exceptions = [line for line in printed if line.startswith("RLException: ")]
     last = next(iter(exceptions or printed[::-1]), "")
     words = f"; its last output: {shown(last)}" if last else ""
-    hint, given = RUN_IT, [one for one in life.start.argv[1:] if ":=" not in one]
-    if given and re.search(r"\busage\b", last, re.IGNORECASE):
-        words += f"; it was given {plural(len(given), 'argument')} ({shown(' '.join(given))})"
-        hint = f"compare argc, or len(sys.argv), with {len(given) + 1}: the program's name counts too"
+    given = [one for one in life.start.argv[1:] if ":=" not in one]
+    explained = explain_arguments(last, given)
+    words, hint = (f"{words}; {explained[0]}", explained[1]) if explained else (words, RUN_IT)
     return Ending(f"it exited with code {code}{words}", hint)
 
 
@@ -402,11 +403,8 @@ def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts
     if found.kind in {"NameError", "UnboundLocalError"}:
         return _misspelt(found, place, package)
     if found.kind == "AttributeError" or "missing 1 required positional argument: 'self'" in found.message:
-        here = (
-            s
-            for s in package.slips
-            if s.kind == "object" and s.place == FileCitation(file=place.file, line=place.line)
-        )
+        lines = {place.line} if "is read-only" not in found.message else {s.line for s in own}
+        here = (s for s in own if s.kind == "object" and s.line in lines)
         return next(((s.message, s.fix) for s in here if re.search(rf"\b{s.name}\b", found.message)), None)
     if found.kind == "SerializationError" and _NUMBER_WANTED.search(found.message):
         return _no_number(found, place, package)
@@ -430,7 +428,10 @@ def _no_number(found: Traceback, place: FileCitation, package: PackageFacts) -> 
         return "a command-line argument is a string", f"on line {read.line}, write `{fix}`"
     if ".publish(" in found.innermost.source:
         return None
-    return "it takes a number but gets something else", f"turn the value into one first: `{kind}(…)`"
+    return (
+        "it takes a number but gets something else",
+        f"turn the value into one first: {as_number(kind, found.own_frames[-1].source)}",
+    )
 
 
 def _late_init(place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:

@@ -16,14 +16,14 @@ from grader.checks.registry import Check
 from grader.checks.support.console_output import Line
 from grader.checks.support.exit_causes import Ending, explain_end, explain_error
 from grader.checks.support.fields import value_text
-from grader.checks.support.processes import early_end
-from grader.checks.support.text import get_param, init, near_names
+from grader.checks.support.processes import base_name, early_end
+from grader.checks.support.text import both, get_param, init, near_names
 from grader.checks.support.topics import cite, nodes_on, published_topics
 from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
 from grader.model.package import LaunchNode, LaunchParam, PackageFacts
 from grader.model.verdict import EvidenceCitation, Verdict
-from grader.wording import plural, there_is
+from grader.wording import join_words, plural, there_is
 from grader.yaml_fixes import YAML_LINES_MAX, slip_of_yaml
 
 UNNAMED = "/unnamed"
@@ -37,6 +37,7 @@ SYSTEM = (
     "/roslaunch/",
 )
 NOT_IN_FILE = "not in the file"
+UNREAD_SHOWN = 4
 PRINTED_INDENT = 4
 _BETWEEN_PARTS = re.compile(r"[,;]?\s*\n\s*|[,;]\s+")
 _YAML_KEY = re.compile(r"^( *)[\"']?([A-Za-z]\w{0,99})[\"']?\s*:(?:\s|$)")
@@ -212,13 +213,15 @@ def params_given(run: Run) -> dict[str, Given]:
 def _may_rest_on_one(check: Check, verdict: Verdict) -> bool:
     """Return whether a parameter may be the cause of a loss that nothing explains yet: what a node does upon what it
     hears, or other words of its own than the lab's."""
-    says = check.name in {"logs", "prints"} and not verdict.unjudged
+    says = check.name in {"logs", "params-read", "prints"} and not verdict.unjudged
     return (check.of_callbacks or says) and not verdict.cause
 
 
 def explain_by_unread_parameter(check: Check, _package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a lost mark with the parameter that the run sets and that no node asked for, whatever it did instead."""
-    if not _may_rest_on_one(check, verdict) or early_end(run):
+    if not _may_rest_on_one(check, verdict):
+        return verdict
+    if (early := early_end(run)) and (early.end is None or early.end.exit_code != 0):
         return verdict
     reads = [(e.actor, absolute_name(e.topic or "")) for _, e in run.actors if e.action == "read"]
     names = {name for _, name in reads}  # a program of the grader's reads some of them itself
@@ -230,7 +233,7 @@ def explain_by_unread_parameter(check: Check, _package: PackageFacts, run: Run, 
     ]
     if not asked or not unread or (verdict.unjudged and not published_topics(run)):
         return verdict  # what no node publishes at all, no parameter explains
-    name, value, _ = unread[0]
+    name = unread[0].name
     above, _, last = name.rpartition("/")
     own = [(node, n) for node, n in asked if last in n.split("/") or near_names(last, n.split("/"))]
     seen = f"; {own[0][0]} asks for {own[0][1]}" if own else ""
@@ -238,9 +241,21 @@ def explain_by_unread_parameter(check: Check, _package: PackageFacts, run: Run, 
     if _is_too_early(run):
         hint = "move `rospy.init_node(…)` above the line that reads it: before, the node has no name"
     if own and own[0][1] == f"{own[0][0]}/{last}" and above not in run.student_nodes():
-        hint = f"name the node {above}: {init(above.lstrip('/'))}"
-    why = f"the run sets {name} to {value!r}, and no node reads it{seen}"
+        hint = _named(own[0][0], above)
+    sets = join_words(f"{one.name} to {one.value!r}" for one in unread[:UNREAD_SHOWN])
+    them = "it" if len(unread) == 1 else "them"
+    why = f"the run sets {sets}, and no node reads {them}{seen}"
     return verdict.explained(why, hint, cause=name).about(citations=(cite(run, "/grader/actor"),))
+
+
+def _named(node: str, wanted: str) -> str:
+    """Return what to do where the node's private parameters are not those of the node that the lab asks for."""
+    if base_name(node) == wanted:
+        flag = both("`anonymous=True`", "`ros::init_options::AnonymousName`")
+        return (
+            f"take out {flag}: with it, the node has another name each time, and so have its own parameters"
+        )
+    return f"name the node {wanted}: {init(wanted.lstrip('/'))}"
 
 
 def explain_by_misplaced_parameter(
@@ -361,8 +376,15 @@ def explain_failure(package: PackageFacts, run: Run) -> Ending | None:
         return end
     names = list(without_system_params(params_on_server(run)))
     parts = {part for name in names for part in name.split("/") if part}
-    last = PurePosixPath(key[1]).name
+    last = PurePosixPath(key[1]).name.lstrip("~")
     deeper = [name for name in names if name.endswith(f"/{last}")]
+    asked = ((e.actor, e.topic) for _, e in run.actors if e.action == "read" and e.detail)
+    node = next((actor for actor, name in asked if name == f"{actor}/{last}" and key[1] == f"~{last}"), "")
+    if len(deeper) == 1 and node:
+        above = deeper[0].rpartition("/")[0]
+        cause = f"{end.cause}: ~{last} is {node}/{last} here, and {deeper[0]} is set"
+        hint = _named(node, above) if above else f"write {get_param(deeper[0])}: it is no node's own"
+        return end._replace(cause=cause, hint=hint)
     if len(deeper) == 1:
         levels = "".join(f"['{part}']" for part in deeper[0].split("/") if part)
         hint = f"write {get_param(deeper[0])}, or a key for each level: {levels}"

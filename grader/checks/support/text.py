@@ -5,14 +5,14 @@ from __future__ import annotations
 import difflib
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from typing import Literal
 
 from pydantic import AfterValidator
 
 from grader.untrusted_text import visible, without_colours
-from grader.wording import is_one_edit, shorten
+from grader.wording import is_one_edit, plural, shorten
 
 SIMILARITY = 0.8
 IN_OWN_WORDS = "in the handout's own words"
@@ -318,3 +318,42 @@ def texts_of_cpp(lines: Iterable[str]) -> Iterator[tuple[Literal["publishes", "p
 
 def _is_said(part: str) -> bool:
     return "endl" not in part and bool(part.strip(" ;)"))
+
+
+ARGUMENT_HINT = (
+    "put the value in the code, or use a default where `len(sys.argv)` is 1: nothing passes arguments"
+)
+PARSER_REFUSES = re.compile(r": error: (the following arguments|unrecognized arguments|argument )")
+"""What Python's `argparse` prints last."""
+
+
+def explain_arguments(last: str, given: Sequence[str]) -> tuple[str, str] | None:
+    """Return what a program that ends for its arguments was given, and what to do; None where its last line names no
+    such reason."""
+    parser = PARSER_REFUSES.search(last)
+    if parser is None and not re.search(r"\busage\b", last, re.IGNORECASE):
+        return None
+    listed = f"{plural(len(given), 'argument')} ({shown(' '.join(given))})" if given else "no arguments"
+    return f"it was given {listed}", _parser_hint(last, given) if parser else _usage_hint(given)
+
+
+def _usage_hint(given: Sequence[str]) -> str:
+    if given:
+        return f"compare argc, or len(sys.argv), with {len(given) + 1}: the program's name counts too"
+    return ARGUMENT_HINT
+
+
+def _parser_hint(last: str, given: Sequence[str]) -> str:
+    if ":=" in last:
+        return "write `parse_args(rospy.myargv()[1:])`: the last arguments are for ROS"
+    if not given:
+        return "write `default=…` in `add_argument(…)`, and no `required=True`: nothing passes arguments"
+    option = re.search(r"required: (?:-\w/)?--([\w-]+)$", last)
+    name = option[1].replace("-", "_") if option else "…"
+    return f"write `add_argument('{name}', …)`, without dashes and without `required`: the arguments have no names"
+
+
+def as_number(kind: str, source: str) -> str:
+    """Return how to make a number of this kind of a value on a line of source."""
+    divided = kind == "int" and not re.search("['\"]", source)
+    return f"`{kind}(…)`" + (", or write `//` in place of a `/`, which makes a float" if divided else "")

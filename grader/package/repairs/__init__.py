@@ -172,7 +172,8 @@ def _scripts(
     asked = {PurePosixPath(path).name for path in wanted.launch_files}
     launches = [f for f in package.launch_files if PurePosixPath(renames.get(f.path, f.path)).name in asked]
     named += [node.type for launch in launches for node in (*launch.nodes, *launch.brings) if node.type]
-    named += [f"{name}.py" for name in named if not PurePosixPath(name).suffix]
+    built = {one.name for one in package.cmake.executables} if package.cmake else set[str]()
+    named += [f"{name}.py" for name in named if not PurePosixPath(name).suffix and name not in built]
     names = dict.fromkeys(PurePosixPath(file.path).name for file in python)
     there = {*names, *(PurePosixPath(path).name for path in renames.values())}
     named += [right for name in named if name not in there for right in names if is_near(name, right)]

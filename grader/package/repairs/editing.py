@@ -32,6 +32,13 @@ HAS_DIR_FD = os.open in os.supports_dir_fd
 BOM = b"\xef\xbb\xbf"
 UTF16 = (b"\xff\xfe", b"\xfe\xff")
 NAMING = (".launch", ".launch.xml", ".test")
+CODE = (".py", ".cpp", ".cc", ".cxx", ".h", ".hpp")
+MADE_OF = {
+    ".msg": "",
+    ".srv": "Request|Response",
+    ".action": "(?:Action)?(?:Goal|Result|Feedback)|Action",
+}
+"""Ends of the classes that are made of a definition, beside its own name."""
 
 
 class NotRepairable(ValueError):
@@ -96,6 +103,10 @@ class Files:
     def put(self, file: str, text: str | None) -> None:
         """Remember what the file will be."""
         self._texts[self._renamed.get(file, file)] = text
+
+    def path_of(self, file: str) -> str:
+        """Return where a file of the package is after the repairs so far."""
+        return self._renamed.get(file, file)
 
     def rename(self, old: str, new: str) -> None:
         """Remember that the file will be at another path."""
@@ -238,12 +249,21 @@ def rename_word(text: str, old: str, new: str) -> str:
     return re.sub(rf"(?<![\w.-]){re.escape(old)}(?![\w-]|\.\w)", lambda _: new, text)
 
 
-def naming_files(folder: Path) -> Iterator[str]:
+def rename_type(text: str, old: str, new: str) -> str:
+    """Return the code with the file's own name (`Two.srv`) and what is made of it replaced: `Two`, `TwoRequest`."""
+    (before, kind), after = (PurePosixPath(old).stem, PurePosixPath(old).suffix), PurePosixPath(new).stem
+    if kind not in MADE_OF:
+        return text
+    made = rf"(?<![\w.\"'])((?:\w+\.)*(?:srv|msg)\.)?{re.escape(before)}(?=(?:{MADE_OF[kind]})?(?:Const)?(?:Ptr)?\b)"
+    return re.sub(made, lambda found: f"{found[1] or ''}{after}", text)
+
+
+def naming_files(folder: Path, endings: tuple[str, ...] = NAMING) -> Iterator[str]:
     """Yield the files that name the package and its scripts: the manifest, CMake's file and launch files."""
     for place, folders, names in os.walk(folder):
         folders[:] = sorted(name for name in folders if name not in LEFT_OUT)
         for name in sorted(names):
-            if name in (MANIFEST, CMAKE) or name.lower().endswith(NAMING):
+            if (name in (MANIFEST, CMAKE) and endings == NAMING) or name.lower().endswith(endings):
                 yield (Path(place) / name).relative_to(folder).as_posix()
 
 
@@ -338,12 +358,15 @@ def _rename(folder: Path, old: str, new: str) -> None:
 
 
 def rename_everywhere(folder: Path, old: str, new: str) -> None:
-    """Write the new name where the build files and launch files have the old one."""
-    for file in naming_files(folder):
-        data = read_data(folder, file)
-        text = as_text(data) if data is not None else None
-        if data is None or text is None or (changed := rename_word(text, old, new)) == text:
-            continue
-        line, before, after = changed_lines(text, changed)
-        whole = Repair(kind="file-name", file=file, line=line, before=before, after=after, message="", fix="")
-        write_data(folder, file, replace_lines(data, whole))
+    """Write the new name where the build files and launch files have the old one, and the code a definition's."""
+    for endings, rename in ((NAMING, rename_word), (CODE, rename_type)):
+        for file in naming_files(folder, endings):
+            data = read_data(folder, file)
+            text = as_text(data) if data is not None else None
+            if data is None or text is None or (changed := rename(text, old, new)) == text:
+                continue
+            line, before, after = changed_lines(text, changed)
+            whole = Repair(
+                kind="file-name", file=file, line=line, before=before, after=after, message="", fix=""
+            )
+            write_data(folder, file, replace_lines(data, whole))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import codecs
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import PurePosixPath
 
 from grader.model.package import CMAKE, MANIFEST, PackageFacts, SourceFile
@@ -13,12 +13,14 @@ from grader.model.submission import chmod_hint
 from grader.package.reading import LEFT_OUT
 from grader.package.repairs.editing import (
     BOM,
+    CODE,
     UTF16,
     Files,
     as_text,
     is_executable,
     naming_files,
     read_data,
+    rename_type,
     rename_word,
 )
 from grader.package.repairs.names import Wanted, is_near
@@ -174,8 +176,10 @@ def find_renames(package: PackageFacts, wanted: Wanted) -> dict[str, str]:
             renames[old] = str(PurePosixPath(old).with_name(name))
         elif name not in names:
             other = {*right, *renames}
-            meant = _meant_launch(package, wanted, name, renames) or _meant_script(
-                package, wanted, name, other
+            meant = (
+                _meant_launch(package, wanted, name, renames)
+                or _meant_script(package, wanted, name, other)
+                or _meant_definition(package, wanted, name, other)
             )
             renames |= {meant: str(PurePosixPath(meant).with_name(name))} if meant else {}
     return renames
@@ -195,6 +199,22 @@ def _meant_script(package: PackageFacts, wanted: Wanted, name: str, others: set[
     called = [path for path in does_it if topics and has_role_of(path, name)]
     meant = [path for path, done in does_it.items() if not nodes or nodes & done] or called
     return meant[0] if len(meant) == 1 else ""
+
+
+def _meant_definition(package: PackageFacts, wanted: Wanted, name: str, others: set[str]) -> str:
+    """Return the only definition of the kind that has exactly the fields of the one of this name; "" otherwise."""
+    fields = dict(wanted.definitions).get(
+        next((f for f, _ in wanted.definitions if f.endswith(f"/{name}")), "")
+    )
+    asked = {(one.part, one.type, one.name) for one in fields or ()}
+    found = [
+        one.path
+        for one in package.interfaces
+        if one.path.endswith(PurePosixPath(name).suffix)
+        and not {one.path, PurePosixPath(one.path).name} & others
+        and {(field.part, field.type, field.name) for field in one.fields} == asked
+    ]
+    return found[0] if asked and len(found) == 1 else ""
 
 
 def _meant_launch(package: PackageFacts, wanted: Wanted, name: str, renames: Mapping[str, str]) -> str:
@@ -220,13 +240,23 @@ def rename_files(files: Files, renames: dict[str, str]) -> None:
         others = [file for file in naming_files(files.folder) if file != old]
         naming = [file for file in others if _put_word(files, file, PurePosixPath(old).name, name)]
         words = f"{fix}, and write {name} in {join_words(naming)}" if naming else fix
+        code = [
+            file
+            for file in naming_files(files.folder, CODE)
+            if _put_word(files, file, PurePosixPath(old).name, name, rename_type)
+        ]
+        if code:
+            stems = f"{PurePosixPath(new).stem} instead of {PurePosixPath(old).stem}"
+            words += f", and {stems} in {join_words(code)}"
         files.add(Repair(kind="file-name", file=old, before=old, after=new, message=message, fix=words))
         files.rename(old, new)
 
 
-def _put_word(files: Files, file: str, old: str, new: str) -> bool:
+def _put_word(
+    files: Files, file: str, old: str, new: str, rename: Callable[[str, str, str], str] = rename_word
+) -> bool:
     text = files.text(file)
-    if text is None or (changed := rename_word(text, old, new)) == text:
+    if text is None or (changed := rename(text, old, new)) == text:
         return False
     files.put(file, changed)
     return True

@@ -55,7 +55,9 @@ def make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Col
     _delete_empty(files, package)
     code = [f.path for f in package.files if is_own(f.path) and (f.python or f.path.endswith(CPP))]
     used = _used_kinds(files, package, name, code)
-    made = {c: _definitions(package, folder) for c, folder in INTERFACE_FOLDERS.items() if folder in used}
+    made = {
+        c: _definitions(files, package, folder) for c, folder in INTERFACE_FOLDERS.items() if folder in used
+    }
     if not any(made.values()):
         _delete_generation(files, package)
         return
@@ -279,8 +281,8 @@ def _call_by_kind(files: Files) -> None:
                 files.change("build-line", CMAKE, changed, message, f"write {right} instead of {name}")
 
 
-def _definitions(package: PackageFacts, folder: str) -> list[str]:
-    paths = (PurePosixPath(file.path) for file in package.files)
+def _definitions(files: Files, package: PackageFacts, folder: str) -> list[str]:
+    paths = (PurePosixPath(files.path_of(file.path)) for file in package.files)
     return sorted(p.name for p in paths if str(p.parent) == folder and p.suffix == f".{folder}")
 
 

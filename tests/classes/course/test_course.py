@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from grader.classes.course import rounds
-from grader.classes.roster import read_roster
 from grader.cli.main import run
 from grader.errors import RubricError, UsageError
 from grader.judging.settle import lateness
+from grader.model.batch import Entry, Roster
 from grader.model.result import HandedIn
 from grader.rubric.course import load_course
 from grader.rubric.load import load_rubric
@@ -351,9 +351,9 @@ def test_a_lab_without_a_roster(course: Path, capsys) -> None:
     assert "lab1 has no roster" in capsys.readouterr().err
 
 
-def test_attempts_are_in_the_order_of_their_moments_whatever_their_zones(tmp_path: Path) -> None:
-    for name in ("early", "late"):
-        (tmp_path / name).mkdir()
-    write_roster(tmp_path / "r.csv", "ada,late,2026-11-01T09:30:00Z", "ada,early,2026-11-01T10:00:00+01:00")
-    first, second = rounds(read_roster(tmp_path / "r.csv"))
-    assert [Path(one.entries[0].source).name for one in (first, second)] == ["early", "late"]
+def test_attempts_are_in_the_order_of_their_moments_whatever_their_zones() -> None:
+    here = timezone(timedelta(hours=1))
+    late = Entry(id="ada", source="late", submitted_at=datetime(2026, 11, 1, 9, 30, tzinfo=timezone.utc))
+    early = Entry(id="ada", source="early", submitted_at=datetime(2026, 11, 1, 10, 0, tzinfo=here))
+    first, second = rounds(Roster(file="r.csv", entries=(late,), again=(early,)))
+    assert [one.entries[0].source for one in (first, second)] == ["early", "late"]
