@@ -56,30 +56,23 @@ def with_values_called(text: str) -> Iterator[Step]:
     lines = text.split("\n")
     for node in nodes_in(tree_of(text)):
         target = node.targets[-1] if isinstance(node, ast.Assign) else None
-        if (
-            not isinstance(target, ast.Attribute)
-            or last_name(target.value) != "rospy"
-            or not isinstance(node, ast.Assign)
-        ):
+        if not isinstance(node, ast.Assign) or not isinstance(target, ast.Attribute):
             continue
-        meant = {name.lower(): name for name in GIVEN_ONE}.get(target.attr.lower(), "")
+        names = {name.lower(): name for name in GIVEN_ONE} if last_name(target.value) == "rospy" else {}
+        meant = names.get(target.attr.lower(), "")
         begin, value = span_of(lines, target), span_of(lines, node.value)
         if meant and begin is not None and value is not None and begin[0] == value[0]:
             line, start, end = value
-            call = f"rospy.{meant}({lines[line][start:end]})"
-            yield from step_to(
-                "value", line + 1, text, edited(text, [(line, begin[1], end, call)]), f"rospy.{meant}"
-            )
+            after = edited(text, [(line, begin[1], end, f"rospy.{meant}({lines[line][start:end]})")])
+            yield from step_to("value", line + 1, text, after, f"rospy.{meant}")
             return
 
 
 def with_calls(text: str) -> Iterator[Step]:
     tree, lines = tree_of(text), text.split("\n")
-    own = {n.name for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)}
-    own -= {n.name for n in nodes_in(tree) if isinstance(n, ast.FunctionDef) and n.decorator_list}
-    named = [
-        n for n in chain.from_iterable(map(_uncalled_expressions, nodes_in(tree))) if _is_callable(n, own)
-    ]
+    functions = [n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)]
+    own = {n.name for n in functions} - {n.name for n in functions if n.decorator_list}
+    named = [n for node in nodes_in(tree) for n in _uncalled_expressions(node) if _is_callable(n, own)]
     alone = (n.value for n in nodes_in(tree) if isinstance(n, ast.Expr))
     named += [n for n in alone if isinstance(n, ast.Attribute) and n.attr in own - CALLED]
     spans = [span for n in named if (span := span_of(lines, n))]
@@ -143,8 +136,7 @@ def _is_callback(function: ast.FunctionDef) -> bool:
 
 def with_arguments(text: str, kinds: list[str]) -> Iterator[Step]:
     """`kinds` are the message types that the lab uses."""
-    lines = text.split("\n")
-    tree = tree_of(text)
+    tree, lines = tree_of(text), text.split("\n")
     for mistake in chain(_wrong_arguments(tree, kinds), _names_of_objects(tree)):
         spans = [(span, new) for node, new in mistake.edits if (span := span_of(lines, node))]
         if len(spans) == len(mistake.edits):
@@ -177,19 +169,20 @@ def with_lines_turned(text: str) -> Iterator[Step]:
         known = shared | {n.arg for n in nodes_in(function) if isinstance(n, ast.arg)}
         blocks = [n.body for n in nodes_in(function) if isinstance(n, ast.FunctionDef | ast.While | ast.For)]
         for first, second in chain.from_iterable(map(pairwise, blocks)):
-            given = {
-                n.id for n in nodes_in(second) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
-            }
-            read = {n.id for n in nodes_in(first) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+            given, read = _names_in(second, ast.Store), _names_in(first, ast.Load)
             late = {name for name in given & read - known if stored.count(name) == 1}
-            alone = (
-                first.end_lineno == first.lineno == second.lineno - 1 and second.end_lineno == second.lineno
-            )
+            ends = (first.lineno, first.end_lineno, second.end_lineno)
+            alone = ends == (first.lineno, second.lineno - 1, second.lineno)
             if late and alone and isinstance(second, ast.Assign):
                 at = first.lineno - 1
                 after = "\n".join([*lines[:at], lines[at + 1], lines[at], *lines[at + 2 :]])
                 yield from step_to("turned", first.lineno, text, after)
                 return
+
+
+def _names_in(node: ast.AST, kind: type[ast.expr_context]) -> set[str]:
+    """Return the names in a node that it reads, or gives a value."""
+    return {n.id for n in nodes_in(node) if isinstance(n, ast.Name) and isinstance(n.ctx, kind)}
 
 
 NUMBERS = re.compile(r"U?Int\d+|Float\d+|Byte|Char")
@@ -209,19 +202,15 @@ def _wrong_arguments(tree: ast.Module, kinds: list[str]) -> Iterator[Argument]:
     yield from _published_nothing(tree)
     for call in (n for n in nodes_in(tree) if isinstance(n, ast.Call)):
         name = _called(call)
-        if ast.unparse(call.func) == "rospy.Rate.sleep" and call.args and _is_number(call.args[0]):
-            yield Argument(
-                [(call.func, "rospy.sleep")], "`Rate.sleep` needs a Rate that was made, as in `rate.sleep()`"
-            )
-        elif (
-            name == "sleep" and isinstance(call.func, ast.Attribute) and ast.unparse(call.func.value) in rates
-        ):
+        owner = ast.unparse(call.func.value) if isinstance(call.func, ast.Attribute) else ""
+        if (owner, name) == ("rospy.Rate", "sleep") and call.args and _is_number(call.args[0]):
+            why = "`Rate.sleep` needs a Rate that was made, as in `rate.sleep()`"
+            yield Argument([(call.func, "rospy.sleep")], why)
+        elif name == "sleep" and owner in rates:
             if call.args:
-                yield Argument(
-                    [(call, f"{ast.unparse(call.func)}()")], "a Rate already knows how long to sleep"
-                )
-        elif name == "publish" and isinstance(call.func, ast.Attribute):
-            kind = published.get(ast.unparse(call.func.value), "")
+                yield Argument([(call, f"{owner}.sleep()")], "a Rate already knows how long to sleep")
+        elif name == "publish" and owner:
+            kind = published.get(owner, "")
             yield from _text_of_a_number(call) if NUMBERS.fullmatch(kind) else ()
             yield from _published_together(call, kind)
         elif _is_rospys(call.func, of_rospy):
@@ -251,9 +240,8 @@ def _of_topic(call: ast.Call, types: set[str], kinds: list[str]) -> Iterator[Arg
     """Of `Publisher` and `Subscriber`, which take a topic's name and a class."""
     first, second, *_ = [*call.args, None, None]
     if isinstance(first, ast.Name) and _is_type(first.id, types) and _is_text(second):
-        yield Argument(
-            [(first, repr(second.value)), (second, first.id)], "the topic's name comes first, then its type"
-        )
+        edits: list[tuple[ast.expr, str]] = [(first, repr(second.value)), (second, first.id)]
+        yield Argument(edits, "the topic's name comes first, then its type")
         return
     given = next((k.value for k in call.keywords if k.arg == "data_class"), second)
     module = ast.unparse(given) if isinstance(given, ast.Attribute) and given.attr == "msg" else ""
@@ -272,22 +260,21 @@ def _type_of_topic(call: ast.Call, types: set[str], functions: set[str]) -> Iter
     """Of `Subscriber('x', on_x, String)`, whose type comes too late, and `Subscriber('x', on_x)` and
     `Publisher('x', queue_size=1)`, which have none, where the script imports just one."""
     first, second, third, *_ = [*call.args, None, None, None]
-    named = {k.arg for k in call.keywords}
+    named, why = {k.arg for k in call.keywords}, "the type of the messages is missing"
     if isinstance(second, ast.Name) and second.id in functions and isinstance(third, ast.Name):
         if _is_type(third.id, types):
             yield Argument([(second, third.id), (third, second.id)], "the type comes before the callback")
     elif (
-        len(types) == 1
-        and "*" not in types
+        len(types - {"*"}) == len(types) == 1
         and "data_class" not in named
         and third is None
         and _is_text(first)
     ):
         (kind,) = types
         if isinstance(second, ast.Name) and second.id in functions:
-            yield Argument([(second, f"{kind}, {second.id}")], "the type of the messages is missing")
+            yield Argument([(second, f"{kind}, {second.id}")], why)
         elif second is None:
-            yield Argument([(first, f"{ast.unparse(first)}, {kind}")], "the type of the messages is missing")
+            yield Argument([(first, f"{ast.unparse(first)}, {kind}")], why)
 
 
 def _published_type(value: ast.expr) -> str:
@@ -338,9 +325,7 @@ def _published_nothing(tree: ast.Module) -> Iterator[Argument]:
     made = [n for n in nodes_in(tree) if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)]
     of_others = {ast.unparse(t) for n in made if _called(n.value) != "Publisher" for t in n.targets}
     for function in (n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)):
-        names = [n for n in nodes_in(function) if isinstance(n, ast.Name)]
-        read = {n.id for n in names if isinstance(n.ctx, ast.Load)}
-        unread = {n.id for n in names if isinstance(n.ctx, ast.Store)} - read
+        unread = _names_in(function, ast.Store) - _names_in(function, ast.Load)
         published = [n for n in nodes_in(function) if isinstance(n, ast.Call) and _called(n) == "publish"]
         published = [n for n in published if ast.unparse(n.func).rpartition(".")[0] not in of_others]
         calls = [n for n in published if not n.keywords and _gives_nothing(n, known)]
@@ -364,19 +349,12 @@ def _gives_nothing(call: ast.Call, known: AbstractSet[str]) -> bool:
 
 def _logged(call: ast.Call) -> Iterator[Argument]:
     """Of `loginfo('a', b)`, whose text has no place for the value."""
-    text, *values = [*call.args, None]
-    values = [one for one in values if one is not None]
-    if (
-        len(values) == 1
-        and text is not None
-        and not _is_text(text)
-        and _is_text(values[0])
-        and "%" in values[0].value
-    ):
-        edits = [(text, ast.unparse(values[0])), (values[0], ast.unparse(text))]
+    text, values = next(iter(call.args), None), call.args[1:]
+    value = values[0] if len(values) == 1 else None
+    if text is not None and not _is_text(text) and _is_text(value) and "%" in value.value:
+        edits = [(text, ast.unparse(value)), (value, ast.unparse(text))]
         yield Argument(edits, "the string comes first, then its values")
-        return
-    if _is_text(text) and values and "%" not in text.value:
+    elif _is_text(text) and values and "%" not in text.value:
         right = with_place(repr(text.value)) if len(values) == 1 else ""
         lacks = "no `%` in it" if right else "fewer `%` than there are values after it"
         yield Argument([(text, _with_places(text.value, len(values)))], f"the string has {lacks}")
@@ -403,9 +381,8 @@ def _names_of_objects(tree: ast.Module) -> Iterator[Argument]:
         for method in (n for n in methods if n.args.args and n.args.args[0].arg == "self"):
             known = shared | {name for part in method.body for name in _bound_in(part)}
             known |= {n.arg for n in nodes_in(method) if isinstance(n, ast.arg)}
-            for name in (
-                n for n in nodes_in(method) if isinstance(n, ast.Name) and n.id in attributes - known
-            ):
+            names = (n for n in nodes_in(method) if isinstance(n, ast.Name))
+            for name in (n for n in names if n.id in attributes - known):
                 yield Argument([(name, f"self.{name.id}")], f"`{name.id}` belongs to the class {one.name}")
     read = [n for n in nodes_in(tree) if isinstance(n, ast.Attribute)]
     used = {ast.unparse(n.value) for n in read}
@@ -419,15 +396,10 @@ def _names_of_objects(tree: ast.Module) -> Iterator[Argument]:
         for alias in n.names
     }
     for node in (n for n in nodes_in(tree) if isinstance(n, ast.Assign) and len(n.targets) == 1):
-        if (
-            isinstance(node.value, ast.Name)
-            and node.value.id in made | of_messages
-            and ast.unparse(node.targets[0]) in (used if node.value.id in made else given)
-        ):
-            edit = (node.value, f"{node.value.id}()")
-            yield Argument(
-                [edit], f"`{ast.unparse(node.targets[0])}` is the class itself, not an object of it"
-            )
+        target, value = ast.unparse(node.targets[0]), node.value
+        class_ = value.id if isinstance(value, ast.Name) else ""
+        if (class_ in made and target in used) or (class_ in of_messages and target in given):
+            yield Argument([(value, f"{class_}()")], f"`{target}` is the class itself, not an object of it")
 
 
 def _is_self(node: ast.expr) -> bool:
@@ -510,17 +482,11 @@ def _without_quotes(call: ast.Call, name: str, functions: set[str]) -> Iterator[
 def _unbound_variables(tree: ast.Module) -> Iterator[Unbound]:
     """Yield variables of the whole file to which a function gives a value without a `global`, and which it has read
     before, or never reads while others do."""
-    shared = {
-        target.id
-        for one in tree.body
-        if isinstance(one, ast.Assign | ast.AnnAssign)
-        for target in ([one.target] if isinstance(one, ast.AnnAssign) else one.targets)
-        if isinstance(target, ast.Name)
-    }
+    assigned = (one for one in tree.body if isinstance(one, ast.Assign | ast.AnnAssign))
+    targets = (t for one in assigned for t in getattr(one, "targets", None) or [getattr(one, "target", None)])
+    shared = {target.id for target in targets if isinstance(target, ast.Name)}
     for function in (n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)):
-        inner = [
-            n for n in nodes_in(function) if isinstance(n, ast.FunctionDef | ast.Lambda) and n is not function
-        ]
+        inner = (n for n in nodes_in(function)[1:] if isinstance(n, ast.FunctionDef | ast.Lambda))
         nodes = set(nodes_in(function)) - {n for one in inner for n in nodes_in(one)}
         own = {n.arg for n in nodes_in(function.args) if isinstance(n, ast.arg)}
         own |= {name for n in nodes if isinstance(n, ast.Global | ast.Nonlocal) for name in n.names}
@@ -540,10 +506,9 @@ def _is_read_outside(tree: ast.Module, name: str, function: ast.FunctionDef) -> 
     for one in nodes_in(tree):
         if isinstance(one, ast.FunctionDef) and one not in inside and _has_its_own(one, name):
             inside |= {*nodes_in(one)}
-    reads = [
-        n for n in nodes_in(tree) if isinstance(n, ast.Name) and n.id == name and isinstance(n.ctx, ast.Load)
-    ]
-    return any(n not in inside for n in reads) and not any(n in {*nodes_in(function)} for n in reads)
+    names = (n for n in nodes_in(tree) if isinstance(n, ast.Name) and n.id == name)
+    reads = {n for n in names if isinstance(n.ctx, ast.Load)}
+    return bool(reads - inside) and reads.isdisjoint(nodes_in(function))
 
 
 def _has_its_own(function: ast.FunctionDef, name: str) -> bool:
@@ -566,12 +531,9 @@ def _reads_and_writes(nodes: set[ast.AST], name: str) -> Iterator[tuple[tuple[in
 
 
 def _imported(tree: ast.Module, ending: str) -> set[str]:
-    return {
-        a.asname or a.name
-        for one in nodes_in(tree)
-        if isinstance(one, ast.ImportFrom) and f".{one.module}".endswith(f".{ending}")
-        for a in one.names
-    }
+    imports = (one for one in nodes_in(tree) if isinstance(one, ast.ImportFrom))
+    named = (one.names for one in imports if f".{one.module}".endswith(f".{ending}"))
+    return {a.asname or a.name for names in named for a in names}
 
 
 def _called(node: ast.AST | None) -> str:
@@ -600,8 +562,4 @@ def _is_text(node: ast.expr | None) -> TypeGuard[_Text]:
 def _is_number(node: ast.expr) -> bool:
     if isinstance(node, ast.BinOp):
         return _is_number(node.left) and _is_number(node.right)
-    return (
-        isinstance(node, ast.Constant)
-        and isinstance(node.value, int | float)
-        and not isinstance(node.value, bool)
-    )
+    return isinstance(node, ast.Constant) and type(node.value) in (int, float)

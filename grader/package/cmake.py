@@ -139,32 +139,30 @@ def _entries(trace: Path) -> Iterator[dict[str, Any]]:
                 read_bytes += len(line)
                 if not line or read_bytes > _TRACE_BYTES_MAX:
                     return
-                entry = _decode(line)
-                if isinstance(entry, dict):
-                    yield entry
+                yield _decode(line)
     except OSError:
         return
 
 
-def _decode(line: bytes) -> Any:  # noqa: ANN401 - whatever JSON holds
+def _decode(line: bytes) -> dict[str, Any]:
+    """Return an entry of the trace; an empty one where the line holds none."""
     try:
-        return json.loads(line)
+        entry = json.loads(line)
     except (ValueError, RecursionError):  # garbage between the lines, or the last one cut short
-        return None
+        return {}
+    return entry if isinstance(entry, dict) else {}
+
+
+def _is_call(entry: dict[str, Any]) -> bool:
+    wanted = {"file": str, "cmd": str, "line": int, "args": list}
+    return all(isinstance(entry.get(key), kind) for key, kind in wanted.items())
 
 
 def _call(entry: dict[str, Any]) -> CMakeCall | None:
-    name, args, file, line = (entry.get(key) for key in ("cmd", "args", "file", "line"))
-    if not (isinstance(name, str) and isinstance(file, str) and isinstance(line, int) and line > 0):
+    if not _is_call(entry) or entry["line"] <= 0 or not all(isinstance(arg, str) for arg in entry["args"]):
         return None
-    if not isinstance(args, list) or not all(isinstance(arg, str) for arg in args):
-        return None
-    return CMakeCall(
-        name=printable(name).lower(),
-        args=split_lists(args),
-        file=posixpath.normpath(printable(file)),
-        line=line,
-    )
+    name, file = printable(entry["cmd"]).lower(), posixpath.normpath(printable(entry["file"]))
+    return CMakeCall(name=name, args=split_lists(entry["args"]), file=file, line=entry["line"])
 
 
 def split_lists(args: list[str]) -> tuple[str, ...]:
@@ -193,27 +191,11 @@ def written_calls(trace: bytes, folder: Path, root: str) -> Written:
     too_many = f"CMake's trace has more than {LINES_MAX} lines" if len(lines) > LINES_MAX else ""
     kept = []
     for line in lines[:LINES_MAX]:
-        call = _traced_call(line)
-        path = posixpath.normpath(call["file"]) if call else ""
-        if (
-            call is None
-            or not path.startswith(prefix)
-            or _fits(call, files.commands(path.removeprefix(prefix)))
-        ):
+        call = _decode(line)
+        path = posixpath.normpath(call["file"]) if _is_call(call) else ""
+        if not path.startswith(prefix) or _fits(call, files.commands(path.removeprefix(prefix))):
             kept.append(line)
     return Written(b"\n".join(kept), too_many or files.too_much)
-
-
-def _traced_call(line: bytes) -> dict[str, Any] | None:
-    """Return an entry that names a call; None for whatever else is in the trace."""
-    try:
-        entry = json.loads(line)
-    except (ValueError, RecursionError):  # cut short, or not CMake's
-        return None
-    wanted = {"file": str, "cmd": str, "line": int, "args": list}
-    if isinstance(entry, dict) and all(isinstance(entry.get(key), kind) for key, kind in wanted.items()):
-        return entry
-    return None
 
 
 class _Files:

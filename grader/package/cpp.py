@@ -80,14 +80,8 @@ def _waiting(path: str, code: str) -> Iterator[PythonSlip]:
             line = code.count("\n", 0, at) + 1
             name = body.name or f"line {code.count(NEW_LINE, 0, body.start) + 1}"
             called = f"`{name}`" if body.name else f"on {name}"
-            yield PythonSlip(
-                file=path,
-                line=line,
-                kind="callback-waits",
-                message=message.format(name=called, line=line),
-                fix=fix.format(line=line),
-                name=name,
-            )
+            words = {"message": message.format(name=called, line=line), "fix": fix.format(line=line)}
+            yield PythonSlip(file=path, line=line, kind="callback-waits", name=name, **words)
 
 
 def _unspun(path: str, code: str) -> Iterator[PythonSlip]:
@@ -190,8 +184,6 @@ def _degrees(path: str, code: str) -> Iterator[PythonSlip]:
             fix = f"write `{match['call']}({given} * M_PI / 180)`"
         else:
             continue
-        line, message = (
-            code.count("\n", 0, match.start()) + 1,
-            f"`{match['call']}` takes radians, and gets degrees",
-        )
+        line = code.count("\n", 0, match.start()) + 1
+        message = f"`{match['call']}` takes radians, and gets degrees"
         yield PythonSlip(file=path, line=line, kind="wrong-value", message=message, fix=fix, name="degrees")

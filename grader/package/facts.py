@@ -94,13 +94,8 @@ def _source_file(package: SourcePackage, path: str) -> SourceFile:
             file = regular_file(package.folder, path)
         except Unreadable as error:
             digest = hashlib.sha256(os.fsencode(target)).hexdigest()
-            return SourceFile(
-                **common,
-                size_bytes=0,
-                sha256=digest,
-                executable=None,
-                link_problem=f"`{common['path']}` {error}",
-            )
+            problem = f"`{common['path']}` {error}"
+            return SourceFile(**common, size_bytes=0, sha256=digest, executable=None, link_problem=problem)
         path = file.relative_to(os.path.realpath(package.folder)).as_posix()
     executable = _executable(package, path, file)
     if printable(path) in package.left_out:
@@ -193,9 +188,8 @@ def read_shebang(data: bytes) -> tuple[Shebang | None, ShebangFault, str]:
     interpreter, program, problem = resolve(text)
     found = not problem and (program in _PYTHONS or on_system(program))
     if crlf:
-        problem = (
-            f"line 1 has a Windows line ending (CRLF), and there is no `{interpreter}\\r`: save it with LF"
-        )
+        problem = f"there is no `{interpreter}\\r`: save it with LF"
+        problem = f"line 1 has a Windows line ending (CRLF), and {problem}"
     elif not problem and not found:
         problem = f"there is no `{program}` on a ROS machine"
     fault: ShebangFault = "line-end" if crlf else "other" if problem else ""
@@ -244,10 +238,8 @@ def _near(data: bytes) -> tuple[ShebangFault, str]:
     if not data.strip():
         return "empty-file", "the file is empty"
     if data.startswith(_BOM + b"#!"):
-        return (
-            "byte-order-mark",
-            "an invisible byte order mark (BOM) comes before `#!`: save as UTF-8 without BOM",
-        )
+        problem = "an invisible byte order mark (BOM) comes before `#!`: save as UTF-8 without BOM"
+        return "byte-order-mark", problem
     if later == 1:
         return "other", "a space comes before `#!`: it must be the very first thing in the file"
     if _NO_SHEBANG.match(first):
@@ -280,9 +272,8 @@ def read_package(
     """
     entries = read_files(package)
     with ThreadPoolExecutor(1) as beside:
-        asked = beside.submit(
-            check_syntax, package.folder, [entry.path for entry in entries if _to_check(entry.file)]
-        )
+        sources = [entry.path for entry in entries if _to_check(entry.file)]
+        asked = beside.submit(check_syntax, package.folder, sources)
         # the parsers are slow to load, and are loaded while the child reads the scripts
         from grader.package.cmake import read_cmake  # noqa: PLC0415
         from grader.package.launch import read_launch_files  # noqa: PLC0415

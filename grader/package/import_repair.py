@@ -62,9 +62,8 @@ def without_suffixes(text: str, types: list[str]) -> Iterator[Step]:
         lines = text.split("\n")
         for number in {n.lineno - 1 for n in named if _file_of(n) or ast.unparse(n) == name}:
             lines[number] = re.sub(rf"(?<![\w.]){re.escape(name)}\b", name.removesuffix(".py"), lines[number])
-        for step in step_to(
-            "module", line, text, "\n".join(lines), SUFFIX.format(name, name.removesuffix(".py"))
-        ):
+        why = SUFFIX.format(name, name.removesuffix(".py"))
+        for step in step_to("module", line, text, "\n".join(lines), why):
             text = step["text"]
             yield step
     yield from with_modules(text, types)
@@ -96,9 +95,7 @@ def with_modules(text: str, types: list[str]) -> Iterator[Step]:
         if module.endswith("msg") and module.removesuffix("msg") in known:
             package, inner = module.removesuffix("msg"), ""
         names = {alias.name for alias in node.names}
-        misspelt = (
-            inner not in ("", "msg") and not is_one_edit(inner.lower(), "msg") and inner.lower() != "msg"
-        )
+        misspelt = inner.lower() not in ("", "msg") and not is_one_edit(inner.lower(), "msg")
         if misspelt or (package in known and inner == "msg"):
             continue
         near = package if package in known else next(iter(get_close_matches(package, known, 1, 0.85)), "")
@@ -114,10 +111,8 @@ def with_modules(text: str, types: list[str]) -> Iterator[Step]:
 
 def _is_near_one(name: str, known: Collection[str]) -> bool:
     """Return whether it is one of the classes, or a slip in one, which `with_classes` puts right."""
-    slips = known if name not in MODULES_OF_MESSAGES else ()
-    return name in known or any(
-        is_one_edit(name.lower(), one.lower()) or name.lower() == one.lower() for one in slips
-    )
+    slips = [one.lower() for one in known if name not in MODULES_OF_MESSAGES]
+    return name in known or any(is_one_edit(name.lower(), one) or name.lower() == one for one in slips)
 
 
 def with_classes(text: str, types: list[str]) -> Iterator[Step]:
@@ -125,9 +120,8 @@ def with_classes(text: str, types: list[str]) -> Iterator[Step]:
     too, and the lab's own type is meant, or the same word in other letters."""
     tree, lines = tree_of(text), text.split("\n")
     uses = [n for n in nodes_in(tree) if isinstance(n, ast.Name)]
-    known = {name for names in MESSAGES.values() for name in names.split()} | {
-        t.partition("/")[2] for t in types
-    }
+    known = {name for names in MESSAGES.values() for name in names.split()}
+    known |= {t.partition("/")[2] for t in types}
     unbound = {n.id for n in uses} & known - bound_in(tree)
     for node in nodes_in(tree):
         package, _, module = (getattr(node, "module", "") or "").partition(".")
@@ -188,9 +182,7 @@ def with_imports(text: str, types: list[str]) -> Iterator[Step]:
     packages |= {name: package for package, _, name in (kind.partition("/") for kind in types)}
     parts = [n for n in nodes_in(tree) if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)]
     modules = {last_name(n.value) for n in parts}
-    of_messages = {
-        last_name(n.value): f"{last_name(n.value)}.{n.attr}" for n in parts if n.attr in ("msg", "srv")
-    }
+    of_messages = {last_name(n.value): ast.unparse(n) for n in parts if n.attr in ("msg", "srv")}
     loaded = [n for n in nodes_in(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)]
     missing = {n.id: n.lineno for n in sorted(loaded, key=lambda n: -n.lineno) if n.id not in bound}
     for name in sorted(missing, key=lambda name: (missing[name], name)):

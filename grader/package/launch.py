@@ -11,7 +11,7 @@ from typing import NamedTuple
 from lxml import etree
 
 from grader.model.package import Fault, LaunchFile, LaunchNode
-from grader.package.launch_loader import Find, Scope, load, unknown_attributes, wanted
+from grader.package.launch_loader import KEPT_AS_WRITTEN, Find, Scope, load, unknown_attributes, wanted
 from grader.package.reading import read_markup
 from grader.package.xml import line_of, parse_what_is_left, parse_xml
 from grader.wording import is_one_edit
@@ -219,15 +219,7 @@ def _node(element: etree._Element, remaps: Remaps) -> LaunchNode:
     for child in element.iterchildren("remap"):
         if wanted(child):
             remaps += _remap(child)
-    return LaunchNode(
-        pkg=element.get("pkg"),
-        type=element.get("type"),
-        name=element.get("name"),
-        ns=element.get("ns"),
-        output=element.get("output"),
-        launch_prefix=element.get("launch-prefix"),
-        args=element.get("args"),
-        remaps=remaps,
-        line=line_of(element) or 0,
-        unknown=unknown_attributes(element),
+    written = {name: element.get(name.replace("_", "-")) for name in KEPT_AS_WRITTEN}
+    return LaunchNode.model_validate(
+        {**written, "remaps": remaps, "line": line_of(element) or 0, "unknown": unknown_attributes(element)}
     )

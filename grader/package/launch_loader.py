@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import PurePosixPath
-from typing import Protocol
+from typing import Any, Protocol
 
 from lxml import etree
 from pydantic import Field
@@ -25,6 +25,8 @@ INCLUDES_MAX = 50
 DEPTH_MAX = 10
 WORK_MAX = 10_000
 STARTING = ("node", "group", "include")
+KEPT_AS_WRITTEN = ("pkg", "type", "name", "ns", "output", "launch_prefix", "args")
+"""Attributes of a `<node>`, also of one that no scope resolves."""
 _TOO_MUCH = "launch files that hold more than a robot can start"
 _FOUND = re.compile(r"\$\(find\s+([^()\s]+)\s*\)/+(.+)")
 _SUBSTITUTION = re.compile(r"\$\(([^()]*)\)")
@@ -77,28 +79,16 @@ def load(root: etree._Element, scope: Scope, find: Find) -> Loaded:
 def node_of(element: etree._Element, scope: Scope, remapping: Sequence[etree._Element] = ()) -> LaunchNode:
     """Return one `<node>` as it stands in this scope, with its own `<remap>`s."""
     below = scope.below(scope.get(element, "ns"), element)
-    given = [word.split(":=", 1) for word in (scope.get(element, "args") or "").split() if ":=" in word]
-    given = [[old, new] for old, new in given if old and new and not old.startswith("_")]
-    by_args = [
-        LaunchLine(tag="args", value=old, file=scope.file, line=line_of(element) or 0) for old, _ in given
-    ]
-    remaps = (*scope.remaps, *(_remap(one, scope) for one in remapping), *((old, new) for old, new in given))
-    renaming = (
-        *below.renaming,
-        *(_line(one, scope, scope.get(one, "from")) for one in remapping),
-        *by_args,
-    )
+    words = (word.partition(":=") for word in (scope.get(element, "args") or "").split())
+    renamed = [(old, new) for old, _, new in words if old and new and not old.startswith("_")]
+    by_args = [_line(element, scope, old).model_copy(update={"tag": "args"}) for old, _ in renamed]
+    remaps = (*scope.remaps, *(_remap(one, scope) for one in remapping), *renamed)
+    by_tags = (_line(one, scope, scope.get(one, "from")) for one in remapping)
+    renaming = (*below.renaming, *by_tags, *by_args)
+    names = (*KEPT_AS_WRITTEN, "machine", "respawn", "required")
+    given: dict[str, Any] = {name: scope.get(element, name.replace("_", "-")) for name in names}
     return LaunchNode(
-        pkg=scope.get(element, "pkg"),
-        type=scope.get(element, "type"),
-        name=scope.get(element, "name"),
-        ns=scope.get(element, "ns"),
-        output=scope.get(element, "output"),
-        launch_prefix=scope.get(element, "launch-prefix"),
-        args=scope.get(element, "args"),
-        machine=scope.get(element, "machine"),
-        respawn=scope.get(element, "respawn"),
-        required=scope.get(element, "required"),
+        **given,
         remaps=remaps,
         line=line_of(element) or 0,
         file=scope.file,
@@ -187,17 +177,13 @@ class _Loader:
 
     def _note_unset(self, element: etree._Element, scope: Scope) -> None:
         """Note what the tag asks for by `$(arg …)` and nothing gives: roslaunch starts nothing then."""
-        found, place = self.loaded.unset_args, (scope.file, line_of(element) or 0)
+        found, file, line = self.loaded.unset_args, scope.file, line_of(element) or 0
         name = element.get("name") or ""
         if element.tag == "arg" and _with_arg(element, scope) is scope and name not in scope.args:
-            found[scope.file, name] = LaunchArg(name=name, declared=True, file=place[0], line=place[1])
-        for value in element.attrib.values():
-            for asked in _ARGUMENT.findall(str(value)):
-                if asked not in scope.args and len(found) < _UNSET_MAX:
-                    found.setdefault(
-                        (scope.file, asked),
-                        LaunchArg(name=asked, declared=False, file=place[0], line=place[1]),
-                    )
+            found[file, name] = LaunchArg(name=name, declared=True, file=file, line=line)
+        for asked in (name for value in element.attrib.values() for name in _ARGUMENT.findall(str(value))):
+            if asked not in scope.args and len(found) < _UNSET_MAX:
+                found.setdefault((file, asked), LaunchArg(name=asked, declared=False, file=file, line=line))
 
     def _param(self, element: etree._Element, scope: Scope) -> Scope:
         param = _param(element, scope)
@@ -294,10 +280,8 @@ def _private(param: LaunchParam, inside: Scope) -> LaunchParam:
 
 
 def _fault(element: etree._Element, scope: Scope, message: str, fix: str = "remove this <include>") -> Fault:
-    cause = "this <include> brings nothing"
-    return Fault(
-        file=scope.file, line=line_of(element), kind="Include", message=message, cause=cause, fix=fix
-    )
+    words = {"message": message, "cause": "this <include> brings nothing", "fix": fix}
+    return Fault(file=scope.file, line=line_of(element), kind="Include", **words)
 
 
 class Scope(Record):
@@ -317,10 +301,10 @@ class Scope(Record):
 
     def text(self, written: str) -> str:
         """Resolve `$(arg …)`, `$(dirname)` and `$(optenv NAME DEFAULT)`; what only roslaunch knows stays as it is."""
-        text = _SUBSTITUTION.sub(
-            lambda match: self._value(match[0], match[1].split()), written[:_VALUE_CHARS_MAX]
-        )
-        return text[:_VALUE_CHARS_MAX]
+        short = written[:_VALUE_CHARS_MAX]
+        return _SUBSTITUTION.sub(lambda found: self._value(found[0], found[1].split()), short)[
+            :_VALUE_CHARS_MAX
+        ]
 
     def get(self, element: etree._Element, name: str) -> str | None:
         """Return an attribute resolved, None where it is not there."""
@@ -338,11 +322,8 @@ class Scope(Record):
             return self
         whole = namespace if namespace.startswith("/") else f"{self.namespace}{namespace}"
         noted = () if element is None else (_line(element, self, namespace),)
-        update = {
-            "namespace": _SLASHES.sub("/", f"/{whole[:_VALUE_CHARS_MAX]}/"),
-            "renaming": (*self.renaming, *noted),
-        }
-        return self.model_copy(update=update)
+        inner = _SLASHES.sub("/", f"/{whole[:_VALUE_CHARS_MAX]}/")
+        return self.model_copy(update={"namespace": inner, "renaming": (*self.renaming, *noted)})
 
     def resolved(self, name: str) -> str:
         """Return a parameter's whole name."""

@@ -34,17 +34,9 @@ OF_TEXTS = tuple(name for name in dir(str) if not name.startswith("_"))
 ALL_MEMBERS = frozenset(chain.from_iterable(MEMBERS.values()))
 KEYWORDS = {
     "Publisher": ("queue_size", "latch", "data_class", "subscriber_listener", "tcp_nodelay", "name"),
-    "Subscriber": (
-        "queue_size",
-        "callback",
-        "callback_args",
-        "data_class",
-        "buff_size",
-        "tcp_nodelay",
-        "name",
-    ),
+    "Subscriber": ("queue_size", "callback", "callback_args", "data_class", "buff_size", "tcp_nodelay", "name"),
     "init_node": ("anonymous", "name", "argv", "log_level", "disable_signals"),
-}
+}  # fmt: skip
 PLACE = re.compile(r"(?:(?<=\s)|^)[^\w\s%]?([sdf])$")
 """What is left of the `%s` at the end of a text."""
 
@@ -105,13 +97,8 @@ class _Names:
         """Return whether a dot is meant by the sign between two words."""
         if sign == "," and first.string == "self" and second in self.own:
             return not re.match(r"\s*def\b", first.line)
-        if (
-            sign == ","
-            and first.string in ("msg", "srv")
-            and second[:1].isupper()
-            and second not in self.known
-        ):
-            return True
+        if sign == "," and first.string in ("msg", "srv") and second[:1].isupper():
+            return second not in self.known
         is_there = first.type == tokenize.NAME and first.string in self.bound | self.own
         is_member = second in self.members_of(first.string) and second not in self.known
         return is_there and is_member and sign in (",", ";", ":")
@@ -153,32 +140,24 @@ def _of_self(tree: ast.Module) -> set[str]:
     attributes = {n.attr for n in nodes if isinstance(n, ast.Attribute) and last_name(n.value) == "self"}
     classes = [n for n in nodes if isinstance(n, ast.ClassDef)]
     methods = {m.name for one in classes for m in one.body if isinstance(m, ast.FunctionDef)}
-    beside = {  # `self, pub = …`, for `self.pub = …`
-        id(n)
-        for one in nodes
-        if isinstance(one, ast.Tuple) and last_name(one.elts[0]) == "self"
-        for n in one.elts
+    tuples = (one.elts for one in nodes if isinstance(one, ast.Tuple))
+    # `self, pub = …`, for `self.pub = …`
+    beside = {
+        id(n) for elements in tuples if last_name(next(iter(elements), None)) == "self" for n in elements
     }
-    plain = {n.arg for n in nodes if isinstance(n, ast.arg)} | {
-        n.id
-        for n in nodes
-        if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store) and id(n) not in beside
-    }
+    stored = (n for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store))
+    plain = {n.arg for n in nodes if isinstance(n, ast.arg)} | {n.id for n in stored if id(n) not in beside}
     return (attributes | methods) - plain - {getattr(one, "name", "") for one in tree.body}
 
 
 def _misspelt_members(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
     """Yield `rate.slep()` and `msg.Data`."""
     tree, lines = tree_of(text), text.split("\n")
-    kinds = {
-        ast.unparse(n.targets[0]): last_name(n.value.func)
-        for n in nodes_in(tree)
-        if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)
-    }
+    assigned = [n for n in nodes_in(tree) if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)]
+    kinds = {ast.unparse(n.targets[0]): last_name(getattr(n.value, "func", None)) for n in assigned}
     own = {one.name: _members_of(one) for one in tree.body if isinstance(one, ast.ClassDef) and not one.bases}
-    inside = {
-        id(n): name for one in tree.body if (name := getattr(one, "name", "")) in own for n in nodes_in(one)
-    }
+    named = [(one, getattr(one, "name", "")) for one in tree.body]
+    inside = {id(n): name for one, name in named if name in own for n in nodes_in(one)}
     stored = {n.attr for n in nodes_in(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
     fields_of = known.fields(tree)
     messages = _messages_of_callbacks(tree, fields_of)
@@ -201,11 +180,9 @@ def _misspelt_members(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
 
 def _members_of(one: ast.ClassDef) -> tuple[str, ...]:
     """Return what the objects of a class have."""
-    nodes = list(nodes_in(one))
+    nodes, assigned = nodes_in(one), [s for s in one.body if isinstance(s, ast.Assign)]
     stored = [n.attr for n in nodes if isinstance(n, ast.Attribute) and not isinstance(n.ctx, ast.Load)]
-    named = [
-        n.id for s in one.body for n in nodes_in(s) if isinstance(s, ast.Assign) and isinstance(n, ast.Name)
-    ]
+    named = [n.id for s in assigned for n in nodes_in(s) if isinstance(n, ast.Name)]
     return (*(s.name for s in one.body if isinstance(s, ast.FunctionDef)), *stored, *named)
 
 
@@ -218,9 +195,8 @@ def _messages_of_callbacks(
     members = {**{a.asname or a.name: MEMBERS["message"] for n in imports for a in n.names}, **fields}
     named: dict[str, Collection[str]] = {}
     for call in (n for n in nodes_in(tree) if isinstance(n, ast.Call) and len(n.args) > 1):
-        given = {str(k.arg): k.value for k in call.keywords} | dict(
-            zip(("name", "type", "callback"), call.args, strict=False)
-        )
+        given = {str(k.arg): k.value for k in call.keywords}
+        given |= dict(zip(("name", "type", "callback"), call.args, strict=False))
         kind, part = last_name(given["type"]), GIVES.get(last_name(call.func))
         callback = given.get("callback") or given.get("handler") or given.get("execute_cb")
         if part is not None and callback is not None:
@@ -243,10 +219,8 @@ def _misspelt_keywords(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
         for one in (k for k in call.keywords if keywords and k.arg and k.arg not in keywords):
             right, at = _near(str(one.arg), keywords), one.lineno - 1
             if right and at < len(lines) and (found := re.search(rf"\b{one.arg}(?=\s*=)", lines[at])):
-                yield (
-                    ((at, *found.span()), right),
-                    f"there is no argument `{one.arg}`: it is called `{right}`",
-                )
+                why = f"there is no argument `{one.arg}`: it is called `{right}`"
+                yield ((at, *found.span()), right), why
         compared = [n for n in call.args if isinstance(n, ast.Compare) and isinstance(n.ops[0], ast.Eq)]
         for left in (n.left for n in compared if last_name(n.left) in keywords):
             span = span_of(lines, left)
@@ -273,9 +247,8 @@ def _lost_values(text: str, _known: Known) -> Iterator[tuple[Edit, str]]:
             yield ((span[0], sign, sign + 2), "="), "a name gets its value by `=`, and not by `==`"
     for node in (n for n in nodes_in(tree) if isinstance(n, ast.AnnAssign) and n.value is None):
         span, kind = span_of(lines, node.target), node.annotation
-        is_value = isinstance(kind, ast.Call | ast.BinOp) or (
-            isinstance(kind, ast.Constant) and kind.value is not None
-        )
+        is_text = isinstance(kind, ast.Constant) and kind.value is not None
+        is_value = is_text or isinstance(kind, ast.Call | ast.BinOp)
         colon = lines[span[0]].find(":", span[2]) if span is not None else -1
         if is_value and span is not None and colon >= 0:
             yield ((span[0], colon, colon + 1), "="), "a name gets its value by `=`, and not by `:`"
@@ -285,11 +258,10 @@ def _lost_places(text: str, _known: Known) -> Iterator[tuple[Edit, str]]:
     """Yield `"hello world s" % x`, `"hello world %s" & x` and `"hello world %s" + x`."""
     tree, lines = tree_of(text), text.split("\n")
     calls = [n for n in nodes_in(tree) if isinstance(n, ast.Call) and len(n.args) > 1]
+    sums = [n for n in nodes_in(tree) if isinstance(n, ast.BinOp)]
     with_values = {id(n) for one in calls for n in nodes_in(one.args[0])}
-    with_values |= {
-        id(n.left) for n in nodes_in(tree) if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Mod)
-    }
-    for node in (n for n in nodes_in(tree) if isinstance(n, ast.BinOp)):
+    with_values |= {id(n.left) for n in sums if isinstance(n.op, ast.Mod)}
+    for node in sums:
         left, span = node.left, span_of(lines, node.left)
         if not isinstance(left, ast.Constant) or not isinstance(left.value, str) or span is None:
             continue
@@ -301,14 +273,10 @@ def _lost_places(text: str, _known: Known) -> Iterator[tuple[Edit, str]]:
         alone = re.fullmatch(r"[^%]*%s\W*", left.value)
         if added and alone and (at := lines[line].find("+", end)) >= 0:
             yield ((line, at, at + 1), "%"), "`%` belongs between a string and its values, and not `+`"
-        doubled = lines[line][start:end].replace("%%", "%")
-        if isinstance(node.op, ast.Mod) and re.fullmatch(r"[^%]*%%[sdf][^%]*", left.value):
-            yield (span, doubled), "`%%` is a plain `%`, and no place for a value"
-        if (
-            isinstance(node.op, ast.Mod)
-            and "%" not in left.value
-            and (right := with_place(lines[line][start:end]))
-        ):
+        source = lines[line][start:end] if isinstance(node.op, ast.Mod) else ""
+        if source and re.fullmatch(r"[^%]*%%[sdf][^%]*", left.value):
+            yield (span, source.replace("%%", "%")), "`%%` is a plain `%`, and no place for a value"
+        if source and "%" not in left.value and (right := with_place(source)):
             yield (span, right), "the string has no `%` in it"
 
 

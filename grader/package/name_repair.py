@@ -59,9 +59,8 @@ def with_self(text: str) -> Iterator[Step]:
         span = span_of(lines, first)  # type: ignore[arg-type] # an argument has a place too
         is_slip = is_one_edit(first.arg, "self") and "self" in used and first.arg not in used
         if is_slip and span is not None:
-            yield from step_to(
-                "argument", first.lineno, text, edited(text, [(*span, "self")]), OF_SELF % first.arg
-            )
+            after = edited(text, [(*span, "self")])
+            yield from step_to("argument", first.lineno, text, after, OF_SELF % first.arg)
             return
 
 
@@ -135,12 +134,8 @@ def with_names(text: str) -> Iterator[Step]:
     loaded = {n.id for n in nodes_in(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
     functions = {n.name for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)}
     unread = [one for one in tree.body if isinstance(one, ast.FunctionDef) and one.name not in loaded]
-    blocks = (
-        inner
-        for one in tree.body
-        if not isinstance(one, ast.Import | ast.ImportFrom)
-        for inner in (one.body if isinstance(one, ast.ClassDef) else [one])
-    )
+    parts = (one for one in tree.body if not isinstance(one, ast.Import | ast.ImportFrom))
+    blocks = (inner for one in parts for inner in (one.body if isinstance(one, ast.ClassDef) else [one]))
     for block in blocks:
         own = shared | (bound_in(ast.Module([block], [])) if isinstance(block, ast.FunctionDef) else set())
         missing = [n for n in nodes_in(block) if isinstance(n, ast.Name) and n.id not in known]
@@ -159,9 +154,8 @@ def with_names(text: str) -> Iterator[Step]:
             if meant and spans:
                 after = edited(text, [(*span, meant) for span in spans])
                 for step in step_to("name", spans[0][0] + 1, text, after, name):
-                    text, lines = step["text"], step["text"].split("\n")
                     yield step
-                    yield from with_names(text)
+                    yield from with_names(step["text"])
                     return
 
 

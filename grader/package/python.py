@@ -15,7 +15,7 @@ from pydantic import Field
 
 from grader.limited_child import ChildLimits, run_limited
 from grader.model.package import Fault
-from grader.model.python_slip import PythonSlip, SlipKind
+from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
 from grader.package.reading import printable
 from grader.syntax_fixes import (
@@ -44,21 +44,10 @@ _TYPOGRAPHIC = (
 )
 TEXT_CHARS_MAX = SOURCE_CHARS_MAX = 300
 _VAGUE = (
-    "multiple exception",
-    "expression cannot contain assignment",
-    "expected 'except'",
-    *(
-        "Function parameters cannot be parenthesized",
-        "Lambda expression parameters cannot",
-        "invalid syntax",
-        "expected ':'",
-        "invalid decimal",
-        "unexpected EOF",
-        "cannot assign",
-        "can't assign",
-    ),
-    "Did you mean to use 'from",
-)
+    "multiple exception", "expression cannot contain assignment", "expected 'except'",
+    "Function parameters cannot be parenthesized", "Lambda expression parameters cannot", "invalid syntax",
+    "expected ':'", "invalid decimal", "unexpected EOF", "cannot assign", "can't assign", "Did you mean to use 'from",
+)  # fmt: skip
 """Messages that say less than the line itself."""
 _EMPTY_BLOCK = re.compile(r"expected an indented block after .* on line (\d+)")
 _EXCEPT = re.compile(r"\s*(except|finally)\b")
@@ -172,18 +161,10 @@ class _RawFault(Record):
     mixed: bool = False
 
 
-class _RawSlip(Record):
-    line: int
-    kind: SlipKind
-    message: str
-    fix: str = ""
-    name: str = ""
-
-
 class _RawEntry(Record):
     file: str
     faults: tuple[_RawFault, ...]
-    slips: tuple[_RawSlip, ...]
+    slips: tuple[PythonSlip, ...]
 
 
 def read_syntax_report(output: bytes | str) -> SyntaxReport:
@@ -197,24 +178,18 @@ def read_syntax_report(output: bytes | str) -> SyntaxReport:
         checked.append(file)
         if entry.faults:
             faults[file] = _fault(file, entry.faults[0])
-        slips += [
-            PythonSlip(
-                file=file,
-                line=slip.line,
-                kind=slip.kind,
-                message=printable(slip.message),
-                fix=printable(slip.fix),
-                name=printable(slip.name),
-            )
-            for slip in entry.slips
-        ]
+        for slip in entry.slips:
+            words = {key: printable(getattr(slip, key)) for key in ("message", "fix", "name")}
+            slips.append(slip.model_copy(update={"file": file, **words}))
     return SyntaxReport(checked=tuple(checked), faults=faults, slips=tuple(slips))
 
 
 def _entry(line: bytes | str) -> _RawEntry | None:
     try:
-        return _RawEntry.model_validate(json.loads(line))
-    except (ValueError, RecursionError):
+        entry = json.loads(line)
+        slips = [{**slip, "file": ""} for slip in entry["slips"]]
+        return _RawEntry.model_validate({**entry, "slips": slips})
+    except (ValueError, TypeError, KeyError, RecursionError):
         return None
 
 
@@ -258,21 +233,19 @@ def check_syntax(folder: Path, paths: Sequence[str], *, timeout_s: float = 10.0)
         left = [path for path in left if printable(path) not in done]
         report = _join_reports(report, found)
         if left:
-            kind, message = (
-                ("NotChecked", "takes too long") if timed_out else ("PythonCrash", "crashes Python")
-            )
+            crashed = ("PythonCrash", "crashes Python")
+            kind, message = ("NotChecked", "takes too long") if timed_out else crashed
             report = _join_reports(report, _without_result([left.pop(0)], kind, message))
     return _join_reports(report, _without_result(left, "NotChecked", "was not reached in time"))
 
 
 def _run(folder: Path, paths: list[str], timeout_s: float) -> tuple[SyntaxReport, bool]:
-    limits = ChildLimits(
-        memory_bytes=MEMORY_BYTES,
-        cpu_s=CPU_S,
-        wall_s=timeout_s,
-        file_bytes=4 * REPORT_BYTES_MAX,
-        answer_bytes=REPORT_BYTES_MAX,
-    )
+    size = {
+        "memory_bytes": MEMORY_BYTES,
+        "file_bytes": 4 * REPORT_BYTES_MAX,
+        "answer_bytes": REPORT_BYTES_MAX,
+    }
+    limits = ChildLimits(cpu_s=CPU_S, wall_s=timeout_s, **size)
     answer = run_limited(CHECK, str(folder.absolute()), paths, limits=limits)
     return read_syntax_report(answer.lines), answer.timed_out
 
@@ -287,11 +260,8 @@ def _without_result(paths: Iterable[str], kind: str, message: str) -> SyntaxRepo
 
 
 def _join_reports(one: SyntaxReport, two: SyntaxReport) -> SyntaxReport:
-    return SyntaxReport(
-        checked=one.checked + two.checked,
-        faults={**one.faults, **two.faults},
-        slips=one.slips + two.slips,
-    )
+    faults = {**one.faults, **two.faults}
+    return SyntaxReport(checked=one.checked + two.checked, faults=faults, slips=one.slips + two.slips)
 
 
 def reason_of(
@@ -331,17 +301,15 @@ def _reason_of_block(message: str, text: str, *, mixed: bool) -> Reason | None:
         why = "tabs and spaces are mixed in the indentation of this file"
         return Reason(why, "use four spaces everywhere")
     if "unindent does not match" in message and (lone := _EXCEPT.match(text)):
-        return Reason(
-            f"there is no `try:` for this `{lone[1]}`", "write `try:` above the lines that it is for"
-        )
+        why = f"there is no `try:` for this `{lone[1]}`"
+        return Reason(why, "write `try:` above the lines that it is for")
     if message.startswith("f-string") and _SAME_QUOTES.search(text):
         why = "the quote inside the braces of this f-string ends it"
         return Reason(why, "write the other kind of quotes inside the braces")
     empty = _EMPTY_BLOCK.match(message)
     if empty and _EXCEPT.match(text):
-        return Reason(
-            f"there is nothing in the block on line {empty[1]}", f"below line {empty[1]}, write `pass`"
-        )
+        why = f"there is nothing in the block on line {empty[1]}"
+        return Reason(why, f"below line {empty[1]}, write `pass`")
     if empty and _NEXT_BLOCK.match(text) and "class" not in message:
         why = f"there are only comments in the block on line {empty[1]}"
         return Reason(why, f"below line {empty[1]}, write what it should do")
@@ -363,20 +331,14 @@ def _character(message: str, text: str) -> Reason:
     named = re.search(r"U\+([0-9A-Fa-f]{4,6})", message)
     if named and int(named[1], 16) <= sys.maxunicode:
         return _character_words(chr(int(named[1], 16)))
-    strange = sorted(_strange(text), key=lambda c: c.isprintable() and not _is_typographic(c))
-    return (
-        _character_words(strange[0])
-        if strange
-        else Reason("this line holds a character that Python does not know")
-    )
+    typographic = "".join(group for group, _, _ in _TYPOGRAPHIC)
+    strange = sorted(_strange(text), key=lambda c: c.isprintable() and c not in typographic)
+    unknown = Reason("this line holds a character that Python does not know")
+    return _character_words(strange[0]) if strange else unknown
 
 
 def _strange(text: str) -> list[str]:
     return [c for c in text if ord(c) > 127 and not c.isidentifier() and not unicodedata.combining(c)]
-
-
-def _is_typographic(char: str) -> bool:
-    return any(char in group for group, _, _ in _TYPOGRAPHIC)
 
 
 def _character_words(char: str) -> Reason:

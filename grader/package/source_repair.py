@@ -68,10 +68,8 @@ ROLES = {
     **dict.fromkeys(("Service", "SimpleActionServer", "ActionServer"), "server"),
     **dict.fromkeys(("ServiceProxy", "wait_for_service", "SimpleActionClient", "ActionClient"), "client"),
     "init_node": "node",
-    "get_param": "param",
-    "has_param": "param",
-    "set_param": "set-param",
-    "delete_param": "set-param",
+    **dict.fromkeys(("get_param", "has_param"), "param"),
+    **dict.fromkeys(("set_param", "delete_param"), "set-param"),
 }
 
 
@@ -146,11 +144,8 @@ def _without_old_print(text: str) -> Iterator[Step]:
     for node in nodes_in(tree_of(text)):
         value = node.value if isinstance(node, ast.Expr) else None
         first = value.elts[0] if isinstance(value, ast.Tuple) and value.elts else value
-        if (
-            isinstance(first, ast.BinOp)
-            and isinstance(first.op, ast.RShift)
-            and last_name(first.left) == "print"
-        ):
+        shifts = isinstance(first, ast.BinOp) and isinstance(first.op, ast.RShift)
+        if first is not None and shifts and last_name(getattr(first, "left", None)) == "print":
             for after in as_python3(text.split("\n"), first.lineno - 1):
                 for step in step_to("old-name", first.lineno, text, after, "print >>"):
                     text = step["text"]
@@ -171,12 +166,10 @@ def _with_quotes(text: str) -> Iterator[Step]:
     missing = [n for n in texts if n.id not in known and not meant_by(n.id, set(stored))]
     assigned = [n for n in nodes_in(tree) if isinstance(n, ast.Assign)]
     own = {id(inner): last_name(n.targets[0]) for n in assigned for inner in nodes_in(n.value)}
-    keys = [
-        n
-        for n in _keys_of_parameters(tree)
-        if n.id not in known or (stored.get(n.id) == [n.lineno] and own.get(id(n)) == n.id)
-    ]
-    spans = [(span, n.id) for n in (*missing, *keys) if (span := span_of(lines, n))]
+    keys = list(_keys_of_parameters(tree))
+    own_keys = {id(n) for n in keys if stored.get(n.id) == [n.lineno] and own.get(id(n)) == n.id}
+    unknown = [*missing, *(n for n in keys if n.id not in known or id(n) in own_keys)]
+    spans = [(span, n.id) for n in unknown if (span := span_of(lines, n))]
     if spans:
         after = edited(text, [(*span, f"'{name}'") for span, name in spans])
         words = ", ".join(dict.fromkeys(name for _, name in sorted(spans)))
@@ -195,13 +188,10 @@ def _texts_of_ros(tree: ast.Module) -> Iterator[ast.expr]:
 
 def _keys_of_parameters(tree: ast.Module) -> Iterator[ast.Name]:
     """Yield the names in the brackets behind what `get_param(…)` gives."""
-    read = {
-        ast.unparse(n.targets[0])
-        for n in nodes_in(tree)
-        if isinstance(n, ast.Assign)
-        and isinstance(n.value, ast.Call)
-        and last_name(n.value.func) == "get_param"
-    }
+    given = [
+        (n.targets[0], getattr(n.value, "func", None)) for n in nodes_in(tree) if isinstance(n, ast.Assign)
+    ]
+    read = {ast.unparse(target) for target, function in given if last_name(function) == "get_param"}
     for node in nodes_in(tree):
         root: ast.expr | None = node if isinstance(node, ast.Subscript) else None
         while isinstance(root, ast.Subscript):
@@ -220,10 +210,8 @@ def _with_attributes(text: str) -> Iterator[Step]:
         plain = {name.lower(): name for name in ROSPY}
         if isinstance(node.ctx, ast.Store):
             continue  # a value is given to it: `rospy.rate = 10`
-        near = [
-            *get_close_matches(node.attr, ROSPY, 1, 0.85),
-            *(one for one in ROSPY if is_one_edit(node.attr, one)),
-        ]
+        near = get_close_matches(node.attr, ROSPY, 1, 0.85)
+        near += [one for one in ROSPY if is_one_edit(node.attr, one)]
         meant = plain.get(node.attr.lower()) or next(iter(near), "")
         span = span_of(lines, node)
         if meant and span is not None and not node.attr.startswith("_"):
@@ -239,10 +227,7 @@ def _with_start(text: str) -> Iterator[Step]:
     node or calls a function there, the line that begins the script's own part."""
     tree, lines = tree_of(text), text.split("\n")
     functions = [n for n in tree.body if isinstance(n, ast.FunctionDef)]
-    plain = (ast.FunctionDef, ast.ClassDef, ast.Import, ast.ImportFrom)
-    started = any(
-        isinstance(n, ast.Call) for one in tree.body if not isinstance(one, plain) for n in nodes_in(one)
-    )
+    started = any(isinstance(n, ast.Call) for one in _runs(tree) for n in nodes_in(one))
     for function in functions:
         for before, after in pairwise(function.body):
             if after.lineno - (before.end_lineno or after.lineno) <= BLANK_LINES:
@@ -256,6 +241,12 @@ def _with_start(text: str) -> Iterator[Step]:
             if line and syntax_error(changed) is None:
                 yield from step_to("start", after.lineno, text, changed, function.name)
                 return
+
+
+def _runs(tree: ast.Module) -> Iterator[ast.stmt]:
+    """Yield the statements of a script that do more than to define or import names."""
+    plain = ast.FunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom
+    return (one for one in tree.body if not isinstance(one, plain))
 
 
 BLANK_LINES = 2
@@ -291,31 +282,20 @@ def _with_main(text: str) -> Iterator[Step]:
     tree, lines = tree_of(text), text.split("\n")
     for node in nodes_in(tree):
         if isinstance(node, ast.Compare) and isinstance(node.left, ast.Name) and node.left.id == "__name__":
-            word, span = node.comparators[0], span_of(lines, node.comparators[0])
-            if (
-                isinstance(word, ast.Constant)
-                and (
-                    str(word.value).strip("_ ").lower() == "main" or is_one_edit(str(word.value), "__main__")
-                )
-                and span
-            ):
-                if word.value != "__main__":
-                    after = edited(text, [(*span, "'__main__'")])
-                    yield from step_to("guard", node.lineno, text, after, str(word.value))
+            value, span = node.comparators[0], span_of(lines, node.comparators[0])
+            word = str(value.value) if isinstance(value, ast.Constant) else ""
+            if span and (word.strip("_ ").lower() == "main" or is_one_edit(word, "__main__")):
+                if word != "__main__":
+                    yield from step_to(
+                        "guard", node.lineno, text, edited(text, [(*span, "'__main__'")]), word
+                    )
                 return
-    runs = (
-        s
-        for s in tree.body
-        if not isinstance(s, ast.FunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom)
-    )
-    if any(isinstance(n, ast.Call) for s in runs for n in nodes_in(s)):
+    if any(isinstance(n, ast.Call) for one in _runs(tree) for n in nodes_in(one)):
         return
+    functions = [f for f in tree.body if isinstance(f, ast.FunctionDef)]
+    functions = [f for f in functions if len(f.args.args) == len(f.args.defaults)]
     makers = [
-        f
-        for f in tree.body
-        if isinstance(f, ast.FunctionDef)
-        and len(f.args.args) == len(f.args.defaults)
-        and any(isinstance(n, ast.Call) and last_name(n.func) == "init_node" for n in nodes_in(f))
+        f for f in functions if any(last_name(getattr(n, "func", None)) == "init_node" for n in nodes_in(f))
     ]
     named = {n.id for n in nodes_in(tree) if isinstance(n, ast.Name)}
     if len(makers) == 1 and makers[0].name not in named:
@@ -397,12 +377,8 @@ def with_sign_turned(text: str, side: str) -> Iterator[Step]:
 def _turns(tree: ast.Module) -> list[ast.expr]:
     """Return what `angular.z` is set to; where that is a variable, what it is set to; where only its bounds are kept,
     nothing."""
-    bounded = {
-        id(inner)
-        for n in nodes_in(tree)
-        if isinstance(n, ast.If) and ".angular.z" in ast.unparse(n.test)
-        for inner in nodes_in(n)
-    }
+    asking = [n for n in nodes_in(tree) if isinstance(n, ast.If) and ".angular.z" in ast.unparse(n.test)]
+    bounded = {id(inner) for n in asking for inner in nodes_in(n)}
     found: list[ast.expr] = []
     for node in nodes_in(tree):
         target = node.targets[0] if isinstance(node, ast.Assign) else None
@@ -426,11 +402,8 @@ def _sign(value: ast.expr) -> float | None:
         return None if left is None or right is None else left * right
     if last_name(value) == "pi":
         return 1.0
-    return (
-        float(value.value)
-        if isinstance(value, ast.Constant) and isinstance(value.value, int | float)
-        else None
-    )
+    number = value.value if isinstance(value, ast.Constant) else None
+    return float(number) if isinstance(number, int | float) else None
 
 
 def _other_sign(value: ast.expr, text: str) -> str:
@@ -493,11 +466,10 @@ def _named_texts(tree: ast.Module) -> Iterator[tuple[str, ast.expr]]:
 def _constants(tree: ast.Module) -> dict[str, ast.expr]:
     """Names that are given one value, once, in the whole file."""
     found: dict[str, list[ast.expr]] = {}
-    for node in nodes_in(tree):
-        if isinstance(node, ast.Assign):
-            for target in node.targets:
-                if isinstance(target, ast.Name):
-                    found.setdefault(target.id, []).append(node.value)
+    assigned = (n for n in nodes_in(tree) if isinstance(n, ast.Assign))
+    for target, value in ((target, n.value) for n in assigned for target in n.targets):
+        if isinstance(target, ast.Name):
+            found.setdefault(target.id, []).append(value)
     return {name: values[0] for name, values in found.items() if len(values) == 1}
 
 

@@ -149,9 +149,8 @@ def line_of(element: etree._Element) -> int | None:
 def _fault(error: etree.XMLSyntaxError, parser: etree.XMLParser, data: bytes, file: str, root: str) -> Fault:
     line, column = error.position
     said = (error.msg or "not well-formed").strip()
-    message = re.sub(
-        r", line \d+, column \d+$", "", said[:_MESSAGE_CHARS_MAX] + said[_MESSAGE_CHARS_MAX:][-40:]
-    ).strip()
+    short = said[:_MESSAGE_CHARS_MAX] + said[_MESSAGE_CHARS_MAX:][-40:]
+    message = re.sub(r", line \d+, column \d+$", "", short).strip()
     text = _line(data, line)
     of_root = _never_opened(message, data, root)
     slip = None if of_root else find_slip(data.decode("utf-8", "replace"), root)
@@ -203,10 +202,8 @@ def first_tag(text: str, root: str) -> int | None:
 
 
 def _line(data: bytes, number: int) -> str:
-    lines = data.split(b"\n")
-    return (
-        lines[number - 1][:_MESSAGE_CHARS_MAX].decode("utf-8", "replace") if 0 < number <= len(lines) else ""
-    )
+    line = b"".join(data.split(b"\n")[max(0, number - 1) : max(0, number)])
+    return line[:_MESSAGE_CHARS_MAX].decode("utf-8", "replace")
 
 
 _JOINED = re.compile(r"(node|param|rosparam|arg|remap|include|group)[-_.]?(pkg|type|name|file|from|ns|value)")
@@ -239,13 +236,10 @@ def _explain(message: str, log: list[str], line: str, *, root: str) -> tuple[Rea
 
 
 def _mismatch(opened: str, line: int, closed: str, root: str) -> tuple[Reason, int | None]:
-    tag = f"`<{opened}>` on line {line}"
-    if opened.lower() == closed.lower():
-        return Reason(
-            f"{tag} is closed by `</{closed}>`, with other capital letters", f"write `</{opened}>`"
-        ), None
-    if get_close_matches(closed, [opened], cutoff=0.7):
-        return Reason(f"{tag} is closed by `</{closed}>`", f"write `</{opened}>`"), None
+    tag, capitals = f"`<{opened}>` on line {line}", opened.lower() == closed.lower()
+    if capitals or get_close_matches(closed, [opened], cutoff=0.7):
+        other = ", with other capital letters" if capitals else ""
+        return Reason(f"{tag} is closed by `</{closed}>`{other}", f"write `</{opened}>`"), None
     if opened == root:
         why = f"`</{closed}>` closes nothing, since only {tag} is open here"
         return Reason(why, f"delete `</{closed}>`"), None
@@ -314,11 +308,9 @@ def _slips_near(at: int, message: str, text: str, root: str) -> Iterator[LineSli
     lines = text.split("\n")
     mismatch = re.search(_MISMATCH, message)
     opened, closed = (mismatch[1], mismatch[3]) if mismatch else ("", "")
-    begun = re.compile(
-        rf"\s*[^\w\s<]?(?:{re.escape(closed)}\b[^<]*|/{re.escape(opened)}\s*)>" if mismatch else r"(?!)"
-    )
+    begun = re.compile(rf"\s*[^\w\s<]?(?:{re.escape(closed)}\b[^<]*|/{re.escape(opened)}\s*)>")
     told = [at, *map(int, re.findall(r"line (\d+)", message))]
-    told += [n for n, line in enumerate(lines, 1) if begun.match(line)]
+    told += [n for n, line in enumerate(lines, 1) if mismatch and begun.match(line)]
     if re.search("omment|hyphen|'--'", message):
         told += [n for n, line in enumerate(lines, 1) if "<!--" in line and "-->" not in line]
     named = [number for number in told if 0 < number <= len(lines)]
@@ -343,12 +335,8 @@ def _declarations(lines: list[str], root: str) -> Iterator[LineSlip]:
     at = next((n for n, line in enumerate(lines) if n and line.lstrip().startswith("<?xml")), 0)
     if at and any(lines[:at]):
         moved = "\n".join([lines[at].lstrip(), *lines[:at], *lines[at + 1 :]])
-        yield LineSlip(
-            "`<?xml … ?>` stands below another line",
-            at + 1,
-            f"make line {at + 1} the first line of the file",
-            moved,
-        )
+        why, fix = "`<?xml … ?>` stands below another line", f"make line {at + 1} the first line of the file"
+        yield LineSlip(why, at + 1, fix, moved)
     if re.search(r"xml|version|1\.0", lines[0]) and f"<{root}" not in lines[0]:
         whole = "\n".join([DECLARATION, *lines[1:]])
         yield LineSlip("the first line has a slip", 1, f"write `{DECLARATION}`", whole)
@@ -361,12 +349,10 @@ def _strange_things(root: etree._Element, name: str) -> int:
     inner = [e for e in root.iter(etree.Element) if name == "launch" or e in (root, *root)]
     for element in inner:
         tag = str(element.tag)
-        known = ATTRIBUTES.get(name, {}).get(tag)
+        known = ATTRIBUTES.get(name, {}).get(tag, ())
         strange += (tag not in TAGS[name] if name in TAGS else 0) or (tag == name and element is not root)
-        strange += sum(one not in known for one in element.attrib) if known else 0
-        strange += (
-            sum(bool(re.search("[\"'<>]", str(value))) for value in element.attrib.values()) if known else 0
-        )
+        for one, value in element.attrib.items() if known else ():
+            strange += (one not in known) + bool(re.search("[\"'<>]", str(value)))
         holds_tags = element is root or (name == "launch" and tag not in _OF_TEXT)
         texts = [element.text or "", *(child.tail or "" for child in element)]
         strange += sum(bool(one.strip()) if holds_tags else ">" in one for one in texts)

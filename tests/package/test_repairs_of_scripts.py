@@ -66,6 +66,10 @@ CASES = {
         ["python-syntax"], "for the first one, delete lines 10 and 12 to 16",
         after={TALKER: "is_shutdown():\n\n        publisher.publish(1)\n\n\n\n\n\n        rate"},
     ),
+    "member-beside-an-empty-tuple": Case(
+        swapped(TALKER, ("\ndef main", "NOTHING = ()\n\ndef main"), ("rate.sleep()", "rate.slep()")),
+        ["missing-call"], "`slep` is called `sleep`",
+    ),
     "field-of-an-own-message": Case(
         OWN_POINT | swapped(TALKER, ("\ndef main", "from lab.msg import Point\nPoint().x = 1\n\ndef main")),
         [*3 * ["build-line"], "missing-call"], "`x` is called `X`",

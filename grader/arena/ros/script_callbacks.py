@@ -7,7 +7,21 @@ Nothing is executed. Python 3.8, standard library only.
 import ast
 import itertools
 
-from script_names import argument, called_name, calls_in, dotted, functions_in, is_call, slip, text_of, walk
+from script_names import (
+    all_of,
+    argument,
+    callback_of,
+    called_name,
+    calls_in,
+    dotted,
+    functions_in,
+    is_call,
+    listed,
+    names_in,
+    slip,
+    text_of,
+    walk,
+)
 
 CALLBACKS = {
     "Subscriber": ("callback", 2, 1),
@@ -20,6 +34,7 @@ CALLBACKS = {
 """What takes a function: the argument's name, its place, and with how many values ROS calls it."""
 VALUES = {"Service": "request", "SimpleActionServer": "goal", "Timer": "event"}
 """What ROS passes to the function, where that is no message."""
+OTHER_VALUES = {"on_shutdown": "nothing", "signal": "the signal's number and a frame"}
 
 
 def callbacks(tree):
@@ -36,21 +51,17 @@ def callbacks(tree):
             continue
         keyword, place, values = CALLBACKS[name]
         given = argument(node, place, keyword)
-        if (
-            not given
-            and dotted(node.func) == "rospy.Subscriber"
-            and len(node.args) == place
-            and all(k.arg for k in node.keywords)
-        ):
+        lacks_one = not given and len(node.args) == place and all(k.arg for k in node.keywords)
+        if lacks_one and dotted(node.func) == "rospy.Subscriber":
             fix = "write the function's name as its third value"
-            yield slip(node.lineno, "callback-missing", "`Subscriber(…)` gets no callback", fix=fix)
+            yield slip(node.lineno, "callback-missing", "`Subscriber(…)` gets no callback", fix)
         handed = argument(node, place + 1, "callback_args") if name == "Subscriber" else []
         values += any(getattr(one, "value", "") is not None for one in handed)
         for one in given[:1]:
             text = text_of(one)
             if text.isidentifier():
                 message, fix = "'%s' is a string, not a function" % text, "write `%s`, without quotes" % text
-                yield slip(one.lineno, "callback-called", message, fix=fix, name=text)
+                yield slip(one.lineno, "callback-called", message, fix, text)
             called = isinstance(one, ast.Call)
             meant = one.func if called else one
             own = functions.get(dotted(meant).rpartition(".")[2])
@@ -58,17 +69,14 @@ def callbacks(tree):
             if own and called and (least or not gives_value(own)):
                 message, fix = "`%s()` is called here", "write `%s`, without brackets"
                 name = dotted(meant)
-                yield slip(one.lineno, "callback-called", message % name, fix=fix % name, name=name)
+                yield slip(one.lineno, "callback-called", message % name, fix % name, name)
             elif own and not called and not least <= values <= most:
-                what = {
-                    "on_shutdown": "nothing",
-                    "signal": "the signal's number and a frame",
-                }.get(name, "the %s" % VALUES.get(name, "message"))
+                what = OTHER_VALUES.get(name, "the %s" % VALUES.get(name, "message"))
                 what += " and its `callback_args`" if name == "Subscriber" and values > 1 else ""
                 message, fix = wrong_callback(own, node, functions, isinstance(meant, ast.Attribute), values)
                 number = "1 argument" if least == 1 else "%d arguments" % least
                 message = message or "`%s` takes %s, but ROS passes it %s" % (own.name, number, what)
-                yield slip(own.lineno, "callback-values", message, fix=fix, name=own.name)
+                yield slip(own.lineno, "callback-values", message, fix, own.name)
 
 
 SETS_UP = ("init_node", "Publisher", "Subscriber", "spin")
@@ -76,7 +84,7 @@ SETS_UP = ("init_node", "Publisher", "Subscriber", "spin")
 
 def own_callbacks(tree, functions):
     """Calls, without a message, of a function that sets the node up and is the callback of its own Subscriber."""
-    bare = [n for n in walk(tree) if isinstance(n, ast.Call) and not n.args and not n.keywords]
+    bare = [n for n in all_of(tree, ast.Call) if not n.args and not n.keywords]
     calls = {called_name(n): n.lineno for n in reversed(bare)}
     for name, own in functions.items():
         if name not in calls or takes(own, False) != (1, 1):
@@ -84,30 +92,27 @@ def own_callbacks(tree, functions):
         given = [one for call in calls_in(own, "Subscriber") for one in argument(call, 2, "callback")]
         if name not in map(dotted, given):
             continue
-        *others, last = sorted({one.lineno for one in calls_in(own, *SETS_UP)})
-        where = "lines %s and %d" % (", ".join(map(str, others)), last) if others else "line %d" % last
+        where = listed(sorted({one.lineno for one in calls_in(own, *SETS_UP)}))
         message = "`%s` sets the node up, and is also the callback, which ROS gives each message" % name
         fix = "move %s out of `%s`, to where line %d is, in its place" % (where, name, calls[name])
         fix += "" if calls_in(tree, "spin") else ", with `rospy.spin()` below"
         if all(isinstance(one, (ast.Expr, ast.Assign)) and calls_in(one, *SETS_UP) for one in own.body):
             fix += "; in `%s`, write what to do with each message" % name
-        yield slip(calls[name], "callback-called", message, fix=fix, name=name)
+        yield slip(calls[name], "callback-called", message, fix, name)
 
 
 def spare_callbacks(tree, functions):
     """The only function that reads a message and that nothing names, in a script without a Subscriber."""
     if calls_in(tree, "Subscriber"):
         return
-    read = {n.id for n in walk(tree) if isinstance(n, ast.Name)} | {
-        getattr(n, "attr", "") for n in walk(tree)
-    }
-    data = {dotted(n.value) for n in walk(tree) if isinstance(n, ast.Attribute) and n.attr == "data"}
+    read = {getattr(n, "attr", getattr(n, "id", "")) for n in walk(tree)}
+    data = {dotted(n.value) for n in all_of(tree, ast.Attribute) if n.attr == "data"}
     spare = [f for name, f in functions.items() if name not in read and takes(f, "self" in read) == (1, 1)]
     spare = [f for f in spare if [a for a in f.args.args[-1:] if a.arg in data]]
     if len(spare) == 1:
         name = ("self." if len(spare[0].args.args) > 1 else "") + spare[0].name
         message, fix = "no Subscriber is given `%s`" % name, "pass it: `rospy.Subscriber(…, %s)`" % name
-        yield slip(spare[0].lineno, "callback-missing", message, fix=fix, name=name)
+        yield slip(spare[0].lineno, "callback-missing", message, fix, name)
 
 
 def wrong_callback(own, call, functions, bound, values):
@@ -157,15 +162,12 @@ def ending_callbacks(tree):
     """Callbacks of topics that end the node at the first message."""
     functions = functions_in(tree)
     for node in walk(tree):
-        given = argument(node, 2, "callback") if called_name(node) == "Subscriber" else []
-        own = functions.get(dotted(given[0]).rpartition(".")[2]) if given else None
+        own = callback_of(node, functions)
         for one in own.body if own is not None else ():
             if isinstance(one, ast.Expr) and called_name(one.value) in ENDING:
-                message = "the callback `%s` ends the node on line %d, at the first message" % (
-                    own.name,
-                    one.lineno,
-                )
-                yield slip(one.lineno, "loop-left", message, fix="delete line %d" % one.lineno)
+                message = "the callback `%s` ends the node on line %d, at the first message"
+                message %= (own.name, one.lineno)
+                yield slip(one.lineno, "loop-left", message, "delete line %d" % one.lineno)
 
 
 # ---- what a topic's callback prints of its message
@@ -198,13 +200,7 @@ def unprinted_messages(tree):
     level = any(k.arg == "log_level" for n in walk(tree) if is_call(n, "init_node") for k in n.keywords)
     for node in walk(tree):
         given = argument(node, 2, "callback") if called_name(node) == "Subscriber" else []
-        if not given:
-            continue
-        own = (
-            given[0]
-            if isinstance(given[0], ast.Lambda)
-            else functions.get(dotted(given[0]).rpartition(".")[2])
-        )
+        own = given[0] if given and isinstance(given[0], ast.Lambda) else callback_of(node, functions)
         taken = [one.arg for one in own.args.args if one.arg != "self"] if own is not None else []
         if not taken:
             continue
@@ -214,7 +210,7 @@ def unprinted_messages(tree):
         found = callback.found(tree, level)
         if found:
             line, kind, message, fix = found
-            yield slip(line, kind, message, fix=fix, name=text_of(topics[0]) if topics else "")
+            yield slip(line, kind, message, fix, text_of(topics[0]) if topics else "")
 
 
 def stored_and_printed(function):
@@ -222,10 +218,6 @@ def stored_and_printed(function):
     lines = (n for n in ast.walk(function) if isinstance(n, ast.Assign) or is_print(n))
     for n in itertools.islice(lines, LINES_LIMIT):
         yield n, names_in(n)
-
-
-def names_in(node):
-    return {dotted(one) for one in ast.walk(node) if isinstance(one, (ast.Name, ast.Attribute))}
 
 
 class Printing:
@@ -304,7 +296,7 @@ class Printing:
     def kept(self, tree):
         """What the callback keeps, and a loop elsewhere prints: what the variable holds by then."""
         if not hasattr(tree, "prints_of_loops"):  # each callback asks for them
-            loops = [one for one in walk(tree) if isinstance(one, ast.While)]
+            loops = all_of(tree, ast.While)
             calls = {id(call): call for loop in loops for call in filter(is_print, ast.walk(loop))}
             tree.prints_of_loops = [(call, names_in(call)) for call in calls.values()]
         for call, names in tree.prints_of_loops:
@@ -320,10 +312,10 @@ class Printing:
     def kept_for_another(self, tree):
         """What the callback keeps, and the callback of another topic prints, with what comes there."""
         if not hasattr(tree, "all_callbacks"):  # each callback asks for them
-            taken = [argument(n, 2, "callback") for n in walk(tree) if called_name(n) == "Subscriber"]
-            names = dict.fromkeys(dotted(one).rpartition(".")[2] for given in taken for one in given)
-            found = [self.functions[name] for name in names if name in self.functions][:OTHERS_LIMIT]
-            tree.all_callbacks = [(one, list(stored_and_printed(one))) for one in found]
+            found = dict.fromkeys(callback_of(n, self.functions) for n in walk(tree))
+            found.pop(None, None)
+            others = list(found)[:OTHERS_LIMIT]
+            tree.all_callbacks = [(one, list(stored_and_printed(one))) for one in others]
         for other, told in tree.all_callbacks:
             held = set(self.shared)
             for n, names in told if other is not self.own else ():
@@ -342,13 +334,8 @@ class Printing:
             return None
         if debug:
             line, name = debug[0].lineno, called_name(debug[0])
-            fix = "on line %d, write `rospy.loginfo`" % line
-            return (
-                line,
-                "not-printed",
-                "`%s` on line %d shows nothing: rospy shows `loginfo` and above" % (name, line),
-                fix,
-            )
+            message = "`%s` on line %d shows nothing: rospy shows `loginfo` and above" % (name, line)
+            return line, "not-printed", message, "on line %d, write `rospy.loginfo`" % line
         line = self.own.lineno
         fix = "print in it what it hears: `rospy.loginfo(%s)`" % self.value
         return line, "not-printed", "%s on line %d prints nothing" % (self.name, line), fix
@@ -369,13 +356,8 @@ class Printing:
             message = "no `print` or `log` in %s has the message's value in it" % self.name
             return line, kind, message, "print `%s` on the first line of %s" % (self.value, self.name)
         if late:
-            since = self.known[late[0]][0][0]
-            message = "line %d prints `%s`, which gets the message's value only on line %d" % (
-                line,
-                late[0],
-                since,
-            )
-            return line, "printed-in-part", message, fix
+            message = "line %d prints `%s`, which gets the message's value only on line %d"
+            return line, "printed-in-part", message % (line, late[0], self.known[late[0]][0][0]), fix
         if len(set(names)) == 1:
             return line, kind, "line %d prints `%s`, and not the message's value" % (line, names[0]), fix
         return line, kind, "what line %d prints has nothing of the message in it" % line, fix
@@ -393,10 +375,8 @@ class Printing:
             return (why.lineno, kind, *under_condition(why, often))
         if why == ALWAYS and all(self.holds(one)[1] for n in often for one in n.args if self.holds(one)[0]):
             line = often[0].lineno
-            message = (
-                "line %d prints something that is made of the message's value, not the value itself" % line
-            )
-            return line, kind, message, "on line %d, print `%s` as it is" % (line, self.value)
+            message = "line %d prints something that is made of the message's value, not the value itself"
+            return line, kind, message % line, "on line %d, print `%s` as it is" % (line, self.value)
         return None
 
     def whether(self, body, after=NEVER):
@@ -443,9 +423,7 @@ def is_print(node):
     """Whether it is a call that prints on the terminal."""
     if not isinstance(node, ast.Call):
         return False
-    into = [
-        k for k in node.keywords if k.arg == "file" and dotted(k.value) not in ("sys.stdout", "sys.stderr")
-    ]
+    into = {dotted(k.value) for k in node.keywords if k.arg == "file"} - {"sys.stdout", "sys.stderr"}
     return (called_name(node) == "print" and not into) or is_log(node) or dotted(node.func) in STREAMS
 
 

@@ -8,7 +8,20 @@ import ast
 import builtins
 
 from script_loops import turns
-from script_names import called_name, calls_in, dotted, functions_in, is_call, slip, text_of, walk
+from script_names import (
+    LOOPS,
+    all_of,
+    called_name,
+    calls_in,
+    dotted,
+    functions_in,
+    is_call,
+    lines_from,
+    names_in,
+    slip,
+    text_of,
+    walk,
+)
 
 CLOCKS = {
     "get_time", "get_rostime", "now", "time", "time_ns", "monotonic", "monotonic_ns", "perf_counter",
@@ -39,9 +52,7 @@ def resets(tree):
     """Where a counter goes back: the number that it is set to in an `if` that asks for it, and the number in that `if`,
     or behind a `%`, or in the `range(…)` of a loop that publishes.
     """
-    added = {
-        id(n.right): n.left for n in walk(tree) if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Add)
-    }
+    added = {id(n.right): n.left for n in all_of(tree, ast.BinOp) if isinstance(n.op, ast.Add)}
     yield from limits_of_ranges(tree)
     for node in walk(tree):
         value, done, asked, fix = None, (), [], ""
@@ -62,14 +73,14 @@ def resets(tree):
             asked = test if value is not None else []
         for part in asked:
             if whole(part) is not None:
-                yield slip(part.lineno, "reset-limit", "%d" % whole(part), fix=fix)
+                yield slip(part.lineno, "reset-limit", "%d" % whole(part), fix)
         if value is not None:
             yield slip(value.lineno, "reset-value", "%d" % whole(value))
 
 
 def limits_of_ranges(tree):
-    for node in walk(tree):
-        ranged = isinstance(node, ast.For) and called_name(node.iter) == "range" and calls_in(node, "publish")
+    for node in all_of(tree, ast.For):
+        ranged = called_name(node.iter) == "range" and calls_in(node, "publish")
         limit = whole((node.iter.args[:2] or [None])[-1]) if ranged else None
         if limit is not None:
             yield slip(node.lineno, "reset-limit", "%d" % limit, name="range")
@@ -102,9 +113,8 @@ def counter_slips(tree):
     not count: `n =+ 1`, or the line below the loop.
     """
     yield from uncounted(tree)
-    for loop in walk(tree):
-        body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
-        inside = [n for one in body for n in ast.walk(one)]
+    for loop in all_of(tree, *LOOPS):
+        body, inside = loop.body, [n for one in loop.body for n in ast.walk(one)]
         sent = [i for i, one in enumerate(body) if calls_in(one, "publish")]
         added = {dotted(t): n for n in inside for t in increments(n)} if sent else {}
         for name, node in added.items():
@@ -115,7 +125,7 @@ def counter_slips(tree):
                 one = body[set_at[0]]
                 message = "this sets `%s` again each time around the loop" % name
                 fix = "move line %d above the loop on line %d" % (one.lineno, loop.lineno)
-                yield slip(one.lineno, "set-in-loop", message, fix=fix, name=name)
+                yield slip(one.lineno, "set-in-loop", message, fix, name)
             elif reset_at and node in body:
                 first = next((i for i in sent if name in names_in(body[i])), sent[0])
                 turn = [(i - first) % len(body) for i in (reset_at[0], body.index(node))]
@@ -123,7 +133,7 @@ def counter_slips(tree):
                     line = body[reset_at[0]].lineno
                     message = "line %d adds one after the counter was reset, so what follows a reset is one too high"
                     fix = "move line %d above the `if` on line %d" % (node.lineno, line)
-                    yield slip(line, "reset-early", message % node.lineno, fix=fix, name=name)
+                    yield slip(line, "reset-early", message % node.lineno, fix, name)
 
 
 def reset_the_wrong_way(ifs, name):
@@ -132,32 +142,26 @@ def reset_the_wrong_way(ifs, name):
         inverted = isinstance(one.test, ast.UnaryOp) and isinstance(one.test.op, ast.Not)
         test = one.test.operand if inverted else one.test
         below = (ast.Gt, ast.GtE) if inverted else (ast.Lt, ast.LtE)
-        if (
-            not isinstance(test, ast.Compare)
-            or not isinstance(test.ops[0], below)
-            or dotted(test.left) != name
-        ):
-            continue
-        limit, resets_to = (
-            whole(test.comparators[0]),
-            [whole(n.value) for n in one.body if isinstance(n, ast.Assign) and dotted(n.targets[0]) == name],
+        compares = (
+            isinstance(test, ast.Compare) and isinstance(test.ops[0], below) and dotted(test.left) == name
         )
-        if limit is not None and any(value is not None and value < limit for value in resets_to):
+        limit = whole(test.comparators[0]) if compares else None
+        given = [n for n in one.body if isinstance(n, ast.Assign) and dotted(n.targets[0]) == name]
+        resets_to = [value for value in (whole(n.value) for n in given) if value is not None]
+        if limit is not None and resets_to and min(resets_to) < limit:
             message = "the `if` on line %d resets `%s` while it is below %d" % (one.lineno, name, limit)
             fix = "delete the `not` on line %d" if inverted else "on line %d, write `>` in the condition"
-            yield slip(one.lineno, "set-in-loop", message, fix=fix % one.lineno, name=name)
+            yield slip(one.lineno, "set-in-loop", message, fix % one.lineno, name)
 
 
 def counter_starts(tree):
     """Where a counter gets its first number, and where a loop adds one before it publishes: no slips."""
-    loops = [n for n in walk(tree) if isinstance(n, (ast.While, ast.For))]
+    loops = all_of(tree, *LOOPS)
     later = {id(n) for loop in loops for n in ast.walk(loop) if n is not loop}
-    for node in walk(tree):
-        if isinstance(node, ast.If):
-            later |= {
-                id(one) for one in node.body if {dotted(t) for t in constants_in([one])} & reset_in(node)
-            }
-    changed = [n for n in walk(tree) if isinstance(n, (ast.Assign, ast.AugAssign))]
+    for node in all_of(tree, ast.If):
+        resets = reset_in(node)
+        later |= {id(one) for one in node.body if any(dotted(t) in resets for t in constants_in([one]))}
+    changed = all_of(tree, ast.Assign, ast.AugAssign)
     counted = {dotted(t) for n in changed for t in increments(n)}
     for node in changed:
         value = whole(node.value) if isinstance(node, ast.Assign) else None
@@ -178,10 +182,9 @@ def added_first(body):
             first = (used or sent or [at])[0]
             below = [body[i] for i in sent if i >= first]
             if at < first and below:
-                last = one.end_lineno
-                lines = "line %d" % last if one.lineno == last else "lines %d to %d" % (one.lineno, last)
+                lines = lines_from(one.lineno, one.end_lineno)
                 fix = "move %s below line %d" % (lines, below[0].end_lineno)
-                yield slip(one.lineno, "added-first", "", fix=fix, name=name)
+                yield slip(one.lineno, "added-first", "", fix, name)
 
 
 def put_in_messages(node):
@@ -198,7 +201,7 @@ def uncounted(tree):
         if isinstance(value, ast.UnaryOp) and isinstance(value.op, ast.UAdd):
             name = dotted(node.targets[0])
             message, fix = "`%s =+ …` sets it, and adds nothing" % name, "write `%s += …`" % name
-            yield slip(node.lineno, "no-effect", message, fix=fix, name=name)
+            yield slip(node.lineno, "no-effect", message, fix, name)
         body = getattr(node, "body", None)
         for at, loop in enumerate(body[:-1] if isinstance(body, list) else ()):
             after = body[at + 1]
@@ -209,13 +212,9 @@ def uncounted(tree):
                     message = (
                         "`%s` is counted below the loop on line %d, and is not reached while the node runs"
                     )
-                    last = after
-                    for one in body[at + 2 :]:
-                        last = one if name in names_in(one) else last
-                    lines = "line %d" % after.lineno if last is after else "lines %d to %d"
-                    lines = lines if last is after else lines % (after.lineno, last.end_lineno)
-                    fix = "indent %s like the lines of that loop" % lines
-                    yield slip(after.lineno, "no-effect", message % (name, loop.lineno), fix=fix, name=name)
+                    last = [after.lineno, *(n.end_lineno for n in body[at + 2 :] if name in names_in(n))][-1]
+                    fix = "indent %s like the lines of that loop" % lines_from(after.lineno, last)
+                    yield slip(after.lineno, "no-effect", message % (name, loop.lineno), fix, name)
 
 
 def increments(node):
@@ -225,18 +224,13 @@ def increments(node):
 
 
 def constants_in(statements):
-    return [
-        n.targets[0] for n in statements if isinstance(n, ast.Assign) and isinstance(n.value, ast.Constant)
-    ]
+    assigned = (n for n in statements if isinstance(n, ast.Assign))
+    return [n.targets[0] for n in assigned if isinstance(n.value, ast.Constant)]
 
 
 def reset_in(node):
     """Return the names that an `if` asks for and gives a fixed value."""
     return {dotted(t) for t in constants_in(node.body)} & names_in(node.test)
-
-
-def names_in(node):
-    return {dotted(n) for n in ast.walk(node) if isinstance(n, (ast.Name, ast.Attribute))}
 
 
 # ---- clocks
@@ -274,17 +268,8 @@ PLAIN_CALLS = {
 
 
 RANDOM = {
-    "random",
-    "randint",
-    "randrange",
-    "uniform",
-    "choice",
-    "gauss",
-    "rand",
-    "randn",
-    "getrandbits",
-    "urandom",
-}
+    "random", "randint", "randrange", "uniform", "choice", "gauss", "rand", "randn", "getrandbits", "urandom",
+}  # fmt: skip
 TOPICS_LIMIT = 5
 """Of so many topics, each that an `if` publishes on is told."""
 IFS_LIMIT = CALLS_LIMIT = 20
@@ -293,15 +278,22 @@ CLOCK_METHODS = {"to_sec", "to_nsec"}
 
 
 def sends_no_time(tree):
-    """Return what is to be said where what is published comes from counting alone, though the script may read a clock
-    for something else, or for the value that it counts on from; "" otherwise."""
+    """What is published comes from counting alone, though the script may read a clock for something else, or for the
+    value that it counts on from."""
+    published = calls_in(tree, "publish")
+    if not published or not counts(tree):
+        return
     source = Source(tree)
-    found = source.reached([arg for n in calls_in(tree, "publish") for arg in n.args])
-    if found.clock or found.unknown or not found.counts:
-        return ""
-    if source.reached(source.starts).clock:
-        return "the script reads the clock once, and counts on from there"
-    return "the script counts, and reads no clock for what it publishes"
+    found = source.reached([arg for n in published for arg in n.args])
+    if not knows_time(tree):
+        message = "the script counts, and reads no clock"
+    elif found.clock or found.unknown or not found.counts:
+        return
+    elif source.reached(source.starts).clock:
+        message = "the script reads the clock once, and counts on from there"
+    else:
+        message = "the script counts, and reads no clock for what it publishes"
+    yield slip(published[0].lineno, "no-clock", message)
 
 
 def clock_values(tree):
@@ -318,10 +310,9 @@ def clock_values(tree):
 def values_left_out(tree):
     """Loops that publish only in some of their turns: an `if` asks for what they count, or they count nothing."""
     source = Source(tree)
-    for loop in walk(tree):
-        body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
-        deciding = [one for one in body if isinstance(one, ast.If) and calls_in(one, "publish")][:IFS_LIMIT]
-        for one in deciding:
+    for loop in all_of(tree, *LOOPS):
+        deciding = [one for one in loop.body if isinstance(one, ast.If) and calls_in(one, "publish")]
+        for one in deciding[:IFS_LIMIT]:
             chain = [n for part in [*one.body, *one.orelse] for n in calls_in(part, "publish")]
             if not chain:  # its condition publishes
                 continue
@@ -341,18 +332,18 @@ def values_left_out(tree):
 
 def left_out(one, calls, topic, *, alone):
     """Yield that an `if` publishes on a topic in some turns; `alone` says whether that is all that it publishes."""
-    numbers = sorted({n.lineno for n in calls})
-    message = "line %d publishes only under the condition on line %d" % (numbers[0], one.lineno)
+    first, last, asking = min(n.lineno for n in calls), max(n.lineno for n in calls), one.lineno
     if len(calls) > 1:
-        lines = (numbers[0], numbers[-1], one.lineno)
-        message = "lines %d to %d publish only under the conditions of the `if` on line %d" % lines
-    elif not alone:
-        message = "line %d publishes only under a condition of the `if` on line %d" % (numbers[0], one.lineno)
-    fix = "publish outside the `if` on line %d, so that it happens each time around the loop" % one.lineno
+        message = "lines %d to %d publish only under the conditions of the `if`" % (first, last)
+    elif alone:
+        message = "line %d publishes only under the condition" % first
+    else:
+        message = "line %d publishes only under a condition of the `if`" % first
+    fix = "publish outside the `if` on line %d, so that it happens each time around the loop" % asking
     if alone:
-        lines = (numbers[0], one.lineno)
-        fix = "move line %d out of the `if` on line %d, so that it runs each time around the loop" % lines
-    yield slip(numbers[0], "published-in-part", message, fix=fix, name=topic)
+        fix = "move line %d out of the `if` on line %d, so that it runs each time around the loop"
+        fix %= (first, asking)
+    yield slip(first, "published-in-part", "%s on line %d" % (message, asking), fix, topic)
 
 
 def publishes_always(block, call):
@@ -378,8 +369,8 @@ def published_unchanged(tree):
         if isinstance(n, ast.Assign):
             made.update((dotted(t), n) for t in n.targets)
     plain = {dotted(t) for t in constants_in(walk(tree))}
-    for loop in walk(tree):
-        inside = [n for one in loop.body for n in ast.walk(one)] if isinstance(loop, ast.While) else []
+    for loop in all_of(tree, ast.While):
+        inside = [n for one in loop.body for n in ast.walk(one)]
         told = [n for n in inside if called_name(n) in TELLS or called_name(n).startswith("log")]
         told_of = {id(n) for call in told for n in ast.walk(call)}
         names = [n for n in inside if isinstance(n, ast.Name)]
@@ -390,26 +381,19 @@ def published_unchanged(tree):
         for call in (n for n in told if called_name(n) == "publish" and len(n.args) == 1):
             name = dotted(call.args[0])
             lines = set_at.get(name, [])
-            if (
-                name in plain
-                or name in used
-                or len(lines) != 1
-                or lines[0] >= loop.lineno
-                or name not in made
-            ):
+            is_once = name in made and len(lines) == 1 and lines[0] < loop.lineno
+            if name in plain or name in used or not is_once:
                 continue
-            line, last = lines[0], made[name].end_lineno
-            fix = "lines %d to %d" % (line, last) if last > line else "line %d" % line
-            fix = "move %s into that loop, above line %d" % (fix, loop.body[0].lineno)
+            line, moved = lines[0], lines_from(lines[0], made[name].end_lineno)
+            fix = "move %s into that loop, above line %d" % (moved, loop.body[0].lineno)
             # another number that the loop works out, such as the time alone, is no text to be published
             alike = [one for one in fresh if one in made and alike_made(made[one].value, made[name].value)]
-            fix = (
-                "on line %d, publish `%s`" % (call.lineno, alike[0]) if len(fresh) == len(alike) == 1 else fix
-            )
+            if len(fresh) == len(alike) == 1:
+                fix = "on line %d, publish `%s`" % (call.lineno, alike[0])
             message = (
                 "each pass through the loop on line %d publishes `%s`, which only line %d makes, above it"
             )
-            yield slip(call.lineno, "no-effect", message % (loop.lineno, name, line), fix=fix, name=name)
+            yield slip(call.lineno, "no-effect", message % (loop.lineno, name, line), fix, name)
 
 
 def alike_made(one, other):
@@ -436,9 +420,7 @@ class Source:
             function, again = places[node]
             name, begins = dotted(target), not again and isinstance(node, ast.Assign)
             where = added.get(name)
-            once = (
-                function is None or getattr(function, "name", "") == "__init__" or where == (function, True)
-            )
+            once = getattr(function, "name", "__init__") == "__init__" or where == (function, True)
             if begins and where and once:
                 self.starts.append(value)
             elif begins and called_name(value) == "count":

@@ -8,14 +8,20 @@ import ast
 from collections import Counter
 
 from script_names import (
+    LOOPS,
+    all_of,
     argument,
     called_name,
     calls_in,
+    caught_by,
     dotted,
     functions_in,
     is_call,
+    listed,
+    names_in,
     parents_of,
     published_type,
+    set_in,
     slip,
     text_of,
     walk,
@@ -34,7 +40,7 @@ def loop_rates(tree):
     for node in walk(tree):
         if isinstance(node, ast.Assign) and len(node.targets) == 1:
             bound.setdefault(ast.dump(node.targets[0]).replace("Store()", "Load()"), []).append(node.value)
-        elif isinstance(node, (ast.While, ast.For)):
+        elif isinstance(node, LOOPS):
             looped.update(map(id, calls_in(node, "sleep")))
 
     def given(node):
@@ -62,7 +68,7 @@ def loop_rate(call, timed, value, number):
         pause, fix = dotted(call.func) if timed == "sleep" else "", ""
         if is_call(value, "Duration"):
             pause, fix = dotted(value.func), "its second number counts nanoseconds, so it is %.9g s" % number
-        yield slip(call.lineno, "rate-number", hz, fix=fix, name=pause)
+        yield slip(call.lineno, "rate-number", hz, fix, pause)
 
 
 def nanoseconds_apart(call):
@@ -80,12 +86,12 @@ def never_reached(tree):
     """Loops without an end before the first `publish(…)`, `Publisher(…)` and the like that comes behind them in the
     same block, in a function or class of this file too.
     """
-    parts = [n for n in walk(tree) if isinstance(n, (ast.FunctionDef, ast.ClassDef))]
+    parts = all_of(tree, ast.FunctionDef, ast.ClassDef)
     own = {n.name for n in parts if calls_in(n, *MAKES)}
 
     def word(node):
         name = called_name(node)
-        return name if name in own or is_call(node, "publish", *MAKES) else None
+        return name if name and (name in own or is_call(node, "publish", *MAKES)) else None
 
     for node in walk(tree):
         for block in (getattr(node, "body", None), getattr(node, "orelse", None)):
@@ -93,10 +99,8 @@ def never_reached(tree):
                 spins = isinstance(loop, ast.Expr) and is_call(loop.value, "spin")
                 if not spins and not (isinstance(loop, ast.While) and is_endless(loop)):
                     continue
-                within = {word(n) for n in ast.walk(loop) if isinstance(n, ast.Call)}
-                behind = [
-                    n for later in block[index + 1 :] for n in ast.walk(later) if isinstance(n, ast.Call)
-                ]
+                within = set(map(word, ast.walk(loop)))
+                behind = (n for later in block[index + 1 :] for n in ast.walk(later))
                 behind = [n for n in behind if word(n) and word(n) not in within]
                 if behind and "publish" not in within:
                     what = "spin()" if spins else "loop"
@@ -104,7 +108,7 @@ def never_reached(tree):
                     message %= (what, loop.lineno, word(behind[0]), behind[0].lineno)
                     fix = "move line %d above line %d" % (behind[0].lineno, loop.lineno)
                     fix = "" if word(behind[0]) == "publish" else fix
-                    yield slip(loop.lineno, "never-reached", message, fix=fix)
+                    yield slip(loop.lineno, "never-reached", message, fix)
                 break  # nothing behind it in the block runs
 
 
@@ -129,21 +133,19 @@ def stopped_loops(tree):
         if once and not turned[loop][1] and calls_in(loop, "publish"):
             message = "the `if` on line %d runs what follows it once" % loop.lineno
             fix = "write `while` instead of `if` on line %d" % loop.lineno
-            yield slip(loop.lineno, "loop-left", message, fix=fix)
+            yield slip(loop.lineno, "loop-left", message, fix)
         ending = loop_ends(loop.test) if isinstance(loop, ast.While) else None
         if ending is not None:
-            message = (
-                "the loop on line %d runs only when the node should end: a `not` is missing" % loop.lineno
-            )
-            asks = dotted(ending.func)
+            message = "the loop on line %d runs only when the node should end: a `not` is missing"
+            message, asks = message % loop.lineno, dotted(ending.func)
             fix = "on line %d, write `while not %s():`" % (loop.lineno, asks)
-            yield slip(loop.lineno, "loop-left", message, fix=fix, name=asks)
-        if not isinstance(loop, (ast.While, ast.For)) or not calls_in(loop, "publish"):
+            yield slip(loop.lineno, "loop-left", message, fix, asks)
+        if not isinstance(loop, LOOPS) or not calls_in(loop, "publish"):
             continue
         for spin in calls_in(loop, "spin")[:1]:
             message = "the loop stops at the spin() on line %d, which waits until the node ends" % spin.lineno
             fix = "remove spin(): the loop keeps the node alive"
-            yield slip(spin.lineno, "spin-in-loop", message, fix=fix)
+            yield slip(spin.lineno, "spin-in-loop", message, fix)
         name = getattr(turned[loop][0], "name", None)
         is_part = called[name] > 1 and name != "publish"  # of what the node does
         if is_counted(loop) and ending is None and not turned[loop][1] and not is_part:
@@ -158,7 +160,7 @@ def stopped_loops(tree):
                 fix %= (last.end_lineno, "" if last.lineno == last.end_lineno else alike)
             elif isinstance(loop, ast.For) and dotted(loop.target) in used:
                 fix = "put it inside a `while not rospy.is_shutdown():`"
-            yield slip(loop.lineno, "loop-left", message, fix=fix)
+            yield slip(loop.lineno, "loop-left", message, fix)
         # what is done again and again, or in several places, ends by no loop in it
         ends = not turned[loop][1] and not is_part
         left = next((n for n in loop.body if isinstance(n, (ast.Break, ast.Return))), None) if ends else None
@@ -166,7 +168,7 @@ def stopped_loops(tree):
             word = "break" if isinstance(left, ast.Break) else "return"
             message = "the loop ends the first time around, at the %s on line %d" % (word, left.lineno)
             fix = "remove it from line %d, or put it inside an `if`" % left.lineno
-            yield slip(left.lineno, "loop-left", message, fix=fix)
+            yield slip(left.lineno, "loop-left", message, fix)
 
 
 def is_of_robot(tree):
@@ -182,7 +184,7 @@ def calls_made(tree):
         given = [*call.args, *(keyword.value for keyword in call.keywords)]
         called.update(2 * [dotted(one).rpartition(".")[2] for one in given])
     for loop in walk(tree):
-        called.update(map(called_name, ast.walk(loop)) if isinstance(loop, (ast.While, ast.For)) else ())
+        called.update(map(called_name, ast.walk(loop)) if isinstance(loop, LOOPS) else ())
     return called
 
 
@@ -211,7 +213,7 @@ def published_before(tree):
                 message = "the publish(…) on line %d is above the loop on line %d, and runs once"
                 fix = "move line %d into that loop, above line %d, with the same spaces or tabs before it"
                 message, fix = message % (above, one.lineno), fix % (above, one.body[0].lineno)
-                yield slip(above, "loop-left", message, fix=fix)
+                yield slip(above, "loop-left", message, fix)
 
 
 def is_counted(loop):
@@ -230,8 +232,7 @@ WAITS = ("sleep", "spin", "spin_once", "wait_for_message", "wait_for_service", "
 
 def sleepless_loops(tree):
     """Loops that publish and wait nowhere, where `rate.sleep()` stands outside of them or a Rate is made in them."""
-    loops = [n for n in walk(tree) if isinstance(n, (ast.While, ast.For))]
-    sleeps = calls_in(tree, "sleep")
+    loops, sleeps = all_of(tree, *LOOPS), calls_in(tree, "sleep")
     for loop in loops:
         inner = [n for n in ast.walk(loop) if n is not loop and n in loops and calls_in(n, "publish")]
         before = [n for n in sleeps if n.lineno < loop.lineno and dotted(n.func) not in PAUSES]
@@ -247,7 +248,7 @@ def sleepless_loops(tree):
         last = loop.body[-1]
         fix = "move it into that loop, below line %d, with the same spaces or tabs before it as line %d has"
         fix %= (last.end_lineno, last.lineno)
-        yield slip(outside[0].lineno, "sleep-outside", message, fix=fix, name=name)
+        yield slip(outside[0].lineno, "sleep-outside", message, fix, name)
 
 
 def rates_in_loop(loop):
@@ -255,15 +256,13 @@ def rates_in_loop(loop):
     made = [n for n in loop.body if isinstance(n, ast.Assign) and is_call(n.value, "Rate")]
     named = any(isinstance(n, ast.Attribute) and n.attr == "sleep" for n in ast.walk(loop))
     name = dotted(made[0].targets[0]) if len(made) == 1 and len(loop.body) > 1 and not named else ""
-    stored = {n.id for n in ast.walk(loop) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
-    own = {n.id for n in ast.walk(made[0].value) if isinstance(n, ast.Name)} & stored if made else ()
+    own = names_in(made[0].value) & set_in(loop) if made else ()
     skipped = any(isinstance(n, ast.Continue) for n in ast.walk(loop))
     if name and not own and not skipped and not isinstance(made[0].targets[0], ast.Subscript):
         message = "a Rate is made in each turn of the loop on line %d, and nothing sleeps" % loop.lineno
         fix = "move line %d above that loop, and write `%s.sleep()` as the last line in the loop"
-        yield slip(
-            made[0].lineno, "sleep-outside", message, fix=fix % (made[0].lineno, name), name=name + ".sleep"
-        )
+        fix %= (made[0].lineno, name)
+        yield slip(made[0].lineno, "sleep-outside", message, fix, name + ".sleep")
 
 
 def sleeps_in_if(loop):
@@ -277,15 +276,15 @@ def sleeps_in_if(loop):
             name, line = dotted(own[0].value.func), own[0].lineno
             message = "`%s()` is inside the `if` on line %d" % (name, one.lineno)
             fix = "write line %d with the same spaces or tabs before it as line %d has" % (line, one.lineno)
-            yield slip(line, "sleep-outside", message, fix=fix, name=name)
+            yield slip(line, "sleep-outside", message, fix, name)
 
 
 def sleeps_twice(tree):
     """Loops that wait twice in each of their turns, once maybe in a function that they call, and publish once on each
     topic."""
     functions = functions_in(tree)
-    for loop in walk(tree):
-        body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
+    for loop in all_of(tree, *LOOPS):
+        body = loop.body
         called = {n: called_own(getattr(n, "value", None), functions) for n in body}
         helpers = [one for one in called.values() if one is not None]
         if len(set(helpers)) < len(helpers):
@@ -295,14 +294,12 @@ def sleeps_twice(tree):
         own = [body[i].lineno for i in at if body[i] in called]
         if len(at) != 2 or not own:
             continue
-        between, around = body[at[0] + 1 : at[1]], body[: at[0]] + body[at[1] + 1 :]
-        sent = [
-            {ast.dump(n.func) for one in part for n in calls_in(one, "publish")} for part in (between, around)
-        ]
+        parts = body[at[0] + 1 : at[1]], body[: at[0]] + body[at[1] + 1 :]
+        sent = [{ast.dump(n.func) for one in part for n in calls_in(one, "publish")} for part in parts]
         if any(sent) and sent[0].isdisjoint(sent[1]):
             lines = tuple(sorted(body[i].lineno for i in at))
             message = "the loop sleeps on line %d and again on line %d" % lines
-            yield slip(own[-1], "sleep-twice", message, fix="delete line %d" % own[-1])
+            yield slip(own[-1], "sleep-twice", message, "delete line %d" % own[-1])
 
 
 def called_own(node, functions):
@@ -313,27 +310,25 @@ def called_own(node, functions):
 
 def publishes_twice(tree):
     """Loops that publish on one topic more than once in each of their turns, and sleep once at most."""
-    for loop in walk(tree):
-        body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
-        plain = [one for one in body if isinstance(one, ast.Expr) and called_name(one.value) == "publish"]
+    for loop in all_of(tree, *LOOPS):
         by_publisher = {}
-        for one in plain:
-            by_publisher.setdefault(ast.dump(one.value.func), []).append(one)
-        many = [same for same in by_publisher.values() if len(same) > 1]
-        if not many or any(
-            calls_in(n, *WAITS) for n in body[body.index(many[0][0]) : body.index(many[0][-1])]
-        ):
+        for one in loop.body:
+            if isinstance(one, ast.Expr) and called_name(one.value) == "publish":
+                by_publisher.setdefault(ast.dump(one.value.func), []).append(one)
+        many = next((same for same in by_publisher.values() if len(same) > 1), None)
+        if many is None:
             continue
-        first, second = many[0][:2]
-        lines = [one.lineno for one in many[0]]
-        if ast.dump(first) == ast.dump(second) and body.index(second) == body.index(first) + 1:
-            message, fix = "the loop publishes on line %d and the same again on line %d", "delete line %d"
-            message, fix = message % (lines[0], lines[1]), fix % lines[1]
+        first, last = (loop.body.index(one) for one in (many[0], many[-1]))
+        if any(calls_in(n, *WAITS) for n in loop.body[first:last]):
+            continue
+        lines = [one.lineno for one in many]
+        if ast.dump(many[0]) == ast.dump(many[1]) and loop.body[first + 1] is many[1]:
+            message = "the loop publishes on line %d and the same again on line %d" % (lines[0], lines[1])
+            fix = "delete line %d" % lines[1]
         else:
-            listed = "lines %s and %d" % (", ".join(map(str, lines[:-1])), lines[-1])
-            message, fix = "each pass through the loop publishes on %s", "delete all but one of %s"
-            message, fix = message % listed, fix % listed
-        yield slip(lines[1], "publish-twice", message, fix=fix)
+            message = "each pass through the loop publishes on " + listed(lines)
+            fix = "delete all but one of " + listed(lines)
+        yield slip(lines[1], "publish-twice", message, fix)
 
 
 def waiting_callbacks(tree):
@@ -353,10 +348,8 @@ def waiting_callbacks(tree):
                 message, fix = "the callback `%s` sleeps on line %d", "delete line %d"
             else:
                 continue
-            fix = fix % inner.lineno if "%" in fix else fix
-            yield slip(
-                inner.lineno, "callback-waits", message % (own.name, inner.lineno), fix=fix, name=own.name
-            )
+            fix, message = fix % inner.lineno if "%" in fix else fix, message % (own.name, inner.lineno)
+            yield slip(inner.lineno, "callback-waits", message, fix, own.name)
             break
 
 
@@ -368,25 +361,21 @@ def loops_of_numbers(tree):
     called = [functions[name] for name in {dotted(n).rpartition(".")[2] for n in given} if name in functions]
     inside = {n for function in called for n in ast.walk(function)}
     kept = {arg.arg + ".data" for function in called for arg in function.args.args if arg.arg != "self"}
-    assigned = [n for n in walk(tree) if isinstance(n, ast.Assign)]
+    assigned = all_of(tree, ast.Assign)
     for _ in range(KEPT_STEPS):
-        kept |= {dotted(t) for n in assigned if reads(n.value, kept) for t in n.targets}
+        kept |= {dotted(t) for n in assigned if names_in(n.value) & kept for t in n.targets}
     types = {dotted(n.targets[0]): published_type(n.value) for n in assigned if is_call(n.value, "Publisher")}
-    for loop in (n for n in walk(tree) if isinstance(n, ast.While) and n not in inside):
+    for loop in (n for n in all_of(tree, ast.While) if n not in inside):
         of_number = (n for n in ast.walk(loop) if needs_number(n, kept, types))
         for node in sorted(of_number, key=lambda n: n.lineno)[:1]:
             lines = (loop.lineno, loop.end_lineno)
             fix = "write `rospy.spin()` in place of the loop on lines %d to %d" % lines
             inside.update(ast.walk(loop))
-            yield slip(loop.lineno, "takes-number", "line %d needs a number" % node.lineno, fix=fix)
+            yield slip(loop.lineno, "takes-number", "line %d needs a number" % node.lineno, fix)
 
 
 KEPT_STEPS = 3
 NUMERIC = ("int", "float", "abs", "round", "range")
-
-
-def reads(node, names):
-    return any(dotted(n) in names for n in ast.walk(node) if isinstance(n, (ast.Name, ast.Attribute)))
 
 
 def needs_number(node, kept, types):
@@ -424,7 +413,7 @@ def turns(tree):
         yield node, (function, again)
         for child in ast.iter_child_nodes(node):
             own = isinstance(child, (ast.FunctionDef, ast.Lambda))
-            looped = again or isinstance(node, (ast.While, ast.For))
+            looped = again or isinstance(node, LOOPS)
             left.append((child, child if own else function, looped and not own))
 
 
@@ -449,17 +438,10 @@ def is_unchanging(loop, function):
         parts = [part for part in loop.test.values if not asks_for_ever(part)]
     inside = [n for part in parts for n in ast.walk(part)]
     names = {n.id for n in inside if isinstance(n, ast.Name)}
-    shared = {
-        name for n in ast.walk(function) if isinstance(n, (ast.Global, ast.Nonlocal)) for name in n.names
-    }
-    own, changed = set_in(function) - shared, set_in(loop)
+    outer = (n for n in ast.walk(function) if isinstance(n, (ast.Global, ast.Nonlocal)))
+    own, changed = set_in(function) - {name for n in outer for name in n.names}, set_in(loop)
     is_plain_test = not any(isinstance(n, (ast.Call, ast.Attribute, ast.Subscript)) for n in inside)
     return bool(names) and is_plain_test and names <= own - changed
-
-
-def set_in(tree):
-    """Return the names that are set somewhere in a tree."""
-    return {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and not isinstance(n.ctx, ast.Load)}
 
 
 def constant(node, given, depth=4):
@@ -481,26 +463,22 @@ def read_parameter(node):
     return text_of(node.args[0]) if is_call(node, "get_param") and node.args else ""
 
 
-SWALLOWS = {"KeyboardInterrupt", "ROSInterruptException", "ROSException", "Exception", "BaseException"}
+SWALLOWS = {"", "KeyboardInterrupt", "ROSInterruptException", "ROSException", "Exception", "BaseException"}
 ENDS = (ast.Break, ast.Return, ast.Raise)
 RAISING = ("wait_for_message", "wait_for_service")
 """Calls that end with an exception on Ctrl-C. `rate.sleep()` is none of them: by the real clock it sleeps on."""
 ASKS = "check `rospy.is_shutdown()` in it: `while not rospy.is_shutdown():`"
+ENDS_FOR = "write `if rospy.is_shutdown(): break` below the `for` on line %d"
 ASKS_TOO = "on line %d, write `and not rospy.is_shutdown()` before the colon"
 
 
 def deaf_loops(tree):
     """Why a node goes on after Ctrl-C: loops that do not ask for it, an `except` within them, signals put off."""
     endless, others, counted = [], [], []
-    for loop in walk(tree):
-        is_while = isinstance(loop, ast.While)
-        inside = list(ast.walk(loop)) if is_while or isinstance(loop, ast.For) else []
-        if (
-            not inside
-            or any(map(is_shutdown, inside))
-            or counts_down(loop)
-            or not (is_while or is_endless_for(loop) or sleeps(loop))
-        ):
+    for loop in all_of(tree, *LOOPS):
+        is_while, inside = isinstance(loop, ast.While), list(ast.walk(loop))
+        may_last = is_while or is_endless_for(loop) or sleeps(loop)
+        if not may_last or any(map(is_shutdown, inside)) or counts_down(loop):
             continue
         caught = [h for n in inside if isinstance(n, ast.Try) for h in n.handlers if goes_on(h)]
         if calls_in(loop, *RAISING):
@@ -508,27 +486,26 @@ def deaf_loops(tree):
                 message = (
                     "the `except` on line %d catches what Ctrl-C raises, and the loop on line %d goes on"
                 )
-                endless.append(slip(loop.lineno, "deaf", message % (handler.lineno, loop.lineno), fix=ASKS))
+                message %= (handler.lineno, loop.lineno)
+                endless.append(slip(loop.lineno, "deaf", message, ASKS))
         elif is_while or is_endless_for(loop):
-            known = not is_while or isinstance(loop.test, ast.Constant)
-            (endless if known else others).append(
-                deaf(loop, [n for n in inside if n is not loop and sleeps(n)])
-            )
+            known = endless if not is_while or isinstance(loop.test, ast.Constant) else others
+            known.append(deaf(loop, [n for n in inside if n is not loop and sleeps(n)]))
         else:
             counted.append(deaf(loop, []))
     for node in walk(tree):
         if is_call(node, "init_node") and any(k.arg == "disable_signals" for k in node.keywords):
             message = "`disable_signals=True` on line %d keeps Ctrl-C from rospy" % node.lineno
-            yield slip(node.lineno, "deaf", message, fix="leave it out")
+            yield slip(node.lineno, "deaf", message, "leave it out")
         if is_call(node, "signal") and node.args and dotted(node.args[0]).endswith("SIGINT"):
             message = "line %d replaces what rospy does on Ctrl-C" % node.lineno
-            yield slip(node.lineno, "deaf", message, fix="delete it")
+            yield slip(node.lineno, "deaf", message, "delete it")
     yield from endless or others or counted
 
 
 def counts_down(loop):
     """Whether it calls nothing, and steps what it asks for: `while angle > pi: angle -= 2 * pi`."""
-    asked = {dotted(n) for n in ast.walk(getattr(loop, "test", loop))} - {"..."}
+    asked = names_in(getattr(loop, "test", loop)) - {"..."}
     inside = [n for one in loop.body for n in ast.walk(one)]
     steps = any(isinstance(n, ast.AugAssign) and dotted(n.target) in asked for n in inside)
     return isinstance(loop, ast.While) and steps and not any(isinstance(n, ast.Call) for n in inside)
@@ -536,21 +513,18 @@ def counts_down(loop):
 
 def deaf(loop, within):
     """Return the slip of a loop that never asks, with those `within` it that take their time."""
-    lines = [one.lineno for one in (loop, *within)]
-    named = "loops on lines %s and %d never check" % (", ".join(map(str, lines[:-1])), lines[-1])
-    named = named if within else "loop on line %d never checks" % loop.lineno
-    ends = ["write `if rospy.is_shutdown(): break` below the `for` on line %d" % one.lineno for one in within]
-    asks = ASKS
+    named = "%s on %s never check%s" % (
+        "loops" if within else "loop",
+        listed(one.lineno for one in (loop, *within)),
+        "" if within else "s",
+    )
+    asks, ends = ASKS, [ENDS_FOR % one.lineno for one in within]
     test = getattr(loop, "test", ast.Constant(True))
     is_loose = isinstance(getattr(test, "op", None), ast.Or)  # binds less than `and` does
     if not is_loose and not isinstance(test, (ast.Constant, ast.NamedExpr, ast.IfExp, ast.Lambda)):
         asks = ASKS_TOO % test.end_lineno  # its own condition ends it, too
-    fixes = (
-        [asks, *ends]
-        if isinstance(loop, ast.While) or within
-        else ["write `if rospy.is_shutdown(): break` below the `for` on line %d" % loop.lineno]
-    )
-    return slip(loop.lineno, "deaf", "the %s whether the node should end" % named, fix="; then ".join(fixes))
+    fixes = [asks, *ends] if isinstance(loop, ast.While) or within else [ENDS_FOR % loop.lineno]
+    return slip(loop.lineno, "deaf", "the %s whether the node should end" % named, "; then ".join(fixes))
 
 
 def is_endless_for(loop):
@@ -564,8 +538,7 @@ def sleeps(loop):
 
 def goes_on(handler):
     """Whether an `except` catches what Ctrl-C raises, and leaves neither the loop nor the script."""
-    kinds = handler.type.elts if isinstance(handler.type, ast.Tuple) else [handler.type]
-    catches = any(kind is None or dotted(kind).rpartition(".")[2] in SWALLOWS for kind in kinds)
+    catches = any(kind.rpartition(".")[2] in SWALLOWS for kind in caught_by(handler))
     left = (n for n in ast.walk(handler) if isinstance(n, ENDS) or called_name(n) in ("exit", "_exit"))
     return catches and next(left, None) is None
 

@@ -1,7 +1,7 @@
-"""Finds the names in a student's Python that its run depends on, for `slips.py`.
+"""Finds the names in a student's Python that are not there when they are read, for `slips.py`.
 
-Names that are not there when they are read, and where a script names its node and its topics. What the others of
-`slips.py` use to look into a source is here too. Nothing is executed. Python 3.8, standard library only.
+What the others of `slips.py` use to look into a source is here too. Nothing is executed. Python 3.8, standard library
+only.
 """
 
 import ast
@@ -14,19 +14,11 @@ USES_LIMIT = 40
 """So many uses of unknown names are explained in a file: each takes a look at all of it."""
 MODULE_NAMES = {"__file__", "__builtins__", "__annotations__", "WindowsError", "exit", "quit"}
 OLD_NAMES = {
-    "xrange",
-    "raw_input",
-    "unicode",
-    "basestring",
-    "unichr",
-    "long",
-    "reduce",
-    "reload",
-    "execfile",
-    "cmp",
-}
+    "xrange", "raw_input", "unicode", "basestring", "unichr", "long", "reduce", "reload", "execfile", "cmp",
+}  # fmt: skip
 """Of Python 2: the traceback is explained by what Python 3 has in their place."""
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
+LOOPS = (ast.While, ast.For)
 COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 
 
@@ -35,6 +27,11 @@ def walk(tree):
     if not hasattr(tree, "all_nodes"):
         tree.all_nodes = list(ast.walk(tree))
     return tree.all_nodes
+
+
+def all_of(tree, *kinds):
+    """Return the nodes of a module that are of these kinds."""
+    return [n for n in walk(tree) if isinstance(n, kinds)]
 
 
 def parents_of(tree):
@@ -56,7 +53,18 @@ def calls_in(node, *names):
 
 def functions_in(tree):
     """Return the functions and methods of a module by their names."""
-    return {n.name: n for n in walk(tree) if isinstance(n, ast.FunctionDef)}
+    return {n.name: n for n in all_of(tree, ast.FunctionDef)}
+
+
+def callback_of(call, functions):
+    """Return the script's function that a `Subscriber(…)` is given; None of any other node."""
+    given = argument(call, 2, "callback") if called_name(call) == "Subscriber" else []
+    return functions.get(dotted(given[0]).rpartition(".")[2]) if given else None
+
+
+def targets_of(tree):
+    """Return the name that each value is given to, by the identity of the value."""
+    return {id(n.value): dotted(n.targets[0]) for n in all_of(tree, ast.Assign)}
 
 
 def argument(call, place, keyword):
@@ -86,66 +94,26 @@ def dotted(node):
     return ".".join(reversed(parts))[:TEXT_LIMIT]
 
 
+def names_in(node):
+    """Return the names in a node, as `dotted` writes them."""
+    return {dotted(n) for n in ast.walk(node) if isinstance(n, (ast.Name, ast.Attribute))}
+
+
+def listed(lines):
+    """Return `line 3`, `lines 3, 5 and 8`."""
+    *others, last = map(str, lines)
+    return "lines %s and %s" % (", ".join(others), last) if others else "line " + last
+
+
+def lines_from(first, last):
+    """Return `line 3`, `lines 3 to 5`."""
+    return "line %d" % first if first == last else "lines %d to %d" % (first, last)
+
+
 def slip(line, kind, message, fix="", name=""):
     """Return what `PythonSlip` (grader/model/python_slip.py) says of a line of the script."""
     texts = {"message": message, "fix": fix, "name": name}
     return {"line": line, "kind": kind, **{key: text[:TEXT_LIMIT] for key, text in texts.items()}}
-
-
-# ---- where ROS is told a name
-
-NAMED = {
-    "init_node": "node-name", "Publisher": "publisher", "Subscriber": "subscriber", "wait_for_message": "subscriber",
-    "set_param": "sets-parameter",
-}  # fmt: skip
-"""Calls whose first argument is a name, and the kind of slip that tells where."""
-
-
-def graph_names(tree):
-    """Where a script names its node, its topics and the parameters that it sets, as written; and the types that it
-    publishes."""
-    owners = {id(n.value): dotted(n.targets[0]) for n in walk(tree) if isinstance(n, ast.Assign)}
-    own = {n.name for n in walk(tree) if isinstance(n, ast.ClassDef)}
-    for node in walk(tree):
-        kind = NAMED.get(called_name(node))
-        if not kind or dotted(node.func) in own:
-            continue
-        anonymous = [k for k in node.keywords if k.arg == "anonymous" and getattr(k.value, "value", True)]
-        owner = owners.get(id(node), "") or ("anonymous" if anonymous else "")
-        names, name = argument(node, 0, "name"), published_type(node)
-        if names and text_of(names[0]):
-            yield slip(names[0].lineno, kind, text_of(names[0]), name=owner)
-        elif names and kind == "node-name":
-            for text, written in text_behind(names[0], tree):
-                yield slip(text.lineno, kind, text_of(text), fix=written, name=owner)
-        if names and name.isidentifier() and kind in ("publisher", "subscriber"):
-            yield slip(names[0].lineno, kind + "-type", name)
-
-
-def text_behind(node, tree):
-    """Yield the text that a variable is given once, or that an argument gets in the only call of its function, and how
-    it is written there, with `{}` in its place: `self.name = {}`, `name={}`."""
-    name = dotted(node)
-    assigned = [n.value for n in walk(tree) if isinstance(n, ast.Assign) and name in map(dotted, n.targets)]
-    if len(assigned) == 1 and text_of(assigned[0]):
-        yield assigned[0], "%s = {}" % name
-    for function in () if assigned else functions_in(tree).values():
-        arguments = [one.arg for one in function.args.args]
-        if name in arguments and any(one is node for one in ast.walk(function)):
-            owners = [n.name for n in walk(tree) if isinstance(n, ast.ClassDef) and function in n.body]
-            called = owners[0] if owners and function.name == "__init__" else function.name
-            calls = [
-                n
-                for n in walk(tree)
-                if isinstance(n, ast.Call) and dotted(n.func) in (called, "self." + called)
-            ]
-            place = arguments.index(name) - (arguments[0] == "self")
-            found = argument(calls[0], place, name) if len(calls) == 1 else []
-            if found and text_of(found[0]):
-                alone = len(calls[0].args) + len(calls[0].keywords) == 1
-                by_name = found[0] in [one.value for one in calls[0].keywords]
-                written = "%s={}" % name if by_name else "%s({})" % called if alone else "{}"
-                yield found[0], written
 
 
 def published_type(call):
@@ -162,51 +130,48 @@ def published_type(call):
 def misspelt(tree):
     """Names that are read where nothing has given them a value: `misspelt` where one that is bound is spelt alike, or
     `self` has one of that name, else `undefined`."""
-    names = [n for n in walk(tree) if isinstance(n, ast.Name)]
+    names = all_of(tree, ast.Name)
     own = given_names(tree, names)
-    imported = {a.name for n in walk(tree) if isinstance(n, ast.Import) for a in n.names}
+    imported = {a.name for n in all_of(tree, ast.Import) for a in n.names}
     if "*" in own or len(own) > NAMES_LIMIT:
         return
-    attributes = {
-        dotted(n) for n in walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)
-    }
+    attributes = {dotted(n) for n in all_of(tree, ast.Attribute) if isinstance(n.ctx, ast.Store)}
     known = own | set(dir(builtins)) | MODULE_NAMES | imported_otherwise(tree, {n.id for n in names})
     outside = {id(n) for n in outside_methods(tree)}
     unbound = unbound_names(tree, known)
     keys, texts = without_quotes(tree, known), where_texts_stand(tree)
     stored = {n.id for n in names if isinstance(n.ctx, ast.Store)}
-    functions = {n.name for n in walk(tree) if isinstance(n, FUNCTIONS[:2])} - stored
+    functions = {n.name for n in all_of(tree, *FUNCTIONS[:2])} - stored
     odd = {*keys, *unbound, *outside}
     unknown = [n for n in names if n.id not in known or id(n) in odd]
     for node in unknown[:USES_LIMIT]:
+        kind, line, message = "undefined", node.lineno, ""
         fitting = stored if id(node) in texts else own - functions if is_value(node, tree) else own
         near = "" if node.id in known | OLD_NAMES else spelt_alike(node.id, fitting, attributes)
         if id(node) in outside and (node.id == "self" or node.id not in known):
-            message = "line %d is in the class, but in none of its methods, so it runs before them"
-            fix = "indent line %d like the lines of the method above it, or delete it" % node.lineno
-            yield slip(node.lineno, "outside-method", message % node.lineno, fix=fix)
-        elif id(node) in keys:
+            message = "line %d is in the class, but in none of its methods, so it runs before them" % line
+            fix = "indent line %d like the lines of the method above it, or delete it" % line
+            yield slip(line, "outside-method", message, fix)
+            continue
+        if id(node) in keys:
             message = "the key `%s` is written here without quotes" % node.id
-            fix = "on line %d, write `%s`" % (node.lineno, keys[id(node)])
-            yield slip(node.lineno, "undefined", message, fix=fix, name=node.id)
+            fix = "on line %d, write `%s`" % (line, keys[id(node)])
         elif near and not (node.id in MODULES and near in imported):  # there the import has it wrong
-            whole = near == "__name__" and is_guard(node, tree)
+            guards = near == "__name__" and is_guard(node, tree)
+            kind, message = "misspelt", "did you mean %s?" % near
             fix = (
-                "write `if __name__ == '__main__':`" if whole else "write %s instead of %s" % (near, node.id)
+                "write `if __name__ == '__main__':`" if guards else "write %s instead of %s" % (near, node.id)
             )
-            yield slip(node.lineno, "misspelt", "did you mean %s?" % near, fix=fix, name=node.id)
         elif node.id not in known and (argument := unread_argument(node, tree)):
-            message = "the argument of `%s` is called `%s`" % argument
+            kind, message = "misspelt", "the argument of `%s` is called `%s`" % argument
             fix = "write %s instead of %s" % (argument[1], node.id)
-            yield slip(node.lineno, "misspelt", message, fix=fix, name=node.id)
         elif id(node) in unbound and id(node) in texts:
             message = "`%s` is written here without quotes" % node.id
-            fix = "on line %d, write `'%s'`" % (node.lineno, node.id)
-            yield slip(node.lineno, "undefined", message, fix=fix, name=node.id)
+            fix = "on line %d, write `'%s'`" % (line, node.id)
         elif id(node) in unbound:
             message, fix = why_unbound(node, tree, known)
-            if message:
-                yield slip(node.lineno, "undefined", message, fix=fix, name=node.id)
+        if message:
+            yield slip(line, kind, message, fix, node.id)
 
 
 def given_names(tree, names):
@@ -228,7 +193,7 @@ def without_quotes(tree, known):
     Nothing gives such a name a value, or only the line that it stands in does (`phone = d[phone]`). Only where a script
     reads parameters, or has other keys in quotes.
     """
-    arguments, lines = {n.arg for n in walk(tree) if isinstance(n, ast.arg)}, {}
+    arguments, lines = {n.arg for n in all_of(tree, ast.arg)}, {}
     for node in walk(tree):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
             lines.setdefault(node.id, []).append(node.lineno)
@@ -237,7 +202,7 @@ def without_quotes(tree, known):
         own = lines.get(node.id) == [node.lineno] and node.id not in arguments
         return (own or node.id not in known) and len(node.id) > 1
 
-    values = [n for n in walk(tree) if isinstance(n, ast.Subscript)]
+    values = all_of(tree, ast.Subscript)
     keyed = any(text_of(key_of(n)) for n in values)
     reads = any(called_name(n) in ("get_param", "get_param_cached") for n in walk(tree))
     found = {}
@@ -283,7 +248,7 @@ def key_of(subscript):
 def imported_otherwise(tree, names):
     """Return those of the names that are classes of messages or services, and are imported with other capitals: it is
     the import that fails."""
-    froms = [n for n in walk(tree) if isinstance(n, ast.ImportFrom)]
+    froms = all_of(tree, ast.ImportFrom)
     modules = [n for n in froms if (n.module or "").endswith((".msg", ".srv"))]
     imported = {alias.name.lower() for n in modules for alias in n.names}
     return {name for name in names if name.lower() in imported}
@@ -331,27 +296,22 @@ def unread_argument(node, tree):
         one = parents.get(one)
     for function in reversed(functions):
         given = [one.arg for one in function.args.args if one.arg != "self"]
-        read = len(given) == 1 and any(
-            isinstance(n, ast.Name) and n.id == given[0] for n in ast.walk(function)
-        )
-        if len(given) == 1 and not read:
+        if len(given) == 1 and given[0] not in names_in(function):
             return function.name, given[0]
     return None
 
 
 def assigned_late(tree):
     """Names that a function reads above the line that first gives them a value, and that nothing outside of it has."""
-    outside = bound_names(tree) | {n for one in walk(tree) if isinstance(one, ast.Global) for n in one.names}
-    for function in walk(tree):
-        if not isinstance(function, ast.FunctionDef):
-            continue
+    outside = bound_names(tree) | {n for one in all_of(tree, ast.Global) for n in one.names}
+    for function in all_of(tree, ast.FunctionDef):
         taken = {one.arg for one in ast.walk(function.args) if isinstance(one, ast.arg)} | outside
         inside = list(walk_own(function))
         stored = {}
         for n in inside:
             if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store):
                 stored[n.id] = min(n.lineno, stored.get(n.id, n.lineno))
-        for block in [function.body, *(n.body for n in inside if isinstance(n, (ast.While, ast.For)))]:
+        for block in [function.body, *(n.body for n in inside if isinstance(n, LOOPS))]:
             yield from assigned_late_in(block, {name: stored[name] for name in stored if name not in taken})
 
 
@@ -365,7 +325,7 @@ def assigned_late_in(block, stored):
                 line = late[n.id]
                 message = "line %d, which gives `%s` its value, comes after it" % (line, n.id)
                 fix = "move line %d above line %d" % (line, statement.lineno)
-                yield slip(n.lineno, "undefined", message, fix=fix, name=n.id)
+                yield slip(n.lineno, "undefined", message, fix, n.id)
 
 
 def walk_own(function):
@@ -393,7 +353,7 @@ def unbound_names(tree, known):
     """
     if any(called_name(n) in ("exec", "globals", "locals", "setattr") for n in walk(tree)):
         return set()
-    shared = {name for n in walk(tree) if isinstance(n, ast.Global) for name in n.names}
+    shared = {name for n in all_of(tree, ast.Global) for name in n.names}
     builtin = (set(dir(builtins)) | MODULE_NAMES) & known
     found, left = set(), [(tree, bound_names(tree) | shared | builtin)]
     while left:
@@ -410,21 +370,27 @@ def unbound_names(tree, known):
             left += [(c, visible) for c in outer] + [(c, inner) for c in body]
         elif isinstance(node, ast.ClassDef):
             own = visible | bound_names(node)
-            for child in ast.iter_child_nodes(node):
-                left.append((child, visible if isinstance(child, FUNCTIONS) else own))
-        elif isinstance(node, COMPREHENSIONS):
-            inner = visible | {
-                n.id for n in ast.walk(node) if isinstance(n, ast.Name) and not isinstance(n.ctx, ast.Load)
-            }
-            left += [(child, inner) for child in ast.iter_child_nodes(node)]
+            children = ast.iter_child_nodes(node)
+            left += [(child, visible if isinstance(child, FUNCTIONS) else own) for child in children]
         else:
-            left += [(child, visible) for child in ast.iter_child_nodes(node)]
+            inner = visible | set_in(node) if isinstance(node, COMPREHENSIONS) else visible
+            left += [(child, inner) for child in ast.iter_child_nodes(node)]
     return found
 
 
+def set_in(node):
+    """Return the names that are set somewhere in a node."""
+    return {n.id for n in ast.walk(node) if isinstance(n, ast.Name) and not isinstance(n.ctx, ast.Load)}
+
+
 def catches_names(handler):
+    return not caught_by(handler).isdisjoint(["", "NameError", "Exception", "BaseException"])
+
+
+def caught_by(handler):
+    """Return the names of what an `except` catches, "" for all."""
     kinds = handler.type.elts if isinstance(handler.type, ast.Tuple) else [handler.type]
-    return any(kind is None or dotted(kind) in ("NameError", "Exception", "BaseException") for kind in kinds)
+    return {dotted(kind) if kind is not None else "" for kind in kinds}
 
 
 def bound_names(scope):
@@ -524,8 +490,8 @@ def unnamed_exception(node, tree):
 def idle_functions(node, tree):
     """Return the functions of the file itself that nothing in it names. Within a function, only those that have a word
     of the name that stands there."""
-    named = {n.id for n in walk(tree) if isinstance(n, ast.Name)}
-    functions = [n for n in walk(tree) if isinstance(n, ast.FunctionDef)]
+    named = {n.id for n in all_of(tree, ast.Name)}
+    functions = all_of(tree, ast.FunctionDef)
     inside = [n for n in functions if n.lineno <= node.lineno <= n.end_lineno]
     words = words_of(node.id)
     own = (n for n in tree.body if isinstance(n, ast.FunctionDef))
@@ -545,7 +511,7 @@ def unread_alike(node, tree):
     scope = parents.get(node)
     while scope is not None and not isinstance(scope, (ast.FunctionDef, ast.Module)):
         scope = parents.get(scope)
-    names = [n for n in walk(tree) if isinstance(n, ast.Name) and len(n.id) > 1]
+    names = [n for n in all_of(tree, ast.Name) if len(n.id) > 1]
     read = {n.id for n in names if isinstance(n.ctx, ast.Load)}
     own = (n for n in ast.walk(scope or tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store))
     above = {n.id for n in own if n.lineno < node.lineno} - read
@@ -565,7 +531,7 @@ def what_to_write(node, used, tree):
     if called_name(around) in CALL_BACK and node in around.args[1:]:
         return line, "define it with `def %s(…):`" % name
     if inner in MADE:
-        loops = [n.lineno for n in walk(tree) if isinstance(n, (ast.While, ast.For)) and node in ast.walk(n)]
+        loops = [n.lineno for n in all_of(tree, *LOOPS) if node in ast.walk(n)]
         return min([line, *loops]), "write `%s = %s`" % (name, MADE[inner])
     sent = {one.id for n in calls_in(tree, "publish") for one in n.args if isinstance(one, ast.Name)}
     if name in sent or (isinstance(used, ast.Attribute) and isinstance(used.ctx, ast.Store)):

@@ -1,5 +1,6 @@
-"""Finds attributes that a class in a student's Python gives no object, classes used as objects, and what ROS is given
-that does not fit: sizes of queues, servers that are not started, names that hide others. For `slips.py`.
+"""Finds attributes that a class in a student's Python gives no object, classes used as objects, where a script names
+its node and topics, and what ROS is given that does not fit: sizes of queues, servers that are not started, names that
+hide others. For `slips.py`.
 
 Nothing is executed. Python 3.8, standard library only.
 """
@@ -10,23 +11,27 @@ import difflib
 
 from script_names import (
     CALL_BACK,
-    NAMED,
     TEXT_LIMIT,
+    all_of,
     argument,
     bound_names,
     called_name,
     calls_in,
     dotted,
+    functions_in,
     is_call,
+    listed,
+    published_type,
     slip,
+    targets_of,
     text_of,
     walk,
-)  # fmt: skip
+)
 
 
 def object_slips(tree):
     """Attributes that a class of this file gives no object, and classes that are used in place of an object."""
-    classes = [n for n in walk(tree) if isinstance(n, ast.ClassDef)]
+    classes = all_of(tree, ast.ClassDef)
     if any(called_name(n) == "setattr" for n in walk(tree)):
         return
     for one in classes:
@@ -45,9 +50,7 @@ class Members:
         self.fixed = bound_names(node)
         owner = {id(n): m for m in self.methods.values() for n in ast.walk(m)}
         self.stores, self.reads = {}, []
-        for n in walk(tree):
-            if not isinstance(n, ast.Attribute):
-                continue
+        for n in all_of(tree, ast.Attribute):
             method = owner.get(id(n))
             given = method.args.args[:1] if method is not None else []
             if not isinstance(n.ctx, ast.Load):
@@ -67,55 +70,48 @@ class Members:
                     method.lineno,
                 )
                 return method, why, "on line %d, write `__init__` instead of `%s`" % (method.lineno, name)
-        for n in walk(self.tree):
-            if isinstance(n, ast.FunctionDef) and n.name == "__init__" and n not in all_methods(self.tree):
+        methods = {m for n in all_of(self.tree, ast.ClassDef) for m in n.body}
+        for n in all_of(self.tree, ast.FunctionDef):
+            if n.name == "__init__" and n not in methods:
                 why = "`__init__` on line %d is not in the class %s" % (n.lineno, self.name)
                 fix = "indent `def __init__` on line %d like the other methods of %s, and its lines below it"
                 return n, why, fix % (n.lineno, self.name)
         return None
 
 
-def all_methods(tree):
-    return {m for n in walk(tree) if isinstance(n, ast.ClassDef) for m in n.body}
-
-
 def lacking_attributes(own):
     """Yield the attributes that the methods of a class read and that its objects need not have by then."""
     astray = own.astray()
     if astray:
-        yield slip(astray[0].lineno, "object", astray[1], fix=astray[2], name="__init__")
+        yield slip(astray[0].lineno, "object", astray[1], astray[2], "__init__")
     inside = set(ast.walk(astray[0])) if astray else set()
-    at_first = (
-        {called_name(n) for n in ast.walk(own.methods["__init__"])} if "__init__" in own.methods else set()
-    )
+    at_first = {called_name(n) for m in [own.methods.get("__init__")] if m for n in ast.walk(m)}
     for node, method in own.reads:
         name, stores = node.attr, own.stores.get(node.attr, [])
         givers = [m.name if m is not None else "__init__" for _, m in stores]
         if name in own.fixed or node in inside:
             continue
         if stores and inside.issuperset(n for n, _ in stores):
-            yield slip(node.lineno, "object", astray[1], fix=astray[2], name=name)
+            message, fix = astray[1:]
         elif not stores:
             message, fix = never_given(own, name, node.lineno)
-            yield slip(node.lineno, "object", message, fix=fix, name=name)
         elif not own.called.union(["__init__", method.name]).intersection(givers):
             message = "only `%s(…)` gives `self.%s` a value, and it was not called before" % (givers[0], name)
             fix = "give `self.%s` its value in `__init__`, or call `self.%s(…)` there" % (name, givers[0])
-            yield slip(node.lineno, "object", message, fix=fix, name=name)
         elif not at_first.union(["__init__", method.name]).intersection(givers):
             message = "line %d of `%s(…)` gives `self.%s` a value, and had not been reached"
             fix = "give `self.%s` its value in `__init__`, before anything can ask for it" % name
             message %= (stores[0][0].lineno, givers[0], name)
-            yield slip(node.lineno, "object", message, fix=fix, name=name)
+        else:
+            continue
+        yield slip(node.lineno, "object", message, fix, name)
 
 
 def methods_inside(tree):
     """Yield where a method is read that is defined inside another one."""
-    reads = {}
-    for n in walk(tree):
-        if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Load):
-            reads.setdefault(n.attr, n.lineno)
-    for owner in (n for n in walk(tree) if isinstance(n, ast.ClassDef)):
+    read = [n for n in all_of(tree, ast.Attribute) if isinstance(n.ctx, ast.Load)]
+    reads = {n.attr: n.lineno for n in reversed(read)}
+    for owner in all_of(tree, ast.ClassDef):
         for method in (n for n in owner.body if isinstance(n, ast.FunctionDef)):
             inner = [n for n in ast.walk(method) if isinstance(n, ast.FunctionDef) and n is not method]
             for one in inner:
@@ -123,7 +119,7 @@ def methods_inside(tree):
                     message = "`%s` on line %d is inside of `%s`" % (one.name, one.lineno, method.name)
                     fix = "begin line %d with the same spaces or tabs as line %d, and move the lines below it as far"
                     fix %= (one.lineno, method.lineno)
-                    yield slip(reads[one.name], "object", message, fix=fix, name=one.name)
+                    yield slip(reads[one.name], "object", message, fix, one.name)
 
 
 def never_given(own, name, line):
@@ -133,10 +129,9 @@ def never_given(own, name, line):
             if isinstance(n, ast.Name) and n.id == name and isinstance(n.ctx, ast.Store):
                 why = "line %d gives a value to `%s`, and not to `self.%s`" % (n.lineno, name, name)
                 return why, "on line %d, write `self.%s` instead of `%s`" % (n.lineno, name, name)
-    near = difflib.get_close_matches(name, sorted(own.fixed | set(own.stores)), 1, 0.75)
-    near = near or [
-        n for n in sorted(own.fixed | set(own.stores)) if n.startswith(name) or name.startswith(n)
-    ]
+    there = sorted(own.fixed | set(own.stores))
+    near = difflib.get_close_matches(name, there, 1, 0.75)
+    near = near or [n for n in there if n.startswith(name) or name.startswith(n)]
     if near:
         fix = "on line %d, write `self.%s` instead of `self.%s`" % (line, near[0], name)
         return "did you mean self.%s?" % near[0], fix
@@ -148,7 +143,7 @@ def never_given(own, name, line):
 
 def called_methods(tree):
     """Return what is called of `self`, here or by rospy, which was given it to call."""
-    calls = [n for n in walk(tree) if isinstance(n, ast.Call)]
+    calls = all_of(tree, ast.Call)
     given = [arg for n in calls if called_name(n) in CALL_BACK for arg in n.args[1:]]
     given += [k.value for n in calls if called_name(n) in CALL_BACK for k in n.keywords]
     names = [dotted(n) for n in [n.func for n in calls] + given]
@@ -158,7 +153,7 @@ def called_methods(tree):
 def never_defined(own, name, line):
     """Return why a class has no such method, and what to do."""
     why = "the class %s has no method `%s`" % (own.name, name)
-    for outside in (n for n in walk(own.tree) if isinstance(n, ast.FunctionDef) and n.name == name):
+    for outside in (n for n in all_of(own.tree, ast.FunctionDef) if n.name == name):
         if [one.arg for one in outside.args.args[:1]] == ["self"]:
             fix = "indent `def %s` on line %d like the other methods of %s, and its lines below it"
             return why, fix % (name, outside.lineno, own.name)
@@ -170,21 +165,20 @@ def classes_as_objects(classes, tree):
     """Yield where a method is called of a class, or of a name that was given the class, in place of an object, and
     where a field is set of one that was given a class of messages."""
     values = {}
-    for n in walk(tree):
-        for target in n.targets if isinstance(n, ast.Assign) else ():
+    for n in all_of(tree, ast.Assign):
+        for target in n.targets:
             values.setdefault(dotted(target), []).append(n)
-    imports = [n for n in walk(tree) if isinstance(n, ast.ImportFrom)]
-    imports = [n for n in imports if (n.module or "").endswith((".msg", ".srv"))]
+    imports = [n for n in all_of(tree, ast.ImportFrom) if (n.module or "").endswith((".msg", ".srv"))]
     of_messages = {one.asname or one.name for n in imports for one in n.names}
-    stored = [n for n in walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)]
+    stored = [n for n in all_of(tree, ast.Attribute) if isinstance(n.ctx, ast.Store)]
     stored = [dotted(n.value).split(".") for n in stored]
     for owner in sorted({".".join(parts[:end]) for parts in stored for end in range(1, len(parts) + 1)}):
         for given in (n for n in values.get(owner, ()) if dotted(n.value) in of_messages):
             kind, message = dotted(given.value), "`%s` is the class itself, not an object of it" % owner
             fix = "on line %d, write `%s = %s()`" % (given.lineno, owner, kind)
-            yield slip(given.lineno, "object", message, fix=fix, name=kind)
-    for n in walk(tree):
-        if not isinstance(n, ast.Call) or not isinstance(n.func, ast.Attribute) or n.args:
+            yield slip(given.lineno, "object", message, fix, kind)
+    for n in all_of(tree, ast.Call):
+        if not isinstance(n.func, ast.Attribute) or n.args:
             continue
         owner, given = dotted(n.func.value), values.get(dotted(n.func.value), [])
         name = dotted(given[0].value) if len(given) == 1 else owner
@@ -196,24 +190,25 @@ def classes_as_objects(classes, tree):
         made = "%s(%s)" % (name, "…" if init is not None and len(init.args.args) > 1 else "")
         right = "%s = %s" % (owner, made) if given else "%s.%s()" % (made, method.name)
         line = given[0].lineno if given else n.lineno
-        message = "`%s` is the class itself, not an object of it" % owner
-        yield slip(
-            n.lineno, "object", message, fix="on line %d, write `%s`" % (line, right), name=method.name
+        message, fix = (
+            "`%s` is the class itself, not an object of it",
+            "on line %d, write `%s`" % (line, right),
         )
+        yield slip(n.lineno, "object", message % owner, fix, method.name)
 
 
 def names_of_objects(tree):
     """Yield names that one method of a class gives a value and another reads, and `self` outside of all functions."""
-    parts = [n for n in walk(tree) if isinstance(n, (ast.FunctionDef, ast.ClassDef))]
+    parts = all_of(tree, ast.FunctionDef, ast.ClassDef)
     within = {inner for one in parts for inner in ast.walk(one)}
-    names = [n for n in walk(tree) if isinstance(n, ast.Name)]
+    names = all_of(tree, ast.Name)
     shared = bound_names(tree) | set(dir(builtins))
     shared |= {name for n in within if isinstance(n, ast.Global) for name in n.names}
     for one in (n for n in names if n.id == "self" and n not in within):
-        given = any(one in n.args for n in walk(tree) if isinstance(n, ast.Call))
+        given = any(one in n.args for n in all_of(tree, ast.Call))
         fix = "take `self` out of the brackets" if given else "write the object's name instead of `self`"
         message = "`self` is known only inside of a class's methods"
-        yield slip(one.lineno, "undefined", message, fix="on line %d, %s" % (one.lineno, fix), name="self")
+        yield slip(one.lineno, "undefined", message, "on line %d, %s" % (one.lineno, fix), "self")
     for owner in (one for one in parts if isinstance(one, ast.ClassDef)):
         methods = [n for n in owner.body if isinstance(n, ast.FunctionDef)]
         methods = [n for n in methods if n.args.args and n.args.args[0].arg == "self"]
@@ -224,11 +219,62 @@ def names_of_objects(tree):
             own |= {n.id for n in names[method.name] if not isinstance(n.ctx, ast.Load)}
             for node in (n for n in names[method.name] if n.id in givers and n.id not in own):
                 uses = [*names[method.name], *names[givers[node.id]]]
-                lines = sorted({n.lineno for n in uses if n.id == node.id})
+                lines = listed(sorted({n.lineno for n in uses if n.id == node.id}))
                 message = "`%s` has a value only in `%s(…)`" % (node.id, givers[node.id])
-                fix = "on lines %s and %d, write `self.%s` instead of `%s`"
-                fix %= (", ".join(map(str, lines[:-1])), lines[-1], node.id, node.id)
-                yield slip(node.lineno, "undefined", message, fix=fix, name=node.id)
+                fix = "on %s, write `self.%s` instead of `%s`" % (lines, node.id, node.id)
+                yield slip(node.lineno, "undefined", message, fix, node.id)
+
+
+# ---- where ROS is told a name
+
+NAMED = {
+    "init_node": "node-name", "Publisher": "publisher", "Subscriber": "subscriber", "wait_for_message": "subscriber",
+    "set_param": "sets-parameter",
+}  # fmt: skip
+"""Calls whose first argument is a name, and the kind of slip that tells where."""
+
+
+def graph_names(tree):
+    """Where a script names its node, its topics and the parameters that it sets, as written; and the types that it
+    publishes."""
+    owners = targets_of(tree)
+    own = {n.name for n in all_of(tree, ast.ClassDef)}
+    for node in walk(tree):
+        kind = NAMED.get(called_name(node))
+        if not kind or dotted(node.func) in own:
+            continue
+        anonymous = [k for k in node.keywords if k.arg == "anonymous" and getattr(k.value, "value", True)]
+        owner = owners.get(id(node), "") or ("anonymous" if anonymous else "")
+        names, name = argument(node, 0, "name"), published_type(node)
+        if names and text_of(names[0]):
+            yield slip(names[0].lineno, kind, text_of(names[0]), name=owner)
+        elif names and kind == "node-name":
+            for text, written in text_behind(names[0], tree):
+                yield slip(text.lineno, kind, text_of(text), written, owner)
+        if names and name.isidentifier() and kind in ("publisher", "subscriber"):
+            yield slip(names[0].lineno, kind + "-type", name)
+
+
+def text_behind(node, tree):
+    """Yield the text that a variable is given once, or that an argument gets in the only call of its function, and how
+    it is written there, with `{}` in its place: `self.name = {}`, `name={}`."""
+    name = dotted(node)
+    assigned = [n.value for n in all_of(tree, ast.Assign) if name in map(dotted, n.targets)]
+    if len(assigned) == 1 and text_of(assigned[0]):
+        yield assigned[0], "%s = {}" % name
+    for function in () if assigned else functions_in(tree).values():
+        arguments = [one.arg for one in function.args.args]
+        if name in arguments and any(one is node for one in ast.walk(function)):
+            owners = [n.name for n in all_of(tree, ast.ClassDef) if function in n.body]
+            called = owners[0] if owners and function.name == "__init__" else function.name
+            calls = [n for n in all_of(tree, ast.Call) if dotted(n.func) in (called, "self." + called)]
+            place = arguments.index(name) - (arguments[0] == "self")
+            found = argument(calls[0], place, name) if len(calls) == 1 else []
+            if found and text_of(found[0]):
+                alone = len(calls[0].args) + len(calls[0].keywords) == 1
+                by_name = found[0] in [one.value for one in calls[0].keywords]
+                written = "%s={}" % name if by_name else "%s({})" % called if alone else "{}"
+                yield found[0], written
 
 
 # ---- what ROS is given
@@ -236,65 +282,62 @@ def names_of_objects(tree):
 
 def subscribed_again(tree):
     """Yield each `Subscriber(…)` in a loop that runs until the node ends: each turn makes another one."""
-    for loop in walk(tree):
-        if isinstance(loop, ast.While) and calls_in(loop.test, "is_shutdown") and not calls_in(loop, "spin"):
+    for loop in all_of(tree, ast.While):
+        if calls_in(loop.test, "is_shutdown") and not calls_in(loop, "spin"):
             made = next((n for n in ast.walk(loop) if called_name(n) == "Subscriber"), None)
             if made is not None:
                 message = "the loop on line %d makes the Subscriber on line %d again and again"
                 fix = "move line %d above line %d, and write `rospy.spin()` in place of the loop if that is all it does"
                 lines = (made.lineno, loop.lineno)
-                yield slip(made.lineno, "subscribed-again", message % lines[::-1], fix=fix % lines)
+                yield slip(made.lineno, "subscribed-again", message % lines[::-1], fix % lines)
 
 
 def taken_off(tree):
     """Yield where a `Publisher` or `Subscriber` is unregistered, but for what a function does at the node's end."""
-    at_end = {
-        dotted(arg).rpartition(".")[2] for n in walk(tree) if is_call(n, "on_shutdown") for arg in n.args
-    }
-    functions = [n for n in walk(tree) if isinstance(n, ast.FunctionDef) and n.name in at_end]
+    at_end = {dotted(arg).rpartition(".")[2] for n in calls_in(tree, "on_shutdown") for arg in n.args}
+    functions = [n for n in all_of(tree, ast.FunctionDef) if n.name in at_end]
     spared = {inner for function in functions for inner in ast.walk(function)}
-    for node in walk(tree):
-        if is_call(node, "unregister") and not node.args and node not in spared:
-            message = "line %d unregisters `%s`, which then has no topic" % (
-                node.lineno,
-                dotted(node.func.value),
-            )
-            yield slip(node.lineno, "unregistered", message, fix="delete line %d" % node.lineno)
+    for node in calls_in(tree, "unregister"):
+        if not node.args and node not in spared:
+            line, message = node.lineno, "line %d unregisters `%s`, which then has no topic"
+            message %= (line, dotted(node.func.value))
+            yield slip(line, "unregistered", message, "delete line %d" % line)
 
 
 def unused_publishers(tree):
     """Yield each `pub = Publisher(…)` whose `pub` nothing in the script uses, so that nothing is published by it."""
     read = {dotted(n) for n in walk(tree) if isinstance(getattr(n, "ctx", None), ast.Load)}
-    for node in walk(tree):
-        made = isinstance(node, ast.Assign) and is_call(node.value, "Publisher")
-        name, topics = (dotted(node.targets[0]), argument(node.value, 0, "name")) if made else ("", [])
+    for node in all_of(tree, ast.Assign):
+        name = dotted(node.targets[0])
+        topics = argument(node.value, 0, "name") if is_call(node.value, "Publisher") else []
         if topics and name not in read:
             message = "nothing in the script calls `%s.publish(…)`" % name
             fix = "call `%s.publish(…)` inside the loop" % name
-            yield slip(node.lineno, "never-published", message, fix=fix, name=text_of(topics[0]))
+            yield slip(node.lineno, "never-published", message, fix, text_of(topics[0]))
 
 
 def unstarted_servers(tree):
     """Yield each `SimpleActionServer(…, auto_start=False)` where nothing in the script calls or names a `start`."""
     started = any(isinstance(n, ast.Attribute) and n.attr == "start" for n in walk(tree))
-    given = {id(n.value): dotted(n.targets[0]) for n in walk(tree) if isinstance(n, ast.Assign)}
-    for node in walk(tree):
-        waits = [k for k in getattr(node, "keywords", ()) if k.arg == "auto_start"]
-        waits = [k for k in waits if getattr(k.value, "value", None) is False]
-        if called_name(node) == "SimpleActionServer" and waits and not started:
+    given = targets_of(tree)
+    for node in () if started else walk(tree):
+        waits = [k.value for k in getattr(node, "keywords", ()) if k.arg == "auto_start"]
+        if called_name(node) == "SimpleActionServer" and any(
+            getattr(v, "value", None) is False for v in waits
+        ):
             message = "the action server of line %d is never started" % node.lineno
             fix = "below line %d, write `%s.start()`" % (node.end_lineno, given.get(id(node), "server"))
-            yield slip(node.lineno, "not-started", message, fix=fix)
+            yield slip(node.lineno, "not-started", message, fix)
 
 
 def hidden_names(tree):
     """Yield callbacks that are defined twice, so that the first one is never called; and calls of a name that a line
     imports and a class below it takes."""
-    functions, classes = {}, {n.name: n for n in walk(tree) if isinstance(n, ast.ClassDef)}
+    functions, classes = {}, {n.name: n for n in all_of(tree, ast.ClassDef)}
     for node in getattr(tree, "body", ()):
         if isinstance(node, ast.FunctionDef):
             functions.setdefault(node.name, []).append(node)
-    imports = [(n, a) for n in walk(tree) if isinstance(n, ast.ImportFrom) for a in n.names]
+    imports = [(n, a) for n in all_of(tree, ast.ImportFrom) for a in n.names]
     imported = {a.asname or a.name: "%s.%s" % (n.module, a.name) for n, a in imports}
     yield from hidden_classes(tree, imported)
     for node in walk(tree):
@@ -305,55 +348,46 @@ def hidden_names(tree):
             lines = (twice[1].lineno, twice[0].name, twice[0].lineno)
             message = "line %d defines `%s` again, so that the one on line %d is never called" % lines
             fix = "give the function on line %d another name, also in the Subscriber(…) that should call it"
-            yield slip(
-                twice[1].lineno, "defined-twice", message, fix=fix % twice[1].lineno, name=twice[0].name
-            )
+            yield slip(lines[0], "defined-twice", message, fix % lines[0], twice[0].name)
         if isinstance(getattr(node, "func", None), ast.Name) and name in classes and name in imported:
             message = "the class on line %d is called %s too, and hides what is imported"
+            message %= (classes[name].lineno, name)
             fix = "write `%s(…)` on line %d, and `import %s` at the top if it is not there"
             fix %= (imported[name], node.lineno, imported[name].partition(".")[0])
-            yield slip(
-                node.lineno, "defined-twice", message % (classes[name].lineno, name), fix=fix, name=name
-            )
+            yield slip(node.lineno, "defined-twice", message, fix, name)
 
 
 def hidden_classes(tree, imported):
     """Yield the first message that takes the name of its class, which an import gives: `String = String()`."""
-    made = [n for n in walk(tree) if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)]
-    made = [
-        n for n in made if dotted(n.value.func) in imported and dotted(n.value.func) in map(dotted, n.targets)
-    ]
-    for node in [n for n in made if dotted(n.value.func)[:1].isupper()][:1]:
-        name = dotted(node.value.func)
+    made = [(n, dotted(getattr(n.value, "func", None))) for n in all_of(tree, ast.Assign)]
+    made = [(n, name) for n, name in made if name in imported and name[:1].isupper()]
+    for node, name in [(n, name) for n, name in made if name in map(dotted, n.targets)][:1]:
         is_message = ".msg." in imported[name]
-        classes = {id(n.func) for n in walk(tree) if isinstance(n, ast.Call)}
-        classes |= {
-            id(one) for n in walk(tree) if called_name(n) in NAMED for one in argument(n, 1, "data_class")
-        }
-        names = {n.id for n in walk(tree) if isinstance(n, ast.Name)}
+        classes = {id(n.func) for n in all_of(tree, ast.Call)}
+        given = (argument(n, 1, "data_class") for n in walk(tree) if called_name(n) in NAMED)
+        classes |= {id(one) for types in given for one in types}
+        names = {n.id for n in all_of(tree, ast.Name)}
         free = [one for one in ("msg", "message") if one not in names and is_message]
         other, what = (free or ["own_" + name.lower()])[0], "message" if is_message else "object"
         meant = [n for n in walk(tree) if getattr(n, "id", "") == name and id(n) not in classes]
-        lines = sorted({n.lineno for n in meant})
-        where = ", ".join(map(str, lines[:-1])) + " and %d" % lines[-1] if lines[1:] else "%d" % lines[0]
+        where = listed(sorted({n.lineno for n in meant}))
         message = "line %d calls a%s `%s`, and hides the class of that name"
         message %= (node.lineno, (" " if is_message else "n ") + what, name)
         given = "…" if node.value.args or node.value.keywords else ""
-        fix = "on line%s %s, call the %s `%s`, as in `%s = %s(%s)`"
-        fix %= ("s" if lines[1:] else "", where, what, other, other, name, given)
-        yield slip(node.lineno, "hides-class", message, fix=fix, name=name)
+        fix = "on %s, call the %s `%s`, as in `%s = %s(%s)`" % (where, what, other, other, name, given)
+        yield slip(node.lineno, "hides-class", message, fix, name)
 
 
 def queue_sizes(tree):
     """Publishers whose `queue_size` is a string, or a number without its name: rospy takes it, and sends nothing."""
-    for node in walk(tree):
-        third = node.args[2] if is_call(node, "Publisher") and len(node.args) == 3 else None
+    for node in calls_in(tree, "Publisher"):
+        third = node.args[2] if len(node.args) == 3 else None
         if isinstance(third, ast.Constant) and type(third.value) is int and third.value:
             message = "the third value of `Publisher(…)` is no queue size, which it takes by its name"
             fix = "write `queue_size=%d` instead of `%d`" % (third.value, third.value)
-            yield slip(third.lineno, "queue-size", message, fix=fix)
-        for one in node.keywords if is_call(node, "Publisher") else ():
+            yield slip(third.lineno, "queue-size", message, fix)
+        for one in node.keywords:
             value = getattr(one.value, "value", None)
             if one.arg == "queue_size" and isinstance(value, str):
                 fix = "write `queue_size=%s`, without quotes" % (value[:TEXT_LIMIT] or "10")
-                yield slip(one.value.lineno, "queue-size", "`queue_size` is a string", fix=fix)
+                yield slip(one.value.lineno, "queue-size", "`queue_size` is a string", fix)

@@ -7,7 +7,18 @@ only.
 import ast
 import re
 
-from script_names import FUNCTIONS, TEXT_LIMIT, called_name, calls_in, dotted, is_call, slip, walk
+from script_names import (
+    FUNCTIONS,
+    LOOPS,
+    TEXT_LIMIT,
+    all_of,
+    called_name,
+    calls_in,
+    dotted,
+    is_call,
+    slip,
+    walk,
+)
 
 PRINTED = ("loginfo", "logwarn", "logerr", "logdebug", "logfatal", "print", "write")
 VALUE, DATA, NODE = "{}", "{data}", "{node}"
@@ -29,7 +40,7 @@ def said_texts(tree):
             kinds.update(arg.arg for arg in ast.walk(node.args) if isinstance(arg, ast.arg))
     read = Texts({name: values[0] for name, values in given.items() if len(values) == 1 and values[0]}, kinds)
     moves = moves_to_run(tree)
-    loops = [n for n in walk(tree) if isinstance(n, (ast.While, ast.For))]
+    loops = all_of(tree, *LOOPS)
     for node in walk(tree):
         if is_call(node, "publish") and len(node.args) == 1:
             place, text = read.message(node.args[0])
@@ -47,7 +58,7 @@ def made_before(place, call, loops):
 
 def said(kind, node, text, call, fix=""):
     if text and text != VALUE and len(text) <= TEXT_LIMIT:
-        yield slip(node.lineno, kind, text, fix=fix, name=call)
+        yield slip(node.lineno, kind, text, fix, call)
 
 
 def moves_to_run(tree):
@@ -113,11 +124,7 @@ class Texts:
         """Return the expression that another one gives its text: what is in `str(…)`, or what a name was given."""
         if isinstance(node, ast.FormattedValue):
             return node.value
-        if (
-            isinstance(node, ast.Call)
-            and node.args
-            and called_name(node) in ("str", "String", "unicode", "repr")
-        ):
+        if called_name(node) in ("str", "String", "unicode", "repr") and node.args:
             return node.args[0]
         return self.given.get(dotted(node)) if isinstance(node, (ast.Name, ast.Attribute)) else None
 

@@ -13,55 +13,24 @@ import sys
 
 # `-I` leaves this folder out
 sys.path.append(os.path.dirname(os.path.abspath(__file__)))
-from script_callbacks import callbacks, unprinted_messages
-from script_counters import (
-    PLAIN_MODULES,
-    clock_values,
-    counter_slips,
-    counter_starts,
-    counts,
-    knows_time,
-    names_in,
-    published_unchanged,
-    resets,
-    sends_no_time,
-    values_left_out,
-)  # fmt: skip
-from script_loops import (
-    deaf_loops,
-    is_shutdown,
-    loop_rates,
-    loops_of_numbers,
-    never_reached,
-    published_before,
-    publishes_twice,
-    sleepless_loops,
-    sleeps_twice,
-    stopped_loops,
-    waiting_callbacks,
-)  # fmt: skip
+import script_callbacks as callbacks
+import script_counters as counters
+import script_loops as loops
+import script_names as names
+import script_objects as objects
 from script_names import (
-    assigned_late,
+    LOOPS,
+    all_of,
     called_name,
     calls_in,
     dotted,
-    graph_names,
     key_of,
-    misspelt,
+    names_in,
     parents_of,
     slip,
+    targets_of,
     walk,
     walk_own,
-)  # fmt: skip
-from script_objects import (
-    hidden_names,
-    names_of_objects,
-    object_slips,
-    queue_sizes,
-    subscribed_again,
-    taken_off,
-    unstarted_servers,
-    unused_publishers,
 )
 from script_texts import said_texts
 
@@ -71,59 +40,56 @@ SLIPS_LIMIT = 100
 
 def slips(tree):
     """What compiles and is not meant: names that are not called or not there, questions that wait for a keyboard."""
-    functions = {n.name for n in walk(tree) if isinstance(n, (ast.FunctionDef, ast.ClassDef))}
-    assigned = [n for n in walk(tree) if isinstance(n, ast.Assign)]
-    kept = {
-        id(n.value): dotted(n.targets[0]) for n in assigned if not isinstance(n.targets[0], ast.Subscript)
-    }
-    found = []
+    finders = (
+        uncalled_and_asked, objects.names_of_objects, names.misspelt, loops.loop_rates, counters.resets, never_run,
+        loops.never_reached, loops.stopped_loops, loops.published_before, loops.sleepless_loops, loops.sleeps_twice,
+        loops.publishes_twice, callbacks.callbacks, loops.waiting_callbacks, objects.queue_sizes, objects.graph_names,
+        objects.object_slips, said_texts, loops.deaf_loops, counters.clock_values, counters.counter_slips,
+        counters.counter_starts, without_effect, names.assigned_late, objects.hidden_names, objects.subscribed_again,
+        imports, objects.taken_off, objects.unstarted_servers, wrong_values, decided_conditions,
+        callbacks.unprinted_messages, counters.values_left_out, counters.published_unchanged,
+        objects.unused_publishers, loops.loops_of_numbers, finished_goals, counters.sends_no_time, without_node,
+    )  # fmt: skip
+    found = [one for find in finders for one in find(tree)]
+    # of two that say why a name is not there, the first is about the class that it belongs to
+    first = {(one["line"], one["name"]): one for one in reversed(found) if one["kind"] == "undefined"}
+    found = [one for one in found if one["kind"] != "undefined" or first[one["line"], one["name"]] is one]
+    return sorted(found, key=lambda one: one["line"])[:SLIPS_LIMIT]
+
+
+def uncalled_and_asked(tree):
+    """Functions that are named but not called, and questions that wait for a keyboard."""
+    functions, kept = {n.name for n in all_of(tree, ast.FunctionDef, ast.ClassDef)}, targets_of(tree)
+    count = 0
     for node in walk(tree):
         name = uncalled(node, functions)
         if name:
+            count += 1
             message, fix = "`%s` is named but not called" % name, "write `%s()`" % name
-            found.append(slip(node.lineno, "not-called", message, fix=fix, name=name))
+            yield slip(node.lineno, "not-called", message, fix, name)
         name = asked(node, functions)
-        if name and len(found) < SLIPS_LIMIT:  # each looks through the whole script
+        if name and count < SLIPS_LIMIT:  # each looks through the whole script
+            count += 1
             message = "`%s()` waits for someone to type, and a graded node gets no input" % name
             line = numbered(node, tree)
             fix = "delete line %d, which makes a number of it" % line if line else ""
             fix = decided_by(node, tree) or fix
-            found.append(slip(node.lineno, "input", message, fix=fix, name=how_often(node, tree)))
+            yield slip(node.lineno, "input", message, fix, how_often(node, tree))
             if name == "input" and not line and kept.get(id(node), "...") != "...":
-                found.append(slip(node.lineno, "typed-text", name, name=kept[id(node)]))
-    finders = (
-        names_of_objects, misspelt, loop_rates, resets, never_run, never_reached, stopped_loops,
-        published_before, sleepless_loops, sleeps_twice, publishes_twice, callbacks, waiting_callbacks,
-        queue_sizes, graph_names, object_slips, said_texts, deaf_loops, clock_values, counter_slips,
-        counter_starts, without_effect, assigned_late, hidden_names, subscribed_again, imports, taken_off,
-        unstarted_servers, wrong_values, decided_conditions, unprinted_messages, values_left_out, published_unchanged,
-        unused_publishers, loops_of_numbers, finished_goals,
-    )  # fmt: skip
-    for find in finders:
-        found += find(tree)
-    published = calls_in(tree, "publish")
-    if published and counts(tree):
-        message = "" if knows_time(tree) else "the script counts, and reads no clock"
-        message = message or sends_no_time(tree)
-        if message:
-            found.append(slip(published[0].lineno, "no-clock", message))
-    calls = {called_name(n): n.lineno for n in walk(tree) if isinstance(n, ast.Call)}
-    if "init_node" not in calls and ("Publisher" in calls or "Subscriber" in calls or does_something(tree)):
+                yield slip(node.lineno, "typed-text", name, name=kept[id(node)])
+
+
+def without_node(tree):
+    """A script with topics, or one that does more than define names, that makes no node."""
+    calls = {called_name(n) for n in all_of(tree, ast.Call)}
+    if "init_node" not in calls and (calls & {"Publisher", "Subscriber"} or does_something(tree)):
         fix = "make it a node: `rospy.init_node(…)`, then its topics, then `rospy.spin()` or a loop"
-        found.append(slip(1, "no-init", "nothing in the script calls `rospy.init_node(…)`", fix=fix))
-    # of two that say why a name is not there, the first is about the class that it belongs to
-    first = {(one["line"], one["name"]): one for one in reversed(found) if one["kind"] == "undefined"}
-    found = [
-        one
-        for one in found
-        if first.get((one["line"], one["name"]), one) is one or one["kind"] != "undefined"
-    ]
-    return sorted(found, key=lambda one: one["line"])[:SLIPS_LIMIT]
+        yield slip(1, "no-init", "nothing in the script calls `rospy.init_node(…)`", fix)
 
 
 def does_something(tree):
     """Return whether a file does more when it is run than to define names for others."""
-    calls = any(isinstance(n, (ast.While, ast.For)) or is_call_alone(n) for n in tree.body)
+    calls = any(isinstance(n, LOOPS) or is_call_alone(n) for n in tree.body)
     return calls or any(getattr(n, "id", "") == "__name__" for n in walk(tree))
 
 
@@ -139,37 +105,28 @@ def never_run(tree):
     """Functions that make a node, publish or wait, and that nothing names; and `__name__` beside another word than
     `__main__`.
     """
-    named = {n.id for n in walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
-    named |= {n.attr for n in walk(tree) if isinstance(n, ast.Attribute)}
-    made = [n for n in walk(tree) if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)]
-    objects = {dotted(n.value.func): dotted(n.targets[0]) for n in made}
-    classes = [n for n in walk(tree) if isinstance(n, ast.ClassDef)]
+    named = {n.id for n in all_of(tree, ast.Name) if isinstance(n.ctx, ast.Load)}
+    named |= {n.attr for n in all_of(tree, ast.Attribute)}
+    made = [n for n in all_of(tree, ast.Assign) if isinstance(n.value, ast.Call)]
+    made_of = {dotted(n.value.func): dotted(n.targets[0]) for n in made}
+    classes = all_of(tree, ast.ClassDef)
     of_class = {id(f): c.name for c in classes for f in c.body}
     plain = {c.name for c in classes} | {"object"}
     for one in classes:  # what a class of another module is the base of, that module may call
         if {dotted(base) for base in one.bases} - plain:
             plain.discard(one.name)
-            named |= {f.name for f in functions_of(one)}
+            named |= {f.name for f in one.body if isinstance(f, ast.FunctionDef)}
     for node in walk(tree):
         if isinstance(node, ast.FunctionDef) and node.name not in named and not node.decorator_list:
             if calls_in(node, *WORKS) and not node.name.startswith("__"):
                 message, owner = "nothing calls `%s()`" % node.name, of_class.get(id(node), "")
-                owner = owner and (objects.get(owner) or owner + "()") + "."
-                yield slip(
-                    node.lineno,
-                    "never-called",
-                    message,
-                    handed_over(node, tree, owner),
-                    name=owner + node.name,
-                )
+                owner = owner and (made_of.get(owner) or owner + "()") + "."
+                fix = handed_over(node, tree, owner)
+                yield slip(node.lineno, "never-called", message, fix, owner + node.name)
         elif isinstance(node, ast.Compare) and getattr(node.left, "id", "") == "__name__":
             word = getattr(node.comparators[0], "value", "__main__")
             if word != "__main__" and isinstance(node.ops[0], (ast.Eq, ast.Is)):
                 yield slip(node.lineno, "main-guard", "`__name__` is never %r" % (word,))
-
-
-def functions_of(owner):
-    return [one for one in owner.body if isinstance(one, ast.FunctionDef)]
 
 
 def handed_over(function, tree, owner):
@@ -193,44 +150,33 @@ IN_DEGREES = ("degrees", "rad2deg")
 def wrong_values(tree):
     """Comparisons with NaN, angles in degrees of which a sine is taken, answers of services that are dropped, and an
     index that is a float."""
-    made = [n for n in walk(tree) if isinstance(n, ast.Assign) and called_name(n.value) in IN_DEGREES]
+    made = [n for n in all_of(tree, ast.Assign) if called_name(n.value) in IN_DEGREES]
     degrees = {dotted(target) for n in made for target in n.targets}
     for node in walk(tree):
+        line = getattr(node, "lineno", 0)
         if isinstance(node, ast.Compare) and any(map(is_nan, [node.left, *node.comparators])):
             name = dotted(node.comparators[0] if is_nan(node.left) else node.left)
             fix = "write `math.isnan(%s)`" % (name if "..." not in name else "…")
-            yield slip(
-                node.lineno,
-                "wrong-value",
-                "no number is equal to NaN, not even NaN itself",
-                fix=fix,
-                name="nan",
-            )
+            yield slip(line, "wrong-value", "no number is equal to NaN, not even NaN itself", fix, "nan")
         elif called_name(node) in OF_ANGLES and node.args:
             given = dotted(node.args[0])
             if given in degrees or called_name(node.args[0]) in IN_DEGREES:
                 message = "`%s` takes radians, and gets degrees" % called_name(node)
                 fix = "leave out `degrees(…)`: the angle is already in radians"
-                yield slip(node.lineno, "wrong-value", message, fix=fix, name="degrees")
+                yield slip(line, "wrong-value", message, fix, "degrees")
         elif isinstance(node, ast.Subscript) and is_quotient(key_of(node)):
             message = "`/` makes a float, also of whole numbers, and an index is a whole number"
-            fix = "on line %d, write `//` instead of `/` in the index" % node.lineno
-            yield slip(node.lineno, "float-index", message, fix=fix, name=dotted(node.value))
+            fix = "on line %d, write `//` instead of `/` in the index" % line
+            yield slip(line, "float-index", message, fix, dotted(node.value))
         elif isinstance(node, ast.Expr) and called_name(node.value).endswith("Response"):
             name = called_name(node.value)
-            fix = "write `return %s(…)`" % name
-            yield slip(
-                node.lineno,
-                "wrong-value",
-                "the `%s` that is made is not returned" % name,
-                fix=fix,
-                name="return",
-            )
+            message, fix = "the `%s` that is made is not returned" % name, "write `return %s(…)`" % name
+            yield slip(line, "wrong-value", message, fix, "return")
         elif isinstance(node, ast.FunctionDef) and unfilled_answer(node):
             variable, name, line = unfilled_answer(node)
             message = "no field of the `%s` that is returned is ever set" % name
             fix = "set it above the `return`: `%s.<field> = …`" % variable
-            yield slip(line, "wrong-value", message, fix=fix, name="empty")
+            yield slip(line, "wrong-value", message, fix, "empty")
 
 
 def is_quotient(node):
@@ -264,8 +210,8 @@ BELOW_LIMIT = 50
 def finished_goals(tree):
     """Where an `if` of an action's callback ends the goal last of all, and the callback goes on below it."""
     parents = parents_of(tree)
-    for node in walk(tree):
-        if not isinstance(node, ast.If) or node.orelse or not is_call_alone(node.body[-1]):
+    for node in all_of(tree, ast.If):
+        if node.orelse or not is_call_alone(node.body[-1]):
             continue
         call, around = node.body[-1].value, parents.get(node)
         if called_name(call) not in FINISHING:
@@ -273,16 +219,13 @@ def finished_goals(tree):
         block = getattr(around, "body", [])
         at = block.index(node) + 1 if isinstance(block, list) and node in block else len(block)
         below = [one for one in block[at : at + BELOW_LIMIT] if not is_other_case(one, node)]
-        more = any(calls_in(one, *FINISHING) or is_loop(one) for one in below)
-        if more or (is_loop(around) and not is_last_turn(around, node, call)):
-            what = "loop" if is_loop(around) else "callback"
+        more = any(calls_in(one, *FINISHING) or isinstance(one, LOOPS) for one in below)
+        in_loop = isinstance(around, LOOPS)
+        if more or (in_loop and not is_last_turn(around, node, call)):
+            what = "loop" if in_loop else "callback"
             message = "the goal is over with `%s(…)`, and the %s goes on" % (called_name(call), what)
             fix = "below line %d, write `return`" % node.body[-1].end_lineno
-            yield slip(call.lineno, "goes-on", message, fix=fix, name=called_name(call))
-
-
-def is_loop(node):
-    return isinstance(node, (ast.While, ast.For))
+            yield slip(call.lineno, "goes-on", message, fix, called_name(call))
 
 
 def is_other_case(node, before):
@@ -300,9 +243,8 @@ def is_last_turn(loop, node, call):
     if isinstance(loop, ast.For):
         return dotted(loop.target) == dotted(call.func.value)
     stored = {dotted(target) for n in node.body if isinstance(n, ast.Assign) for target in n.targets}
-    asked = {dotted(n) for n in ast.walk(loop.test) if isinstance(n, (ast.Name, ast.Attribute))}
     takes = any(calls_in(one, "accept_new_goal") for one in loop.body[:BELOW_LIMIT])
-    return bool(takes or calls_in(loop.test, "is_active") or stored & asked)
+    return bool(takes or calls_in(loop.test, "is_active") or stored & names_in(loop.test))
 
 
 BELOW = (ast.Lt, ast.LtE)
@@ -313,9 +255,7 @@ TURNED = {ast.Gt: ast.Lt, ast.GtE: ast.LtE, ast.Lt: ast.Gt, ast.LtE: ast.GtE}
 
 def decided_conditions(tree):
     """`x > 265 or x < 275`, which every number fulfils, and `x < 10 and x > 350`, which none does."""
-    for node in walk(tree):
-        if not isinstance(node, ast.BoolOp):
-            continue
+    for node in all_of(tree, ast.BoolOp):
         any_of, bounds = isinstance(node.op, ast.Or), {}
         yield from decided_by_values(node, ast.NotEq if any_of else ast.Eq)
         for name, kind, number in filter(None, map(bound_of, node.values)):
@@ -332,9 +272,7 @@ def decided_conditions(tree):
             pair = "%s %s %g %s %s %s %g" % (name, SIGNS[low[0]], low[1], word, name, SIGNS[high[0]], high[1])
             fix = "on line %d, write `%s` in place of `%s`, or compare with other numbers"
             fix %= (node.lineno, other, word)
-            yield slip(
-                node.lineno, "wrong-value", "`%s` is true for %s" % (pair, holds), fix=fix, name="bounds"
-            )
+            yield slip(node.lineno, "wrong-value", "`%s` is true for %s" % (pair, holds), fix, "bounds")
 
 
 def decided_by_values(condition, kind):
@@ -347,14 +285,13 @@ def decided_by_values(condition, kind):
             asked.setdefault(dotted(one.left), {})[value] = repr(value)[:TEXT_SHOWN].replace("`", "'")
     for name, values in asked.items():
         if len(values) > 1:
-            sign, word, other, holds = (
-                ("!=", "or", "and", "every") if kind is ast.NotEq else ("==", "and", "or", "no")
-            )
+            is_or = kind is ast.NotEq
+            sign, word, other, holds = ("!=", "or", "and", "every") if is_or else ("==", "and", "or", "no")
             first, second = list(values.values())[:2]
             pair = "%s %s %s %s %s %s %s" % (name, sign, first, word, name, sign, second)
             fix = "on line %d, write `%s` in place of `%s`" % (condition.lineno, other, word)
             message = "`%s` is true for %s value" % (pair, holds)
-            yield slip(condition.lineno, "wrong-value", message, fix=fix, name="bounds")
+            yield slip(condition.lineno, "wrong-value", message, fix, "bounds")
 
 
 def bound_of(node):
@@ -401,8 +338,8 @@ def uncalled(node, functions):
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Name) and node.value.id in functions:
         return node.value.id
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
-        return dotted(node.operand) if is_shutdown(node.operand) else None
-    if isinstance(node, (ast.While, ast.If)) and is_shutdown(node.test):
+        return dotted(node.operand) if loops.is_shutdown(node.operand) else None
+    if isinstance(node, (ast.While, ast.If)) and loops.is_shutdown(node.test):
         return dotted(node.test)
     return None
 
@@ -418,24 +355,19 @@ def asked(node, functions):
 
 def how_often(node, tree):
     """Return "once" for what no loop around it does again, "paused" for what a loop does that sleeps, "" else."""
-    loops = [n for n in walk(tree) if isinstance(n, (ast.While, ast.For)) and node in ast.walk(n)]
-    if not loops:
+    around = [n for n in all_of(tree, *LOOPS) if node in ast.walk(n)]
+    if not around:
         return "once"
-    return "paused" if calls_in(loops[-1], "sleep") else ""
+    return "paused" if calls_in(around[-1], "sleep") else ""
 
 
 def numbered(node, tree):
     """Return the line on which the variable that gets what is typed is made a number, `n = int(n)`; 0 for none."""
-    assigned = [n for n in walk(tree) if isinstance(n, ast.Assign) and n.lineno >= node.lineno]
-    names = {dotted(n.targets[0]) for n in assigned if n.value is node}
-    lines = [
-        n.lineno
-        for n in assigned
-        if called_name(n.value) in ("int", "float")
-        and [dotted(one) for one in n.value.args] == [dotted(n.targets[0])]
-        and dotted(n.targets[0]) in names
-    ]
-    return min(lines, default=0)
+    assigned = [n for n in all_of(tree, ast.Assign) if n.lineno >= node.lineno]
+    given = {dotted(n.targets[0]) for n in assigned if n.value is node}
+    made = [n for n in assigned if called_name(n.value) in ("int", "float") and dotted(n.targets[0]) in given]
+    own = [n for n in made if [dotted(one) for one in n.value.args] == [dotted(n.targets[0])]]
+    return min((n.lineno for n in own), default=0)
 
 
 def decided_by(node, tree):
@@ -443,10 +375,10 @@ def decided_by(node, tree):
     parents = parents_of(tree)
     while node in parents and not isinstance(node, ast.stmt):
         node = parents[node]
-    names = {dotted(t) for t in getattr(node, "targets", [])}
+    given = {dotted(t) for t in getattr(node, "targets", [])}
     block = getattr(parents.get(node), "body", [])
     below = block[block.index(node) + 1 :] if isinstance(block, list) and node in block else []
-    deciding = [one for one in below if isinstance(one, ast.If) and names & names_in(one.test)]
+    deciding = [one for one in below if isinstance(one, ast.If) and given & names_in(one.test)]
     sent = [n for one in below for n in calls_in(one, "publish")]
     if not deciding or not sent or any(calls_in(one, "publish") for one in below if one not in deciding):
         return ""
@@ -461,20 +393,19 @@ IMPORTS_LIMIT = 30
 def imports(tree):
     """Imports of what nothing in the script uses, and of modules that this Python does not find; the standard library's
     and rospy are there and cost nothing."""
-    names = [n for n in walk(tree) if isinstance(n, ast.Name)]
-    hidden = {n.id for n in names if isinstance(n.ctx, ast.Store)}
+    every = all_of(tree, ast.Name)
+    hidden = {n.id for n in every if isinstance(n.ctx, ast.Store)}
     # `String = String()` reads the import, or was meant to
-    hidden -= {called_name(n.value) for n in walk(tree) if isinstance(n, ast.Assign)}
-    used = {n.id for n in names} - hidden
-    tried = {id(n) for one in walk(tree) if isinstance(one, ast.Try) for n in ast.walk(one)}
-    found = [n for n in walk(tree) if isinstance(n, (ast.Import, ast.ImportFrom)) and id(n) not in tried]
+    hidden -= {called_name(n.value) for n in all_of(tree, ast.Assign)}
+    used = {n.id for n in every} - hidden
+    tried = {id(n) for one in all_of(tree, ast.Try) for n in ast.walk(one)}
+    found = [n for n in all_of(tree, ast.Import, ast.ImportFrom) if id(n) not in tried]
     for node in found[:IMPORTS_LIMIT]:
-        modules = (
-            [alias.name for alias in node.names] if isinstance(node, ast.Import) else [node.module or ""]
-        )
+        listed = [alias.name for alias in node.names]
+        modules = listed if isinstance(node, ast.Import) else [node.module or ""]
         module = modules[0].partition(".")[0]
         bound = [alias.asname or alias.name.partition(".")[0] for alias in node.names]
-        if len(modules) > 1 or getattr(node, "level", 0) or module in PLAIN_MODULES - {"numpy"}:
+        if len(modules) > 1 or getattr(node, "level", 0) or module in counters.PLAIN_MODULES - {"numpy"}:
             continue
         if not used.intersection(bound) and bound != ["*"] and "__all__" not in used:
             why = (
@@ -483,10 +414,10 @@ def imports(tree):
                 else "nothing in the script uses `%s`"
             )
             fix = "delete line %d: %s" % (node.lineno, why % "`, `".join(bound))
-            yield slip(node.lineno, "unused-import", module, fix=fix, name=bound[0])
+            yield slip(node.lineno, "unused-import", module, fix, bound[0])
         if not is_there(module):
             whole = modules[0] if modules[0] != module else ""
-            yield slip(node.lineno, "lacking-import", module, fix=whole, name=bound[0])
+            yield slip(node.lineno, "lacking-import", module, whole, bound[0])
 
 
 def is_there(module):
@@ -500,29 +431,27 @@ def is_there(module):
 def without_effect(tree):
     """Statements that compute something and keep nothing of it: `++i`, `i + 1`, `i == 0`; and `i = i`."""
     for node in walk(tree):
-        if isinstance(node, ast.Assign) and [dotted(t) for t in node.targets] == [dotted(node.value)] != [
-            "..."
-        ]:
-            name = dotted(node.value)
+        name = dotted(getattr(node, "value", None))
+        if isinstance(node, ast.Assign) and [dotted(t) for t in node.targets] == [name] != ["..."]:
             message, fix = "`{0} = {0}` changes nothing", "write `{0} = {0} + 1`, or whatever it should be,"
-            yield slip(node.lineno, "no-effect", message.format(name), fix=fix.format(name), name=name)
+            yield slip(node.lineno, "no-effect", message.format(name), fix.format(name), name)
         value = node.value if isinstance(node, ast.Expr) else None
         if isinstance(value, ast.UnaryOp) and isinstance(value.operand, ast.UnaryOp):
             same = type(value.op) is type(value.operand.op) and isinstance(value.op, (ast.UAdd, ast.USub))
             name, sign = dotted(value.operand.operand), "+" if isinstance(value.op, ast.UAdd) else "-"
             if same and "..." not in name:
                 message = "`%s%s` changes nothing in Python" % (2 * sign, name)
-                yield slip(node.lineno, "no-effect", message, fix="write `%s %s= 1`" % (name, sign))
+                yield slip(node.lineno, "no-effect", message, "write `%s %s= 1`" % (name, sign))
         elif isinstance(value, ast.BinOp) and isinstance(value.op, (ast.Add, ast.Sub)):
             name, sign = dotted(value.left), "+" if isinstance(value.op, ast.Add) else "-"
             if "..." not in name and isinstance(value.right, ast.Constant):
                 parts = (name, sign, value.right.value)
                 message, fix = "`%s %s %r` alone changes nothing" % parts, "write `%s %s= %r`" % parts
-                yield slip(node.lineno, "no-effect", message, fix=fix)
+                yield slip(node.lineno, "no-effect", message, fix)
         elif isinstance(value, ast.Compare) and isinstance(value.ops[0], ast.Eq):
             name = dotted(value.left)
             if "..." not in name:
                 right = value.comparators[0]
                 right = repr(right.value) if isinstance(right, ast.Constant) else dotted(right)
                 message = "`%s ==` compares and gives no value" % name
-                yield slip(node.lineno, "compared", message, fix="write `%s = %s`" % (name, right))
+                yield slip(node.lineno, "compared", message, "write `%s = %s`" % (name, right))

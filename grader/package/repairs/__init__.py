@@ -74,9 +74,8 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     scripts = _scripts(files, package, wanted, renames)
     repair_files(files, scripts)
     rename_files(files, renames)
-    paths = [
-        renames.get(f.path, f.path) for f in scripts if f.python and f.link is None and not f.is_no_script
-    ]
+    sources = (f.path for f in scripts if f.python and f.link is None and not f.is_no_script)
+    paths = [renames.get(path, path) for path in sources]
     names = repair_python(files, paths, package, wanted.types)
     name = repair_manifest(files, package, wanted)
     repair_cmake(files, package, name, wanted, [f.path for f in scripts])

@@ -41,6 +41,18 @@ def replace_token(text: str, token: Token, new: str) -> str:
     return text[: token.span.start] + new + text[token.span.stop :]
 
 
+def change_line(files: Files, place: Command | Token, text: str, why: str, fix: str = "") -> None:
+    """Remember that `CMakeLists.txt` becomes `text`, because of what is wrong on the line of a call or a word."""
+    files.change("build-line", CMAKE, text, f"line {place.line} of {CMAKE}: {why}", fix)
+
+
+def change_word(
+    files: Files, token: Token, new: str, why: str, fix: str = "", *, call: Command | None = None
+) -> None:
+    """Remember that a word becomes another one; the line is that of its `call` where that is given."""
+    change_line(files, call or token, replace_token(cmake_text(files), token, new), why, fix)
+
+
 def all_words(files: Files) -> Iterator[Token]:
     for command in all_calls(files):
         yield from command.args

@@ -19,6 +19,8 @@ from grader.package.repairs.cmake_calls import (
     add_call,
     all_calls,
     calls_of,
+    change_line,
+    change_word,
     cmake_text,
     has_call,
     replace_token,
@@ -144,8 +146,8 @@ def _leave_out_modules(files: Files) -> None:
         text, names = cmake_text(files), join_words(word.value for word in lost)
         for word in reversed(lost):
             text = replace_token(text, word, "")
-        message = f"line {command.line} of {CMAKE}: find_package(…) names {names}, and no package of ROS is called so"
-        files.change("build-line", CMAKE, text, message, f"take {names} out of find_package(…)")
+        why = f"find_package(…) names {names}, and no package of ROS is called so"
+        change_line(files, command, text, why, f"take {names} out of find_package(…)")
 
 
 def _spell_catkin(files: Files) -> None:
@@ -157,19 +159,14 @@ def _spell_catkin(files: Files) -> None:
         if first is None or first.value == "catkin":
             continue
         behind = next((word for word in words[1:] if word.value == "catkin"), None)
-        text = cmake_text(files)
+        text, new, fix = cmake_text(files), "catkin", f"write catkin instead of {first.value}"
         if first.value in ("REQUIRED", "COMPONENTS"):
             text = replace_token(text, behind, "") if behind is not None else text
-            text, fix = (
-                replace_token(text, first, f"catkin {first.value}"),
-                f"write catkin before {first.value}",
-            )
-        elif is_near(first.value, "catkin"):
-            text, fix = replace_token(text, first, "catkin"), f"write catkin instead of {first.value}"
-        else:
+            new, fix = f"catkin {first.value}", f"write catkin before {first.value}"
+        elif not is_near(first.value, "catkin"):
             continue
-        message = f"line {command.line} of {CMAKE}: find_package(…) names {first.value}, and not catkin"
-        files.change("build-line", CMAKE, text, message, fix)
+        why = f"find_package(…) names {first.value}, and not catkin"
+        change_line(files, command, replace_token(text, first, new), why, fix)
         return
 
 
@@ -193,13 +190,10 @@ def _spell_keywords(files: Files) -> None:
         for at in range(len(calls_of(files, name))):
             for keyword in keywords:
                 words = words_of(calls_of(files, name)[at])
-                stray = next(
-                    (w for w in words if is_near(w.value, keyword) and w.value not in keywords), None
-                )
-                if stray is not None and keyword not in [w.value for w in words]:
-                    message = f"line {stray.line} of {CMAKE}: {name}(…) has no keyword {stray.value}: it is {keyword}"
-                    changed = replace_token(cmake_text(files), stray, keyword)
-                    files.change("build-line", CMAKE, changed, message)
+                strays = [w for w in words if is_near(w.value, keyword) and w.value not in keywords]
+                if strays and keyword not in [w.value for w in words]:
+                    why = f"{name}(…) has no keyword {strays[0].value}: it is {keyword}"
+                    change_word(files, strays[0], keyword, why)
             _put_first(files, name, words_of(calls_of(files, name)[at]))
 
 
@@ -211,9 +205,9 @@ def _put_first(files: Files, name: str, words: Sequence[Token]) -> None:
     text = cmake_text(files)
     behind = words[values.index(right)] if right in values else None
     text = replace_token(text, behind, "") if behind is not None else text
-    message = f"line {words[0].line} of {CMAKE}: {name}(…) does not begin with {right}"
-    fix = f"write {right} before {values[0]}"
-    files.change("build-line", CMAKE, replace_token(text, words[0], f"{right} {values[0]}"), message, fix)
+    changed = replace_token(text, words[0], f"{right} {values[0]}")
+    why, fix = f"{name}(…) does not begin with {right}", f"write {right} before {values[0]}"
+    change_line(files, words[0], changed, why, fix)
 
 
 def _correct_version(files: Files) -> None:
@@ -222,15 +216,12 @@ def _correct_version(files: Files) -> None:
         words = words_of(command)
         given = words[1] if len(words) > 1 else None
         if [word.value for word in words] == ["VERSION"]:
-            message = f"line {command.line} of {CMAKE}: {command.identifier}(…) has no version"
-            files.change(
-                "build-line", CMAKE, replace_token(cmake_text(files), words[0], "VERSION 3.0.2"), message
-            )
+            why = f"{command.identifier}(…) has no version"
+            change_word(files, words[0], "VERSION 3.0.2", why, call=command)
             return
         right = re.fullmatch(r"[23](\.\d+){1,3}(\.\.\.[\d.]+)?", given.value) if given is not None else None
         if given is not None and right is None and "$" not in given.value:
-            message = f"line {given.line} of {CMAKE}: there is no version {given.value} of CMake"
-            files.change("build-line", CMAKE, replace_token(cmake_text(files), given, "3.0.2"), message)
+            change_word(files, given, "3.0.2", f"there is no version {given.value} of CMake")
 
 
 def _correct_line(files: Files) -> None:
@@ -252,9 +243,8 @@ def _close_bracket(files: Files) -> None:
     if commands_of(text.encode()) is not None:
         return
     if half := join_half_comment(text):
-        files.change(
-            "build-line", CMAKE, half.text, f"line {half.line} of {CMAKE}: {half.cause}: {half.fix}", half.fix
-        )
+        message = f"line {half.line} of {CMAKE}: {half.cause}: {half.fix}"
+        files.change("build-line", CMAKE, half.text, message, half.fix)
         return
     lines = text.rstrip().split("\n")
     fault = parse_tree_of(text.encode(), CMAKE)[1]
@@ -289,8 +279,8 @@ def _spell_commands(files: Files) -> None:
         if right:
             text, start = cmake_text(files), command.span.start
             start = text.index(name, start)
-            message = f"line {command.line} of {CMAKE}: there is no command {name}; it is called {right}"
-            files.change("build-line", CMAKE, text[:start] + right + text[start + len(name) :], message)
+            changed = text[:start] + right + text[start + len(name) :]
+            change_line(files, command, changed, f"there is no command {name}; it is called {right}")
 
 
 def _leave_out_rosbuild(files: Files) -> None:
@@ -305,11 +295,8 @@ def _leave_out_rosbuild(files: Files) -> None:
         text = text[: call.span.start] + new + text[call.span.stop :]
     gone = [c.line for c in calls if c.identifier.lower() not in made]
     spelt = {c.identifier: made[c.identifier.lower()] for c in calls if c.identifier.lower() in made}
-    fixes = (
-        [f"delete the calls on {'lines' if len(gone) > 1 else 'line'} {numbers_text(sorted(gone))}"]
-        if gone
-        else []
-    )
+    where = f"{'lines' if len(gone) > 1 else 'line'} {numbers_text(sorted(gone))}"
+    fixes = [f"delete the calls on {where}"] if gone else []
     fixes += [f"write {new} instead of {old}" for old, new in spelt.items()]
     message = f"{CMAKE} calls what only rosbuild has, and catkin does not"
     files.change("build-line", CMAKE, text, message, join_words(fixes))
@@ -330,12 +317,9 @@ def _correct_include(files: Files) -> None:
             text = replace_token(text, token, "")
         listed = " ".join(t.value for t in absent)
         folders = join_words(f"the folder {t.value.strip('/')}/" for t in absent)
-        message = (
-            f"line {call.line} of {CMAKE}: catkin_package(…) names {folders}, which is not in the package"
-        )
+        why = f"catkin_package(…) names {folders}, which is not in the package"
         fix = f"remove INCLUDE_DIRS {listed}" if absent == given else f"remove {listed} from INCLUDE_DIRS"
-        fix += ", as git keeps no empty folder"
-        files.change("build-line", CMAKE, text, message, fix)
+        change_line(files, call, text, why, f"{fix}, as git keeps no empty folder")
         return
 
 
@@ -347,18 +331,11 @@ def _declare_exported(files: Files) -> None:
             token = next(t for t in words_of(call) if t.value == name)
             known = {*_declared(files), *known_packages(), *noetic_messages(), *OF_ROS}
             if name not in known and len(meant) == 1:
-                message = (
-                    f"line {call.line} of {CMAKE}: catkin_package(…) names {name}, which is called {meant[0]}"
-                )
-                fix = f"write {meant[0]} instead of {name}"
-                files.change(
-                    "build-line", CMAKE, replace_token(cmake_text(files), token, meant[0]), message, fix
-                )
+                why = f"catkin_package(…) names {name}, which is called {meant[0]}"
+                change_word(files, token, meant[0], why, f"write {meant[0]} instead of {name}", call=call)
             elif re.fullmatch(r"\w+", name):
-                message = (
-                    f"line {call.line} of {CMAKE}: catkin_package(…) names {name}, and {MANIFEST} does not"
-                )
-                declare_for_running(files, name, message)
+                why = f"catkin_package(…) names {name}, and {MANIFEST} does not"
+                declare_for_running(files, name, f"line {call.line} of {CMAKE}: {why}")
 
 
 def _declared(files: Files) -> set[str]:
@@ -376,9 +353,10 @@ def _move_project(files: Files) -> None:
     first = next((c for c in calls_of(files, "find_package", "catkin_package")), call).span.start
     text, span = cmake_text(files), call.span
     changed = f"{text[:first]}{text[span]}\n{text[first : span.start].rstrip()}\n{text[span.stop :].lstrip()}"
-    message = f"line {call.line} of {CMAKE}: project(…) is called after catkin_package(…)"
     above = text.count("\n", 0, first) + 1
-    files.change("build-line", CMAKE, changed, message, f"move it above line {above}")
+    change_line(
+        files, call, changed, "project(…) is called after catkin_package(…)", f"move it above line {above}"
+    )
 
 
 def _name_project(files: Files, package: PackageFacts, name: str, wanted: str) -> None:
@@ -388,8 +366,7 @@ def _name_project(files: Files, package: PackageFacts, name: str, wanted: str) -
         words = words_of(command)
         if not words:
             text, at = cmake_text(files), command.span.stop - 1
-            message = f"line {command.line} of {CMAKE}: project(…) has no name"
-            files.change("build-line", CMAKE, f"{text[:at]}{name}{text[at:]}", message)
+            change_line(files, command, f"{text[:at]}{name}{text[at:]}", "project(…) has no name")
         if words and words[0].value.strip('"') not in (name, right) and "$" not in words[0].value:
             given = words[0].value
             message = f"line {command.line} of {CMAKE}: project({given}) is not the package's name, {name}"

@@ -56,9 +56,8 @@ def _repair_bytes(files: Files, script: SourceFile) -> None:
         message = (
             f"{script.path} begins with an invisible byte order mark (BOM), so it does not begin with #!"
         )
-        _add_bytes(
-            files, "byte-order-mark", script.path, data, message=message, fix="save it as UTF-8 without BOM"
-        )
+        fix = "save it as UTF-8 without BOM"
+        _add_bytes(files, "byte-order-mark", script.path, data, message=message, fix=fix)
         data = data.removeprefix(BOM)
     if b"\r\n" in data and (data.startswith(b"#!") or script.path.endswith(".sh")):
         message = f"{script.path} has Windows line endings (CR LF)"
@@ -81,11 +80,9 @@ def _repair_cookie(files: Files, script: SourceFile, text: str) -> None:
         try:
             codecs.lookup(named[1])
         except LookupError:
-            changed = line[: named.start(1)] + "utf-8" + line[named.end(1) :]
+            lines[at] = line[: named.start(1)] + "utf-8" + line[named.end(1) :]
             message = f"line {at + 1} of {script.path}: Python knows no encoding {named[1]}"
-            files.change(
-                "python-syntax", script.path, "\n".join([*lines[:at], changed, *lines[at + 1 :]]), message
-            )
+            files.change("python-syntax", script.path, "\n".join(lines), message)
         return
 
 
@@ -101,17 +98,9 @@ def _repair_encoding(files: Files, script: SourceFile, data: bytes) -> bytes:
     message = f"{script.path} is {'saved as UTF-16' if wide else 'not saved as UTF-8'}"
     old = b"" if wide else next((line for line in data.split(b"\n") if not line.isascii()), b"")
     line = data[: data.find(old)].count(b"\n")
-    files.add(
-        Repair(
-            kind="encoding",
-            file=script.path,
-            line=line + 1,
-            before=old[:SHOWN_BYTES].decode("utf-8", "replace"),
-            after=after.split(b"\n")[line][:SHOWN_BYTES].decode("utf-8", "replace"),
-            message=message,
-            fix=f"save {script.path} as UTF-8 in your editor",
-        )
-    )
+    lines = [one[:SHOWN_BYTES].decode("utf-8", "replace") for one in (old, after.split(b"\n")[line])]
+    words = {"before": lines[0], "after": lines[1], "fix": f"save {script.path} as UTF-8 in your editor"}
+    files.add(Repair(kind="encoding", file=script.path, line=line + 1, message=message, **words))
     return after
 
 
@@ -124,8 +113,7 @@ def to_utf8(data: bytes) -> bytes:
             text = data.decode("cp1252")
         except UnicodeDecodeError:
             text = data.decode("latin-1")
-    head, newline, rest = text.partition("\n")
-    lines = [head, *rest.split("\n", 1)] if newline else [head]
+    lines = text.split("\n", 2)
     for number, line in enumerate(lines[:2]):
         if COOKIE.match(line):
             lines[number] = "# -*- coding: utf-8 -*-"
@@ -142,14 +130,11 @@ def _repair_shebang(files: Files, script: SourceFile, text: str) -> None:
         problem = "" if usable else f"there is no {script.shebang.interpreter} on a ROS machine"  # type: ignore[union-attr]
     if not wanted or not problem or script.shebang_fault == "empty-file":
         return
-    first = next((i for i, line in enumerate(lines[:50]) if re.match(r"\s*(#\s*!|!\s*#)", line)), None)
-    looks_like = first is not None and bool(re.search(r"python|/(ba)?sh|bin/", lines[first]))
-    above = lines[:first] if looks_like and first is not None else []
-    if looks_like and first is not None and all(not line.strip() or line.startswith("#") for line in above):
-        rest = lines[first + 1 :]
-        after = [wanted, *(line for line in above if line.strip()), *rest]
-    else:
-        after = [wanted, *lines]
+    first = next((i for i, line in enumerate(lines[:50]) if re.match(r"\s*(#\s*!|!\s*#)", line)), len(lines))
+    looks_like = first < len(lines) and re.search(r"python|/(ba)?sh|bin/", lines[first])
+    after = [wanted, *lines]
+    if looks_like and all(not line.strip() or line.startswith("#") for line in lines[:first]):
+        after = [wanted, *(line for line in lines[:first] if line.strip()), *lines[first + 1 :]]
     message = f"{script.path} cannot be started: {problem}"
     files.change("shebang", script.path, "\n".join(after), message, f"write {wanted} as the very first line")
     if after == [wanted, *lines]:
@@ -166,21 +151,16 @@ def find_renames(package: PackageFacts, wanted: Wanted) -> dict[str, str]:
     right = {PurePosixPath(path).name: path for path in _wanted_files(wanted)}
     renames: dict[str, str] = {}
     for name, path in right.items():
-        near = [
-            p
-            for p in present
-            if p not in renames and PurePosixPath(p).name not in right and _is_slip(p, name)
-        ]
+        free = [p for p in present if p not in renames and PurePosixPath(p).name not in right]
+        near = [p for p in free if _is_slip(p, name)]
         if name not in names and near:
             old = min(near, key=lambda p: (PurePosixPath(p).parent != PurePosixPath(path).parent, p))
             renames[old] = str(PurePosixPath(old).with_name(name))
         elif name not in names:
             other = {*right, *renames}
-            meant = (
-                _meant_launch(package, wanted, name, renames)
-                or _meant_script(package, wanted, name, other)
-                or _meant_definition(package, wanted, name, other)
-            )
+            meant = _meant_launch(package, wanted, name, renames)
+            meant = meant or _meant_script(package, wanted, name, other)
+            meant = meant or _meant_definition(package, wanted, name, other)
             renames |= {meant: str(PurePosixPath(meant).with_name(name))} if meant else {}
     return renames
 
@@ -223,11 +203,8 @@ def _meant_launch(package: PackageFacts, wanted: Wanted, name: str, renames: Map
     before = {PurePosixPath(new).name: PurePosixPath(old).name for old, new in renames.items()}
     asked = {script for launch, script in wanted.started if PurePosixPath(launch).name == name}
     right = {PurePosixPath(path).name for path in _wanted_files(wanted)}
-    found = [
-        path
-        for path in package.launches_of({before.get(script, script) for script in asked})
-        if PurePosixPath(path).name not in right and path not in renames
-    ]
+    starting = package.launches_of({before.get(script, script) for script in asked})
+    found = [path for path in starting if PurePosixPath(path).name not in right and path not in renames]
     return found[0] if len(found) == 1 else ""
 
 

@@ -17,13 +17,14 @@ from grader.model.message_definitions import (
     exchanged_parts,
     meant_type,
 )
-from grader.model.package import CMAKE, INTERFACE_FOLDERS, Interface, InterfaceField, PackageFacts
+from grader.model.package import INTERFACE_FOLDERS, Interface, InterfaceField, PackageFacts
 from grader.package.repairs.cmake_calls import (
     add_call,
     all_words,
     calls_of,
+    change_line,
+    change_word,
     cmake_text,
-    replace_token,
     values_behind,
     words_of,
 )
@@ -78,11 +79,8 @@ def make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Col
         words = words_of(of_catkin[0])
         near = next((token for token in words if is_one_edit(token.value, GENERATION)), None)
         if near is not None:
-            message = f"line {of_catkin[0].line} of {CMAKE}: there is no package {near.value}"
-            fix = f"write {GENERATION} instead of {near.value}"
-            files.change(
-                "build-line", CMAKE, replace_token(cmake_text(files), near, GENERATION), message, fix
-            )
+            why, fix = f"there is no package {near.value}", f"write {GENERATION} instead of {near.value}"
+            change_word(files, near, GENERATION, why, fix, call=of_catkin[0])
             return
         lacking.append(GENERATION)
     _name_components(files, lacking)
@@ -104,11 +102,8 @@ def _delete_empty(files: Files, package: PackageFacts) -> None:
         there = any(file.path.startswith(f"{folder}/") for file in package.files)
         for call in reversed(calls_of(files, name)) if not there else ():
             if [token.value for token in words_of(call)] in ([], ["FILES"]):
-                _delete(
-                    files,
-                    call,
-                    f"{name}(…) names no file, and needs the folder {folder}/, which is not there",
-                )
+                why = f"{name}(…) names no file, and needs the folder {folder}/, which is not there"
+                _delete(files, call, why)
 
 
 def _delete(files: Files, call: Command, why: str) -> None:
@@ -116,8 +111,7 @@ def _delete(files: Files, call: Command, why: str) -> None:
     text, span = cmake_text(files), call.span
     first, last = (text.count("\n", 0, at) for at in (span.start, span.stop))
     changed = text[: span.start] + "\n" * (last - first) + text[span.stop :]
-    fix = f"delete {lines_text(first, last)}, {call.identifier}(…)"
-    files.change("build-line", CMAKE, changed, f"line {call.line} of {CMAKE}: {why}", fix)
+    change_line(files, call, changed, why, f"delete {lines_text(first, last)}, {call.identifier}(…)")
 
 
 def wait_for_headers(files: Files, package: PackageFacts, name: str) -> None:
@@ -148,10 +142,8 @@ def wait_for_headers(files: Files, package: PackageFacts, name: str) -> None:
         lines.insert(at, new)
         fixes.insert(0, f"below the add_executable(…) on line {call.line}, write {new}")
     targets = join_words(target for target, *_ in found)
-    message = (
-        f"line {found[0][1].line} of {CMAKE}: {targets} may be compiled before the headers of the messages"
-    )
-    files.change("build-line", CMAKE, "\n".join(lines), message, "; ".join(fixes))
+    why = f"{targets} may be compiled before the headers of the messages"
+    change_line(files, found[0][1], "\n".join(lines), why, "; ".join(fixes))
 
 
 def _components(files: Files) -> tuple[list[Command], list[str]]:
@@ -170,11 +162,11 @@ def _name_components(files: Files, names: Sequence[str]) -> None:
     words = words_of(of_catkin[0])
     listed = next((t for t in words if t.value == "COMPONENTS"), None)
     token, new = (listed, missing) if listed else (words[-1], f"COMPONENTS {missing}")
-    changed = replace_token(cmake_text(files), token, f"{token.value} {new}")
-    message = (
-        f"line {of_catkin[0].line} of {CMAKE}: find_package(catkin …) does not name {join_words(absent)}"
+    why, fix = (
+        f"find_package(catkin …) does not name {join_words(absent)}",
+        f"write {new} after {token.value}",
     )
-    files.change("build-line", CMAKE, changed, message, f"write {new} after {token.value}")
+    change_word(files, token, f"{token.value} {new}", why, fix, call=of_catkin[0])
 
 
 def define_as_asked(files: Files, package: PackageFacts, wanted: Wanted) -> None:
@@ -202,15 +194,13 @@ def define_as_asked(files: Files, package: PackageFacts, wanted: Wanted) -> None
             if one.value is None and asked and _cannot_stand_for(one.type, asked, path, package.name or ""):
                 now = files.text(path) or ""
                 lines = now.split("\n")
-                lines[one.line - 1] = re.sub(
-                    rf"^(\s*){re.escape(one.type)}(?=\s)", rf"\g<1>{asked}", lines[one.line - 1]
-                )
+                kind = rf"^(\s*){re.escape(one.type)}(?=\s)"
+                lines[one.line - 1] = re.sub(kind, rf"\g<1>{asked}", lines[one.line - 1])
                 if "\n".join(lines) == now:
                     continue  # put right already
-                message = (
-                    f"line {one.line} of {path}: {one.path} is {one.type}, but the handout asks for {asked}"
-                )
-                files.change("build-line", path, "\n".join(lines), message, f"write `{asked} {one.name}`")
+                why = f"{one.path} is {one.type}, but the handout asks for {asked}"
+                message, fix = f"line {one.line} of {path}: {why}", f"write `{asked} {one.name}`"
+                files.change("build-line", path, "\n".join(lines), message, fix)
 
 
 def _cannot_stand_for(kind: str, asked: str, path: str, package: str) -> bool:
@@ -246,10 +236,8 @@ def _correct_types(files: Files, package: PackageFacts) -> None:
     own = {PurePosixPath(one.path).stem for one in package.interfaces}
     for one in package.interfaces:
         for field in one.fields:
-            right, lines = (
-                meant_type(field.type, own, noetic_messages()),
-                (files.text(one.path) or "").split("\n"),
-            )
+            right = meant_type(field.type, own, noetic_messages())
+            lines = (files.text(one.path) or "").split("\n")
             if right != field.type and field.line <= len(lines):
                 lines[field.line - 1] = lines[field.line - 1].replace(field.type, right, 1)
                 message = f"line {field.line} of {one.path}: there is no field type `{field.type}`"
@@ -262,9 +250,8 @@ def _correct_dividers(files: Files, package: PackageFacts) -> None:
         lines = (files.text(fault.file) or "").split("\n")
         if fault.line and fault.line <= len(lines):
             lines[fault.line - 1] = DIVIDING
-            files.change(
-                "build-line", fault.file, "\n".join(lines), f"{fault.file}: {fault.cause}", fault.fix
-            )
+            message = f"{fault.file}: {fault.cause}"
+            files.change("build-line", fault.file, "\n".join(lines), message, fault.fix)
 
 
 def _call_by_kind(files: Files) -> None:
@@ -277,8 +264,8 @@ def _call_by_kind(files: Files) -> None:
             if right:
                 text, at = cmake_text(files), call.span.start
                 changed = text[:at] + re.sub(r"^\w+", right, text[at:], count=1)
-                message = f"line {call.line} of {CMAKE}: {name}(…) names {join_words(named)}"
-                files.change("build-line", CMAKE, changed, message, f"write {right} instead of {name}")
+                why = f"{name}(…) names {join_words(named)}"
+                change_line(files, call, changed, why, f"write {right} instead of {name}")
 
 
 def _definitions(files: Files, package: PackageFacts, folder: str) -> list[str]:
@@ -316,9 +303,8 @@ def _name_definitions(files: Files, name: str, made: Sequence[str], needed: Coll
         token = next((t for one in calls_of(files, name) for t in words_of(one) if t.value == stray), None)
         if token is not None:
             new, place = (f"FILES {file}", "after") if stray == "FILES" else (file, "instead of")
-            message = f"line {call.line} of {CMAKE}: {name}(…) does not name {file}"
-            changed = replace_token(cmake_text(files), token, new)
-            files.change("build-line", CMAKE, changed, message, f"write {file} {place} {stray}")
+            why, fix = f"{name}(…) does not name {file}", f"write {file} {place} {stray}"
+            change_word(files, token, new, why, fix, call=call)
 
 
 def _bring_std_msgs(names: Iterable[str]) -> bool:
@@ -359,19 +345,10 @@ def _generate(files: Files, package: PackageFacts, used: Collection[str]) -> lis
         return sorted(needed)
     late = [c for name in INTERFACE_FOLDERS for c in calls_of(files, name) if c.line > calls[0].line]
     if late and (not of_catkin or late[0].line < of_catkin[0].line):
-        text, call, at = cmake_text(files), late[0].span, calls[0].span.start
-        changed = f"{text[:at]}{text[call]}\n\n{text[at : call.start].rstrip()}\n{text[call.stop :].lstrip()}"
-        name = re.match(r"\w+", text[call])[0]  # type: ignore[index] # a call begins with its name
-        message = f"line {late[0].line} of {CMAKE}: {name}(…) is called after {GENERATE}(…)"
-        fix = f"move {name}(…), from line {late[0].line}, above {GENERATE}(…)"
-        files.change("build-line", CMAKE, changed, message, fix)
+        _move_above(files, late[0], calls[0], GENERATE)
         return []
     if of_catkin and calls[0].line > of_catkin[0].line:
-        text, call, at = cmake_text(files), calls[0].span, of_catkin[0].span.start
-        changed = f"{text[:at]}{text[call]}\n\n{text[at : call.start].rstrip()}\n{text[call.stop :].lstrip()}"
-        message = f"line {calls[0].line} of {CMAKE}: {GENERATE}(…) is called after catkin_package(…)"
-        fix = f"move {GENERATE}(…), from line {calls[0].line}, above catkin_package(…)"
-        files.change("build-line", CMAKE, changed, message, fix)
+        _move_above(files, calls[0], of_catkin[0], "catkin_package")
     call = calls_of(files, GENERATE)[0]
     named = {token.value for token in words_of(call)}
     found = {"std_msgs"} if _bring_std_msgs(named) else set[str]()
@@ -381,8 +358,16 @@ def _generate(files: Files, package: PackageFacts, used: Collection[str]) -> lis
         token = next((t for t in words_of(call) if t.value == "DEPENDENCIES"), None)
         at = token.span.stop if token else text.index("(", call.span.start) + 1
         added = f" {listed}" if token else f"DEPENDENCIES {listed}"
-        message = f"line {call.line} of {CMAKE}: {GENERATE}(…) does not name {join_words(missing)}"
         fix = f"write {listed} after DEPENDENCIES" if token else f"write {GENERATE}({added})"
-        files.change("build-line", CMAKE, text[:at] + added + text[at:], message, fix)
+        why = f"{GENERATE}(…) does not name {join_words(missing)}"
+        change_line(files, call, text[:at] + added + text[at:], why, fix)
         _name_components(files, missing)
     return []
+
+
+def _move_above(files: Files, call: Command, other: Command, what: str) -> None:
+    """Move a call above another one, which is called `what`."""
+    text, span, at, name = cmake_text(files), call.span, other.span.start, call.identifier
+    changed = f"{text[:at]}{text[span]}\n\n{text[at : span.start].rstrip()}\n{text[span.stop :].lstrip()}"
+    fix = f"move {name}(…), from line {call.line}, above {what}(…)"
+    change_line(files, call, changed, f"{name}(…) is called after {what}(…)", fix)

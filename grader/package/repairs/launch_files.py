@@ -75,9 +75,8 @@ def _complete_node(files: Files, file: str, node: LaunchNode, own: str, scripts:
     after = re.sub(r"<node\b", f'<node {lacking[0]}="{value}"', lines[node.line - 1], count=1)
     if not is_empty and after != lines[node.line - 1]:
         lines[node.line - 1] = after
-        files.change(
-            "launch-syntax", file, "\n".join(lines), f"line {node.line} of {file}: <node> has no {lacking[0]}"
-        )
+        message = f"line {node.line} of {file}: <node> has no {lacking[0]}"
+        files.change("launch-syntax", file, "\n".join(lines), message)
 
 
 def _repair_find(files: Files, file: str, own: str) -> None:
@@ -87,9 +86,8 @@ def _repair_find(files: Files, file: str, own: str) -> None:
         if is_near(found := place[1], own):
             after = re.sub(rf"(\$\(find +){re.escape(found)}(?= *\))", rf"\g<1>{own}", files.text(file) or "")
             line = text[: place.start()].count("\n") + 1
-            files.change(
-                "package-name", file, after, f"line {line} of {file}: $(find {found}) should be $(find {own})"
-            )
+            message = f"line {line} of {file}: $(find {found}) should be $(find {own})"
+            files.change("package-name", file, after, message)
 
 
 def _own_name(files: Files, given: str) -> str:

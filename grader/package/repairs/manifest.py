@@ -55,9 +55,7 @@ def repair_manifest(files: Files, package: PackageFacts, wanted: Wanted) -> str:
     for name in wanted.dependencies:
         _add_dependency(files, name)
     manifest, _ = parse_manifest((files.text(MANIFEST) or "").encode())
-    if manifest is None:
-        return package.name
-    return manifest.name
+    return manifest.name if manifest is not None else package.name
 
 
 def _parses(text: str) -> bool:
@@ -96,9 +94,8 @@ def _add_buildtool(files: Files) -> None:
     if re.search(r"<buildtool_depend[^>]*>\s*catkin\s*<", plain) or not _parses(text):
         return
     message = f"{MANIFEST} does not name catkin as its build tool"
-    given = next(
-        (m for m in re.finditer(r"<buildtool_depend>([\w-]+)<", plain) if is_near(m[1], "catkin")), None
-    )
+    named = re.finditer(r"<buildtool_depend>([\w-]+)<", plain)
+    given = next((found for found in named if is_near(found[1], "catkin")), None)
     if given is not None:
         changed = f"{text[: given.start(1)]}catkin{text[given.end(1) :]}"
         files.change("manifest-line", MANIFEST, changed, f"{message}: it names {given[1]}")
@@ -111,13 +108,8 @@ def _spell_dependency(files: Files, name: str) -> None:
     text = files.text(MANIFEST) or ""
     tags = re.compile(r"<(\w*depend)\b[^<>]*>\s*([\w-]+)\s*</\1>")
     given = {found[2] for found in tags.finditer(_blank_comments(text))} if _parses(text) else set[str]()
-    near = {
-        one
-        for one in given
-        if (is_one_edit(one, name) and not _is_version(one, name))
-        or one.lower() == name
-        or is_word_of(one, name, given)
-    }
+    near = {one for one in given if one.lower() == name or is_word_of(one, name, given)}
+    near |= {one for one in given if is_one_edit(one, name) and not _is_version(one, name)}
     slips = near - {name, *known_packages(), *noetic_messages(), *OF_ROS}
     for _ in range(SLIPS_MAX):  # each change reads the file again
         found = next((one for one in tags.finditer(_blank_comments(text)) if one[2] in slips), None)
@@ -171,10 +163,7 @@ def _insert(files: Files, tags: str, message: str) -> None:
         around = lines[at - 1] if at else ""
         indentation = around[: len(around) - len(around.lstrip())] if at in [i + 1 for i in after] else "  "
         changed = "\n".join([*lines[:at], *(f"{indentation}{tag}" for tag in tags.split("\n")), *lines[at:]])
-        if (
-            _parses(changed)
-            and _blank_comments(changed) != _blank_comments(text)
-            and tags.split("\n", 1)[0] in _blank_comments(changed)
-        ):
+        plain = _blank_comments(changed)
+        if _parses(changed) and plain != _blank_comments(text) and tags.split("\n", 1)[0] in plain:
             files.change("manifest-line", MANIFEST, changed, message)
             return

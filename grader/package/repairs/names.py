@@ -53,12 +53,9 @@ class Wanted(Record):
 
 ANONYMOUS = re.compile(r",\s*anonymous\s*=\s*True\b")
 NAMES_ARE = {
-    "node-name": "nodes",
-    "node-lives": "nodes",
+    **dict.fromkeys(("node-name", "node-lives"), "nodes"),
     "dependencies": "dependencies",
-    "params-loaded": "params",
-    "params-read": "params",
-    "launch-loads": "params",
+    **dict.fromkeys(("params-loaded", "params-read", "launch-loads"), "params"),
 }
 """What the parameter `names` of a check holds."""
 STARTED_BY = ("launch-xml", "launch-runs", "launch-loads")
@@ -195,14 +192,10 @@ SHORTEST = 3
 
 
 KINDS: dict[str, RepairKind] = {
-    "publisher": "topic-name",
-    "subscriber": "topic-name",
-    "server": "service-name",
-    "client": "service-name",
+    **dict.fromkeys(("publisher", "subscriber"), "topic-name"),
+    **dict.fromkeys(("server", "client"), "service-name"),
     "node": "node-name",
-    "param": "parameter-name",
-    "set-param": "parameter-name",
-    "key": "parameter-name",
+    **dict.fromkeys(("param", "set-param", "key"), "parameter-name"),
 }
 TOPIC_ROLES = frozenset({"publisher", "subscriber"})
 ROLES = ("node", "publisher", "subscriber", "server", "client", "param", "set-param")
@@ -236,9 +229,8 @@ def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: 
         # of a topic that the script has too, one of nearly the name is another one
         alike_roles = TOPIC_ROLES if role in TOPIC_ROLES else {role}
         used = {_resolve(name, node) for name in names if name.role in alike_roles}
-        absent = [
-            w for w in asked if _bare(w, role) not in used and not _is_of_other_role(file, role, w, wanted)
-        ]
+        absent = [w for w in asked if _bare(w, role) not in used]
+        absent = [w for w in absent if not _is_of_other_role(file, role, w, wanted)]
         for name in dict.fromkeys(given):
             near = (w for w in absent if _is_slip(name, w, node) and _has_keys(w, name.keys, branches))
             right = next(near, "")
@@ -270,11 +262,8 @@ def _name_node(files: Files, file: str, wanted: Wanted) -> str:
 
 def _is_of_other_role(file: str, role: str, topic: str, wanted: Wanted) -> bool:
     """Return whether the script has to subscribe to the topic and this is a publisher, or the other way round."""
-    kinds = {
-        kind
-        for path, kind, used in wanted.does
-        if used == topic and PurePosixPath(path).name == PurePosixPath(file).name
-    }
+    name = PurePosixPath(file).name
+    kinds = {kind for path, kind, used in wanted.does if used == topic and PurePosixPath(path).name == name}
     return role in TOPIC_ROLES and bool(kinds & TOPIC_ROLES) and role not in kinds
 
 
@@ -327,8 +316,8 @@ def repair_script_keys(
     used = {name.value for name in names}
     of_files = "\n".join(files.text(one.path) or "" for one in package.files if one.path.endswith(YAML))
     for name in dict.fromkeys(one for one in names if one.role == "key" and one.value not in parts):
-        alone = len(re.findall(rf"\b{re.escape(name.value)}\b", files.text(file) or "")) == 1
-        is_slip = alone and not re.search(rf"\b{re.escape(name.value)}\b", of_files)
+        word = re.compile(rf"\b{re.escape(name.value)}\b")
+        is_slip = len(word.findall(files.text(file) or "")) == 1 and not word.search(of_files)
         near = [part for part in parts if is_near(name.value, part)]
         near = [part for part in near if part not in used or (is_slip and f"{part}:" in of_files)]
         if len(near) == 1:
@@ -429,11 +418,10 @@ def _replace_literal(
         return
     lines = text.split("\n")
     line = lines[name.line - 1]
-    at = line.find(name.value, name.start)
-    if at < 0:
-        at = line.find(name.value)
-    if at < 0:
+    found = [at for at in (line.find(name.value, name.start), line.find(name.value)) if at >= 0]
+    if not found:
         return
+    at = found[0]
     line = line[:at] + value + line[at + len(name.value) :]
     lines[name.line - 1] = ANONYMOUS.sub("", line) if plain and name.role == "node" else line
     kind = KINDS[name.role]
@@ -457,17 +445,13 @@ def repair_yaml_names(
     """Find keys of parameter files that are slips of the lab's parameters, and the scripts that read them so."""
     branches = set(_branches(wanted))
     names = {PurePosixPath(file).name for file in wanted.files}
-    for file in (
-        f.path
-        for f in package.files
-        if PurePosixPath(f.path).name in names and f.path.endswith((".yaml", ".yml"))
-    ):
+    keys = [(script, name) for script, used in scripts.items() for name in used if name.role == "key"]
+    paths = (f.path for f in package.files if f.path.endswith(YAML))
+    for file in (path for path in paths if PurePosixPath(path).name in names):
         _indent_keys(files, file, branches)
         for old, new in _repair_keys(files, file, branches):
-            for script, used in scripts.items():
-                for name in used:
-                    if name.role == "key" and name.value == old:
-                        _replace_literal(files, script, name, new, new)
+            for script, name in (pair for pair in keys if pair[1].value == old):
+                _replace_literal(files, script, name, new, new)
 
 
 def _repair_keys(files: Files, file: str, branches: set[tuple[str, ...]]) -> Iterator[tuple[str, str]]:

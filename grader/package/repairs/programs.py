@@ -13,6 +13,8 @@ from grader.model.package import CMAKE, PackageFacts
 from grader.package.repairs.cmake_calls import (
     all_words,
     calls_of,
+    change_line,
+    change_word,
     cmake_text,
     find_commented,
     replace_token,
@@ -34,35 +36,25 @@ def link_programs(files: Files) -> None:
         words = words_of(call)
         if words and words[0].value not in linked and "IMPORTED" not in [t.value for t in words]:
             text, line = cmake_text(files), f"target_link_libraries({words[0].value} ${{catkin_LIBRARIES}})"
-            at = call.span.stop
-            message = f"line {call.line} of {CMAKE}: nothing is linked to the program {words[0].value}"
-            files.change("build-line", CMAKE, f"{text[:at]}\n{line}{text[at:]}", message)
+            changed = f"{text[: call.span.stop]}\n{line}{text[call.span.stop :]}"
+            change_line(files, call, changed, f"nothing is linked to the program {words[0].value}")
 
 
 def name_programs(files: Files, wanted: Wanted) -> None:
     """Give the program of a source that has the lab's name this name too."""
-    made = {
-        words[0]: words[1:]
-        for c in calls_of(files, "add_executable")
-        if (words := [t.value for t in words_of(c)])
-    }
+    calls = {words[0].value: c for c in calls_of(files, "add_executable") if (words := words_of(c))}
+    stems = {target: {PurePosixPath(t.value).stem for t in words_of(c)[1:]} for target, c in calls.items()}
     if "OUTPUT_NAME" in cmake_text(files):
         return
-    for name in (one for one in wanted.scripts if "." not in one and "/" not in one and one not in made):
-        stems = {
-            target: {PurePosixPath(source).stem for source in sources} for target, sources in made.items()
-        }
-        meant = [
-            t for t, found in stems.items() if t not in wanted.scripts and "$" not in t and name in found
-        ]
-        if len(meant) != 1:
-            continue
-        call = next(c for c in calls_of(files, "add_executable") if words_of(c)[0].value == meant[0])
-        changed = re.sub(rf"(?<![\w/.-]){re.escape(meant[0])}(?![\w/.-])", name, cmake_text(files))
-        message = f"line {call.line} of {CMAKE}: the program is called {meant[0]}, and the lab wants {name}"
-        files.change(
-            "build-line", CMAKE, changed, message, f"write {name} in place of {meant[0]} wherever it is named"
-        )
+    for name in (one for one in wanted.scripts if "." not in one and "/" not in one and one not in calls):
+        others = [t for t in stems if t not in wanted.scripts and "$" not in t and name in stems[t]]
+        if len(others) == 1:
+            old = others[0]
+            changed = re.sub(rf"(?<![\w/.-]){re.escape(old)}(?![\w/.-])", name, cmake_text(files))
+            why = f"the program is called {old}, and the lab wants {name}"
+            change_line(
+                files, calls[old], changed, why, f"write {name} in place of {old} wherever it is named"
+            )
 
 
 def install_scripts(files: Files, package: PackageFacts, wanted: Wanted) -> None:
@@ -101,9 +93,9 @@ def correct_paths(files: Files, package: PackageFacts) -> None:
         for token, right in reversed(moved):
             text = replace_token(text, token, right)
         names, there = join_words(t.value for t, _ in moved), join_words(right for _, right in moved)
-        message = f"line {call.line} of {CMAKE}: {call.identifier}(…) names {names}, which the package has as {there}"
+        why = f"{call.identifier}(…) names {names}, which the package has as {there}"
         fix = " and ".join(f"write {right} instead of {token.value}" for token, right in moved)
-        files.change("build-line", CMAKE, text, message, fix)
+        change_line(files, call, text, why, fix)
 
 
 def _meant_file(files: Files, word: str, own: Sequence[str], written: Collection[str]) -> str:
@@ -143,10 +135,8 @@ def leave_out_missing(files: Files, wanted: Wanted) -> None:
     sources = [(words[0], [t for t in words[1:] if _is_missing(files, t.value, asked)]) for words in made]
     targets = {target.value for target, lost in sources if lost}
     about = [c for c in calls_of(files, *OF_TARGETS) if words_of(c) and words_of(c)[0].value in targets]
-    lines = numbers_text([call.line for call in about])
-    instead = (
-        f"delete what is built from {{it}}: the calls on {'lines' if len(about) > 1 else 'line'} {lines}"
-    )
+    lines = f"{'lines' if len(about) > 1 else 'line'} {numbers_text([call.line for call in about])}"
+    instead = f"delete what is built from {{it}}: the calls on {lines}"
     all_lost = [token for _, lost in sources for token in lost]
     _leave_out(files, next(iter(about), None), all_lost, [one.span for one in about], instead)
 
@@ -160,11 +150,10 @@ def _leave_out(
     for span in sorted(spans, key=lambda one: -one.start):
         text = text[: span.start].rstrip(" ") + text[span.stop :]
     names, them = join_words(token.value for token in lost), "them" if len(lost) > 1 else "it"
-    message = (
-        f"line {call.line} of {CMAKE}: {call.identifier}(…) names {names}, which the package does not have"
-    )
     fix = f"add {names} and push {them}, or {instead.format(it=them)}"
-    files.change("build-line", CMAKE, text, message, fix)
+    change_line(
+        files, call, text, f"{call.identifier}(…) names {names}, which the package does not have", fix
+    )
 
 
 def _is_missing(files: Files, word: str, asked: Collection[str]) -> bool:
@@ -203,14 +192,13 @@ def _name_scripts(files: Files, own: Sequence[str], paths: Sequence[str]) -> Non
         return
     words = words_of(call)
     programs = next(t for t in words if t.value == "PROGRAMS")
-    message = f"line {call.line} of {CMAKE}: {INSTALL}(…) does not name {join_words(unnamed)}"
     behind = words[words.index(programs) + 1 :][:1]
     known = {"DESTINATION", *(PurePosixPath(one).name for one in own)}  # that it lies elsewhere is told of it
     strays = (t for t in behind if PurePosixPath(_plain(t.value)).name not in known)
     stray = next((t for t in strays if "$" not in t.value), None)
     fix = f"write {listed} in place of {stray.value}" if stray else f"write {listed} after PROGRAMS"
-    changed = replace_token(text, stray or programs, listed if stray else f"PROGRAMS {listed}")
-    files.change("build-line", CMAKE, changed, message, fix)
+    new, why = listed if stray else f"PROGRAMS {listed}", f"{INSTALL}(…) does not name {join_words(unnamed)}"
+    change_word(files, stray or programs, new, why, fix, call=call)
 
 
 def _replace_stray(files: Files, own: Sequence[str], path: str) -> bool:
@@ -220,9 +208,8 @@ def _replace_stray(files: Files, own: Sequence[str], path: str) -> bool:
             given = _plain(token.value)
             same = re.sub(r"[\\/]", "", given) == path.replace("/", "")
             if given not in own and (same or _is_about(PurePosixPath(given).name, name)):
-                message = f"line {call.line} of {CMAKE}: {token.value} does not exist; the script is {path}"
-                fix = f"write {path} instead of {token.value}"
-                files.change("build-line", CMAKE, replace_token(cmake_text(files), token, path), message, fix)
+                why = f"{token.value} does not exist; the script is {path}"
+                change_word(files, token, path, why, f"write {path} instead of {token.value}", call=call)
                 return True
     return False
 
@@ -249,7 +236,6 @@ def _correct_destination(files: Files, scripts: Collection[str]) -> None:
         if names_one and at in (len(words), len(words) - 1) and "PROGRAMS" in [t.value for t in words]:
             text, last = cmake_text(files), words[-1].span.stop
             lacks = "DESTINATION" if at == len(words) else "place behind DESTINATION"
-            message = f"line {call.line} of {CMAKE}: {call.identifier}(…) has no {lacks}"
             if place is not None:
                 text = replace_token(text, words[at], "") if at < len(words) else text
                 changed = replace_token(text, place, f"DESTINATION {BIN}")
@@ -257,10 +243,9 @@ def _correct_destination(files: Files, scripts: Collection[str]) -> None:
                 changed = f"{text[:last]} {BIN}{text[last:]}"
             else:
                 changed = f"{text[:last]}\n  DESTINATION {BIN}{text[last:]}"
-            files.change("build-line", CMAKE, changed, message)
+            change_line(files, call, changed, f"{call.identifier}(…) has no {lacks}")
             return
         if given and names_one and given.value != BIN and "CATKIN_" in given.value.upper():
-            message = f"line {call.line} of {CMAKE}: {given.value} is not where rosrun looks"
-            fix = f"write DESTINATION {BIN}"
-            files.change("build-line", CMAKE, replace_token(cmake_text(files), given, BIN), message, fix)
+            why, fix = f"{given.value} is not where rosrun looks", f"write DESTINATION {BIN}"
+            change_word(files, given, BIN, why, fix, call=call)
             return

@@ -111,12 +111,8 @@ def _delete_imports(files: Files, scripts: Sequence[str], package: PackageFacts)
     for slip in sorted(unused, key=lambda s: s.line, reverse=True):
         lines = (files.text(slip.file) or "").split("\n")
         text = lines[slip.line - 1] if slip.line <= len(lines) else ""
-        if (
-            slip.file not in scripts
-            or slip.message in own
-            or not IMPORT.fullmatch(text)
-            or _is_misspelt(text)
-        ):
+        is_import = slip.file in scripts and slip.message not in own and IMPORT.fullmatch(text)
+        if not is_import or _is_misspelt(text):
             continue
         what = _unknown_message(text)
         if (slip.file, slip.line) in lacking and not exists_somewhere(slip.message, own):
@@ -144,9 +140,8 @@ def _delete_manifests(files: Files, scripts: Sequence[str], package: PackageFact
                 continue
             if sum("roslib." in one.partition("#")[0] for one in lines) > 1:
                 continue
-            message = (
-                f"line {number} of {file}: there is no package {loaded[1]}, and catkin needs no such line"
-            )
+            why = f"there is no package {loaded[1]}, and catkin needs no such line"
+            message = f"line {number} of {file}: {why}"
             files.change("missing-import", file, _emptied(lines, number), message, f"delete line {number}")
 
 
@@ -180,9 +175,8 @@ def _is_misspelt(line: str) -> bool:
     known = noetic_messages()
     near = get_close_matches(found[1], known, 1, 0.85) if found and found[1] not in known else []
     classes = [one.lower() for name in near for one in known[name]]
-    return found is not None and any(
-        found[2].lower() == one or is_one_edit(found[2].lower(), one) for one in classes
-    )
+    name = found[2].lower() if found else ""
+    return any(name == one or is_one_edit(name, one) for one in classes)
 
 
 def _unknown_message(line: str) -> str:
@@ -225,16 +219,11 @@ def turn_sign(folder: Path, file: str, side: str = "") -> Repair | None:
     text = files.text(file)
     answer = run_limited(TURN, text or "", side, limits=ChildLimits(wall_s=WALL_S, **LIMITS))
     for step in map(json.loads, answer.lines.splitlines()[:1]):
-        place = f"line {step['line']} of {file}"
-        passes = "a copy of the package with the other sign passes"
         # where no side is known to be wrong, another line may be what is meant
-        why = (
-            f"this turn has the wrong sign: {passes}"
-            if side
-            else "with the other sign for this turn, a copy of the package passes"
-        )
-        message = f"{place}: {why}"
-        files.change("turn-sign", file, step["text"], message)
+        why = "with the other sign for this turn, a copy of the package passes"
+        if side:
+            why = "this turn has the wrong sign: a copy of the package with the other sign passes"
+        files.change("turn-sign", file, step["text"], f"line {step['line']} of {file}: {why}")
     return next(iter(files.repairs), None)
 
 
@@ -294,16 +283,14 @@ def _join_steps(steps: Sequence[_Step]) -> Iterator[tuple[Cause, list[_Step]]]:
     """Steps of one cause that follow each other are one mistake, but each missing token and import is its own."""
     groups: list[tuple[Cause, list[_Step]]] = []
     for step in steps:
-        if (
-            groups
-            and groups[-1][0] == step.cause
-            and step.cause
-            not in ("token", "indent", "module", "import", "name", "attribute", "argument", "unbound", "kept")
-        ):
+        if groups and groups[-1][0] == step.cause and step.cause not in EACH_ITS_OWN:
             groups[-1][1].append(step)
         else:
             groups.append((step.cause, [step]))
     yield from groups
+
+
+EACH_ITS_OWN = ("token", "indent", "module", "import", "name", "attribute", "argument", "unbound", "kept")
 
 
 def _change(files: Files, file: str, cause: Cause, steps: list[_Step]) -> None:
@@ -317,15 +304,12 @@ def _required_indentation(before: str, after: str, first: str) -> str:
     """How lines that are indented otherwise have to begin, so that the file parses; `first` goes before it."""
     pairs = enumerate(zip(before.split("\n"), after.split("\n"), strict=False), start=1)
     lines: dict[int, list[int]] = {}
-    for number, (old, new) in pairs:
-        if old != new and new.strip():
-            lines.setdefault(len(new) - len(new.lstrip()), []).append(number)
-    if sum(map(len, lines.values())) > INDENTED_SHOWN:
-        numbers = sorted(number for some in lines.values() for number in some)
-        return (
-            f"indent with spaces only, the same at each level, from line {numbers[0]} to {numbers[-1]}; "
-            "`grader check --fix` does it"
-        )
+    changed = [(number, new) for number, (old, new) in pairs if old != new and new.strip()]
+    for number, new in changed:
+        lines.setdefault(len(new) - len(new.lstrip()), []).append(number)
+    if len(changed) > INDENTED_SHOWN:
+        where = f"from line {changed[0][0]} to {changed[-1][0]}"
+        return f"indent with spaces only, the same at each level, {where}; `grader check --fix` does it"
     begun = [
         f"{'line' if len(some) == 1 else 'lines'} {numbers_text(some)} with {plural(spaces, 'space')}"
         for spaces, some in lines.items()
@@ -347,10 +331,8 @@ def _rewritten(before: str, after: str) -> str:
 
 def _further_in(before: str, after: str, line: int) -> str:
     """Return by how many characters more the line begins."""
-    one, other = (text.split("\n")[line - 1 : line] or [""] for text in (before, after))
-    more = sum(len(text) - len(text.lstrip()) for text in other) - sum(
-        len(text) - len(text.lstrip()) for text in one
-    )
+    one, other = ("".join(text.split("\n")[line - 1 : line]) for text in (before, after))
+    more = len(other) - len(other.lstrip()) - (len(one) - len(one.lstrip()))
     return "four" if more == INDENTATION else str(more)
 
 
@@ -370,21 +352,12 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
     calls = ", ".join(f"{one}()" for one in word.split(", "))
     meant = {"commented": COMMENTED_OUT, "level": OUT_OF_BLOCK if error and first.line < error.line else ""}
     told = reason_of(meant.get(cause) or (error.message if error else "")).text
-    said, fix = (
-        words.format(
-            file=file,
-            place=place,
-            line=first.line,
-            below=first.line + 1,
-            word=word,
-            names=names,
-            calls=calls,
-            told=told,
-            emptied=emptied_lines(before, after),
-            further=_further_in(before, after, first.line),
-        )
-        for words in WORDS[cause]
-    )
+    known = {
+        "file": file, "place": place, "line": first.line, "below": first.line + 1, "word": word, "names": names,
+        "calls": calls, "told": told, "emptied": emptied_lines(before, after),
+        "further": _further_in(before, after, first.line),
+    }  # fmt: skip
+    said, fix = (words.format(**known) for words in WORDS[cause])
     if cause == "quotes":
         fix = _rewritten(before, after)
     if cause in {"tabs", "level", "inside"}:

@@ -58,24 +58,16 @@ def _without_fault(text: str, at: int, wanted: Wanted) -> _Repaired | None:
     tabbed = next((n for n, line in enumerate(lines, 1) if "\t" in _blanks(line)), None)
     if tabbed is not None and tabbed <= at:
         why = f"line {tabbed} of {{path}} is indented with a tab, which YAML does not accept"
-        return _best(
-            [_Repaired(one, why, _begin(one, lines, tabbed)) for one in _untabbed(lines, tabbed)], wanted
-        )
+        plain = [_Repaired(one, why, _begin(one, lines, tabbed)) for one in _untabbed(lines, tabbed)]
+        return _best(plain, wanted)
     if slip := slip_of_yaml(text, at):
         comment = re.search(r"\s+#.*", lines[slip.number - 1])
         changed = f"{_blanks(lines[slip.number - 1])}{slip.right}{comment[0] if comment else ''}"
         repaired = "\n".join([*lines[: slip.number - 1], changed, *lines[slip.number :]])
         return _Repaired(repaired, f"line {slip.number} of {{path}} {slip.why}", f"write `{slip.right}`")
-    moved = [
-        _Repaired(
-            one,
-            f"line {number} of {{path}} does not line up with the lines beside it",
-            _begin(one, lines, number),
-        )
-        for number in (at, at - 1)
-        for one in _moved(lines, number)
-    ]
-    return _best(moved, wanted)
+    why = "line {} of {{path}} does not line up with the lines beside it"
+    moved = [(number, one) for number in (at, at - 1) for one in _moved(lines, number)]
+    return _best([_Repaired(one, why.format(n), _begin(one, lines, n)) for n, one in moved], wanted)
 
 
 def _untabbed(lines: list[str], number: int) -> Iterator[str]:
