@@ -37,7 +37,7 @@ from grader.model.package import PackageFacts
 from grader.model.record import build_records
 from grader.model.result import EarlyVerdict, GradingResult, Progress, SubmissionInfo, TimingInfo
 from grader.model.submission import RecordedSubmission, Submission
-from grader.package import read_packages
+from grader.package.facts import read_packages
 from grader.portable import wait_for_children
 from grader.recording import (
     Judged,

@@ -23,7 +23,7 @@ from grader.judging.repeats_and_repairs import REPAIRS, was_built
 from grader.model.package import PackageFacts
 from grader.model.result import Progress
 from grader.model.submission import Submission
-from grader.package import read_packages
+from grader.package.facts import read_packages
 from grader.ros_env import look_for, why_nodes_cannot_run
 from grader.rubric.load import LoadedRubric, cancels_of, needs_ros, rates_of, select_started, watched_of
 from grader.rubric.made_up import KEY

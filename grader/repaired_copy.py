@@ -75,11 +75,8 @@ def choose_repairs(
     def unblocks(one: Repair) -> bool:
         return any(concerns(one, c, rubric, by_id, built=built, launched=launched) for c in blocked)
 
-    helping = [
-        one
-        for one in counting
-        if one.kind not in DONE_BEFORE_RUNS and (any(uses(name, one) for name in lost) or unblocks(one))
-    ]
+    later = [one for one in counting if one.kind not in DONE_BEFORE_RUNS]
+    helping = [one for one in later if any(uses(name, one) for name in lost) or unblocks(one)]
     chosen = most_of(helping)
     scenarios = sorted(name for name in lost if any(uses(name, one) for one in chosen))
     # only where nothing mechanical explains a loss is the logic of a script touched
@@ -91,10 +88,9 @@ def choose_repairs(
     # of a script that the build makes a program of, neither its bit nor its first line is used
     made = {c.mistake.name for c in criteria if c.mistake is not None and is_unmade(c)}
     made |= programs_of_build(facts) & {one.before for one in chosen if one.kind == "file-name"}
-    before = (one for one in counting if one.kind in DONE_BEFORE_RUNS and one.file not in made)
-    return (*(one for one in before if not is_first_line_added(one, rubric, chosen)), *chosen), tuple(
-        scenarios
-    )
+    before = [one for one in counting if one.kind in DONE_BEFORE_RUNS and one.file not in made]
+    before = [one for one in before if not is_first_line_added(one, rubric, chosen)]
+    return (*before, *chosen), tuple(scenarios)
 
 
 def _choose_logic(
@@ -135,10 +131,8 @@ def _find_in_all(submission: Submission, facts: PackageFacts, rubric: Rubric) ->
     found = [one for one in found if one.file not in never]
     for package, own in zip(submission.also, facts.views()[1:], strict=True):
         way = facts.way_to(own)
-        found += [
-            one.with_paths(partial(posixpath.join, way))
-            for one in find_repairs(package.folder, own, wanted_of(rubric, own.asked))
-        ]
+        others = find_repairs(package.folder, own, wanted_of(rubric, own.asked))
+        found += [one.with_paths(partial(posixpath.join, way)) for one in others]
     return found
 
 
@@ -148,9 +142,8 @@ def repaired_copy(submission: Submission, repairs: Sequence[Repair]) -> Iterator
     turns out to be none that can be repaired."""
     with temporary_folder("repaired") as folder:
         try:
-            main = _repair_copy(
-                submission.package, folder / "main", [r for r in repairs if not r.file.startswith("../")]
-            )
+            of_main = [r for r in repairs if not r.file.startswith("../")]
+            main = _repair_copy(submission.package, folder / "main", of_main)
             also = tuple(
                 _repair_copy(package, folder / package.asked, _of(submission, package, repairs))
                 for package in submission.also

@@ -317,9 +317,9 @@ def corrected(line: str, message: str = "", column: int | None = None) -> str:
 
     `message` is what Python says of the line, and `column` the place, from 1.
     """
-    return next((one for one in corrections(line, message, column) if one != line and _parses(one)), "") or (
-        _without_unmatched(line, message, column) if _ends_earlier_lines(line) else ""
-    )
+    good = (one for one in corrections(line, message, column) if one != line and _parses(one))
+    shorter = _without_unmatched(line, message, column) if _ends_earlier_lines(line) else ""
+    return next(good, shorter)
 
 
 def corrections(line: str, message: str = "", column: int | None = None) -> Iterator[str]:
@@ -456,11 +456,8 @@ def _with_bracket(line: str, message: str, column: int | None) -> Iterator[str]:
             called,
         )
         called = re.sub(r"(^|[\s(=])([A-Z]\w*)\)\.", r"\1\2().", called)
-        called = (
-            re.sub(r"^(\s+def\s+\w+?)(self(?:,\s*\w+)*)\):$", r"\1(\2):", code)
-            if _METHOD.match(code)
-            else called
-        )
+        if _METHOD.match(code):
+            called = re.sub(r"^(\s+def\s+\w+?)(self(?:,\s*\w+)*)\):$", r"\1(\2):", code)
         filled = _GLUED.sub(r"\1(\2)", code)
         opened = _OPENED.sub(lambda found: f"{_log_call(found[1])}(", code, count=1)
         yield from (_together(one, comment, texts) for one in (asked, filled, opened, called) if one != code)
@@ -573,9 +570,8 @@ def _parses(line: str) -> bool:
     code, _, texts = _taken_apart(line.strip())
     word = re.match(r"\w*", code)
     before = _HEADS.get(word[0] if word else "", "")
-    after = (" pass" if code.endswith(":") else "") + (
-        "\nfinally: pass" if re.match(r"try\s*:", code) else ""
-    )
+    after = " pass" if code.endswith(":") else ""
+    after += "\nfinally: pass" if re.match(r"try\s*:", code) else ""
     try:
         parsed(before + _together(code, "", texts) + after)
     except (SyntaxError, ValueError, RecursionError, MemoryError):

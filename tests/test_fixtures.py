@@ -17,7 +17,7 @@ from grader.intake.open import open_submission
 from grader.judging.judge import judge_files
 from grader.model.result import GradingResult
 from grader.model.verdict import FileCitation
-from grader.package import read_packages
+from grader.package.facts import read_packages
 from grader.pipeline import wanted_package
 from tests.classes.gradebook.made import criterion
 from tests.fixture_runs import (

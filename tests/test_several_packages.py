@@ -15,7 +15,7 @@ from grader.intake.open import open_submission
 from grader.model.result import CriterionResult, Silence
 from grader.model.submission import Submission
 from grader.model.verdict import FileCitation, Status
-from grader.package import read_packages
+from grader.package.facts import read_packages
 from grader.pipeline import wanted_package
 from grader.repaired_copy import choose_repairs, repaired_copy
 from grader.rubric.find import VARIABLE

@@ -45,8 +45,8 @@ from grader.model.message_rate import RateBounds
 from grader.model.package import PackageFacts
 from grader.model.result import Progress
 from grader.model.submission import Submission
-from grader.package import SyntaxReport, python_paths, read_syntax_report, with_build_facts
-from grader.package.python import REPORT_BYTES_MAX
+from grader.package.facts import python_paths, with_build_facts
+from grader.package.python import REPORT_BYTES_MAX, SyntaxReport, read_syntax_report
 from grader.ros_env import INSTALL_HINT, NO_ROS, find_ros
 from grader.rubric.model import Rubric
 

@@ -48,7 +48,7 @@ from grader.intake.open import open_submission
 from grader.model.package import Interface, PackageFacts
 from grader.model.result import Progress
 from grader.model.verdict import Status
-from grader.package import read_package
+from grader.package.facts import read_package
 from grader.rubric.consistency import TOTAL_POINTS
 from grader.rubric.load import LoadedRubric
 

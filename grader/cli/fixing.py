@@ -22,7 +22,7 @@ from grader.files import temporary_folder
 from grader.intake.open import open_submission
 from grader.model.repair import Repair
 from grader.model.submission import SourcePackage
-from grader.package import read_package
+from grader.package.facts import read_package
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs, wanted_of
 from grader.package.repairs.editing import is_executable, naming_files, read_data
 from grader.pipeline import wanted_package

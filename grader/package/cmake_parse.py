@@ -34,10 +34,7 @@ _LONE_DOLLAR = re.compile(r"(\\.)|\$(?![A-Za-z]*\{)", re.DOTALL)
 
 # What find_package(catkin) sets (catkin's catkin_destinations.cmake), `{0}` the project's name
 _CATKIN = {
-    "CATKIN_GLOBAL_BIN_DESTINATION": "bin",
-    "CATKIN_GLOBAL_INCLUDE_DESTINATION": "include",
-    "CATKIN_GLOBAL_LIB_DESTINATION": "lib",
-    "CATKIN_GLOBAL_SHARE_DESTINATION": "share",
+    **{f"CATKIN_GLOBAL_{name.upper()}_DESTINATION": name for name in ("bin", "include", "lib", "share")},
     "CATKIN_PACKAGE_BIN_DESTINATION": "lib/{0}",
     "CATKIN_PACKAGE_ETC_DESTINATION": "etc/{0}",
     "CATKIN_PACKAGE_INCLUDE_DESTINATION": "include/{0}",
@@ -209,9 +206,8 @@ class _Reader:
         except (CMakeError, RecursionError) as error:
             line = next((token.line for token in tokens if is_open(token.value)), tokens[0].line)
             cause = "a variable `${...}` is never closed by `}`"
-            self.fault = self.fault or Fault(
-                file=file, line=line, kind=type(error).__name__, message=str(error), cause=cause
-            )
+            words = {"kind": type(error).__name__, "message": str(error), "cause": cause}
+            self.fault = self.fault or Fault(file=file, line=line, **words)
             return [printable(token.value) for token in tokens]
         args = [printable(token.value[:_VALUE_CHARS_MAX]) for token in resolved]
         self.letters += sum(map(len, args)) + 10 * len(args)
@@ -385,9 +381,8 @@ _CLOSING = re.compile(r"\s*#*[^()#]*\)")
 def _last_line(text: str, line: int) -> int:
     """Return the last line of an open call that begins in `line`: then comes a blank line, or another call."""
     own = takewhile(lambda other: other.strip() and not _BEGINS.match(other), text.split("\n")[line:])
-    return max(
-        (n for n, other in enumerate(own, line + 1) if not other.lstrip().startswith("#")), default=line
-    )
+    numbers = (n for n, other in enumerate(own, line + 1) if not other.lstrip().startswith("#"))
+    return max(numbers, default=line)
 
 
 _BEGINS = re.compile(r"\s*\w+\s*\(")
@@ -414,9 +409,8 @@ def _balance(commands: list[nodes.Command], file: str) -> tuple[list[nodes.Comma
             if name not in _MIDDLE:
                 open_blocks.pop()
         if len(open_blocks) > _NESTING_MAX:
-            return commands[:whole], _fault(
-                file, command.line, "nested too deep", "blocks are nested too deep"
-            )
+            fault = _fault(file, command.line, "nested too deep", "blocks are nested too deep")
+            return commands[:whole], fault
         whole = whole if open_blocks else count
     if open_blocks:
         name = open_blocks[0].identifier.lower()

@@ -302,9 +302,8 @@ class Scope(Record):
     def text(self, written: str) -> str:
         """Resolve `$(arg …)`, `$(dirname)` and `$(optenv NAME DEFAULT)`; what only roslaunch knows stays as it is."""
         short = written[:_VALUE_CHARS_MAX]
-        return _SUBSTITUTION.sub(lambda found: self._value(found[0], found[1].split()), short)[
-            :_VALUE_CHARS_MAX
-        ]
+        text = _SUBSTITUTION.sub(lambda found: self._value(found[0], found[1].split()), short)
+        return text[:_VALUE_CHARS_MAX]
 
     def get(self, element: etree._Element, name: str) -> str | None:
         """Return an attribute resolved, None where it is not there."""

@@ -127,9 +127,8 @@ def parse_manifest(data: bytes) -> tuple[Manifest | None, Fault | None]:
     strange = re.search(r"must not contain the following tags: (\w+)", message)
     near = difflib.get_close_matches(strange[1], TAGS["package"], 1, _ALIKE) if strange else []
     if strange and near and near[0] != strange[1]:
-        reason = reason._replace(
-            fix=f"write `<{near[0]}>` instead of `<{strange[1]}>`, and the same in its closing tag"
-        )
+        fix = f"write `<{near[0]}>` instead of `<{strange[1]}>`, and the same in its closing tag"
+        reason = reason._replace(fix=fix)
     return None, _fault(place, "InvalidPackage", "; ".join(message.split("\n")), *reason)
 
 
@@ -240,9 +239,8 @@ def explain(message: str, root: etree._Element) -> tuple[int | None, Reason]:
             if found := re.search(pattern, text):
                 groups = found.groups()
                 tags = {tag: f"add `{line}`" for tag, line in required_tags(_name_in(root)).items()}
-                reason = Reason(
-                    *(one.format(*groups, format=root.get("format", "1"), **tags) for one in words)
-                )
+                texts = (one.format(*groups, format=root.get("format", "1"), **tags) for one in words)
+                reason = Reason(*texts)
                 if "exactly one" in text:
                     reason = _of_one(groups[0], root, tags) or reason
                 known.setdefault(reason, _line_of(root, tag.format(*groups)))

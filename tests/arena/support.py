@@ -20,7 +20,7 @@ from grader.arena.workspace import make_workspace, run_in_place
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run
 from grader.model.submission import SourcePackage, Submission
-from grader.package import read_package
+from grader.package.facts import read_package
 from grader.ros_env import RosInstallation, find_ros
 from grader.rubric.scenario import Scenario, Start, Until
 

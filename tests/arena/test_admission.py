@@ -20,7 +20,7 @@ from grader.arena.recorder import Recorder
 from grader.arena.static_recorder import RunCost
 from grader.intake.open import open_submission
 from grader.model.result import Silence
-from grader.package import read_packages
+from grader.package.facts import read_packages
 from grader.rubric.load import load_rubric
 
 REFERENCE = Path(__file__).parents[2] / "reference_solutions" / "leeds-comp3631-lab1"

@@ -12,7 +12,7 @@ from grader.checks.cmake import CMakeInstallParams, cmake_install
 from grader.evidence.writer import EvidenceWriter
 from grader.model.package import PackageFacts
 from grader.model.submission import SourcePackage
-from grader.package import read_package, with_build_facts
+from grader.package.facts import read_package, with_build_facts
 from tests.arena.support import CMAKE, SCRIPT, make_place
 
 pytestmark = pytest.mark.ros

@@ -13,7 +13,7 @@ import pytest
 from grader.arena.recorder import _python_files, order_runs
 from grader.arena.run_state import RunState
 from grader.arena.session import ArenaSession
-from grader.package import read_package
+from grader.package.facts import read_package
 from grader.ros_env import RosInstallation
 from grader.rubric.model import Rubric
 from grader.rubric.scenario import Scenario, Start, Until

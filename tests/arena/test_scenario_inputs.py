@@ -20,7 +20,7 @@ from grader.arena.static_recorder import (
 )
 from grader.evidence.events import ActorEvent
 from grader.files import read_untrusted
-from grader.package import read_package
+from grader.package.facts import read_package
 from grader.rubric.scenario import Param, Probe
 from tests.package.trees import CMAKE, MANIFEST, make_package
 

@@ -256,7 +256,7 @@ def test_a_service_of_the_packages_own_is_called_and_its_client_answered() -> No
 
 def test_nodes_are_found_by_reading_alone(tmp_path):
     from grader.model.submission import SourcePackage  # noqa: PLC0415
-    from grader.package import read_package  # noqa: PLC0415
+    from grader.package.facts import read_package  # noqa: PLC0415
 
     files = {
         "package.xml": "<package><name>x</name></package>",

@@ -10,7 +10,7 @@ import pytest
 
 from grader.errors import OutputError, UsageError
 from grader.model.submission import chmod_hint
-from grader.package import read_package
+from grader.package.facts import read_package
 from grader.package.repairs import Wanted, find_repairs
 from tests.intake.samples import NODE, commit, git, lab, lab_tar, lab_zip, manifest, opened, repository, write
 

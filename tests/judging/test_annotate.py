@@ -19,7 +19,7 @@ from grader.judging.judge import judge_files
 from grader.model.package import PackageFacts
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status, failed
-from grader.package import read_package
+from grader.package.facts import read_package
 from grader.rubric.load import load_rubric, read_beside_rubric
 from tests.package.trees import CMAKE, MANIFEST, NODE, make_package
 from tests.rubric.samples import faults, spoiled

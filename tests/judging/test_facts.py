@@ -13,7 +13,7 @@ from grader.model.python_slip import PythonSlip
 from grader.model.result import EarlyVerdict
 from grader.model.submission import SourcePackage
 from grader.model.verdict import Status, passed
-from grader.package import read_package
+from grader.package.facts import read_package
 from tests.fixture_runs import loaded, source_of
 from tests.package.trees import CMAKE, MANIFEST, make_package
 from tests.package.trees import NODE as SCRIPT

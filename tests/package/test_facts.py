@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from grader.model.package import Fault, PackageFacts
-from grader.package import python_paths, read_package, with_build_facts
+from grader.package.facts import python_paths, read_package, with_build_facts
 from tests.package.trees import CMAKE, MANIFEST, NODE, make_package
 
 LAUNCH = '<launch>\n  <node pkg="lab1" type="a.py" name="a"/>\n</launch>\n'

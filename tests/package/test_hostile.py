@@ -11,9 +11,8 @@ import pytest
 
 from grader.errors import SubmissionError
 from grader.intake.open import open_submission
-from grader.package import read_package
 from grader.package.cmake import read_trace
-from grader.package.facts import read_shebang
+from grader.package.facts import read_package, read_shebang
 from grader.package.launch import parse_launch, parse_launch_files
 from grader.package.manifest import parse_manifest
 from grader.package.python import REPORT_BYTES_MAX, check_syntax, read_syntax_report, reason_of

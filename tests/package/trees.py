@@ -8,7 +8,7 @@ from typing import Any
 
 from grader.model.package import PackageFacts
 from grader.model.submission import ModeSource, SourcePackage
-from grader.package import read_package
+from grader.package.facts import read_package
 
 MANIFEST = """<?xml version="1.0"?>
 <package format="2">

@@ -302,11 +302,9 @@ class Printing:
         for call, names in tree.prints_of_loops:
             kept = names.intersection(self.shared)
             if kept:
-                message = (
-                    "line %d prints in a loop what `%s` holds by then, and not each message when it comes"
-                )
-                fix = "print `%s` in %s" % (self.value, self.name)
-                return call.lineno, "printed-in-part", message % (call.lineno, min(kept)), fix
+                message = "line %d prints in a loop what `%s` holds by then" % (call.lineno, min(kept))
+                message += ", and not each message when it comes"
+                return call.lineno, "printed-in-part", message, "print `%s` in %s" % (self.value, self.name)
         return self.kept_for_another(tree)
 
     def kept_for_another(self, tree):

@@ -99,11 +99,10 @@ def is_increment(node, target, value):
     parts = list(ast.walk(value))
     called = {id(one.func): one.func for one in parts if isinstance(one, ast.Call)}
     # `n = int(n)` and `String = String()` add nothing
-    adds = any(isinstance(one, (ast.BinOp, ast.UnaryOp)) for one in parts) or any(
-        dotted(one).startswith("self.") if isinstance(one, ast.Attribute) else not hasattr(builtins, one.id)
-        for one in called.values()
-        if isinstance(one, (ast.Attribute, ast.Name))
-    )
+    names = [one for one in called.values() if isinstance(one, (ast.Attribute, ast.Name))]
+    adds = any(isinstance(one, (ast.BinOp, ast.UnaryOp)) for one in parts)
+    adds = adds or any(isinstance(one, ast.Name) and not hasattr(builtins, one.id) for one in names)
+    adds = adds or any(isinstance(one, ast.Attribute) and dotted(one).startswith("self.") for one in names)
     own = [one for one in parts if isinstance(one, type(target)) and id(one) not in called]
     return adds and any(dotted(one) == dotted(target) for one in own)
 
@@ -142,10 +141,8 @@ def reset_the_wrong_way(ifs, name):
         inverted = isinstance(one.test, ast.UnaryOp) and isinstance(one.test.op, ast.Not)
         test = one.test.operand if inverted else one.test
         below = (ast.Gt, ast.GtE) if inverted else (ast.Lt, ast.LtE)
-        compares = (
-            isinstance(test, ast.Compare) and isinstance(test.ops[0], below) and dotted(test.left) == name
-        )
-        limit = whole(test.comparators[0]) if compares else None
+        compares = isinstance(test, ast.Compare) and isinstance(test.ops[0], below)
+        limit = whole(test.comparators[0]) if compares and dotted(test.left) == name else None
         given = [n for n in one.body if isinstance(n, ast.Assign) and dotted(n.targets[0]) == name]
         resets_to = [value for value in (whole(n.value) for n in given) if value is not None]
         if limit is not None and resets_to and min(resets_to) < limit:
@@ -209,12 +206,11 @@ def uncounted(tree):
             sent = [names_in(n) for n in calls_in(loop, "publish")]
             for name in () if ends else (dotted(t) for t in increments(after)):
                 if any(name in names for names in sent):
-                    message = (
-                        "`%s` is counted below the loop on line %d, and is not reached while the node runs"
-                    )
+                    message = "`%s` is counted below the loop on line %d" % (name, loop.lineno)
+                    message += ", and is not reached while the node runs"
                     last = [after.lineno, *(n.end_lineno for n in body[at + 2 :] if name in names_in(n))][-1]
                     fix = "indent %s like the lines of that loop" % lines_from(after.lineno, last)
-                    yield slip(after.lineno, "no-effect", message % (name, loop.lineno), fix, name)
+                    yield slip(after.lineno, "no-effect", message, fix, name)
 
 
 def increments(node):
@@ -390,10 +386,9 @@ def published_unchanged(tree):
             alike = [one for one in fresh if one in made and alike_made(made[one].value, made[name].value)]
             if len(fresh) == len(alike) == 1:
                 fix = "on line %d, publish `%s`" % (call.lineno, alike[0])
-            message = (
-                "each pass through the loop on line %d publishes `%s`, which only line %d makes, above it"
-            )
-            yield slip(call.lineno, "no-effect", message % (loop.lineno, name, line), fix, name)
+            message = "each pass through the loop on line %d publishes `%s`" % (loop.lineno, name)
+            message += ", which only line %d makes, above it" % line
+            yield slip(call.lineno, "no-effect", message, fix, name)
 
 
 def alike_made(one, other):

@@ -425,10 +425,10 @@ def is_endless(loop, function=None):
 
 
 def asks_for_ever(test):
+    if isinstance(test, ast.Constant):
+        return bool(test.value)
     inverted = isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not)
-    return (isinstance(test, ast.Constant) and bool(test.value)) or (
-        inverted and is_call(test.operand, "is_shutdown")
-    )
+    return inverted and is_call(test.operand, "is_shutdown")
 
 
 def is_unchanging(loop, function):
@@ -483,10 +483,8 @@ def deaf_loops(tree):
         caught = [h for n in inside if isinstance(n, ast.Try) for h in n.handlers if goes_on(h)]
         if calls_in(loop, *RAISING):
             for handler in caught[:1]:
-                message = (
-                    "the `except` on line %d catches what Ctrl-C raises, and the loop on line %d goes on"
-                )
-                message %= (handler.lineno, loop.lineno)
+                message = "the `except` on line %d catches what Ctrl-C raises, " % handler.lineno
+                message += "and the loop on line %d goes on" % loop.lineno
                 endless.append(slip(loop.lineno, "deaf", message, ASKS))
         elif is_while or is_endless_for(loop):
             known = endless if not is_while or isinstance(loop.test, ast.Constant) else others
@@ -513,11 +511,8 @@ def counts_down(loop):
 
 def deaf(loop, within):
     """Return the slip of a loop that never asks, with those `within` it that take their time."""
-    named = "%s on %s never check%s" % (
-        "loops" if within else "loop",
-        listed(one.lineno for one in (loop, *within)),
-        "" if within else "s",
-    )
+    named = "loops on %s never check" if within else "loop on %s never checks"
+    named %= listed(one.lineno for one in (loop, *within))
     asks, ends = ASKS, [ENDS_FOR % one.lineno for one in within]
     test = getattr(loop, "test", ast.Constant(True))
     is_loose = isinstance(getattr(test, "op", None), ast.Or)  # binds less than `and` does

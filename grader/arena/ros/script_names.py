@@ -159,9 +159,8 @@ def misspelt(tree):
         elif near and not (node.id in MODULES and near in imported):  # there the import has it wrong
             guards = near == "__name__" and is_guard(node, tree)
             kind, message = "misspelt", "did you mean %s?" % near
-            fix = (
-                "write `if __name__ == '__main__':`" if guards else "write %s instead of %s" % (near, node.id)
-            )
+            near = "if __name__ == '__main__':" if guards else near
+            fix = "write `%s`" % near if guards else "write %s instead of %s" % (near, node.id)
         elif node.id not in known and (argument := unread_argument(node, tree)):
             kind, message = "misspelt", "the argument of `%s` is called `%s`" % argument
             fix = "write %s instead of %s" % (argument[1], node.id)
@@ -275,10 +274,9 @@ def spelt_alike(name, own, attributes):
 def is_value(node, tree):
     """Whether a name stands where a function makes no sense: in a calculation, or in what is answered."""
     around = parents_of(tree).get(node)
-    is_answer = isinstance(around, ast.Call) and node in around.args
-    return isinstance(around, (ast.BinOp, ast.Compare)) or (
-        is_answer and called_name(around).endswith(("Response", "Result", "Feedback"))
-    )
+    if isinstance(around, ast.Call):
+        return node in around.args and called_name(around).endswith(("Response", "Result", "Feedback"))
+    return isinstance(around, (ast.BinOp, ast.Compare))
 
 
 def is_guard(node, tree):

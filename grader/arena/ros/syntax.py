@@ -102,7 +102,7 @@ def check(root, name, with_slips=True):
         return report
     if len(data) > SIZE_LIMIT_BYTES:
         return report
-    problem = no_script(data) or undecodable(data)
+    problem = undecodable(data)
     if problem:
         report["faults"].append(problem)
         return report
@@ -112,9 +112,8 @@ def check(root, name, with_slips=True):
         report["faults"].append(syntax_fault(error, data))
         report["slips"] = slips_of_the_rest(data.decode("utf-8", "replace")) if with_slips else []
         return report
-    with contextlib.suppress(
-        RecursionError, MemoryError
-    ):  # what compiles can be nested too deep to be looked at
+    # what compiles can be nested too deep to be looked at
+    with contextlib.suppress(RecursionError, MemoryError):
         tree = ast.parse(data)
         error = bare_except(tree, os.path.basename(name))
         if error is not None:
@@ -190,15 +189,11 @@ def commented_calls(text):
         with contextlib.suppress(SyntaxError, ValueError, RecursionError, MemoryError):
             if code and ast.parse(code):
                 name = "%s = %s" % (target, call) if target else call
-                message = "`%s(…)` is %s" % (
-                    call,
-                    "in quotes, so it never runs" if quotes else "commented out",
-                )
-                fix = "remove the %s line %d" % (
-                    "quotes around the call on" if quotes else "`#` from",
-                    number,
-                )
-                yield slip(number, "commented-out", message, fix=fix, name=name)
+                message, fix = "`%s(…)` is commented out", "remove the `#` from line %d"
+                if quotes:
+                    message = "`%s(…)` is in quotes, so it never runs"
+                    fix = "remove the quotes around the call on line %d"
+                yield slip(number, "commented-out", message % call, fix % number, name)
 
 
 def bare_except(tree, name):
@@ -217,36 +212,25 @@ def bare_except(tree, name):
 
 
 def fault(kind, line, column, message, *, text="", opened=None, mixed=False):
-    return {
-        "kind": kind,
-        "line": line,
-        "column": column,
-        "message": message[:MESSAGE_LIMIT],
-        "text": text[:TEXT_LIMIT],
-        "opened": opened,
-        "mixed": mixed,
-    }
-
-
-def no_script(data):
-    """Return the fault of a file that is something else as a whole."""
-    for begins, message in NO_SCRIPTS:
-        if begins.match(data):
-            return fault("SyntaxError", None, None, message)
-    return None
+    texts = {"message": message[:MESSAGE_LIMIT], "text": text[:TEXT_LIMIT]}
+    return {"kind": kind, "line": line, "column": column, "opened": opened, "mixed": mixed, **texts}
 
 
 def undecodable(data):
-    """Return the fault of a file whose bytes are not text. `compile` forgives them in comments, running does not."""
+    """Return the fault of a file that is something else as a whole, or whose bytes are not text. `compile` forgives
+    them in comments, running does not."""
+    for begins, message in NO_SCRIPTS:
+        if begins.match(data):
+            return fault("SyntaxError", None, None, message)
     if b"\0" in data:
         line = data.count(b"\n", 0, data.index(b"\0")) + 1
         return fault("ValueError", line, None, "source code cannot contain null bytes")
     try:
         encoding, _ = tokenize.detect_encoding(io.BytesIO(data).readline)
     except ENCODINGS as error:
-        encoding = None if "unknown encoding" in str(error) else "utf-8"
-        if encoding is None:
+        if "unknown encoding" in str(error):
             return fault("SyntaxError", 1, None, str(error))
+        encoding = "utf-8"
     try:
         data.decode(encoding)
     except UnicodeDecodeError as error:
@@ -262,9 +246,7 @@ def has_numbers(data):
     """Return whether the first lines begin with their numbers, as a page or an editor shows them."""
     lines = data.split(b"\n", NUMBERED_LINES)[:NUMBERED_LINES]
     numbers = [re.match(rb"\s*(\d+)\b", line) for line in lines]
-    return len(lines) == NUMBERED_LINES and all(
-        number and int(number[1][:9]) == at for at, number in enumerate(numbers, 1)
-    )
+    return [int(number[1][:9]) for number in numbers if number] == list(range(1, NUMBERED_LINES + 1))
 
 
 def syntax_fault(error, data):
@@ -278,18 +260,17 @@ def syntax_fault(error, data):
     line = getattr(error, "lineno", None)
     known = line is not None and 0 < line <= len(lines)
     # within brackets, Python trips over a line below git's marker
-    strange = (
-        n for n in range(line or 0) if MARKER.match(lines[n]) or BRACE.match(lines[n][: TEXT_LIMIT + 1])
-    )
-    first = next(strange, None) if known else None
+    above = enumerate(lines[:line] if known else ())
+    first = next((n for n, text in above if MARKER.match(text) or BRACE.match(text[: TEXT_LIMIT + 1])), None)
     if first is not None and lines[first][:1] not in "=>|":
         at = lines[first].find("{") + 1 or 1
         return fault("SyntaxError", first + 1, at, "invalid syntax", text=lines[first])
-    head = commented_head(lines, line) if known and "unexpected indent" in str(error) else None
+    indented = known and "unexpected indent" in str(error)
+    head = commented_head(lines, line) if indented else None
     if head is not None:
         at, text = lines[head].index("#") + 1, lines[head]
         return fault("IndentationError", head + 1, at, "block commented out" + moved(lines, head), text=text)
-    odd = out_of_block(lines, line) if known and "unexpected indent" in str(error) else None
+    odd = out_of_block(lines, line) if indented else None
     if odd is not None:
         message = "ends its block too early: " + begin_with(blanks_of(lines[line - 1]))
         return fault("IndentationError", odd + 1, 1, message, text=lines[odd])
@@ -307,25 +288,26 @@ def syntax_fault(error, data):
 
 def commented_head(lines, line):
     """Return the index of the comment above that line which is the first line of a block; None where none is."""
-    above = range(line - 2, -1, -1)
-    for number in above:
+    for number in range(line - 2, -1, -1):
         text = lines[number][:TEXT_LIMIT]
         found = COMMENTED.match(text)
         if found:
             with contextlib.suppress(SyntaxError, ValueError, RecursionError, MemoryError):
-                ast.parse(
-                    found.group(1) + " pass" + ("\nfinally: pass" if found.group(1).startswith("try") else "")
-                )
+                end = "\nfinally: pass" if found.group(1).startswith("try") else ""
+                ast.parse(found.group(1) + " pass" + end)
                 return number
-        if text.strip() and not text.lstrip().startswith("#"):
+        if is_code(text):
             return None
     return None
 
 
+def is_code(text):
+    return bool(text.strip()) and not text.lstrip().startswith("#")
+
+
 def moved(lines, head):
     """Return with what the line has to begin, as the code above does; "" where it begins so."""
-    above = (text for text in reversed(lines[:head]) if text.strip() and not text.lstrip().startswith("#"))
-    blanks = blanks_of(next(above, ""))
+    blanks = blanks_of(next(filter(is_code, reversed(lines[:head])), ""))
     return "" if blanks == blanks_of(lines[head]) else ": " + begin_with(blanks)
 
 
@@ -342,14 +324,12 @@ def blanks_of(text):
 def out_of_block(lines, line):
     """Return the index of the first of at most three lines right above that line which are further out than it, though
     it goes on with the block above them; None where there are none."""
-    code = [n for n in range(line - 2, -1, -1) if lines[n].strip() and not lines[n].lstrip().startswith("#")]
+    code = [n for n in range(line - 2, -1, -1) if is_code(lines[n])]
     own, *widths = [len(blanks_of(lines[n]).expandtabs()) for n in [line - 1, *code]]
     odd = next((i for i, width in enumerate(widths) if width >= own), 0)
     before = next((width for width in widths[odd:] if width <= own), None)
-    fits = (
-        0 < odd <= ODD_LINES_MAX and before == own and not any(OUTERMOST.match(lines[n]) for n in code[:odd])
-    )
-    return code[odd - 1] if fits else None
+    fits = 0 < odd <= ODD_LINES_MAX and before == own
+    return code[odd - 1] if fits and not any(OUTERMOST.match(lines[n]) for n in code[:odd]) else None
 
 
 def never_closed(data, line):

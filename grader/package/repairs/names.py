@@ -487,10 +487,11 @@ def _indent_keys(files: Files, file: str, branches: set[tuple[str, ...]]) -> Non
         right = lines[block[0]][: len(lines[block[0]]) - len(lines[block[0]].lstrip())]
         if not lines[number].rstrip().endswith(":"):
             lines[number] = right + lines[number].lstrip()
-            message = (
-                f"line {number + 1} of {file}: {path[-1]} stands beside {meant[0][-2]}, and not below it"
+            why = f"{path[-1]} stands beside {meant[0][-2]}, and not below it"
+            message, fix = (
+                f"line {number + 1} of {file}: {why}",
+                f"indent it by {plural(len(right), 'space')}",
             )
-            fix = f"indent it by {plural(len(right), 'space')}"
             files.change("parameter-name", file, "\n".join(lines), message, fix)
             there.add(meant[0])
 

@@ -201,9 +201,8 @@ def _examine(
         if not left or wall_s <= 0:
             return
         request = [[file, texts[file]] for file in left]
-        answer = run_limited(
-            EXAMINE, request, list(types), fields, _site(), limits=ChildLimits(wall_s=wall_s, **LIMITS)
-        )
+        limits = ChildLimits(wall_s=wall_s, **LIMITS)
+        answer = run_limited(EXAMINE, request, list(types), fields, _site(), limits=limits)
         for entry in filter(None, map(_entry, answer.lines.splitlines())):
             if entry.file in left:
                 left.remove(entry.file)
@@ -310,10 +309,8 @@ def _required_indentation(before: str, after: str, first: str) -> str:
     if len(changed) > INDENTED_SHOWN:
         where = f"from line {changed[0][0]} to {changed[-1][0]}"
         return f"indent with spaces only, the same at each level, {where}; `grader check --fix` does it"
-    begun = [
-        f"{'line' if len(some) == 1 else 'lines'} {numbers_text(some)} with {plural(spaces, 'space')}"
-        for spaces, some in lines.items()
-    ]
+    named = [("line" if len(some) == 1 else "lines", spaces, some) for spaces, some in lines.items()]
+    begun = [f"{what} {numbers_text(some)} with {plural(spaces, 'space')}" for what, spaces, some in named]
     return f"{first}start {join_words(begun)}"
 
 
