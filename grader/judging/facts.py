@@ -266,7 +266,7 @@ def _launch_names(package: PackageFacts) -> set[str]:
 
 
 def _not_in_messages(run: Run) -> Verdict:
-    message = f"{run.evidence} holds messages, but nothing of the processes and nodes that are judged"
+    message = f"{run.evidence} holds messages, but nothing about the processes and nodes that are judged"
     return inconclusive(message, hint="hand in the package too, so that its nodes can be run")
 
 
