@@ -172,6 +172,8 @@ _HABITS = (
            ((r"^(\s*)([\w.]+)\s*([+-])\3\s*;*$", r"\1\2 \3= 1"), (r"^(\s*)([+-])\2\s*([\w.]+)\s*;*$", r"\1\3 \2= 1"))),
     _Habit(r"&&|\|\||!(?!=)", "Python writes `and`, `or` and `not`",
            "", ((r"\s*&&\s*", " and "), (r"\s*\|\|\s*", " or "), (r"!(?!=)\s*", "not "))),
+    _Habit(r"([<>!=])\s+=(?!=)", "`{0}=` has no space in it", "", ((r"([<>!=])\s+=(?!=)", r"\1="),)),
+    _Habit(r'""\s+5\s*\(', "`%` belongs between a string and its values, not `5`", "", ((r'""\s+5\s*\(', '"" % ('),)),
     _Habit(r"(===|!==|=<|=>|\bnot\s*=)", "Python compares with `==`, `!=`, `<=` and `>=`, not with `{0}`",
            "", ((r"===", "=="), (r"!==", "!="), (r"=<", "<="), (r"=>", ">="), (r"\s*\bnot\s*=+", " !="))),
     _Habit(rf"^\s*{_BRACE}", "Python has no `{` and `}` around a block", "end its first line with `:`",

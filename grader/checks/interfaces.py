@@ -136,6 +136,13 @@ def _not_there(package: PackageFacts, params: DefinitionParams) -> _Fault:
     wanted = PurePosixPath(params.file)
     near = closest(wanted.name, [PurePosixPath(one.path).name for one in package.interfaces], cutoff=0.7)
     other = next((one.path for one in package.interfaces if PurePosixPath(one.path).name == near), "")
+    asked = {(one.part, one.type, one.name) for one in params.wanted()}
+    same = [
+        one.path
+        for one in package.interfaces
+        if one.path.endswith(wanted.suffix) and {(f.part, f.type, f.name) for f in one.fields} == asked
+    ]
+    other = other or (same[0] if len(same) == 1 and asked else "")
     seen = f"; there is {shown(other)}" if other else ""
     hint = (
         f"rename it to {params.file}"

@@ -28,6 +28,7 @@ _LEAVES = re.compile(r"\b(?:break|return|throw|goto|spinOnce)\b")
 _SPIN = re.compile(r"\bros::spin\s*\(")
 _SPINS = re.compile(r"spin|Spinner|call(?:Available|One)\b")
 _MAIN = re.compile(r"\bmain\s*\(")
+_DEFINES_MAIN = re.compile(r"\b(?:int|void)\s+main\s*\([^;{}()]*\)\s*{")
 _LOOP = re.compile(r"\bwhile\s*\([^;{}]*\bok\s*\(\s*\)")
 _SLEEP = re.compile(
     r"\b(?:ros::)?(?:Wall)?Duration\s*\(\s*(?P<s>[\d.]+)\s*\)\s*\.\s*sleep\s*\(|\bus?leep\s*\(\s*(?P<us>\d+)"
@@ -69,6 +70,7 @@ def slips_of(path: str, text: str) -> Iterator[PythonSlip]:
     code = _TEXT.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), text)
     yield from _waiting(path, code)
     yield from _unspun(path, code)
+    yield from _without_main(path, text, code)
     yield from _degrees(path, code)
 
 
@@ -170,6 +172,18 @@ def _seconds(match: re.Match[str]) -> float:
         if match[unit] and re.fullmatch(r"\d+\.?\d*|\.\d+", match[unit]):
             return float(match[unit]) * factor
     return 1.0
+
+
+def _without_main(path: str, text: str, code: str) -> Iterator[PythonSlip]:
+    """A `main` that stands in a comment, where the file has no other."""
+    begins = next(_DEFINES_MAIN.finditer(text), None) if not _DEFINES_MAIN.search(code) else None
+    if begins is not None:
+        line = text.count("\n", 0, begins.start()) + 1
+        message, fix = (
+            f"`main` is a comment (line {line})",
+            "take `main` out of the comment, down to its last `}`",
+        )
+        yield PythonSlip(file=path, line=line, kind="commented-out", message=message, fix=fix, name="main")
 
 
 def _degrees(path: str, code: str) -> Iterator[PythonSlip]:

@@ -128,3 +128,17 @@ def test_a_loop_in_which_no_callback_is_called(loop: str, told: list[str]) -> No
     found = slips_of("src/node.cpp", f"int main() {{ {code}}}")
     assert [f"{one.line}: {one.message.partition(', so')[0]}" for one in found] == told
     assert list(slips_of("src/node.cpp", code)) == []  # what spins may be beside the main() of another file
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        ("bool add() {}\n/*\nint main(int argc, char **argv)\n{\n  ros::spin();\n}*/\n", [3]),
+        ("// int main() { return 0; }\nint x;\n", [1]),
+        ("// int main() { return 1; }\nint main() { return 0; }\n", []),
+        ("// write int main() here\nbool add() {}\n", []),
+    ],
+)
+def test_a_main_in_a_comment(text: str, lines: list[int]) -> None:
+    found = [one for one in slips_of("src/node.cpp", text) if one.kind == "commented-out"]
+    assert [one.line for one in found] == lines

@@ -282,6 +282,15 @@ def test_a_handler_of_a_service_that_waits(tmp_path):
     assert [(s.line, s.message) for s in slips] == [(2, "the callback `add` sleeps on line 2")]
 
 
+def test_a_handler_that_waits_again_and_again(tmp_path):
+    code = "def add(request):\n    rate.sleep()\n    for i in range(3):\n        go()\n        rate.sleep()\n"
+    (tmp_path / "a.py").write_text(code + "rospy.Service('/add', Add, add)\n")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "callback-waits"]
+    assert [(s.message, s.fix) for s in slips] == [
+        ("the callback `add` sleeps on line 2 and again on line 5", "delete lines 2 and 5")
+    ]
+
+
 ARGUMENTS = {
     "one": ("a = sys.argv[1]\n", ["a = int(sys.argv[1])"]),
     "several": ("a, b = rospy.myargv(sys.argv)[1:3]\n", ["a, b = map(int, rospy.myargv(sys.argv)[1:3])"]),

@@ -331,6 +331,9 @@ def publishes_twice(tree):
         yield slip(lines[1], "publish-twice", message, fix)
 
 
+SLEEPS_SHOWN = 5
+
+
 def waiting_callbacks(tree):
     """Callbacks of topics and services that do not come to their end, or late: nothing further is read before."""
     functions = functions_in(tree)
@@ -346,6 +349,16 @@ def waiting_callbacks(tree):
                 message, fix = "the callback `%s` calls spin() on line %d", "move line %d out of it"
             elif called_name(inner) == "sleep" and not is_short(inner):
                 message, fix = "the callback `%s` sleeps on line %d", "delete line %d"
+                slept = {n.lineno for n in inside if called_name(n) == "sleep" and not is_short(n)}
+                slept = sorted(slept - {inner.lineno})[:SLEEPS_SHOWN]
+                if slept:
+                    fix = "delete lines %s and %d" % (
+                        ", ".join(map(str, [inner.lineno, *slept[:-1]])),
+                        slept[-1],
+                    )
+                    message += " and again on line%s" % (
+                        " %d" % slept[0] if len(slept) == 1 else "s " + fix.partition(", ")[2]
+                    )
             else:
                 continue
             fix, message = fix % inner.lineno if "%" in fix else fix, message % (own.name, inner.lineno)

@@ -405,7 +405,10 @@ def _below(path: str, package: PackageFacts) -> str:
 
 
 def _no_cmake_lists(_found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    name = misspelt_cmake_lists(package)
+    name, file = misspelt_cmake_lists(package), package.file(CMAKE)
+    if not name and file is not None and file.link_problem:
+        why = f"CMakeLists.txt is a link to {file.link or 'a file'}, which was not handed in"
+        return Explained(why, "replace it with the CMakeLists.txt that catkin_create_pkg writes")
     if not name:
         return Explained("there is no CMakeLists.txt", "add the CMakeLists.txt that catkin_create_pkg writes")
     why = f"the file is called {name}, and CMake looks for CMakeLists.txt"

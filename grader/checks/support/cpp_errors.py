@@ -111,10 +111,26 @@ def _no_type(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]
     return Explained(f"there is no {found[2]} in {found[1]}", hint)
 
 
-def _explain_unlinked(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+def _without_main(package: PackageFacts, lines: Sequence[str]) -> Explained:
+    """Name the program that has no `main`, by the target that make gives up, and where it is but a comment."""
+    left = [
+        one[1] for line in lines if (one := re.search(r"\*\*\* \[.*/CMakeFiles/([^/]+)\.dir/build", line))
+    ]
+    made = [
+        call.args for call in cmake_calls(package, "add_executable") if left and call.args[:1] == (left[0],)
+    ]
+    sources = [one for args in made for one in args[1:] if one.endswith(CPP_SUFFIXES)]
+    why = f"the program {left[0]} has no `main` function" if left else "a program has no `main` function"
+    slip = next((s for s in package.slips if s.kind == "commented-out" and s.file in sources), None)
+    if slip is not None:
+        return Explained(f"{why}: in {slip.file}, it is a comment", slip.fix, place=slip.place)
+    place = sources[0] if len(sources) == 1 else "one of its sources"
+    return Explained(why, f"write `int main(int argc, char **argv)` in {place}")
+
+
+def _explain_unlinked(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
     if found[1] == "main":
-        why = "a program has no `main` function"
-        return Explained(why, "write `int main(int argc, char **argv)` in one of its sources")
+        return _without_main(package, lines)
     name = found[1].partition("(")[0]
     alone = programs_without(package, "target_link_libraries") if name.startswith("ros::") else []
     program = alone[0] if alone else "<program>"

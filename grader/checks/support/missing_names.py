@@ -180,14 +180,16 @@ def unmade(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
         return f"the package has no .{asked[1]} file to build it from", hint
     whose = "the package's own messages" if maker is package else f"the messages of {maker.name}"
     hint = BUILD_FIRST_HINT
-    if maker.file(CMAKE) is None:
+    if (listed := maker.file(CMAKE)) is None or listed.link_problem:
         hint = f"first add the {CMAKE} that `catkin_create_pkg` writes. In it, {_listing(maker.interfaces)}"
         hint += ", and call generate_messages(…)"
     elif not cmake_calls(maker, "generate_messages"):
         hint = "call generate_messages(…) above catkin_package(…)"
         if not cmake_calls(maker, *OF_FILES):
             # names no file: a repair that does is told behind it
-            hint = "list them in add_message_files(…) or add_service_files(…), and call generate_messages(…)"
+            kinds = {PurePosixPath(one.path).suffix for one in maker.interfaces}
+            calls = join_words((f"{call}(…)" for call, kind in OF_FILES.items() if kind in kinds), "or")
+            hint = f"list them in {calls}, and call generate_messages(…)"
     return f"the build makes {whose}", hint
 
 
