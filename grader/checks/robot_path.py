@@ -168,9 +168,7 @@ def unreadable(found: Track, topic: str) -> Verdict | None:
 
 def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
     taken = relative(found.path) if params.relative else list(found.path)
-    course = followed(taken, params.way.points, params.tolerance_m)
-    if params.may_go_on and course.reached == len(params.way.points):
-        course = course._replace(done=True, strayed=None)
+    course = course_of(taken, params)
     figures = measured(taken, course, params.way)
     if course.done:
         count = f"{len(params.points)} points" if len(params.points) > 1 else "its point"
@@ -189,6 +187,14 @@ def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
         return verdict
     # a robot that only just strays may have strayed with a machine that was late itself
     return excused(verdict, run, run.start_ns, run.end_ns, lambda late: late.reason(LATE_MS, LATE_P95_MS))
+
+
+def course_of(taken: Sequence[Pose], params: PathParams) -> Course:
+    """Return how far a path passes the lab's points; one that may go on behind the last strays nowhere after it."""
+    course = followed(taken, params.way.points, params.tolerance_m)
+    if params.may_go_on and course.reached == len(params.way.points):
+        return course._replace(done=True, strayed=None)
+    return course
 
 
 def never_moves(path: Sequence[Pose], figures: str, run: Run) -> Verdict:

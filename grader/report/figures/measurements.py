@@ -14,7 +14,7 @@ from itertools import chain
 from grader.checks.counter import StartParams, StepParams, judge_start
 from grader.checks.listener import HearsParams
 from grader.checks.rate import RateParams, rhythms_to_judge, sleeps_explain, was_late
-from grader.checks.robot_path import PathParams, spot
+from grader.checks.robot_path import PathParams, course_of, spot
 from grader.checks.robot_places import (
     EndsAtParams,
     Place,
@@ -47,7 +47,7 @@ from grader.checks.support.counters import (
     wrong_steps,
 )
 from grader.checks.support.exit_causes import process_tracebacks
-from grader.checks.support.geometry import Polyline, Pose, followed, out_along, relative, shown_walls, track
+from grader.checks.support.geometry import Polyline, Pose, out_along, relative, shown_walls, track
 from grader.checks.support.processes import how_it_ended, life_of
 from grader.checks.support.text import VALUE
 from grader.checks.support.topics import sent_by
@@ -365,7 +365,7 @@ def path_figures(run: Run, params: PathParams) -> Iterator[PathFigure]:
         return
     taken = relative(found.path) if params.relative else list(found.path)
     way = params.way
-    course = followed(taken, way.points, params.tolerance_m)
+    course = course_of(taken, params)
     kept = _shown_poses(taken, course.strayed)
     yield PathFigure(
         topic=short_name(params.topic),
