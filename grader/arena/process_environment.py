@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice
@@ -87,6 +87,8 @@ OWN_VARIABLES = (
 )
 """The arena's to set: what a package's environment hooks say of them would lead its nodes elsewhere."""
 SERVICE_TYPES_MAX = 500
+UNLESS_SAID: Mapping[str, Any] = {"script": None, "repairs": (), "stdin": False, "keeps": (), "again": False}
+"""What a process's spec has where nothing else is asked for."""
 SOURCE_ENDINGS = frozenset({"", ".py", ".cpp", ".cc", ".cxx", ".h", ".hpp"})
 SOURCES_MAX, SOURCE_BYTES_MAX = 200, 256 << 10
 
@@ -308,11 +310,7 @@ class ProcessEnvironment:
             "filter": base64.b64encode(filtered).decode() if filtered else None,
             "shell": ["/bin/bash", "-c", first, "bash"],
             "collect": collected,
-            "script": None,
-            "repairs": [],
-            "stdin": False,
-            "keeps": [],
-            "again": False,
+            **UNLESS_SAID,
             **more,
         }
 

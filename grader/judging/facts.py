@@ -302,7 +302,7 @@ def with_recordings(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:
     """
     own = {name: run for name, run in runs.items() if not run.foreign}
     foreign = [run for run in runs.values() if run.foreign]
-    # Whoever judges one bag without a package has named it however they liked.
+    # A bag that is judged by itself, without a package, may have any name.
     alone = foreign[0] if len(foreign) == 1 and PACKAGE_RUN not in own else None
     found = dict(own)
     for name, scenario in rubric.scenarios.items():

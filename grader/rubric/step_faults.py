@@ -305,7 +305,7 @@ def _after_the_last(
         # One that a later step may start again is not gone for good.
         living -= {ended} if not any({"start", "restart"} & one.keys() for _, one in rest) else set()
         kind = next((key for key in FOR_NODES if key in step), "")
-        # A pause in seconds needs nobody.
+        # A pause in seconds depends on no process.
         if not living and starts and kind and as_map(step.get("wait")).get("seconds") is None:
             fault = "nothing runs any more that could take part: it has been stopped"
             yield (*path, "steps", index, kind), fault

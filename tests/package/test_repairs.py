@@ -14,6 +14,7 @@ from grader.model.submission import chmod_hint
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs
 from grader.package.repairs.editing import changed_lines
 from grader.package.repairs.names import is_near, is_one_edit
+from grader.package.repairs.python import ros_clock
 from grader.repaired_copy import REPAIRS_MAX, most_of
 from tests.package.repairing import (
     CMAKE,
@@ -274,3 +275,18 @@ def test_a_name_that_is_written_apart_is_put_together_in_each_tag(tmp_path: Path
     text = (folder / "package.xml").read_text()
     assert text.count(">std_msgs<") == 3
     assert ">msgs<" not in text
+
+
+def test_a_program_waits_for_no_header_of_a_package_that_is_not_there(tmp_path: Path) -> None:
+    node = "#include <lab_msgs/Num.h>\n"
+    folder = package(tmp_path, {"src/a.cpp": node, CMAKELISTS: f"{CMAKE}add_executable(a src/a.cpp)\n"})
+    assert not any("headers" in one.message for one in find_repairs(folder, facts_of(folder, "lab"), WANTED))
+
+
+def test_what_to_write_for_the_clock_of_ros_is_right_on_each_line(tmp_path: Path) -> None:
+    text = "import rospy\n# time.time()\nfrom time import sleep  # a while\nstart = time.time()\n"
+    (tmp_path / "drive.py").write_text(text)
+    found = ros_clock(tmp_path, "drive.py")
+    assert found is not None
+    assert found.message.startswith("line 3 of drive.py: time.sleep and time.time() keep to")
+    assert found.fix.startswith("on line 3, write `from rospy import sleep`; on line 4, measure time")

@@ -594,9 +594,3 @@ def test_a_program_waits_for_the_headers_that_it_includes(
     facts = facts_of(folder, "lab").model_copy(update={"also": (beside,)})
     found = [one for one in find_repairs(folder, facts, WANTED) if "headers" in one.message]
     assert [one.fix.partition(", write ")[2] for one in found] == [f"add_dependencies(a {targets})"]
-
-
-def test_a_program_waits_for_no_header_of_a_package_that_is_not_there(tmp_path: Path) -> None:
-    node = "#include <lab_msgs/Num.h>\n"
-    folder = package(tmp_path, {"src/a.cpp": node, CMAKELISTS: f"{CMAKE}add_executable(a src/a.cpp)\n"})
-    assert not any("headers" in one.message for one in find_repairs(folder, facts_of(folder, "lab"), WANTED))

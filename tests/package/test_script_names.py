@@ -356,3 +356,31 @@ def test_names_that_ros_is_given_without_quotes(tmp_path, code, fixes):
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if "without quotes" in s.message]
     last = text.count("\n")
     assert [s.fix for s in slips] == [f"on line {last}, write `{fix}`" for fix in fixes]
+
+
+@pytest.mark.parametrize(
+    ("text", "fixes"),
+    [
+        (
+            "pub = rospy.Publisher('c', String)\nString = String()\nString.data = 'a'\npub.publish(String)\n",
+            ["on lines 3, 4 and 5, call the message `msg`, as in `msg = String()`"],
+        ),
+        (
+            "def f(msg):\n    String = String(msg.data)\n",
+            ["on line 3, call the message `message`, as in `message = String(…)`"],
+        ),
+        (
+            "from rospy import Rate\nprint(String)\ndef f():\n    Rate = Rate(10)\n",
+            ["on line 5, call the object `own_rate`, as in `own_rate = Rate(…)`"],
+        ),
+        ("from tqdm import tqdm\ntqdm = tqdm(9)\nprint(String)\n", []),
+        ("string = String()\nString.data = 'a'\n", []),
+        ("Int8 = Int8()\n", []),
+    ],
+)
+def test_a_message_with_the_name_of_its_class(text: str, fixes: list[str], tmp_path: Path) -> None:
+    source = "from std_msgs.msg import String\n" + text
+    (tmp_path / "a.py").write_text(source, encoding="utf-8")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.fix for s in slips if s.kind == "hides-class"] == fixes
+    assert not fixes or "unused-import" not in [s.kind for s in slips]

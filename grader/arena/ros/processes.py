@@ -84,7 +84,7 @@ class Process:
             return
         self._stopped_by = "INT"
         computed = self._rest_told[0] in ("computes", "stuck")
-        # Counted anew from the signal on: what it computed before is no sign that it ignores it.
+        # Counted from the signal on: what it computed before is no sign that it ignores it.
         self._rest = TreeRest()
         self._ends_within_s = int_s * (STILL_COMPUTES if computed else ENDS_COMPUTING)
         self._signal_group(signal.SIGINT)

@@ -40,9 +40,7 @@ _NOT_WRITABLE = re.compile(r"(?:Permission denied|Read-only file system): '([^']
 _UNPACKED = re.compile(r"(not enough|too many) values to unpack \(expected (\d+)(?:, got (\d+))?")
 DECIMAL = re.compile(r"'-?\d*\.\d+(?:e-?\d+)?'")
 _NO_ITEMS = re.compile(r"\b(min|max)\(\) (?:arg is an empty sequence|iterable argument is empty)")
-_NO_NUMBER = re.compile(
-    r"(?:invalid literal for int\(\) with base \d+|could not convert string to float): (.+)"
-)
+_NO_NUMBER = re.compile(r"(?:invalid literal for int\(\) with base \d+|could not convert \w+ to float): (.+)")
 _LOCAL = re.compile(r"local variable '(\w+)'")
 _OPERANDS = re.compile(
     r"(?:unsupported operand type\(s\) for \S+|not supported between instances of) '(\w+)' and '(\w+)'"
@@ -302,10 +300,8 @@ def _no_number(message: str, source: str) -> Meaning | None:
         return "this is the whole message", "take its field, as in `msg.data`"
     typed = re.match(r"expected \[\w+\] but got \[\w+/(\w+)\]", message)
     if typed and "publish" in source:
-        return (
-            f"the Publisher is not for {typed[1]}",
-            f"name {typed[1]} in `rospy.Publisher(…)`, and import it",
-        )
+        fix = f"name {typed[1]} in `rospy.Publisher(…)`, and import it"
+        return f"the Publisher is not for {typed[1]}", fix
     if re.search(r" of (?:'str' and '(?:int|float)|'(?:int|float)' and 'str)'", message):
         other = "leave out `str(…)`" if "str(" in source else "compare it with a text"
         return "text is compared with a number", f"turn the text into a number first, or {other}"
