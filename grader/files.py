@@ -85,7 +85,7 @@ def _new_beside(target: Path, folder: Path, *, public: bool = False) -> Iterator
 
     It is locked while its writer lives. What writers that were killed left for this target is removed.
     """
-    prefix = f".{target.name[:80]}."  # a name may have 255 bytes, of which the letters can take three each
+    prefix = f".{target.name[:60]}."  # a name may have 255 bytes, of which a letter can take four
     _sweep_beside(folder, prefix)
     for _ in range(ATTEMPTS):
         beside = folder / f"{prefix}{secrets.token_hex(6)}"

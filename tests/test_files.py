@@ -94,6 +94,12 @@ def test_what_a_killed_writer_left_is_removed_by_the_next_one(tmp_path: Path, wr
     assert target.read_bytes() == b"half"
 
 
+def test_a_name_of_letters_of_four_bytes_has_room_for_the_file_beside_it(tmp_path: Path) -> None:
+    target = tmp_path / ("\N{ROBOT FACE}" * 63)
+    atomic_write(target, b"new")
+    assert target.read_bytes() == b"new"
+
+
 HOLD = """
 import sys
 from pathlib import Path

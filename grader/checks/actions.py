@@ -57,7 +57,7 @@ class ActionResultParams(Record):
 
     @property
     def after_cancel_s(self) -> float | None:
-        """How long after a cancel the result still matters, to tell a late one from none; None: as the step waits."""
+        """How long after a cancel the result still matters; None: for as long as the step waits."""
         if self.of_feedback_alone:
             return 0.0
         return None if self.within_s is None else max(2 * self.within_s, self.within_s + CANCELLED_MORE_S)

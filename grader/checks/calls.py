@@ -209,8 +209,8 @@ def _other_request(
         return failed(message, hint=hint)
     hint = f"set {join_words(one.path for one in found)} of the request to what the handout asks for"
     given = [one for life in lives(run) for one in life.start.argv[1:] if ":=" not in one]
-    values = [str(wanted.get(one.path)) for one in found]
-    if len(lives(run)) == 1 and set(values) <= set(given):
+    values = [str(asked) for one in found if isinstance(asked := wanted.get(one.path), str | int | float)]
+    if len(values) == len(found) and len(lives(run)) == 1 and set(values) <= set(given):
         places = [given.index(one) + 1 for one in values]
         read = (f"{d.path} from {_argument(n, wanted[d.path])}" for d, n in zip(found, places, strict=True))
         text += f"; the run starts it with {plural(len(given), 'argument')}: {shown(' '.join(given))}"
@@ -220,6 +220,8 @@ def _other_request(
 
 def _argument(number: int, value: object) -> str:
     """Return what reads an argument of the command line as a value of this kind."""
+    if isinstance(value, bool):  # every text is true to Python and C++, also False
+        return both(f"sys.argv[{number}] == 'True'", f'std::string(argv[{number}]) == "True"')
     python = f"{type(value).__name__}(sys.argv[{number}])"
     cpp = {int: "atoll({})", float: "atof({})"}.get(type(value), "{}").format(f"argv[{number}]")
     return both(f"sys.argv[{number}]" if isinstance(value, str) else python, cpp)

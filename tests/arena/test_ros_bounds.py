@@ -255,6 +255,16 @@ def test_a_job_does_not_wait_for_one_that_came_just_before_it(module) -> None:
     hung.set()
 
 
+def test_many_keys_that_wait_are_not_counted_at_each_job(module, monkeypatch) -> None:
+    pool, stuck, counted = module("quotas").Pool(workers_max=10), threading.Event(), []
+    count = pool._startable
+    monkeypatch.setattr(pool, "_startable", lambda: counted.append(1) or count())
+    for key in range(500):
+        assert pool.submit(key, stuck.wait)
+    assert len(counted) <= 20
+    stuck.set()
+
+
 def test_a_job_is_run_that_comes_as_the_last_worker_leaves(module, monkeypatch) -> None:
     monkeypatch.setattr(module("quotas"), "IDLE_S", 0.01)
     pool, ran, found = module("quotas").Pool(workers_max=1), threading.Event(), []

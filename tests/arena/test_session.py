@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -118,3 +120,36 @@ for number in (1, 2):
     finally:
         os.close(descriptor)
         template.close()
+
+
+def test_an_arena_that_comes_too_late_does_not_take_the_commands_of_the_next(monkeypatch) -> None:
+    """Both have the same pipes: what asked for it has started another one with them."""
+    monkeypatch.setattr(arena_process, "_templates", {})
+    room = Path(arena_process.__file__).with_name("ros")
+    code = f"""
+import os, sys
+sys.path.insert(0, {str(room)!r})
+from importlib.machinery import SourceFileLoader
+def live():
+    while os.read(0, 1):
+        os.write(1, b"%d" % os.getpid())
+SourceFileLoader("room", {str(room / "__main__.py")!r}).load_module().stand_by(live, ())
+"""
+    argv = [sys.executable, "-c", code]
+    late = arena_process.template_of(argv, {})
+    late.forget(0)  # it has begun
+    late._sock.settimeout(0.2)
+    assert late._popen is not None
+    os.kill(late._popen.pid, signal.SIGSTOP)
+    (commands_r, commands), (output, output_w) = os.pipe(), os.pipe()
+    template, pid, _ = arena_process.start_arena(argv, {}, [commands_r, output_w, output_w])
+    os.kill(late._popen.pid, signal.SIGCONT)
+    late.close()
+    for _ in range(20):
+        time.sleep(0.02)
+        os.write(commands, b"x")
+        assert int(os.read(output, 100)) == pid
+    for descriptor in (commands, commands_r, output, output_w):
+        os.close(descriptor)
+    template.forget(pid)
+    template.close()

@@ -112,7 +112,8 @@ class Pool:
                 return False
             jobs.append(job)
             # A worker that was woken counts as idle until it runs: it takes one job only, and that may wait for long.
-            if self._startable() > self._idle and self._workers < self._workers_max:
+            # How many may begin is counted last: with all workers at work, a flood of keys would be counted each time.
+            if self._workers < self._workers_max and self._startable() > self._idle:
                 self._workers += 1
                 threading.Thread(target=self._work, daemon=True).start()
             else:
@@ -185,8 +186,9 @@ class Notifications:
         """Queue a task of rosmaster's; `marker` is the address of the node that it speaks to."""
 
         def job():
-            # rosmaster's tasks raise whatever the node's answer makes them.
-            with contextlib.suppress(Exception):  # whatever a node answers, or does not, is not waited for
+            with contextlib.suppress(
+                Exception
+            ):  # rosmaster's tasks raise whatever the node's answer makes them
                 task(*args)
 
         large = weight(args, LARGE_BYTES) > LARGE_BYTES
