@@ -210,7 +210,7 @@ def _other_request(
     hint = f"set {join_words(one.path for one in found)} of the request to what the handout asks for"
     given = [one for life in lives(run) for one in life.start.argv[1:] if ":=" not in one]
     values = [str(wanted.get(one.path)) for one in found]
-    if len(lives(run)) == 1 and set(values) <= set(given):
+    if len(lives(run)) == 1 and all(given.count(one) == values.count(one) == 1 for one in values):
         places = [given.index(one) + 1 for one in values]
         read = (f"{d.path} from {_argument(n, wanted[d.path])}" for d, n in zip(found, places, strict=True))
         text += f"; the run starts it with {plural(len(given), 'argument')}: {shown(' '.join(given))}"
@@ -220,9 +220,10 @@ def _other_request(
 
 def _argument(number: int, value: object) -> str:
     """Return what reads an argument of the command line as a value of this kind."""
-    python = f"{type(value).__name__}(sys.argv[{number}])"
-    cpp = {int: "atoll({})", float: "atof({})"}.get(type(value), "{}").format(f"argv[{number}]")
-    return both(f"sys.argv[{number}]" if isinstance(value, str) else python, cpp)
+    kind = {int: ("int({})", "atoll({})"), float: ("float({})", "atof({})")}.get(type(value), ("{}", "{}"))
+    if isinstance(value, bool):  # `bool("False")` is true
+        kind = (f"{{}} == '{value}'", f'std::string({{}}) == "{value}"')
+    return both(kind[0].format(f"sys.argv[{number}]"), kind[1].format(f"argv[{number}]"))
 
 
 def _swapped(one: Request, wanted: dict[str, Any], params: CallsParams) -> list[str]:
