@@ -102,7 +102,7 @@ def refuse_others(place: str) -> AfterValidator:
 
     def checked(template: str) -> str:
         for word in re.findall(r"\{(?:[A-Za-z_]\w*)?\}", template):
-            if word != place:
+            if word != place and (not word.isupper() or word.lower() in PLACES):  # `{INFO}` may be printed
                 raise ValueError(f"{word} stands for nothing here: write {place}")
         if other := OTHER_PLACES.search(template):
             raise ValueError(f"{other[0]} stands for itself here, as the other letters do: write {place}")
