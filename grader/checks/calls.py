@@ -210,7 +210,8 @@ def _other_request(
     hint = f"set {join_words(one.path for one in found)} of the request to what the handout asks for"
     given = [one for life in lives(run) for one in life.start.argv[1:] if ":=" not in one]
     values = [str(asked) for one in found if isinstance(asked := wanted.get(one.path), str | int | float)]
-    if len(values) == len(found) and len(lives(run)) == 1 and set(values) <= set(given):
+    is_told = len(values) == len(found) and all(given.count(one) == values.count(one) == 1 for one in values)
+    if is_told and len(lives(run)) == 1:
         places = [given.index(one) + 1 for one in values]
         read = (f"{d.path} from {_argument(n, wanted[d.path])}" for d, n in zip(found, places, strict=True))
         text += f"; the run starts it with {plural(len(given), 'argument')}: {shown(' '.join(given))}"

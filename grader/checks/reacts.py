@@ -114,9 +114,8 @@ class Condition(Record):
     def come_in(self, run: Run) -> list[Reading]:
         """Return the same of all messages on the topic, from any node; or of the grader's calls of a service: one that
         fits counts once it is answered, and ends when another one is made."""
-        channels = [c for c in run.channels if c.topic == self.topic]
-        if channels:
-            return self.read(channels)
+        if not is_called(run, self.topic):
+            return self.read([c for c in run.channels if c.topic == self.topic])
         asked = []
         for one in exchanges(run, self.topic):
             found = Reading(one.at_ns, (), "")
@@ -139,6 +138,14 @@ class Condition(Record):
             return next(differences(value, self.value, self.tolerance), None) is None
         assert isinstance(value, int | float)  # noqa: S101 - what is not a number was left out
         return is_within(value, self.min, self.max)
+
+
+def is_called(run: Run, name: str) -> bool:
+    """Return whether a name is that of a service which the grader calls, or would have called: a topic of the same name
+    is no cause then, unless the grader publishes on it."""
+    sent = any(c.topic == name and c.by_grader for c in run.channels)
+    called = (e for _, e in run.actors if e.topic == name and (e.action == "call" or e.detail == NOT_OFFERED))
+    return not sent and any(called)
 
 
 class ReactsParams(Record):
@@ -232,15 +239,13 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
 
 def _shown_on(run: Run, params: ReactsParams) -> str:
     """Return where the evidence has the causes: a service's calls are among what the grader did."""
-    return "/grader/actor" if exchanges(run, params.trigger.topic) else params.trigger.topic
+    return "/grader/actor" if is_called(run, params.trigger.topic) else params.trigger.topic
 
 
 def how_shown(run: Run, cause: Condition) -> str:
     """Return what shows a student whether the cause comes."""
-    is_service = any(e.topic == cause.topic and e.action != "publish" for _, e in run.actors) and not any(
-        c.topic == cause.topic for c in run.channels
-    )
-    command = f"rosservice call {cause.topic}" if is_service else f"rostopic echo {cause.topic}"
+    command = "rosservice call" if is_called(run, cause.topic) else "rostopic echo"
+    command = f"{command} {cause.topic}"
     return f"`{command}` shows what comes"
 
 
@@ -255,6 +260,7 @@ def _answers(
     to_s, until_ns = run_seconds(run), observed_until_ns(run) or run.end_ns
     if to_s is None:
         return []
+    begun = _begun(run, params)
     each = params.trigger.field is None
     # A condition on a field holds for many messages on end: only where it begins to hold is an answer due.
     before = (False, *(params.trigger.holds(one) for one in causes))
@@ -267,7 +273,8 @@ def _answers(
     answers, first = [], 0
     for number, at_ns in enumerate(starts):
         next_ns = starts[number + 1] if number + 1 < len(starts) else run.end_ns + 1
-        while first < len(came) and to_s(came[first]) - to_s(at_ns) < -ORDER_S:
+        from_s = to_s(begun.get(at_ns, at_ns)) - ORDER_S
+        while first < len(came) and to_s(came[first]) < from_s:
             first += 1
         after_s = to_s(came[first]) - to_s(at_ns) if first < len(came) else math.inf
         if after_s <= params.within_s or (after_s < math.inf and came[first] < next_ns):
@@ -277,6 +284,12 @@ def _answers(
         elif to_s(until_ns) - to_s(at_ns) >= params.within_s:
             answers.append(Answer(at_ns, None))
     return answers
+
+
+def _begun(run: Run, params: ReactsParams) -> dict[int, int]:
+    """Return when each call of a service was made by when it was answered: the effect may come in between."""
+    calls = exchanges(run, params.trigger.topic) if is_called(run, params.trigger.topic) else ()
+    return {one.answered_ns: one.at_ns for one in calls if one.answered_ns is not None}
 
 
 def _nothing_to_judge(
@@ -299,6 +312,7 @@ def _early(
     if not params.not_before or not causes or params.trigger.holds(causes[0]) or to_s is None:
         return None
     first_ns = next((one.time_ns for one in causes if params.trigger.holds(one)), causes[-1].time_ns)
+    first_ns = _begun(run, params).get(first_ns, first_ns)
     too_early = _between(effects, (causes[0].time_ns, first_ns), run, params)
     if not too_early:
         return None
@@ -460,7 +474,8 @@ def _unanswered(
         return None
     is_there = topic in offers(run) and calls
     why = no_answer(package, run, topic, calls[0]) if is_there else not_offered(package, run, topic)
-    return unjudged(f"nothing can be seen after a call of {topic}: {why.message}", hint=why.hint)
+    verdict = unjudged(f"nothing can be seen after a call of {topic}: {why.message}", hint=why.hint)
+    return verdict.late() if why.callbacks == "late" else verdict
 
 
 def _caused_too_late(params: ReactsParams) -> Verdict:

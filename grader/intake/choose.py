@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import islice
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from lxml import etree
 
@@ -23,6 +23,7 @@ from grader.wording import is_one_edit
 
 COPIES_LOOKED_AT, FOLDERS_OF_A_COPY = 50, 300
 FIRST_LINE_BYTES = 200
+USUAL_FOLDERS = frozenset({"src", "scripts", "nodes", "launch"})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,10 +81,13 @@ def choose_loose(
 ) -> Choice | None:
     """Return the only folder that has files of the lab and lacks no more than its manifest to be the package, where the
     submission has no package at all, and nothing else says where that went."""
-    found = [c for c in candidates if _count_files(c.folder, wanted.files)]
-    found = [c for c in found if not any(_below(other, c) for other in found)]
-    elsewhere = wanted.asked or wanted.others or any(c.has_manifest for c in candidates)
-    if elsewhere or len(found) != 1 or _where_it_went(root, wanted.name, git_links):
+    if wanted.asked or wanted.others or any(c.has_manifest for c in candidates):
+        return None
+    own = [c for c in candidates if c.folder.name != "src"]  # with a CMakeLists.txt it is a workspace's
+    found = [c for c in own if _files_of(c.folder, wanted.files, near=not c.has_cmake)]
+    above = {str(folder) for c in found for folder in PurePosixPath(c.path).parents}
+    found = [c for c in found if c.path not in above]
+    if len(found) != 1 or _where_it_went(root, wanted.name, git_links):
         return None
     return _best([replace(found[0], manifest=wanted.name)], wanted)
 
@@ -168,12 +172,17 @@ def _count_files(folder: Path, names: frozenset[str]) -> int:
     return len(_files_of(folder, names))
 
 
-def _files_of(folder: Path, names: frozenset[str]) -> frozenset[str]:
-    """Return which of the lab's files are there by name, in whatever folder of the package."""
+def _files_of(folder: Path, names: frozenset[str], *, near: bool = False) -> frozenset[str]:
+    """Return which of the lab's files are there by name, in whatever folder of the package; with `near`, only in those
+    that a package has: what is deeper may be in another one, and the folder a workspace."""
     found: set[str] = set()
     if names:
         for below in islice(walk(folder, tolerant=True), FOLDERS_OF_A_COPY):
-            below.folders[:] = [name for name in below.folders if name not in NO_CONTENT]
+            below.folders[:] = [name for name in below.folders if name not in NO_CONTENT | BUILD_SPACES]
+            if near:
+                below.folders[:] = (
+                    sorted(USUAL_FOLDERS.intersection(below.folders)) if below.path == "." else []
+                )
             found |= names & {entry.name for entry in below.others}
     return frozenset(found)
 

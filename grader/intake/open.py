@@ -243,7 +243,8 @@ def locate(opened: Opened, wanted: WantedPackage) -> Located:
     if located:
         return located
     candidates = find_candidates(opened.root, leave_out=opened.leave_out)
-    if loose := choose_loose(opened.root, candidates, wanted, opened.git_links):
+    loose = choose_loose(opened.root, candidates, wanted, opened.git_links)
+    if loose and around is None:
         return Located(opened=opened, candidates=candidates, choice=loose, also={})
     raise not_found(opened.root, candidates, wanted, opened.git_links)
 

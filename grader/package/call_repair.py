@@ -395,7 +395,10 @@ def _names_of_objects(tree: ast.Module) -> Iterator[Argument]:
         if isinstance(n, ast.ImportFrom) and re.search(r"\.(msg|srv)$", n.module or "")
         for alias in n.names
     }
-    for node in (n for n in nodes_in(tree) if isinstance(n, ast.Assign) and len(n.targets) == 1):
+    assigned = [n for n in nodes_in(tree) if isinstance(n, ast.Assign) and len(n.targets) == 1]
+    # a name that is given something else, too, may be another one, of another function
+    given -= {ast.unparse(n.targets[0]) for n in assigned if last_name(n.value) not in of_messages}
+    for node in assigned:
         target, value = ast.unparse(node.targets[0]), node.value
         class_ = value.id if isinstance(value, ast.Name) else ""
         if (class_ in made and target in used) or (class_ in of_messages and target in given):

@@ -51,6 +51,9 @@ PRIMITIVE = re.compile(r"(?:std_msgs/)?([Uu]?[Ii]nt|[Ff]loat)(8|16|32|64)")
 OLD_NAMES = {"byte": "int8", "char": "uint8"}
 TEXTS = {"prints": ("text", "template"), "logs": ("text", "template"), "definition": ("file",)}
 """By check, the parameters that the handout has as text."""
+RANGE = re.compile(
+    r"(-?\d+(?:\.\d+)?) (?:to|and) (-?\d+(?:\.\d+)?)(?![\w.]\d)( ?(?:°|deg|%|percent|[cm]m\b))?"
+)
 NAME = re.compile(r"[~/\w.-]+")
 SENTENCE_END = re.compile(r"(?<=[.;])\s+")
 LEVEL = re.compile(
@@ -127,10 +130,14 @@ def _other_range(criterion: WrittenCriterion, handout: str) -> Iterator[Fault]:
     low, high, field = given.get("min"), given.get("max"), str(given.get("field")).rpartition(".")[2]
     if criterion.check != "field-bounds" or not is_number(low) or not is_number(high):
         return
+    ranges = (set(map(float, said.groups()[:2])) for said in RANGE.finditer(handout))
+    if {low, high} in ranges:
+        return
     for sentence in SENTENCE_END.split(handout):
-        said = re.search(r"(-?\d+(?:\.\d+)?) (?:to|and) (-?\d+(?:\.\d+)?)(?![\w.]\d)", sentence)
-        is_about = said and re.search(rf"\b{re.escape(field)}s?\b", sentence)
-        if said and is_about and not {low, high} & {*map(float, said.groups())}:
+        said = RANGE.search(sentence)
+        # what is in another unit than the field's has other numbers
+        is_about = said and re.search(rf"\b{re.escape(field)}s?\b", sentence) and not said[3]
+        if said and is_about and not {low, high} & {*map(float, said.groups()[:2])}:
             yield (*criterion.at, "min"), f"to max is {low:g} to {high:g}, and the handout has {said[0]}"
 
 

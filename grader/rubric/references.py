@@ -139,7 +139,7 @@ def _file_fault(file: str, rubric: WrittenRubric) -> str:
     path = PurePosixPath(file)
     if file.startswith(("/", "~")) or ".." in path.parts:
         return f"is a path in the student's package, from its folder: scripts/{path.name}, not {file}"
-    if "\\" in file or re.match(r"(rosrun|python3?|\./)", file):
+    if "\\" in file or re.match(r"(rosrun|python3?)\s|\./", file):
         name = re.split(r"[\\/\s]+", file.strip())[-1]
         return f"is a path in the student's package, from its folder: scripts/{name}, not {file}"
     if path.suffix in {".cpp", ".cc", ".cxx"}:

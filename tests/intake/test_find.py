@@ -188,12 +188,22 @@ def test_without_any_manifest_the_only_folder_with_the_labs_files_is_taken(files
         {**tree("other"), "a/scripts/talker.py": "x"},
         {"a/scripts/talker.py": "x", "a/package (1).xml": ""},
         {"a/scripts/talker.py": "x", **tree("build/lab1")},
+        {"ws/src/week1/talker.py": "x"},
+        {"ws/src/CMakeLists.txt": "x", "ws/src/week1/talker.py": "x"},
+        {"src/other.py": "x", "week1/talker.py": "x"},
+        {"src/other.py": "x", "CMakeLists.txt": "x", "devel/lib/lab1/talker.py": "x"},
     ],
 )
 def test_no_folder_without_a_manifest_is_taken_where_another_may_be_meant(files, tmp_path):
     wanted = WantedPackage(name="lab1", files=frozenset({"talker.py", "listener.py"}))
     with pytest.raises(PackageNotFound):
         opened(write(tmp_path / "repo", files), tmp_path, package=wanted)
+
+
+def test_a_folder_of_another_package_is_not_taken_for_it_either(tmp_path):
+    repo = write(tmp_path / "repo", {**tree(".", "other"), "week1/scripts/talker.py": "x"})
+    with pytest.raises(PackageNotFound):
+        opened(repo / "week1", tmp_path, package=WantedPackage(name="lab1", files=frozenset({"talker.py"})))
 
 
 def test_what_another_copy_has_and_the_graded_one_has_not_is_named(tmp_path):

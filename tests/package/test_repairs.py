@@ -81,6 +81,13 @@ NAMES_OF_FILES = {
         asking(definitions=(("srv/Two.srv", TWO_FIELDS),), files=("srv/Two.srv",)),
         {CMAKELISTS: "FILES Two.srv", "src/level.py": "from lab.srv import Two\n"},
     ),
+    "own-message-beside-ros-own-of-its-name": Case(
+        {"msg/Point.msg": "int64 n\n", "src/level.py": "from lab.msg import Point\n",
+         "src/place.py": "from geometry_msgs.msg import Pose, Point\n", CMAKELISTS: making("message", "Point.msg")},
+        ["file-name"], "and Place instead of Point in src/level.py",
+        asking(definitions=(("msg/Place.msg", tuple(parse_definition("int64 n", ".msg"))),), files=("msg/Place.msg",)),
+        {CMAKELISTS: "FILES Place.msg", "src/level.py": "import Place\n", "src/place.py": "import Pose, Point\n"},
+    ),
     "another-service-than-the-labs": Case(
         {"srv/other.srv": "int64 b\n---\nint64 sum\n",
          "src/level.py": "from lab.srv import other\n", CMAKELISTS: making("service", "other.srv")},

@@ -238,6 +238,10 @@ CASES = {
                          "down(main)"),
         }.items()
     },
+    "class-of-messages-of-another-function": Case(
+        {TALKER: SCRIPT, "src/own.py": "from std_msgs.msg import Int8\ndef f():\n    m = Int8\n    print(m)\n"
+         "def g():\n    m = Int8()\n    m.data = 1\n"}, [],
+    ),
     "variable-of-the-file": Case(
         swapped(
             TALKER,

@@ -172,8 +172,11 @@ def classes_as_objects(classes, tree):
     of_messages = {one.asname or one.name for n in imports for one in n.names}
     stored = [n for n in all_of(tree, ast.Attribute) if isinstance(n.ctx, ast.Store)]
     stored = [dotted(n.value).split(".") for n in stored]
+    stored = [parts for parts in stored if all(parts)]  # `...` stands for what has no name, as `cells[0]`
     for owner in sorted({".".join(parts[:end]) for parts in stored for end in range(1, len(parts) + 1)}):
-        for given in (n for n in values.get(owner, ()) if dotted(n.value) in of_messages):
+        # a name that is given something else, too, may be another one, of another function
+        every = values.get(owner, ())
+        for given in every if all(dotted(n.value) in of_messages for n in every) else ():
             kind, message = dotted(given.value), "`%s` is the class itself, not an object of it" % owner
             fix = "on line %d, write `%s = %s()`" % (given.lineno, owner, kind)
             yield slip(given.lineno, "object", message, fix, kind)

@@ -410,7 +410,7 @@ def imports(tree):
         if not used.intersection(bound) and bound != ["*"] and "__all__" not in used:
             why = (
                 "the script gives `%s` a value of its own"
-                if hidden & set(bound)
+                if hidden.issuperset(bound)
                 else "nothing in the script uses `%s`"
             )
             fix = "delete line %d: %s" % (node.lineno, why % "`, `".join(bound))

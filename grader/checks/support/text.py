@@ -102,7 +102,7 @@ def refuse_others(place: str) -> AfterValidator:
 
     def checked(template: str) -> str:
         for word in re.findall(r"\{(?:[A-Za-z_]\w*)?\}", template):
-            if word != place:
+            if word != place and (not word.isupper() or word.lower() in PLACES):  # `{INFO}` may be printed
                 raise ValueError(f"{word} stands for nothing here: write {place}")
         if other := OTHER_PLACES.search(template):
             raise ValueError(f"{other[0]} stands for itself here, as the other letters do: write {place}")
@@ -348,6 +348,10 @@ def _parser_hint(last: str, given: Sequence[str]) -> str:
         return "write `parse_args(rospy.myargv()[1:])`: the last arguments are for ROS"
     if not given:
         return "write `default=…` in `add_argument(…)`, and no `required=True`: nothing passes arguments"
+    if any(re.match("--?[A-Za-z]", one) for one in given):
+        return "let `add_argument(…)` take each option by the name, and with the value, that it is given with"
+    if ": error: argument " in last:
+        return "let `type=…`, or `choices=…`, of that `add_argument(…)` take what it is given"
     option = re.search(r"required: (?:-\w/)?--([\w-]+)$", last)
     name = option[1].replace("-", "_") if option else "…"
     return f"write `add_argument('{name}', …)`, without dashes and without `required`: the arguments have no names"

@@ -109,16 +109,16 @@ def _links_of_others(
     imported = {
         word.rpartition(".")[2] for script in of_lab for word in IMPORTED.findall(files.text(script) or "")
     }
-    ends = [(script, one.role, one.value.strip("/")) for script in names for one in names[script]]
+    ends: dict[tuple[str, str], set[str]] = {}
+    for script in names:
+        for one in names[script]:
+            ends.setdefault((one.role, one.value.strip("/")), set()).add(script)
     other = {"publisher": "subscriber", "subscriber": "publisher"}
     return {
         script: [
             one
             for one in names[script]
-            if any(
-                at != script and role == other.get(one.role) and topic == one.value.strip("/")
-                for at, role, topic in ends
-            )
+            if ends.get((other.get(one.role, ""), one.value.strip("/")), set()) - {script}
         ]
         for script in names
         if script not in of_lab and PurePosixPath(script).stem not in imported

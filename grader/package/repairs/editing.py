@@ -39,6 +39,8 @@ MADE_OF = {
     ".action": "(?:Action)?(?:Goal|Result|Feedback)|Action",
 }
 """Ends of the classes that are made of a definition, beside its own name."""
+OF_ROS = r"\b(?:std|geometry|sensor|nav|actionlib)_msgs(?:\.msg import\b.*\b|\.msg\.|/|::)"
+"""What stands before a type of ROS's own in code."""
 
 
 class NotRepairable(ValueError):
@@ -250,9 +252,10 @@ def rename_word(text: str, old: str, new: str) -> str:
 
 
 def rename_type(text: str, old: str, new: str) -> str:
-    """Return the code with the file's own name (`Two.srv`) and what is made of it replaced: `Two`, `TwoRequest`."""
+    """Return the code with the file's own name (`Two.srv`) and what is made of it replaced: `Two`, `TwoRequest`;
+    as it is where ROS's own type has that name in it."""
     (before, kind), after = (PurePosixPath(old).stem, PurePosixPath(old).suffix), PurePosixPath(new).stem
-    if kind not in MADE_OF:
+    if kind not in MADE_OF or re.search(rf"{OF_ROS}{re.escape(before)}\b", text):
         return text
     made = rf"(?<![\w.\"'])((?:\w+\.)*(?:srv|msg)\.)?{re.escape(before)}(?=(?:{MADE_OF[kind]})?(?:Const)?(?:Ptr)?\b)"
     return re.sub(made, lambda found: f"{found[1] or ''}{after}", text)
