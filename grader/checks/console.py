@@ -66,7 +66,7 @@ from grader.wording import join_words, plural, significant
 
 LINES_MAX, LINE_CHARS_MAX = 20_000, 1_000
 """A text is looked for in so much of each stream."""
-# Decimal numbers are not exact as floats: 0.3 may differ from 0.2 by more than 0.1.
+# Decimal numbers are not exact as floats: 0.4 differs from 0.3 by more than 0.1.
 ROUNDING = 1e-9
 CAUSES = frozenset({"publish", "call", "goal", "set_param", "play"})
 """What the grader does in a run that a node may log something upon."""

@@ -313,7 +313,7 @@ def field_bounds(package: PackageFacts, run: Run, params: FieldBoundsParams) -> 
         verdict = nothing_sent(package, run, params.topic, params.of)
     elif not usable and missing:
         verdict = no_field(missing, channels)
-    # Shares are not exact as floats: 0.7 of 10 may be a little more than 7.
+    # Shares are not exact as floats: 0.55 of 100 is a little more than 55.
     elif len(found) - len(outside) < params.share * len(found) - ROUNDING:
         verdict = _outside(outside, found, run, params)
         # Of a share, the messages that the recorder lost may be the ones that were right.
