@@ -308,6 +308,7 @@ def _map(file: LeftFile) -> Verdict | None:
     if head is None:
         return failed(f"{file.path} is not a PGM map", hint=hint)
     width, height = int(head[1]), int(head[2])
+    # A P5 has a byte for each cell; a P2 has text, of any length.
     if data.startswith(b"P5") and len(data) - head.end() < width * height:
         return failed(f"{file.path} is cut short: it has fewer than {width} by {height} cells", hint=hint)
     return None
