@@ -271,7 +271,7 @@ def _by_subscriber(
     if slip is not None and list(missing) == list(probes[-len(missing) :]):
         return _taken_off(lost, slip)
     slip = run_slip(package, run, "callback-waits")
-    # A callback that waits has printed the first message at least: where none is, there is another reason.
+    # A callback that waits holds up later messages: where none at all is printed, there is another reason.
     if slip is None or len(missing) == len(probes):
         return None
     return _taken_off(f"{lost} in time", slip, ": no further message is read until the callback ends")
