@@ -156,6 +156,7 @@ def _how_to_fill(got: Mapping[str, Any], wanted: Mapping[str, Any], hint: str) -
     """Return the advice on a result with other values; one in which all are 0 was never filled in."""
     if _is_empty(got):
         return f"fill in the result before you send it: {hint}"
+    # `isinstance` would take true and false for numbers.
     numbers = [(name, got.get(name), value) for name, value in wanted.items() if type(value) is int]
     for name, came, value in numbers:
         if type(came) is int and abs(came - value) == 1:
@@ -235,6 +236,7 @@ def _too_late(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | Non
         else "do not sleep longer than the handout asks"
     )
     verdict = failed(message, hint=hint)
+    # So much later than asked is no lateness of a machine.
     if took_s > params.within_s + NEVER_LATE_S * run.warp:
         return verdict
     return excused(verdict.if_repeated(), run, from_ns, goal.ended_ns, why_late)
@@ -247,6 +249,7 @@ def _no_feedback(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | 
     count = plural(came, "feedback message")
     message = f"{count} came on {goal.name} of {params.action}, but {params.feedback} are expected"
     verdict = failed(message, hint="call server.publish_feedback(feedback) each time around the loop")
+    # That none came at all is no matter of time.
     return verdict if came == 0 else _excused(verdict.if_repeated(), run, goal)
 
 
@@ -271,6 +274,7 @@ def _feedback(run: Run, goal: Goal, params: ActionResultParams) -> int:
 
 def _not_sent(package: PackageFacts, run: Run, goals: Sequence[Goal], params: ActionResultParams) -> Verdict:
     notes = [e.detail for _, e in run.actors if e.action == "note" and e.topic == params.action]
+    # With an .action file of its own, it is the package that defines what the grader could not use.
     if notes and any(one.path.endswith(".action") for one in package.interfaces):
         why = shown(notes[0].partition(": ")[2] or notes[0])
         hint = "use the handout's names and types in the .action file, and build again"
@@ -287,6 +291,7 @@ def _not_sent(package: PackageFacts, run: Run, goals: Sequence[Goal], params: Ac
 
 def _no_server(package: PackageFacts, run: Run, params: ActionResultParams) -> Verdict:
     what, bare = f"there is no action server {params.action}", params.action.lstrip("/")
+    # An action server subscribes to `<name>/goal`.
     servers = [t.removesuffix("/goal") for t in topics_with(run, "subscribers") if t.endswith("/goal")]
     if near := near_names(params.action, servers):
         hint = f"give SimpleActionServer(…) the name '{bare}'"

@@ -196,6 +196,7 @@ def _name_missing(
         hint = hint if sources else f"{add_hint(package, source)}; then {hint}"
     else:
         return verdict
+    # A function, as a backslash in the text would begin an escape.
     message = re.sub("there (is no script|was nothing) to run", lambda _: why, verdict.message)
     return verdict.model_copy(update={"message": message, "hint": hint, "unbuilt": hint == BUILD_FIRST_HINT})
 

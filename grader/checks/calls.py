@@ -131,6 +131,7 @@ def _first_missing(
     """Return the first request that did not come, and the calls after the one before it; None where all came."""
     left = made
     for wanted in params.wanted:
+        # Other calls in between are judged by `at_most`.
         fits = (n for n, one in enumerate(left) if not any(_differences(one, wanted, params)))
         number = next(fits, None)
         if number is None:
@@ -208,9 +209,11 @@ def _other_request(
         hint = f"pass the request's fields by name, so that none is swapped: ({by_name})"
         return failed(message, hint=hint)
     hint = f"set {join_words(one.path for one in found)} of the request to what the handout asks for"
+    # Remappings are ROS's, and no arguments of the program.
     given = [one for life in lives(run) for one in life.start.argv[1:] if ":=" not in one]
     values = [str(asked) for one in found if isinstance(asked := wanted.get(one.path), str | int | float)]
     is_told = len(values) == len(found) and all(given.count(one) == values.count(one) == 1 for one in values)
+    # With several programs, it is not known whose arguments they are.
     if is_told and len(lives(run)) == 1:
         places = [given.index(one) + 1 for one in values]
         read = (f"{d.path} from {_argument(n, wanted[d.path])}" for d, n in zip(found, places, strict=True))
@@ -242,6 +245,7 @@ def _swapped(one: Request, wanted: dict[str, Any], params: CallsParams) -> list[
         number = next(fits, None)
         if number is None:
             return []
+        # Each value can be that of one field only.
         del asked[number]
     return wrong
 

@@ -154,6 +154,7 @@ def _of_workspace(package: PackageFacts, facts: CMakeFacts, wanted: str) -> Wron
 def _wrong(package: PackageFacts, facts: CMakeFacts, names: tuple[str, str]) -> Iterator[Wrong]:
     """Yield what is wrong or missing. The names are the manifest's and the lab's, which both are to have."""
     given, wanted = names
+    # All that such a file lacks follows from what it is.
     if other := _of_workspace(package, facts, wanted):
         yield other
         return
@@ -178,6 +179,7 @@ def _wrong(package: PackageFacts, facts: CMakeFacts, names: tuple[str, str]) -> 
             yield Wrong(why, "add find_package(catkin REQUIRED)", below=project, uncalled="find_package")
         else:
             why = f"{why} (line {slip.line} says {slip.args[0]})"
+            # `find_package(REQUIRED …)` lacks the name alone.
             place = "before" if slip.args[0].isupper() else "instead of"
             yield Wrong(why, f"write catkin {place} {slip.args[0]}", slip.line)
     if slip := _misspelt(facts, "catkin_package"):

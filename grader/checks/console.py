@@ -66,6 +66,7 @@ from grader.wording import join_words, plural, significant
 
 LINES_MAX, LINE_CHARS_MAX = 20_000, 1_000
 """A text is looked for in so much of each stream."""
+# Decimal numbers are not exact as floats: 0.4 differs from 0.3 by more than 0.1.
 ROUNDING = 1e-9
 CAUSES = frozenset({"publish", "call", "goal", "set_param", "play"})
 """What the grader does in a run that a node may log something upon."""
@@ -162,6 +163,7 @@ def _read(run: Run, process: str) -> tuple[list[Line], list[Line]]:
 def _fits(line: Line, params: PrintsParams) -> bool:
     """Return whether the text stands anywhere on the line with the right numbers in it."""
     most = params.tolerance + ROUNDING
+    # Without `numbers` any number will do, so there may be more groups than numbers.
     return any(
         all(abs(float(text) - n) <= most for text, n in zip(found.groups(), params.numbers, strict=False))
         for found in params.found_in(line)
@@ -179,6 +181,7 @@ def _not_printed(
     absent = [name for name, is_there in asked.items() if not is_there and name not in _offered(run)]
     lacking = absent[0] if absent and not one.ended_early else ""
     is_number_alone = not re.search(r"\w", params.text.replace(PLACE, ""))  # then any number is no answer
+    # Where the call failed or the program crashed, a number on a line need not be an answer.
     if other and not (lacking or (failing and is_number_alone)):
         near = f", within {significant(params.tolerance)}" if params.tolerance else ""
         message = f"it prints {shown(other[0].text)!r}, not {params.words}{near}{_slip(other[0], params)}"
@@ -188,6 +191,7 @@ def _not_printed(
         return end.verdict(unjudged, f"it ended before it printed {params.words}: {end.cause}")
     if error := explain_error(package, run):
         return error.verdict(unjudged, f"it never prints {params.words}: {error.cause}")
+    # What comes after Ctrl-C says how the program stops, not what it does.
     own = [line for line in lines if one.interrupt_ns is None or line.at_ns < one.interrupt_ns]
     deaf = unheard(run, package)
     never = f"it never prints {params.words}"
@@ -215,9 +219,11 @@ def _unseen(one: Life, package: PackageFacts, run: Run, params: PrintsParams, ne
     if refused and run.graph and not nodes_of(run, one.name):
         return unjudged(f"{never}: no node of the launch file came up", hint="read what roslaunch prints")
     files = [file for file in package.launch_files if PurePosixPath(file.path).name in started]
+    # Unless a <node> asks for the screen, roslaunch writes what it prints to a log file.
     for node in (node for file in files for node in file.brings if node.output != "screen"):
         script = own_script(package, node)
         said = [s for s in package.slips if script and s.file == script.path and s.kind == "prints"]
+        # A place that the script fills in may hold any number.
         printed = (re.sub(r"\{\w*\}", "0", s.message) for s in said if s.name == "print")
         if any(any(params.found_in(Line(0, text))) for text in printed):
             why = f'the <node> {node.name} lacks output="screen", so what it prints goes to a log file'
@@ -273,6 +279,7 @@ def _unserved(
             return unjudged(f"{never}: the service's callback returns {wrong}", hint=hint)
     offered = _offered(run)
     absent = lacking or next((n for n, is_there in asked.items() if not is_there and n not in offered), "")
+    # The only service that there is will be the one that is meant, whatever its name.
     near = near_names(absent, offered) or (tuple(offered) if len(offered) == 1 else ())
     if absent and near:
         hint = f"use the name {near[0]} both where you wait for it and where you call it"
@@ -284,6 +291,7 @@ def _unserved(
     early = next((n for n in asked_early if any(f"service [{n}] unavailable" in one.text for one in own)), "")
     if early in offered:
         hint = f"wait for it before the call: `rospy.wait_for_service('{early}')`"
+        # Which of the two comes first may differ from run to run.
         return failed(f"{never}: it calls {early} before a node offers it", hint=hint).if_repeated()
     return None
 
@@ -347,6 +355,7 @@ def callbacks_clean(package: PackageFacts, run: Run, params: CallbacksCleanParam
         if not is_rospys_own(traceback)
     ]
     ended = next((one for one in asked if one.ended_early and one.end and one.end.exit_code != 0), None)
+    # Only the last traceback ended the process: one before it is a callback's.
     if ended is not None and (len(found) <= 1 or found[0][0] != ended):
         end = explain_end(ended, run, package)
         verdict = end.verdict(unjudged, f"{ended.name} ended by itself after {ended.lasted}: {end.cause}")
@@ -407,6 +416,7 @@ def logs(package: PackageFacts, run: Run, params: LogsParams) -> Verdict:
     lines = logged_by(run, nodes)
     right = next((one for one in lines if _has(one.text, params) and one.level == params.level), None)
     level = params.level.upper()
+    # Behind `spin()` first: what is logged there would otherwise count as right.
     verdict = (
         _behind_spin(package, run, lines, params)
         or (passed(f"{right.node} logs {shown(right.text)!r} at level {level}") if right else None)
@@ -441,6 +451,7 @@ def _behind_spin(
     slip, pressed = _hindered(package, run, params), first_interrupt_ns(run)
     times = [t for t, line in _asked_lines(run, params) if _has(line.line, params)]
     times += [line.at_ns for line in lines if _has(line.text, params)]
+    # Only the fix of a line behind `spin()` says to move it above.
     if slip is None or " above " not in slip.fix or pressed is None or min(times, default=0) < pressed:
         return None
     where = f"line {slip.line} of {slip.file} comes after spin()"
@@ -472,6 +483,7 @@ def _only_printed(run: Run, params: LogsParams) -> Verdict | None:
         return failed(message, hint=_call(params))
     if _is_late(run, params):
         return passed(f"{shown(said[0].line)!r} is logged too late: the node was already being stopped")
+    # The console proves that the node logged it.
     return grade_again(f"{shown(said[0].line)!r} was logged on the console, and did not arrive on /rosout")
 
 
@@ -497,6 +509,7 @@ def _near(run: Run, lines: Iterable[Logged], params: LogsParams) -> Verdict | No
     logged = [one.text for one in lines if one.level == params.level]
     otherwise = [one.text for one in lines if one.level != params.level]
     printed = [line.line for _, line in _asked_lines(run, params)]
+    # In this order, as near words at the right level earn a part of the points.
     for texts, how in (
         (logged, "is logged"),
         (otherwise, "is logged at another level"),
@@ -504,6 +517,7 @@ def _near(run: Run, lines: Iterable[Logged], params: LogsParams) -> Verdict | No
     ):
         alike = max(texts, key=lambda text: _likeness(text, params.text), default="")
         if _likeness(alike, params.text) >= ALIKE:
+            # A log line of the console has its level and time before the text.
             text = (split_log_line(alike) or ("", alike))[1]
             message, hint = f"{shown(text)!r} {how}, not {params.text!r}", unfilled(text) or _call(params)
             share = OTHER_WORDS_SHARE if texts is logged else 0.0
@@ -514,6 +528,7 @@ def _near(run: Run, lines: Iterable[Logged], params: LogsParams) -> Verdict | No
 
 def _likeness(text: str, wanted: str) -> float:
     plain = " ".join((split_log_line(text) or ("", text))[1].casefold().split())
+    # With `autojunk`, frequent letters of a text over 200 characters would not count.
     return SequenceMatcher(None, plain, " ".join(wanted.casefold().split()), autojunk=False).ratio()
 
 
@@ -527,6 +542,7 @@ def _nothing(
     asked = life(run, params.process) if params.process else next(iter(lives(run)), None)
     if asked is None:
         return not_started("the node")
+    # Without a process named, any of the student's that ended may be the one that should log.
     ended = asked if asked.ended_early else (None if params.process else early_end(run))
     if ended is not None:
         end = explain_end(ended, run, package)
@@ -543,6 +559,7 @@ def _nothing(
 
 def _silent(package: PackageFacts, run: Run, nodes: tuple[str, ...], params: LogsParams) -> Verdict:
     message = f"{join_words(nodes)} logs nothing"
+    # rospy sends nothing below the level of `init_node`, which is INFO unless the script asks for another.
     debug = (s for s in run_slips(package, run, "prints") if s.name.startswith("logdebug"))
     if slip := next(debug, None):
         message = f"{message}: `rospy.{slip.name}` on line {slip.line} of {slip.file} is not sent"
@@ -550,6 +567,7 @@ def _silent(package: PackageFacts, run: Run, nodes: tuple[str, ...], params: Log
     if slip := _hindered(package, run, params):
         message = f"{message}: line {slip.line} of {slip.file} would, and it is not reached"
         hint = f"in {slip.file}, {slip.fix}"
+        # To log whether or not the condition holds would be wrong where the text answers what the grader sends.
         if " out of " in slip.fix and any(e.action in CAUSES for _, e in run.actors):
             hint = f"in {slip.file}, see why the condition above line {slip.line} never holds"
         return failed(message, hint=hint, citations=(slip.place,))

@@ -109,6 +109,7 @@ def _cite_start(
     value = first.values[0]
     starts = slips_of(package, run, first.callerid, "start-value")
     wrong = [one for one in starts if int(one.message) == value]
+    # Of several such lines, or with one added first, none is known to be what made the first value.
     if len(wrong) != 1 or slips_of(package, run, first.callerid, "added-first"):
         return verdict
     slip = wrong[0]
@@ -134,6 +135,7 @@ def judge_start(first: Count, run: Run, params: StartParams) -> Verdict:
         why = f"{message}; but the node floods its topics, and in a flood the publisher's queue drops values"
         return grade_again(why)
     verdict = failed(message, hint=hint)
+    # Earlier values could have been lost in that time: another run has to show the same.
     return verdict.if_repeated() if _may_follow_others(run, first, params) else verdict
 
 
@@ -218,6 +220,7 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
         return _nothing(package, run, params.topic).about(expected=expected)
     verdict, seen = judge_wraps(count, run, package, params)
     early = added_early(count, run, package, low)
+    # Added early, the counter comes back one too high: only then is that line the reason.
     if early is not None and verdict.status.is_lost and seen and seen.after == low + 1:
         verdict = cite_early(verdict, early)
     else:
@@ -232,6 +235,7 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
 
 def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
     """There is no counter on the topic."""
+    # What was lost may have had the numbers.
     if losses(run, topic):
         return grade_again(f"too little was recorded on {topic}", measured="no number")
     if any(c.messages for c in run.student_channels(topic)):
@@ -278,6 +282,7 @@ def _wrong(count: Count, found: Wrong, run: Run, params: StepParams) -> Verdict 
     after = time_between(run, count.times_ns[0], first.to_ns)
     comes = f"after {significant(first.before)} comes {significant(first.after)}"
     place = f"{comes} (value {first.number + 1}, {after} after the first)"
+    # Where nearly all steps are alike, that step says more than the first wrong one.
     if usual not in {None, 1}:
         message = _usual_fault(usual or 0.0)
     else:
@@ -324,6 +329,7 @@ def _too_few(steps: int, run: Run, package: PackageFacts, params: StepParams) ->
     end = explain_early_end(package, run)
     cause = f": the node ended ({end.cause})" if end else ""
     message = f"only {plural(steps + 1, 'value')} came on {params.topic}{cause}"
+    # What the recorder lost is not charged.
     if losses(run, params.topic):
         return grade_again(message)
     return unjudged(message, hint=f"publish in a loop `{LOOP}`")

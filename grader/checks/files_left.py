@@ -31,6 +31,7 @@ WORKING_FOLDERS = ("~/.ros/", "~/")
 ACTIVE = ".active"
 """Ends the name of a bag while rosbag writes it."""
 RECORDINGS = (".bag", ".mcap")
+# The numbers at the head of a PGM may have comments between them.
 _GAP = rb"\s+(?:#[^\n]*\n\s*)*"
 PGM = re.compile(rb"P[25]" + _GAP + rb"(\d{1,6})" + _GAP + rb"(\d{1,6})" + _GAP + rb"\d{1,5}\s")
 PGM_HEAD_BYTES = 1_000
@@ -109,6 +110,7 @@ class FileLeftParams(Record):
         places = {path, IN_PACKAGE.sub("", path)} | {path.removeprefix(f) for f in WORKING_FOLDERS}
         pattern = PurePosixPath(self.file + ending)
         found = [PurePosixPath(place) for place in places]
+        # `match` alone would take a file of that name in any folder.
         return any(p.match(str(pattern)) and len(p.parts) == len(pattern.parts) for p in found)
 
     def finding(self, file: LeftFile, run: Run) -> Verdict | None:
@@ -155,6 +157,7 @@ def file_left(package: PackageFacts, run: Run, params: FileLeftParams) -> Verdic
         verdict = inconclusive(told, hint="grade on a machine that has bubblewrap")
         return verdict.about(expected=params.words)
     files = [file for file in run.left_files if params.process in {"", file.process}]
+    # A pattern may fit several files: of those that can be read, the largest.
     found = sorted((f for f in files if params.fits(f.path)), key=lambda f: (f.data is None, -f.size_bytes))
     started = [one for one in lives(run) if params.process in {"", one.name}]
     if not started:
@@ -189,6 +192,7 @@ def _not_left(files: Sequence[LeftFile], package: PackageFacts, run: Run, params
     alike = [one for one in names if PurePosixPath(one).suffix == PurePosixPath(name).suffix != ""]
     if near := near_names(name, names) or alike:
         hint = f"name the file {name}"
+        # As `rosbag record` names a bag by itself, with date and time.
         if any(re.search(r"_\d{4}(-\d\d){5}\.bag$", one) for one in near):
             hint = f"write `-O {name}` in the call of `rosbag record`: `-o`, and a call without both, add the time"
         return failed(f"{params.file} was not written; {_list_paths(near)} was", hint=hint)
@@ -249,6 +253,7 @@ def _table(file: LeftFile, params: FileLeftParams, run: Run) -> Verdict | None:
     if len(data) > TABLE_BYTES_MAX:
         return failed(f"{file.path} is larger than {TABLE_BYTES_MAX >> 20} MB", hint="write fewer rows")
     try:
+        # Some programs begin a text with a mark of its encoding, which is no part of the first name.
         rows = [row for row in csv.reader(data.decode("utf-8-sig", errors="replace").splitlines()) if row]
     except csv.Error as error:
         return failed(f"{file.path} is not a table: {error}", hint="write it with csv.writer(file)")
@@ -303,6 +308,7 @@ def _map(file: LeftFile) -> Verdict | None:
     if head is None:
         return failed(f"{file.path} is not a PGM map", hint=hint)
     width, height = int(head[1]), int(head[2])
+    # A P5 has a byte for each cell; a P2 has text, of any length.
     if data.startswith(b"P5") and len(data) - head.end() < width * height:
         return failed(f"{file.path} is cut short: it has fewer than {width} by {height} cells", hint=hint)
     return None

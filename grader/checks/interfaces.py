@@ -248,6 +248,7 @@ def _plain(type_: str, package: str) -> str:
 
 def _equal(wanted: str, found: str) -> bool:
     try:
+        # 1 and 1.0 are the same constant.
         return float(wanted) == float(found)
     except ValueError:
         return wanted.lower() == found.lower() if wanted in {"True", "False"} else wanted == found

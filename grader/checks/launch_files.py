@@ -111,6 +111,7 @@ def _with_next(verdict: Verdict, package: PackageFacts, params: LaunchXmlParams)
         for name in names
         if file is not None
         and file.fault is not None
+        # What is on the fault's own line is told with the fault.
         and node.line != file.fault.line
         and _is_meant(node, name)
     )
@@ -131,6 +132,7 @@ def _lacking(package: PackageFacts, file: LaunchFile, params: LaunchXmlParams) -
     found |= {program: _program(file, program) for program in params.programs}
     lost = joined([one for one in (refused.verdict() if refused else None, *found.values()) if one])
     right = [name for name, one in found.items() if one is None]
+    # From a file that it refuses, roslaunch starts nothing.
     return lost and lost.in_part(0.0 if refused else len(right) / len(found), join_words(right))
 
 
@@ -203,6 +205,7 @@ def _slip_for(package: PackageFacts, node: LaunchNode, name: str) -> Slip | None
 def _is_meant(node: LaunchNode, name: str) -> bool:
     written = PurePosixPath(node.type or "").name
     stem = PurePosixPath(name).stem
+    # A node under the script's name is meant to run it, whatever its `type`.
     return written in {name, stem} or bool(near_names(name, [written])) or node.name == stem
 
 
@@ -362,7 +365,9 @@ def _script(package: PackageFacts, build: Run, file: LaunchFile, params: OpensPa
         source = find_script(package, node.type or "")
         path = source.path if source else node.type or ""
         verdict = executable(package, build, ExecutableParams(path=path))
+        # The advice of that check is for Python.
         verdicts.append(verdict.model_copy(update={"hint": verdict.hint.replace(RIGHT_SHEBANG, SHELL)}))
+    # One right script is enough: others may do something else.
     return None if any(v.status is Status.PASS for v in verdicts) else verdicts[0]
 
 
@@ -434,6 +439,7 @@ def _unread_variable(package: PackageFacts, build: Run, file: LaunchFile, params
         ]
         for number, line in enumerate(lines, start=1):
             if assigned and re.match(rf"\s*{re.escape(params.program)}\b", line):
+                # A shell takes the value that was set last.
                 right = value_given(line.strip(), assigned[-1])
                 why = f"it is not given the value of {assigned[-1]}"
                 return Slip(path, number, why, f"on line {number}, write `{right}`") if right else None
@@ -451,6 +457,7 @@ def _misspelt_address(
     """Return the line of a shell script that has nearly the address that is asked for."""
     for path in _shell_scripts(package, file):
         for number, line in enumerate(build.file_lines(path), start=1):
+            # A comment may quote the handout's address.
             words = re.findall(r"[^\s\"'=#]{4,}", line.partition(" #")[0])
             words = [word for word in words if _plain(word) not in map(_plain, params.urls)]
             if near := get_close_matches(params.urls[0], words, 1, _NEAR_ADDRESS):
@@ -465,6 +472,7 @@ _ASSIGNMENT = re.compile(r"\s*(?:export\s+)?([A-Za-z_]\w*)=[\"']?([^\"'\s]+)")
 
 def value_given(line: str, name: str) -> str:
     """Return the line of a shell with `$NAME` in place of what is not quite that; "" where nothing is."""
+    # In this order: in single quotes, without the closing brace, without the `$`, and another name behind the `$`.
     slips = (
         rf"'\$\{{?{name}\}}?'",
         rf"\$\{{{name}(?!\}})",
@@ -472,6 +480,7 @@ def value_given(line: str, name: str) -> str:
         rf"\$\{{?(?!{name}\b)[A-Za-z_]\w*\}}?",
     )
     values = (f'"${name}"', f"${{{name}}}", f"${name}", f"${name}")
+    # In a replacement, a backslash would begin an escape.
     changed = (
         re.sub(slip, value.replace("\\", "\\\\"), line, count=1)
         for slip, value in zip(slips, values, strict=True)
@@ -481,6 +490,7 @@ def value_given(line: str, name: str) -> str:
 
 def _blanks(run: Run, pages: list[Page]) -> re.Match[str] | None:
     """Return what the shell said of `URL = …`, where no address came to the program because of that."""
+    # A dot or a slash is of an address, so the variable was not empty.
     if any(re.search(r"[./]", argument) for page in pages for argument in page.arguments):
         return None
     return next(filter(None, (ASSIGNED.search(line) for line in console_lines(run))), None)

@@ -102,6 +102,7 @@ def _judge_loaded(
     node = nodes_of_script(package, file, params.script)[0]
     up = nodes_up(run, node)
     start_ns = min((t for t, event in run.graph if set(up) & set(event.nodes)), default=run.end_ns)
+    # What the node sets itself was not loaded.
     before = params_on_server(run, until_ns=start_ns, by=lambda caller: caller not in up)
     missing = [name for name in map(absolute_name, params.names) if name not in before]
     if missing and not (
@@ -241,6 +242,7 @@ def _refusal_verdict(file: LaunchFile, params: LaunchLoadsParams, absence: Absen
 def _is_of(load: LaunchLoad, params: LaunchLoadsParams) -> bool:
     name = PurePosixPath(params.file).name
     source = load.source or ""
+    # What is in an environment variable, only roslaunch knows.
     return load.command == "load" and (PurePosixPath(source).name == name or "$(env" in source)
 
 

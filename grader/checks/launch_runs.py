@@ -105,6 +105,7 @@ def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParam
         or passed(f"roslaunch connects {found[0][0]} and {found[0][1]} over {params.topic}")
     )
     up = [name for name in params.nodes if f"/{name.lstrip('/')}" in nodes] if params.nodes else nodes[:2]
+    # A connection needs two nodes, also where the lab names none.
     share = len(up) / (len(params.nodes) or 2) / 2 + (0.5 if found else 0.0)
     verdict = verdict.in_part(share if up else 0.0, _came_up(up, connected=bool(found)))
     cited = verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/graph"))
@@ -139,6 +140,7 @@ def _why_unconnected(
     nodes = run.student_nodes()
     ends = [nodes_on(run, params.topic, end) for end in ("publishers", "subscribers")]
     absent = [node for node in file.brings if not nodes_up(run, node)]
+    # With a node at both ends, one that is absent is not what keeps them apart.
     if absent and not all(ends):
         return _absent(package, run, nodes, absent)
     if len(nodes) < 2:
@@ -154,6 +156,7 @@ def _why_unconnected(
 def _skipped(package: PackageFacts, file: LaunchFile, nodes: Sequence[str]) -> Verdict | None:
     """Return the verdict where a node of the package's is in the file, and an `if`, an `unless` or a comment leaves it
     out; None where none is."""
+    # A <node> may have the program with its `.py` or without.
     own = {
         name for one in package.files for name in (PurePosixPath(one.path).name, PurePosixPath(one.path).stem)
     }
@@ -186,6 +189,7 @@ def _absent(package: PackageFacts, run: Run, nodes: Sequence[str], absent: Seque
         why = not_started(*unstarted.values())
     else:
         why = why_not_up(package, run, absent[0])
+    # What roslaunch prints is added only where no better reason is known, and once.
     said = "" if why.citations or why.unbuilt or quoted(run) in why.why else quoted(run)
     if not why.citations:
         why = why._replace(citations=(absent[0].place,))
@@ -250,6 +254,7 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
     expected = f"{params.launch} brings up {join_words(what) or 'its nodes'} under the file's names{over}"
     file = read_launch(package, params.launch, (*params.scripts, *params.programs))
     if isinstance(file, Verdict):
+        # A file that cannot be read is charged by launch-xml, where scripts are asked for.
         return file.about(expected=expected).model_copy(update={"unjudged": bool(params.scripts)})
     share, right = _right_parts(package, file, run, params)
     verdict = (
@@ -279,6 +284,7 @@ def _judge_nodes(package: PackageFacts, file: LaunchFile, run: Run, params: Laun
     if dead := _judge_deaths(package, run, wanted, "came up, but then"):
         return dead
     if params.programs and params.params:
+        # `_find_unnamed` has seen to it that there is one.
         program = nodes_of_program(file, params.programs[0])[0]
         misplaced = params_misplaced(run, file, nodes_up(run, program), params.params)
         if misplaced is not None:
@@ -308,6 +314,7 @@ def _right_parts(
     )
     if not up:
         misnamed = [one for name, pkg in params.nodes.items() for one in _misnamed(file, name, pkg)]
+        # Under other names, nodes still earn what their connection is worth.
         if not (connected and len(misnamed) == len(params.nodes) > 0):
             return 0.0, ""
         pair = join_words(name for one in misnamed for name in nodes_up(run, one))
@@ -361,6 +368,7 @@ def _find_unnamed(
             of_package = [n for n in file.brings if n.pkg == pkg and n.type]
             meant = [n for n in of_package if str(n.type) in name or name in str(n.type)]
             meant = meant or [n for n in of_package if is_one_edit(str(n.type), name)]
+            # A program that is asked for itself is not a slip for another one.
             meant = [n for n in meant if f"{n.pkg}/{n.type}" not in params.programs]
             if len(meant) == 1:
                 return _other_type(file, meant[0], name, params)
@@ -388,6 +396,7 @@ def _twins(file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
         first = seen.setdefault(node.full_name, node)
         wanted = [name for name in params.nodes if name.endswith(f"/{node.name}")]
         lacking = [name for name in wanted if name not in {one.full_name for one in file.brings}]
+        # Only with a single namespace around it is it clear which line is wrong.
         spaces = [line for line in node.renaming if line.tag not in RENAMES]
         if first is node or not is_exact(node) or len(lacking) != 1 or len(spaces) != 1:
             continue
@@ -415,6 +424,7 @@ def _wrong_names(file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
     misnamed = ((name, node) for name, pkg in params.nodes.items() for node in _misnamed(file, name, pkg))
     for wanted, node in misnamed:
         why = f"the node of {node.type} is called {node.full_name}, not {wanted}"
+        # Inside a namespace, another `name` alone would not make the full name right.
         if node.namespace == "/":
             fix = f'on line {node.line}, write name="{wanted.lstrip("/")}"'
             slips.append(Slip(node.file, node.line, why, fix).verdict())
@@ -428,6 +438,7 @@ def _wrong_names(file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
 
 def _wrong_name(file: LaunchFile, name: str, pkg: str) -> Verdict | None:
     found = _nodes_named(file, name)
+    # What only roslaunch can work out may well be right.
     if any(n.pkg == pkg or "$(" in (n.pkg or "") for n in found):
         return None
     if found:
@@ -466,12 +477,14 @@ def _find_swap(file: LaunchFile, name: str, params: LaunchRunsParams) -> Verdict
 
 def _nodes_named(file: LaunchFile, name: str) -> list[LaunchNode]:
     exact = [n for n in file.brings if n.full_name == name]
+    # A name that only roslaunch can work out may be this one.
     return exact or [n for n in file.brings if not is_exact(n) and "$(anon" not in n.full_name]
 
 
 def _not_up(package: PackageFacts, file: LaunchFile, run: Run, lacking: Wanted) -> Verdict:
     """A slip of the file's first, then what roslaunch and the script say."""
     if slip := next(refusals(package, file), None):
+        # Slips on the student's own nodes are charged by launch-xml.
         return slip.verdict(quoted(run)).model_copy(update={"unjudged": lacking.own})
     node = lacking.node
     absence = why_not_up(package, run, node)

@@ -124,6 +124,7 @@ def _other_words(
     probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line], params: HearsParams
 ) -> Verdict | None:
     """All that is missing is printed in other words: half of its points. None where something is not there at all."""
+    # A bare value has no words around it that could be others.
     if params.template == VALUE or not all(text_places(missing, lines, VALUE)):
         return None
     said = [line.text for line in lines if _without_blanks(missing[0].value) in _without_blanks(line.text)]
@@ -133,6 +134,7 @@ def _other_words(
     blank = params.template.removesuffix(VALUE).endswith(" ")
     glued = params.template.replace(f" {VALUE}", VALUE)
     hint = f"print '{wanted}', {IN_OWN_WORDS}"
+    # A String that is printed whole comes with the name of its field.
     if any(f'data: "{missing[0].value}"' in line for line in said):
         hint = f"print '{wanted}': of the message only its .data, which is the text"
     elif blank and said and all(text_places(missing, lines, glued)):
@@ -141,6 +143,7 @@ def _other_words(
         hint = f"print '{wanted}', with ' ' in place of {mark!r} between the words and the message"
         if place := unfilled(mark):
             hint = f"print '{wanted}': {place}{both(', in place of the + or the comma there', '')}"
+    # What is printed right counts in full, the rest by the share of other words.
     share = 1 - (1 - OTHER_WORDS_SHARE) * len(missing) / len(probes)
     all_of = plural(len(probes), "message")
     measured = f"{len(probes)} of {all_of} printed, {len(missing)} of them in other words"
@@ -152,6 +155,7 @@ def _mark_between(said: str, probe: Probe, template: str) -> str:
     """Return what stands between the template's words and the message on a line, "" if it is not just marks."""
     before, _, _ = said.partition(str(probe.value))
     _, words, mark = before.casefold().rpartition(template.partition(VALUE)[0].strip().casefold())
+    # The `s` of a `%s` is a letter, yet no word.
     plain = not any(c.isalnum() for c in mark.replace(UNFILLED, ""))
     return mark if words and mark.strip() and plain else ""
 
@@ -164,9 +168,11 @@ def _some_in_other_words(
     probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line], params: HearsParams
 ) -> Verdict | None:
     """Some of what is missing is printed, with other words around it. None where nothing is."""
+    # A number may stand on any line by chance, so finding it proves nothing.
     if params.template == VALUE or any(isinstance(p.value, int) for p in missing):
         return None
     lost = [p for p, found in zip(missing, text_places(missing, lines, VALUE), strict=True) if not found]
+    # Where none of them is printed, other words are not the reason.
     if len(lost) == len(missing):
         return None
     message = (
@@ -194,6 +200,7 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     measured = f"subscribed to {join_words(subscribed)}" if subscribed else "no subscription"
     differing = refused_type(run, topic)
     end = explain_early_end(package, run)
+    # A refused type is a cause of its own, whatever ended the node later.
     if end is not None and differing is None:
         message = f"the node ended before it subscribed to {topic}: {end.cause}"
         return end.verdict(unjudged, message, measured="ended")
@@ -201,6 +208,7 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     slip = run_slip(package, run, "unregistered")
     if verdict is None and slip is not None:
         verdict = _taken_off(f"the node stops listening to {topic} before anything is sent", slip)
+    # The grader sends once it sees the subscription, so this is not the node's fault.
     elif verdict is None and topic in subscribed:
         message = f"the node subscribed to {topic}, but the grader sent nothing"
         verdict = grade_again(message)
@@ -228,6 +236,7 @@ def _never_subscribed(package: PackageFacts, run: Run, topic: str, subscribed: S
         other = f", but publishes on {topic}, as a talker does"
         above = "" if spare and spare.name else f" with `def {callback}(msg):` above it,"
         hint = f"write {call} in place of the publisher,{above} and `rospy.spin()` in place of the loop"
+    # A topic on which the grader sends is meant to be there, so it is not one to swap.
     elif len(subscribed) == 1 and publishes and not near and not probes_on(run, subscribed[0]):
         other = f"{other}, and publishes on {topic}"
         hint = f"swap {topic} and {subscribed[0]}: it should subscribe to {topic}, and not publish on it"
@@ -258,9 +267,11 @@ def _by_subscriber(
     if slip := run_slip(package, run, "subscribed-again"):
         return _taken_off(lost, slip)
     slip = run_slip(package, run, "unregistered")
+    # Taken off, it hears nothing from then on: what is missing has to be the last ones.
     if slip is not None and list(missing) == list(probes[-len(missing) :]):
         return _taken_off(lost, slip)
     slip = run_slip(package, run, "callback-waits")
+    # A callback that waits holds up later messages: where none at all is printed, there is another reason.
     if slip is None or len(missing) == len(probes):
         return None
     return _taken_off(f"{lost} in time", slip, ": no further message is read until the callback ends")
@@ -275,6 +286,7 @@ def _judge_missing(
 ) -> Verdict:
     """Some or all of what was sent was not printed: the likeliest reason that shows."""
     lines = printed_lines(run)
+    # What is proven comes first; the last ones only read the pattern of what is missing.
     verdict = (
         _other_words(probes, missing, lines, params)
         or _judge_error(package, run)
@@ -314,13 +326,16 @@ def _some_numbers(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequ
     """Typical ways to lose zero, or all negative numbers, and print the others."""
     values = [p.value for p in missing if isinstance(p.value, int)]
     heard = {p.value for p in probes if isinstance(p.value, int) and p not in missing}
+    # A value that is printed one time and not the other is not lost for its sign.
     if not values or not heard or heard.intersection(values):
         return None
     if set(values) == {0}:
         return failed("0 is not printed", hint="0 counts as false: print without `if data.data:`")
+    # Only where exactly the negative numbers are missing is the sign the reason.
     if any(v >= 0 for v in values) or any(v < 0 for v in heard):
         return None
     printed = {n for line in lines for n in numbers_in(line.text)}
+    # An Int8 that is read as a byte without a sign is 256 more.
     as_unsigned = all(v + 256 in printed for v in values)
     how = (
         f"are printed as positive ones, {values[0]} as {values[0] + 256}"
@@ -351,6 +366,7 @@ def _by_callback(
     if len(found) != 1 or (found[0].kind == "not-printed" and few):
         return None
     slip, lines, gone = found[0], printed_lines(run), _print_in_comment(package, run)
+    # A print further down that is commented out is the likelier reason.
     if gone is not None and gone.file == slip.file and gone.line > slip.line:
         return None
     verdict = _some_numbers(probes, missing, lines) or _only_again(probes, missing)
@@ -380,4 +396,5 @@ def _by_number(
     value = missing[0].value
     first = significant(value) if isinstance(value, int) else repr(value)
     message = f"{len(missing)} of {plural(len(probes), 'message')} not printed, the first of them {first}"
+    # Messages missing here and there may be the machine's doing: another run has to show it, too.
     return failed(message, hint=CALLBACK_HINT).if_repeated()

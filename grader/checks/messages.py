@@ -94,6 +94,7 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
         return _no_text(package, run, heard, params).about(expected=expected)
     count = sum(len(c.messages) for c in heard)
     verdict = (
+        # Words first: a time can be read only where it stands in its place.
         _misfit(package, run, heard, params)
         or _wrong_time(package, run, heard, params)
         or passed(f"all {count} messages on {params.topic} are '{in_words(params.template)}'{grows}")
@@ -114,6 +115,7 @@ def _misfit(
     package: PackageFacts, run: Run, heard: Sequence[Channel], params: MessageParams
 ) -> Verdict | None:
     """The first message that does not have the template's words, or no number where the time belongs."""
+    # The loose one shows what stands where the time belongs.
     fits, loose = (message_pattern(params.template, value) for value in (NUMBER, ".*?"))
     wrong = [
         (t, text)
@@ -128,6 +130,7 @@ def _misfit(
     found = loose.fullmatch(text)
     part = in_one_line(found[1]) if found and found.groups() else ""
     wanted = in_words(params.template)
+    # Placeholders first: they, too, are not a number where the time belongs.
     if any(mark in text for mark in UNFILLED):
         message = f"a message reads {in_one_line(text)!r}: its placeholder was never filled in"
     elif more := _behind(part):
@@ -215,6 +218,7 @@ def _judge_counting(
 ) -> Verdict | None:
     """Return the verdict on whole numbers, each the one before plus one, of a script that reads no clock. At one a
     second they grow as the time does."""
+    # A clock's first reading has a fraction, a count has none.
     if any(after - before != 1 for before, after in pairwise(told)) or told[0] != int(told[0]):
         return None
     slip = next(iter(slips_of(package, run, channel.callerid, "no-clock")), None)
@@ -231,6 +235,7 @@ def _watched_ns(run: Run, heard: Sequence[Channel]) -> int:
 def _too_few(package: PackageFacts, run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdict:
     """Too little came: the node's own fault where it died, or was watched long enough."""
     few = f"only {plural(sum(len(c.messages) for c in heard), 'message')} came on {params.topic}"
+    # What the recorder lost is not the node's fault.
     if losses(run, params.topic):
         return grade_again(f"{few}: too few to see the time grow")
     if end := explain_early_end(package, run):
@@ -308,6 +313,7 @@ def field_bounds(package: PackageFacts, run: Run, params: FieldBoundsParams) -> 
         verdict = nothing_sent(package, run, params.topic, params.of)
     elif not usable and missing:
         verdict = no_field(missing, channels)
+    # Shares are not exact as floats: 0.55 of 100 is a little more than 55.
     elif len(found) - len(outside) < params.share * len(found) - ROUNDING:
         verdict = _outside(outside, found, run, params)
         # Of a share, the messages that the recorder lost may be the ones that were right.
@@ -389,6 +395,7 @@ class FieldEqualsParams(FieldParams):
         texts = [one for one in (self.value, *self.values) if isinstance(one, str)]
         if self.tolerance and not NOT_FINITE.keys() >= {*texts}:
             raise ValueError("tolerance is for numbers, and text has none: write a number without quotes")
+        # In Python, true and false are the numbers 1 and 0.
         if self.tolerance and any(isinstance(one, bool) for one in (self.value, *self.values)):
             raise ValueError("tolerance is for numbers, and true and false are none")
         if self.value == {} or any(map(has_hole, (self.value, *self.values))):
@@ -532,6 +539,7 @@ def _other_value(
         where = f"in {len(wrong)} of {plural(len(found), 'message')}: {seen}, {after} after the first"
         return failed(f"{params.field} of {params.topic} is wrong {where}", hint=hint)
     message = f"{params.field} of {params.topic} is wrong in the {params.when} message: {seen}"
+    # Reversed, so that of each topic the first message is the one that stays.
     sent = {e.topic: t for t, e in reversed(run.actors) if e.action == "publish" and e.topic != params.topic}
     if params.when == "last" and sent and found[-1].time_ns < min(sent.values()):
         topics = join_words(sorted(filter(None, sent)))

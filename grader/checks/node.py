@@ -98,6 +98,7 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
     nodes = nodes_of(run, one.name)
     up_ns = _up_ns(one, run, nodes)
     message = f"{_script(one)} is the node {join_words(nodes)}, stayed alive and ended on Ctrl-C"
+    # An early end explains what follows: a node that is not registered, or was watched too briefly.
     verdict = (
         _early_end(one, run, package)
         or _registration(one, run, nodes)
@@ -165,6 +166,7 @@ def _judge_misnamed(
     given = params.names, nodes, params.anonymous
     slips = slips_that_name(package, run, "node-name", base_name(nodes[0])) if nodes else []
     cited = tuple(dict.fromkeys(one.place for one in slips))
+    # With calls in several scripts, it is not known which one named the node.
     if len({one.file for one in cited}) > 1:
         cited = ()
     hint = name_hint(*given)
@@ -190,6 +192,7 @@ def _rename_hint(slip: PythonSlip, nodes: tuple[str, ...], params: NodeNameParam
 
 def _up_ns(one: Life, run: Run, nodes: tuple[str, ...]) -> int:
     """Return how long it lived freely after its first message, or after its start where it published none."""
+    # Every node publishes on `/rosout`, before it does anything of its own.
     channels = (c for c in run.student_channels() if c.topic != "/rosout" and c.callerid in nodes)
     first = min((c.times_ns[0] for c in channels if c.messages), default=one.start_ns)
     return max(0, one.until_ns(run) - first)
@@ -223,6 +226,7 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
     stopped_by = one.end.stopped_by if one.end else None
     if stopped_by in {"TERM", "KILL"}:
         message = f"{_script(one)} did not end on Ctrl-C and had to be stopped with SIG{stopped_by}"
+        # A line that is known to keep the node alive goes before any excuse.
         if deaf := next((s for s in package.slips if s.kind == "deaf" and s.file == one.start.script), None):
             return failed(f"{message}: {deaf.message}", hint=deaf.fix, citations=(deaf.place,))
         if excuse := _locked_up(one, run) or _asleep(one, package) or _asking(one, run, package):

@@ -335,6 +335,7 @@ def _rename(package: PackageFacts, found: Manifest, name: str) -> str:
     has_cpp = any(PurePosixPath(file.path).suffix == ".cpp" for file in package.files)
     such += f' or `#include "{found.name}/….h"`' if package.interfaces and has_cpp else ""
     made = next((word for c in calls for word in c.args if word.startswith(f"{found.name}_gen")), "")
+    # With `-w`, grep would not find the name in `<name>_generate_messages_py`.
     words, such = ("", f"{such} or {made}") if made else ("w", such)
     search = f"`grep -rn{words} {found.name} .` shows whether it stands anywhere else, as in {such}"
     return f"write {join_words(places[:PLACES_SHOWN])}; {search}"

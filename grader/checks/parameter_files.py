@@ -123,6 +123,7 @@ def _error(run: Run, one: Life, path: str, build: Run) -> Verdict | None:
         return None
     lines = [line.line for _, line in run.lines(one.name) if line.line.strip()]
     words = explain_yaml(lines)
+    # What YAML says of a pointer of Git LFS would not help.
     if text_of(build, path).startswith(LFS_BEGINS):
         words = Words(*LFS_POINTER, 1)
     if words is not None and words.line is not None:

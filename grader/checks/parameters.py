@@ -233,6 +233,7 @@ def _set_in_part(
 
 
 def _is_value(got: object, wanted: object) -> bool:
+    # In Python, true equals 1.
     return not isinstance(got, bool) and (
         got == wanted or (got is not None and str(got).strip() == str(wanted))
     )
@@ -255,6 +256,7 @@ def _not_set(
         return failed(f"{params.name} is no longer on the server{cause}", hint=hint)
     if end := explain_failure(package, run):
         return end.verdict(unjudged, f"{params.name} was never set: the node ended with {end.cause}")
+    # Without a limit, what came after Ctrl-C shows as well.
     if _is_value(params_on_server(run).get(params.name), params.value):
         message = f"{params.name} is set to {params.value} only after Ctrl-C: the node waits too long"
         return failed(message, hint="set it as soon as the values are read, without a long sleep before it")
@@ -290,6 +292,7 @@ def _judge_unchanged(run: Run, after: dict[str, Any], params: ParamsSetParams) -
 
 def _taken_away(run: Run, name: str) -> str:
     """Return the change that took a name away: a map that lacks it, a value in the map's place, or a delete."""
+    # The last change is the one that took it away.
     for _, event in reversed(run.params):
         above = absolute_name(event.name)
         if run.is_student_node(event.caller_id) and f"{name}/".startswith(f"{above.rstrip('/')}/"):
@@ -357,6 +360,7 @@ def _given_before(package: PackageFacts, build: Run, params: ParamValueParams, g
         values = [
             text[key.line - 1].partition(":")[2].partition(" #")[0].strip().strip("'\"") for key in keys
         ]
+        # Of a key that is there twice, YAML takes the last value.
         if len(values) < 2 or len({key.path for key in keys}) > 1 or values[-1] != str(got):
             continue
         if values[0] == str(params.value) != values[-1]:

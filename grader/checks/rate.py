@@ -161,6 +161,7 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     expected = f"{params.low_hz:g} to {params.high_hz:g} Hz on {params.topic}, evenly"
     if params.cause is not None:
         expected += f", from {significant(params.within_s)} s after {params.cause.words}"
+    # In warped time messages arrive faster than their node's clock says.
     if run.clock != "real":
         message = "rates are judged in real time only, and this run was warped"
         return inconclusive(message, expected=expected, hint="give the criterion a scenario with clock: real")
@@ -176,6 +177,7 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
 def _judge(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict:
     """Return the verdict on one stretch of messages."""
     verdict = (
+        # In this order: a flood is uneven and soon over as well, and its missing sleep is what there is to fix.
         _flood(found, run, package, params)
         or _short(found, run, package, params)
         or _excuse_lateness(_uneven(found, run, package, params), found, run, package, params)
@@ -263,10 +265,12 @@ def _lateness(found: Rhythm, run: Run) -> str:
 
 
 def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
+    # A few messages close together are a burst, not a flood.
     if len(found.times_ns) < 20 or found.mean_hz < FLOOD_FACTOR * params.rate_hz:
         return None
     own = (life_of(run, channel.callerid) for channel in run.student_channels(params.topic))
     scripts = {life.start.script for life in own if life is not None and life.start.script}
+    # Another script may lack its sleep, too: only one whose node publishes here explains this flood.
     told = [s for s in package.slips if s.kind in SLEEPLESS and "sleep" in s.name + s.fix]
     slips = [s for s in told if not scripts or s.file in scripts]
     if not slips and (found.mean_hz >= FLOOD_HZ or not found.is_even):
@@ -347,6 +351,7 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
     """The silence at the end is longer than anything that came before it."""
     # The last gap is the silence itself, up to when the node was watched.
     before_ns = max(found.gaps_ns[:-1], default=0)
+    # So long that neither a stall nor the topic's own pauses explain it.
     if found.tail_ns <= max(5 * params.period_ns, 2 * before_ns, 0.5e9):
         return None
     lasted = seconds(found.times_ns[-1] - found.times_ns[0])
@@ -354,6 +359,7 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
     if slow := _asked_slow(found, run, package, params):
         return slow
     others = _goes_on(found, run, params)
+    # A loop that still publishes on another topic was not left.
     kinds: tuple[SlipKind, ...] = ("spin-in-loop", "unregistered", *(() if others else ("loop-left",)))
     if slip := next(iter(_slips(run, package, params, *kinds)), None):
         return failed(f"{message}: {slip.message}", hint=slip.fix, citations=(slip.place,))
@@ -515,6 +521,7 @@ def _by_read_parameter(
     """Say it where the package's launch file gives a parameter that the node reads and that is the rate it has."""
     for name, value in read.items():
         given = where_given(package, name)
+        # In Python, true is the number 1.
         if given is None or isinstance(value, bool) or not isinstance(value, int | float):
             continue
         if value != params.rate_hz and abs(value - mean_hz) < NUMBER_SHARE * mean_hz:
@@ -551,6 +558,7 @@ def _rate_hint(ratio: float, nominal: str, *, even: bool) -> str:
 
 def _why_late(found: Rhythm, late: Lateness, params: RateParams) -> str:
     """Return what the machine was that may have made the rate wrong; "" where that is not why, or it is too far off."""
+    # A machine that is late slows a loop down: it cannot double its rate.
     if found.mean_hz >= 2 * params.rate_hz:
         return ""
     if found.tail_ns / 2e6 > max(late.max_ms, params.period_ns / 1e6):

@@ -217,6 +217,7 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
     effects = params.effect.read(own)
     answers = _answers(run, causes, effects, params)
     verdict = (
+        # Whether an answer is missing can be said only where effects and causes were there to be seen.
         _nothing_to_judge(package, run, effects, own, params)
         or _early(causes, effects, run, params)
         or _unanswered(package, run, causes, params)
@@ -277,10 +278,12 @@ def _answers(
         while first < len(came) and to_s(came[first]) < from_s:
             first += 1
         after_s = to_s(came[first]) - to_s(at_ns) if first < len(came) else math.inf
+        # A late answer still is one, whose delay can be told, until the next cause begins.
         if after_s <= params.within_s or (after_s < math.inf and came[first] < next_ns):
             answers.append(Answer(at_ns, max(0.0, after_s)))
             # Where each message is a cause, an effect answers one of them alone.
             first += each
+        # Too near to the end, an answer may still have been on its way.
         elif to_s(until_ns) - to_s(at_ns) >= params.within_s:
             answers.append(Answer(at_ns, None))
     return answers
@@ -309,6 +312,7 @@ def _early(
 ) -> Verdict | None:
     """The effect without its cause: between a first message that is not a cause, and the first that is one."""
     to_s = run_seconds(run)
+    # Only if the first message is no cause is there a time before the cause.
     if not params.not_before or not causes or params.trigger.holds(causes[0]) or to_s is None:
         return None
     first_ns = next((one.time_ns for one in causes if params.trigger.holds(one)), causes[-1].time_ns)
@@ -424,6 +428,7 @@ def _disturbed(
     message = f"{params.effect.words} comes {when}, where none may come"
     hint = f"before you publish on {params.effect.topic}, check whether the node may do so now"
     verdict = failed(message, hint=hint, measured=plural(count, "message"))
+    # What comes again and again is not explained by a late machine, nor is what follows no cause.
     if len(wrong) > 1 or params.cause is None:
         return verdict
     return _unless_late(verdict, came[-1], (from_ns, until_ns), run, params)
@@ -548,6 +553,7 @@ def _judge_unanswered(
     if late is None and len(slow) == len(answers):
         seen, hint = (f"; {instead[0]}", instead[1]) if instead else ("", hint)
         verdict = failed(f"{reaction.format('never follows')}, which came {times}{seen}", hint=hint).late(due)
+        # A single answer may have been lost on its way.
         return verdict.if_repeated() if len(answers) == 1 else verdict
     how = "does not follow" if late is None else f"comes up to {late:.2f} s after"
     verdict = failed(f"{len(slow)} of {times} {reaction.format(how)}", hint=hint).late(due).if_repeated()

@@ -273,6 +273,7 @@ class Evidence(Mapping[str, Run]):
         return found
 
     def __contains__(self, scenario: object) -> bool:
+        # Mapping's own asks `__getitem__`, whose NotRecorded is no KeyError.
         return isinstance(self._found.get(str(scenario)), Run)
 
     def __iter__(self) -> Iterator[str]:

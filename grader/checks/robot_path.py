@@ -95,6 +95,7 @@ class PathParams(Record):
         if len(way) < 2:
             raise ValueError("points: a path needs at least two points")
         shortest_m = min(math.dist(a, b) for a, b in pairwise(way))
+        # With a larger one, two points could be passed from one place.
         if self.tolerance_m > shortest_m / 2:
             near = f"two points that follow each other are {shortest_m:g} m apart"
             raise ValueError(f"tolerance_m, {self.tolerance_m:g}, is too large: {near}")
@@ -175,6 +176,7 @@ def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
         return passed(f"the path passes {count} within {significant(params.tolerance_m)} m", measured=figures)
     if stands(taken):
         return never_moves(taken, figures, run)
+    # What explains the whole way goes before what is wrong at one place of it.
     words = (
         _in_degrees(run)
         or _let_go(run, params)
@@ -320,6 +322,7 @@ def _by_other_clock(run: Run, params: PathParams, course: Course) -> Words | Non
         commands = [one._replace(time_s=time_ns / 1e9) for time_ns, one in commands_of(channel)]
         held = driven(commands, params.hold_s, commands[-1].time_s + STOPS_AFTER_S) if commands else []
         other = followed(relative(held), params.way.points, params.tolerance_m)
+        # Where it strays by that clock, too, it has to come farther by it.
         if other.reached >= course.reached + (other.strayed is not None):
             faster = f"{significant(run.warp)} times as fast in this run"
             return Words(
@@ -398,6 +401,7 @@ def _wrong_turn(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
     if not 0 < corner < len(way.points) - 1:
         return None
     before, here, goal = way.points[corner - 1 : corner + 2]
+    # So far from the corner that the tolerance no longer blurs its direction.
     away_m = max(2 * way.tolerance_m, AWAY * math.dist(here, goal))
     behind = list(takewhile(lambda pose: math.dist(pose.point, here) < away_m, path[course.at :]))
     left = path[course.at + len(behind) :]
@@ -437,6 +441,7 @@ def _turns_alike(path: Sequence[Pose], way: Way, course: Course) -> Words | None
     right, heading, x, y = [path[0]], 0.0, path[0].x, path[0].y
     for a, b in pairwise(path):
         step = math.remainder(b.heading - a.heading, math.tau)
+        # Each heading is scaled by `asked / turned`; that of a step, by its middle.
         off, heading = (asked / turned - 1) * (heading + step / 2), heading + step
         cos, sin, dx, dy = math.cos(off), math.sin(off), b.x - a.x, b.y - a.y
         x, y = x + dx * cos - dy * sin, y + dx * sin + dy * cos
@@ -498,6 +503,7 @@ def _strays(path: Sequence[Pose], way: Way, course: Course) -> Words:
 
 def _rests(path: Sequence[Pose]) -> bool:
     """Return whether it stands anywhere for a while, or turns in place."""
+    # Far from everywhere, so that the first pose begins the count.
     since = Pose(0.0, math.inf, math.inf)
     for pose in path:
         if math.dist(pose.point, since.point) > RESTS_M:

@@ -138,6 +138,7 @@ class EndsAtParams(Place):
         """Return by how much it looks too far to the left (degrees); 0 where the heading is not asked for."""
         if self.heading_deg is None:
             return 0.0
+        # The short way round: 350° and -10° are one heading.
         return math.degrees(math.remainder(pose.heading - math.radians(self.heading_deg), math.tau))
 
     def is_there(self, pose: Pose) -> bool:
@@ -487,6 +488,7 @@ def placed(found: Track, params: StaysWithinParams) -> list[Pose]:
     """Return the part of the path that counts: how long it stood before it set off is no one's doing."""
     path = relative(found.path) if params.relative else list(found.path)
     moved = next((i for i, pose in enumerate(path) if math.dist(pose.point, path[0].point) > MOVED_M), 0)
+    # The pose before the one that has moved is where it set off.
     from_s = path[max(0, moved - 1)].time_s + params.from_s
     return [pose for pose in path if pose.time_s >= from_s]
 
@@ -509,6 +511,7 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
         if any(one.forward > SLOW_M_S for one in last) and turned_rad(path) <= TURNING_RAD:
             return unjudged("it never moves, though it is told to drive", measured=figures, hint=IN_ITS_WAY)
         return never_moves(path, figures, run)
+    # A pose that lasts no time at all counts as well where all has to be inside.
     if inside < params.share - ROUNDING or (params.share == 1 and any(out)):
         verdict = _outside(path, out, region, inside, params)
         wrong = _turns_wrong(path, out, region, run) if isinstance(region, Band) else None
@@ -554,6 +557,7 @@ def _turns_wrong(
         return ("left" if side > 0 else "right", "where the wall is", OTHER_SIDE) if to_wall else None
     too_far = [
         pose
+        # Some of the places will do, as to look through all walls at each takes time.
         for pose in outside[:: 1 + len(outside) // PLACES]
         if band.nearest_m(pose.point) > (band.max_m or math.inf)
     ]

@@ -128,6 +128,7 @@ def _lines(run: Run, process: str) -> Iterator[dict[str, object]]:
             continue
         try:
             fields = json.loads(line.line)
+        # A test may print anything, also brackets that are nested without end.
         except (ValueError, RecursionError):
             continue
         if isinstance(fields, dict):

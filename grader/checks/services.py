@@ -153,6 +153,7 @@ def _judge_service(offer: Offer, package: PackageFacts, run: Run, params: Servic
 
 def _taken_back(run: Run, service: str, node: str) -> Verdict | None:
     """Return the loss where the node was there without the service at the end, and never answered."""
+    # An answer shows that it was kept.
     if any(one.response is not None for one in exchanges(run, service)):
         return None
     until_ns = first_interrupt_ns(run) or run.end_ns
@@ -244,6 +245,7 @@ def offers(run: Run) -> dict[str, Offer]:
             node = next((n for n in nodes if run.is_student_node(n)), None)
             if node is None or name.endswith(LOGGERS):
                 continue
+            # An event without the type does not undo what is known of it.
             known = found[name].type if name in found and found[name].node == node else ""
             found[name] = Offer(node, plain_type(event.service_types.get(name, known)))
     return found

@@ -81,10 +81,12 @@ def stamps(package: PackageFacts, run: Run, params: StampsParams) -> Verdict:
     each = [_stamps(run, channel, params.field) for channel in channels]
     found = sorted(one for stamped in each for one in stamped)
     verdict = (
+        # In this order: a stamp of zero, or always the same, is far off as well.
         _nothing_to_judge(package, run, channels, found, params)
         or _zero(found, params)
         or _constant(found, params)
         or _other_clock(run, found, params)
+        # Publisher by publisher, as two may send older and newer stamps by turns.
         or next((fault for stamped in each if (fault := _backwards(stamped, params))), None)
         or _far(run, found, params)
         or _other_frame(found, params)
@@ -170,6 +172,7 @@ def _constant(found: Sequence[Stamp], params: StampsParams) -> Verdict | None:
     first, last = found[0], found[-1]
     if len(found) == 1 or len({one.told_s for one in found}) > 1:
         return None
+    # Messages that came so close together may have one stamp.
     if last.came_s - first.came_s <= params.within_s:
         return None
     message = (
@@ -205,6 +208,7 @@ def _backwards(found: Sequence[Stamp], params: StampsParams) -> Verdict | None:
         f"{before.told_s:.3f} to {after.told_s:.3f}"
     )
     verdict = failed(message, hint=_now(params))
+    # What happens again and again is no chance of one run.
     return verdict if len(falls) > len(found) // 4 else verdict.if_repeated()
 
 
@@ -223,9 +227,11 @@ def _far(run: Run, found: Sequence[Stamp], params: StampsParams) -> Verdict | No
     message = (
         f"{_name(params)} of {params.topic} is up to {abs(worst.age_s):.2f} s {how} than the message {count}"
     )
+    # A few stamps may have whole seconds by chance.
     whole = len(found) > FEW and all(one.whole for one in found)
     verdict = failed(f"{message}: it has only whole seconds" if whole else message, hint=_now(params))
     gross_s = limit_s + NEVER_LATE_S * run.warp
+    # No machine is late by so much with every message.
     if whole or (len(off) == len(found) and min(abs(one.age_s) for one in off) > gross_s):
         return verdict
 

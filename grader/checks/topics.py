@@ -75,6 +75,7 @@ def topic_type(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verd
     """
     channels = run.student_channels(params.topic)
     heard = [c for c in channels if c.messages]
+    # Where messages came, a publisher without any does not matter.
     wrong = [c for c in heard or channels if plain_type(c.type) != plain_type(params.type)]
     if wrong:
         verdict = _wrong_type(package, run, wrong[0], params)
@@ -290,6 +291,7 @@ def _fits(run: Run, node: str, wanted: str) -> bool:
 
 def _apart(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdict:
     lacking = [end for end in ENDS if not _on(run, params.topic, end, params)]
+    # A node that is not there under its name is why no such node is on the topic.
     for end in lacking:
         if verdict := _judge_misnamed(run, end, params):
             return verdict
@@ -303,6 +305,7 @@ def _apart(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdict:
     if absent := no_node(package, run, f"{first} and {second} were not seen connected over {params.topic}"):
         return absent
     message = f"{first} and {second} are both on {params.topic}, but not connected"
+    # The run may have ended before they had found each other.
     return failed(message, hint="do both use the same message type?").if_repeated()
 
 

@@ -236,6 +236,7 @@ def _no_rotation(seen: Sequence[Seen], params: TransformParams) -> Verdict | Non
 
 def _fits(value: Transform, wanted: Transform, params: TransformParams) -> bool:
     metres, degrees = value.apart(wanted)
+    # A tolerance of 0 still allows for the rounding of floats.
     return metres <= params.tolerance_m + 1e-6 and degrees <= params.tolerance_deg + 1e-3
 
 
@@ -261,6 +262,7 @@ def _other_value(seen: Sequence[Seen], params: TransformParams) -> Verdict | Non
 def _why(value: Transform, wanted: Transform, params: TransformParams) -> str:
     if _fits(value.inverse, wanted, params):
         return f": it is the one from {params.child} to {params.parent}"
+    # As if the number of degrees had been given as radians.
     as_degrees = turn_of([math.degrees(angle) for angle in wanted.rpy_deg])
     if any(wanted.rpy_deg) and _fits(value, Transform(value.at, as_degrees), params):
         return ": its angles are in degrees instead of radians"
@@ -291,6 +293,7 @@ def _axes(value: Transform, wanted: Transform, params: TransformParams) -> tuple
 
 
 def _text(value: Transform) -> str:
+    # Adding 0 makes 0.00 of -0.00.
     at = ", ".join(f"{round(v, 2) + 0.0:.2f}" for v in value.at)
     return f"({at}) m and ({', '.join(f'{round(v)}' for v in value.rpy_deg)})°"
 
@@ -312,6 +315,7 @@ def _strays(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verdict 
         return no_clock(run) or grade_again(f"no pose came on {params.pose_of}")
     slack_s = params.within_s + clock_slack_s(run)
     order_s, timed = ORDER_S * run.warp, [(to_s(t), pose) for t, pose in poses]
+    # Before that, the first pose need not have been followed yet.
     from_s = timed[0][0] + slack_s
     judged = [(t, value) for t, value, _ in seen if value is not None and to_s(t) >= from_s]
     wrong = [
@@ -322,6 +326,7 @@ def _strays(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verdict 
     if wrong:
         return _wrong_pose(run, wrong, judged, poses, params)
     until_s, last_s = to_s(observed_until_ns(run) or run.end_ns), timed[-1][0]
+    # Too near to the end, the last pose need not have been followed.
     if until_s - last_s < slack_s or any(to_s(one.time_ns) >= last_s - order_s for one in seen):
         return None
     message = f"{params.name} was no longer sent after the last pose on {params.pose_of}"

@@ -93,6 +93,7 @@ def _interpolate(ticks: list[tuple[int, float]], zero_s: float) -> ToSeconds:
 
     def seconds(time_ns: int) -> float:
         after = bisect_right(times, time_ns)
+        # Outside of what was recorded, the nearest tick is all that is known.
         if after in {0, len(ticks)}:
             return ticks[max(0, after - 1)][1] - zero_s
         (first_ns, first_s), (next_ns, next_s) = ticks[after - 1], ticks[after]
@@ -107,6 +108,7 @@ def _ticks(run: Run) -> list[tuple[int, float]]:
     return [
         (time_ns, value["clock"]["secs"] + value["clock"]["nsecs"] / 1e9)
         for channel in run.channels
+        # A student's node may publish on `/clock`, too.
         if channel.topic == "/clock" and channel.by_grader
         for time_ns, value in zip(channel.times_ns, channel.values, strict=True)
         if value and value.get("clock")
@@ -135,6 +137,7 @@ def wrong_growth(told: Sequence[float], clocks: Sequence[Seconds], *, short: boo
 
 
 def _go_along(told: Sequence[float], clock: Seconds, slack_s: float) -> bool:
+    # Two clocks drift apart, so that the slack grows with the time.
     slack_s += SLACK_SHARE * clock[-1]
     return all(abs(value - told[0] - at_s) <= slack_s for value, at_s in zip(told, clock, strict=True))
 
@@ -283,6 +286,7 @@ class _Window(NamedTuple):
         """Whether the run's own processes filled the machine."""
         busy, own = self.event.busy, self.event.own_busy
         return (
+            # Rounded, as the difference of two shares is not exact.
             busy is not None and own is not None and own >= OWN_LEAST and round(busy - own, 3) <= OTHERS_MOST
         )
 

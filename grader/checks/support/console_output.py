@@ -27,11 +27,13 @@ NAMES_MAX = 100
 CLOCK_SLACK_NS = 50_000_000
 _LOG_PREFIX = re.compile(r"^\s*\[\s*(?:DEBUG|INFO|WARN|ERROR|FATAL)\s*\]\s*(?:\[[^\]]*\]\s*)*:?\s?")
 _WORD = re.compile(r"/?[A-Za-z][\w/]*")
+# A lookahead, so that matches may overlap.
 _ANONYMOUS_END = re.compile(r"(?=(_\d+_\d{9,}))")
 _HEX = re.compile(r"0[xX][0-9a-fA-F]+")
 _TIME = re.compile(
     r"\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d)?|\d{1,2}:\d\d:\d\d(?:[.,]\d+)?|(?<=\d:\d\d):\d\d(?:[.,]\d+)?"
 )
+# Neither a part of another number nor the digits behind its point.
 _NUMBER = re.compile(r"(?<!\d)(?<!\d\.)(?<!\s\.)(?<!^\.)([-+]?)(\d+)(\.\d+)?(?!\d)", re.ASCII)
 _BEFORE, _BEHIND = r"(?<![\w.])", r"(?![\w]|[.,]\d)"
 _Lines = list[tuple[str, str]]
@@ -82,8 +84,10 @@ def printed_lines(run: Run) -> tuple[Line, ...]:
         line
         for process in sorted(students)
         for stream in ("stdout", "stderr")
+        # Stream by stream, as lines of one may come between those of a traceback on the other.
         for line in _without_tracebacks([(t, c.line) for t, c in run.lines(process) if c.stream == stream])
     ]
+    # Longest first, as one name may begin with another.
     names = sorted(run.student_nodes()[:NAMES_MAX], key=len, reverse=True)
     return tuple(
         Line(t, _bare(text, names))
@@ -207,6 +211,7 @@ def number_places(
     `texts` are other probes that the lines may show too; digits in them are not numbers. None where so many
     numbers are printed that any probe would be among them. A `-` after a letter is a sign in all lines or in none.
     """
+    # Longest first, as one text may begin with another; without texts, a pattern that matches nothing.
     hidden = re.compile("|".join(map(re.escape, sorted(texts, key=len, reverse=True))) or r"(?!)")
     shown = [Line(line.at_ns, hidden.sub(_blanks_for, line.text)) for line in lines]
     rows = sum(_NUMBER.search(line.text) is not None for line in shown)
@@ -214,6 +219,7 @@ def number_places(
         return None
     signs, dashes = (_places_read(probes, shown, dashes=dashes) for dashes in (False, True))
     with_dashes = any(found and not other for found, other in zip(dashes, signs, strict=True))
+    # A `-` is taken for a dash only where a number is not found otherwise.
     return dashes if with_dashes and not all(signs) else signs
 
 
@@ -222,6 +228,7 @@ def _places_read(probes: Sequence[Probe], lines: Sequence[Line], *, dashes: bool
     found = defaultdict[int, list[tuple[int, int]]](list)
     for start, line in zip(_starts(lines), lines, strict=False):
         numbers = list(_numbers(line.text, dashes=dashes))
+        # In a line full of other numbers, any number would be found.
         if len({n for _, n in numbers} - sent) <= OTHER_NUMBERS_PER_LINE:
             for at, n in numbers:
                 found[n].append((start + at, line.at_ns))
@@ -234,11 +241,13 @@ def text_places(probes: Sequence[Probe], lines: Sequence[Line], template: str) -
 
     The template's own words may be in capitals or not; the text itself stands letter by letter.
     """
+    # A text alone may be split anywhere, so that blanks do not count; a template's words stay apart.
     blank = "" if template == VALUE else " "
     blob, starts = _join_lines(lines, template)
     places = []
     for probe in probes:
         begin = next((at for t, at in starts if t >= probe.at_ns - CLOCK_SLACK_NS), len(blob))
+        # In a printed list or message, a text has its escapes.
         spellings = {blank.join(text.split()) for text in (str(probe.value), repr(probe.value)[1:-1])}
         patterns = [line_pattern(template, text) for text in spellings if text]
         found = {m.start() for pattern in patterns for m in pattern.finditer(blob, begin)}
@@ -319,6 +328,7 @@ def _worth_a_look(texts: Iterable[str], streams: Iterable[_Lines], most: int) ->
 
 def heard_of(sent: Counter[str], other: Counter[str], printed: Counter[str]) -> int:
     """Return how many messages were printed that can only be this sender's."""
+    # What the other sender sent, too, may have come from there.
     return sum(min(count, max(0, printed[text] - other[text])) for text, count in sent.items())
 
 
@@ -330,6 +340,7 @@ def _times(lines: _Lines, text: str, template: str) -> int:
     edge = _BEFORE if whole[:1].isdigit() and not before else ""
     pattern = re.compile(f"{words_pattern(before)}{edge}{whole}{_BEHIND}{words_pattern(behind)}")
     plain = " ".join(words)
+    # The plain search is quick, and leaves few lines to the pattern.
     return sum(bool(pattern.search(line)) for squeezed, line in lines if plain in squeezed)
 
 
@@ -347,6 +358,7 @@ def logged_by(run: Run, nodes: Collection[str]) -> tuple[Logged, ...]:
     found = [
         Logged(
             t,
+            # Another tool's recording may not have the sender, whom the message itself names.
             channel.callerid or str(value.get("name", "")),
             LEVELS.get(value.get("level", 0)),
             str(value.get("msg", "")),
@@ -423,6 +435,7 @@ def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
         elif frames and not frames[-1].source and line.startswith("    "):
             frames[-1] = frames[-1]._replace(source=line.strip())
         elif frames and frames[-1].source and not frames[-1].marked and (carets := _CARETS.fullmatch(line)):
+            # Python indents source and carets by four.
             frames[-1] = frames[-1]._replace(marked=(carets.start(1) - 4, carets.end(1) - 4))
         elif first is not None and line and not line[0].isspace():
             last = _LAST.match(line)
@@ -439,6 +452,7 @@ def unpack_traceback(line: str) -> list[str]:
     start = line.find("['" + HEADING)
     if start < 0:
         return [line]
+    # It is written as a Python list; nothing of it is run.
     try:
         parts = ast.literal_eval(line[start:].strip())
     except (SyntaxError, ValueError):

@@ -111,6 +111,7 @@ class Count(Record):
 
     def _comes_again(self, step: Step) -> bool:
         same = self._pairs[step.before, step.after]
+        # One more is allowed: a single jump in a short count proves nothing.
         return same > 1 or self._jumps > SYSTEMATIC_SHARE * len(self.steps) + 1
 
     @cached_property
@@ -126,6 +127,7 @@ class Count(Record):
         span_s = (self.times_ns[-1] - self.times_ns[0]) / 1e9
         warp = run.warp if run.clock == "warped" else 1.0
         least_hz = max(FLOOD_FACTOR * rate_hz * warp, FLOOD_HZ)
+        # A few messages close together are a burst, not a flood.
         return len(self.steps) > 20 and len(self.steps) >= least_hz * span_s
 
     def usual_step(self) -> float | None:
@@ -196,6 +198,7 @@ def _count(channel: Channel, until_ns: int | None) -> Count | None:
 
 def _number(value: object) -> float | None:
     """Return a number; text is none, even if it is written in digits."""
+    # In Python, true and false are the numbers 1 and 0.
     if isinstance(value, int | float) and not isinstance(value, bool):
         return value
     return None
@@ -299,12 +302,14 @@ def turns_of(count: Count, run: Run, params: WrapParams) -> Turns:
 
 
 def _is_good(step: Step, params: WrapParams) -> bool:
+    # "Resetting at 127" can be read in two ways: after 127 comes 0, or after 126.
     return step.before in {params.maximum, params.maximum - 1} and step.after == params.minimum
 
 
 def _is_bad(step: Step, params: WrapParams) -> bool:
     beyond = step.after > params.maximum
     return beyond or (
+        # A fall by one is `counter-step`'s matter, except at the top.
         (step.change < -1 or (step.before >= params.maximum - 1 and step.change < 0))
         and not _is_good(step, params)
     )
@@ -328,12 +333,14 @@ def _bad_turn(step: Step, turns: list[Step], count: Count, run: Run, params: Wra
     alone = (
         in_range and sum(_is_bad(s, params) for s in turns) == 1 and any(_is_good(s, params) for s in turns)
     )
+    # One bad turn among good ones may be chance.
     return verdict.if_repeated() if alone else verdict
 
 
 def _where_reset(verdict: Verdict, turn: Step, written: Sequence[PythonSlip], params: WrapParams) -> Verdict:
     """Name the line of the node's script that makes the counter go back as it was seen to."""
     wrong_value = turn.after != params.minimum
+    # A limit in code may be the last value, or the first that is not reached.
     kind, number, apart = ("reset-value", turn.after, 0) if wrong_value else ("reset-limit", turn.before, 1)
     slip = next((s for s in written if s.kind == kind and abs(int(s.message) - number) <= apart), None)
     if slip is None or turn.change > 0 or verdict.status is not Status.FAIL:
@@ -358,6 +365,7 @@ def _limit_hint(slip: PythonSlip, params: WrapParams) -> str:
 def whose_turn(step: Step, count: Count, run: Run, params: WrapParams) -> Literal["program", "flood", "lost"]:
     """Return whether a bad turn is the program's own, or one of values that its flood, or the way, swallowed."""
     low, high = params.minimum, params.maximum
+    # No loss makes a value larger or smaller than those that were sent.
     if step.after > high or step.after < low:
         return "program"
     if count.is_flood(run, params.rate_hz):
@@ -431,6 +439,7 @@ def _silent(count: Count, run: Run, package: PackageFacts, params: WrapParams) -
     cause = f": {explain_traceback(found[-1], package).cause}" if found else ""
     message = f"the node stops publishing after {significant(count.values[-1])}, but keeps running{cause}"
     verdict = failed(message, hint=params.reset_hint) if len(count.values) > 1 else unjudged(message)
+    # Without a traceback, the silence may be the machine's.
     return verdict if found else verdict.if_repeated()
 
 
@@ -439,6 +448,7 @@ def _too_few(count: Count, good: list[Step], run: Run, params: WrapParams) -> Ve
     seen = f"{plural(len(good), 'reset')} in {plural(len(count.values), 'value')}"
     wrong = any(s.change in {0, -1} or s.change > 1 for s in count.steps)
     outcome = run.outcome.outcome if run.outcome else None
+    # Repeats are charged by `counter-step`.
     if good and outcome == "complete" and all(s.change in {0, 1} or s in good for s in count.steps):
         told = f"after {significant(good[0].before)} comes {params.minimum}; values repeat, so only {seen}"
         return passed(told)

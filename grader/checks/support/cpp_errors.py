@@ -66,6 +66,7 @@ def other_namespace(found: re.Match[str], package: PackageFacts, _lines: Sequenc
 
 def _no_message(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
     """Of a callback, or a topic, with what is no message: a pointer to one, or another class."""
+    # The class of a message has its allocator in its name.
     kind = re.sub(r"_<std::allocator<void> ?>", "", found[1]).strip()
     own = re.compile(r"/src/\S*?([\w-]+\.(?:cpp|cc|cxx)):(\d+):\d+:\s+required from here")
     place = next((m for line in lines if (m := own.search(line))), None)

@@ -178,17 +178,21 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
         return Ending(limit, "a node of this lab needs little memory, few processes and little time")
     found = process_tracebacks(run, life.name)
     code = life.end.exit_code if life.end else None
+    # A script that catches an exception and prints it may still come to a good end.
     if found and code != 0:
         return explain_traceback(found[-1], package)
     printed = [line.line for _, line in run.lines(life.name) if line.line.strip()]
+    # A signal of the grader's is no crash.
     if life.end is not None and life.end.signal is not None and life.end.stopped_by is None:
         said = (known for line in printed for text, known in OF_ROSCPP.items() if text in line)
         return Ending(*next(said, (f"{signal_name(life.end.signal)} ended it", RUN_IT)))
     if code == 0:
         return _not_run(life, run, package) or _ran_to_the_end(printed, package)
+    # roslaunch goes on printing after it has said why.
     exceptions = [line for line in printed if line.startswith("RLException: ")]
     last = next(iter(exceptions or printed[::-1]), "")
     words = f"; its last output: {shown(last)}" if last else ""
+    # Remappings are ROS's, and no arguments of the program.
     given = [one for one in life.start.argv[1:] if ":=" not in one]
     explained = explain_arguments(last, given)
     words, hint = (f"{words}; {explained[0]}", explained[1]) if explained else (words, RUN_IT)

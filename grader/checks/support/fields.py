@@ -193,10 +193,12 @@ class Difference(NamedTuple):
 def differences(got: object, wanted: object, tolerance: float, path: str = "") -> Iterator[Difference]:
     """Yield each place in which `got` is not as `wanted`; fields that `wanted` leaves out do not matter."""
     if isinstance(got, float) and isinstance(wanted, str):
+        # A rubric may give NaN and infinity as text.
         wanted = NOT_FINITE.get(wanted, wanted)
     if isinstance(wanted, Mapping):
         yield from _in_fields(got, wanted, tolerance, path)
     elif isinstance(wanted, list | tuple):
+        # A list of uint8 is decoded as bytes.
         yield from _in_items(list(got) if isinstance(got, bytes) else got, wanted, tolerance, path)
     elif not _equal(got, wanted, tolerance):
         why = f"{value_text(got)}, not {value_text(wanted)}{_kinds(got, wanted)}"
@@ -256,9 +258,11 @@ def _moved(got: Sequence[object], wanted: Sequence[object]) -> str:
 
 def _equal(got: object, wanted: object, tolerance: float) -> bool:
     if not is_number(got) or not is_number(wanted):
+        # In Python, 1 equals true.
         return type(got) is type(wanted) and got == wanted
     assert isinstance(got, int | float)  # noqa: S101 - for the type checker
     assert isinstance(wanted, int | float)  # noqa: S101 - as above
+    # By the relative tolerance of `_close`, large whole numbers could differ.
     exact = isinstance(got, int) and isinstance(wanted, int)
     return abs(got - wanted) <= tolerance if exact else _close(got, wanted, tolerance)
 

@@ -46,6 +46,7 @@ class Transform(NamedTuple):
         """Roll, pitch and yaw, as tf's `euler_from_quaternion` gives them."""
         x, y, z, w = self.turn
         roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+        # Rounding may lead a little beyond 1, of which there is no arcsine.
         pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
         yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
         return math.degrees(roll), math.degrees(pitch), math.degrees(yaw)
@@ -156,6 +157,7 @@ class Tree:
 
     def path(self, child: str, at_ns: int) -> Iterator[Sent]:
         """Yield the transforms from a frame up to the root, as they were at that time."""
+        # Frames may be sent as each other's parents, in a circle.
         seen: set[str] = set()
         while child not in seen and child in self._of:
             seen.add(child)
@@ -192,4 +194,5 @@ def unknown_frame(run: Run, output: Iterable[str]) -> str:
         for one in (value or {}).get("transforms") or ()
         for name in (one.get("child_frame_id"), one.get("header", {}).get("frame_id"))
     }
+    # What was looked up before that may have come since.
     return next((name for name in found[-1:] if name not in sent), "")

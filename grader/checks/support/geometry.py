@@ -78,6 +78,7 @@ class Command(NamedTuple):
 def moved(pose: Pose, command: Command, duration_s: float) -> Pose:
     """Return where a command leads in that time: exactly, along the arc that it describes."""
     half = command.turn * duration_s / 2
+    # Straight on, the formula of the arc would divide by 0.
     chord = duration_s * (math.sin(half) / half if abs(half) > 1e-9 else 1.0)
     cos, sin = math.cos(pose.heading + half), math.sin(pose.heading + half)
     return Pose(
@@ -105,8 +106,10 @@ def driven(commands: Sequence[Command], hold_s: float | None, end_s: float) -> l
 
 def _samples(start: Pose, command: Command, duration_s: float) -> Iterator[Pose]:
     """Close enough to each other that no arc strays unseen between two of them."""
+    # In place, one sample shows as much as many.
     turned = abs(command.turn) / SAMPLE_RAD if command.speed else 0.0
     steps = math.ceil(max(command.speed / SAMPLE_M, turned) * duration_s)
+    # A velocity of any size must not fill the memory.
     count = min(SAMPLES_MAX, max(1, steps))
     for number in range(1, count + 1):
         yield moved(start, command, duration_s * number / count)
@@ -139,6 +142,7 @@ def turned_rad(path: Sequence[Pose], last_s: float = math.inf) -> float:
     recent = [pose.heading for pose in path if pose.time_s >= path[-1].time_s - last_s]
     turned, heading = 0.0, recent[0]
     for now in recent:
+        # The short way round, as a heading jumps by a full turn.
         step = abs(math.remainder(now - heading, math.tau))
         if step > TREMOR_RAD:
             turned, heading = turned + step, now
@@ -260,6 +264,7 @@ def followed(path: Sequence[Pose], points: Sequence[Point], tolerance_m: float) 
             return Course(reached, index, largest, at)
         largest = max(largest, min(near.values()))
         on = set(near)
+        # `on` grows in the loop: one pose may pass several points that are close together.
         for leg in range(min(on), len(legs)):
             if leg in on and math.dist(pose.point, legs[leg][1]) <= tolerance_m:
                 at = index if leg + 2 > reached else at
@@ -315,6 +320,7 @@ def _pose(time_s: float, message: Any, fields: PoseFields | None) -> Pose | None
     """`x` and `y` at the top (turtlesim/Pose, geometry_msgs/Pose2D) or in `pose`s (also nav_msgs/Odometry)."""
     if fields is not None:
         return _pose_at(time_s, message, fields)
+    # In an Odometry, the pose is in another one.
     while isinstance(message, Mapping) and "pose" in message:
         message = message["pose"]
     if not isinstance(message, Mapping):
@@ -460,6 +466,7 @@ def out_along(path: Sequence[Pose], region: Region) -> list[float]:
     out: list[float] = []
     at: Point | None = None
     for pose in path:
+        # A robot that hardly moved is as far outside as before, and to look through all walls takes time.
         if at is None or math.dist(pose.point, at) > SAME_M:
             at, far_m = pose.point, region.out_m(pose.point)
         out.append(far_m if far_m > SAME_M else 0.0)
@@ -470,6 +477,7 @@ def share_inside(path: Sequence[Pose], out: Sequence[float]) -> float:
     """Return the share of the time in which it was inside."""
     lasted = [b.time_s - a.time_s for a, b in pairwise(path)]
     whole_s = sum(lasted)
+    # All at one moment: there is no time to share out, so poses are counted.
     if whole_s <= 0:
         return sum(not far for far in out) / len(out)
     return 1.0 if not any(out) else sum(s for s, far in zip(lasted, out, strict=False) if not far) / whole_s

@@ -31,6 +31,7 @@ from grader.wording import join_words, on_lines
 
 NOT_EXECUTED = (2, 126, 127)
 """Exit codes of `env` and of a shell that find no such program, or cannot read what it is given."""
+# The first of these that is found is quoted, so the vaguer ones come later.
 _ERRORS = (
     "ERROR: cannot launch", "RLException", "Invalid ", "ERROR:", "process has died", "roslaunch:",
     "Resource not found",
@@ -76,6 +77,7 @@ _REFUSALS = (
      "the file {0} that <include> names does not exist", "push {0}, or start its nodes here, with a <node> for each"),
     (r"invalid bool value for (\w+): (\S+?)\.?(?:\s|$)", '{0}="{1}" is neither true nor false',
      'write {0}="true" or {0}="false"'),
+    # Last, as the errors above may begin with these words.
     (r"Invalid roslaunch XML syntax", "it is not well-formed", "close every element"),
 )  # fmt: skip
 
@@ -227,6 +229,7 @@ def explain_by_refused_launch(_check: Check, package: PackageFacts, run: Run, ve
 
 
 def _file_meant(package: PackageFacts, name: str) -> str:
+    # `.yaml` and `.yml` are one kind of file.
     """Return the path of the only file of that kind, or of the one that is spelt alike; "" for none."""
     kinds = {PurePosixPath(name).suffix}
     kinds |= YAML if kinds <= YAML else set()
@@ -274,6 +277,7 @@ def unset_arg_fixes(file: LaunchFile, told: str, given: Iterable[str] = ()) -> I
 
 def died(run: Run, node: LaunchNode) -> int | None:
     """Return the exit code with which roslaunch saw it die before Ctrl-C; None where it did not."""
+    # After Ctrl-C, all nodes end.
     until_ns = observed_until_ns(run) or run.end_ns
     lines = _join_required(without_colours(c.line) for t, c in run.console if t <= until_ns)
     codes = [int(m[2]) for line in lines if (m := _DIED.search(line)) and _is(node, m[1])]
@@ -289,6 +293,7 @@ def finished(run: Run, node: LaunchNode) -> bool:
 
 def why_not_up(package: PackageFacts, run: Run, node: LaunchNode) -> Absence:
     """Return why a node of the launch file did not come up."""
+    # What roslaunch says of this very node goes before what it says of the whole file.
     return (
         _not_found(package, run, node)
         or why_died(package, run, node)
@@ -368,6 +373,7 @@ def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | N
     if owner is not None and any(one.is_called(str(node.type)) for one in programs(owner)):
         why = f"CMakeLists.txt makes the program {node.type}, but the build did not make it"
         return Absence(why, BUILD_FIRST_HINT, of_script=True, unbuilt=True)
+    # Without these words, it is the package that was not found.
     if "Cannot locate" not in line:
         return Absence(f"there is no package {node.pkg}", "check how pkg is spelt, and that it is installed")
     why = f"roslaunch finds no program {node.type} in the package {node.pkg}"

@@ -56,6 +56,7 @@ class _Use(NamedTuple):
     def remaps(self) -> Iterator[tuple[str, LaunchLine | None]]:
         """The new names that `<remap>`s give the topic, with their lines where they are known."""
         lines = [line for line in self.node.renaming if line.tag in RENAMES]
+        # Some remaps may come without their line: which line is whose is not known then.
         known = len(lines) == len(self.node.remaps)
         for index, (old, new) in enumerate(self.node.remaps):
             if _whole(old, self.node.namespace) == _whole(self.name, self.node.namespace):
@@ -76,6 +77,7 @@ def find_renaming(
     uses = [use for node in nodes if (use := _use_of(package, node, topic, run, in_scripts=in_scripts))]
     if len(uses) < 2 or all(use.topic() == topic for use in uses):
         return None
+    # What removes least is tried first.
     for drop_ns, drop_remaps in ((True, False), (False, True), (True, True)):
         names = {use.node.name if drop_ns else use.node.full_name for use in uses}
         right = all(use.topic(drop_ns=drop_ns, drop_remaps=drop_remaps) == topic for use in uses)

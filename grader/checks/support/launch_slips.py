@@ -282,6 +282,7 @@ def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
         elif node.full_name in seen and not node.uncertain:
             why = f"a second node is named {node.full_name}, like that on line {seen[node.full_name].line}"
             yield _slip(node, why, "give each <node> its own name: roslaunch refuses the file")
+        # Nodes behind an `if` that only roslaunch works out may exclude each other.
         if not node.uncertain:
             seen.setdefault(node.full_name, node)
 
@@ -300,6 +301,7 @@ def nodes_of_program(file: LaunchFile, program: str) -> tuple[LaunchNode, ...]:
 
 
 def _may_be(written: str | None, name: str) -> bool:
+    # A path is no name, whatever roslaunch makes of it.
     return written == name or (UNRESOLVED in (written or "") and "$(find" not in (written or ""))
 
 
@@ -389,6 +391,7 @@ def owner_of(package: PackageFacts, node: LaunchNode) -> PackageFacts | None:
 
 
 _NO_PROGRAM = re.compile(r"cannot launch node of type \[([^/\]]+)/([^\]]+)\]: Cannot locate node")
+# Where the package itself is not found, roslaunch repeats its name alone.
 _NO_PACKAGE = re.compile(r"cannot launch node of type \[([^/\]]+)/[^\]]+\]: \1$")
 
 

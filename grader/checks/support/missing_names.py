@@ -142,6 +142,7 @@ def own_message(found: Traceback, package: PackageFacts) -> tuple[str, str] | No
 
 def _imported_names(source: str) -> tuple[str, tuple[str, ...]] | None:
     """Return the module and the names of a line that imports, None of any other: `import a.b` is `b` of `a`."""
+    # A hostile line may be nested too deeply for the parser.
     with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
         for node in parsed(source).body[:1]:
             if isinstance(node, ast.ImportFrom) and node.module:
@@ -362,6 +363,7 @@ def _other_attributes(package: PackageFacts, owner: str, wrong: str, source: str
         return f"{wrong} is a field of {having[0]}", f"make it as {having[0]}(), not as {owner}()"
     if not known:
         return None
+    # Two letters are the beginning of too many names.
     alike = [name for name in known if min(len(name), len(wrong)) > 2 and _begins_alike(name, wrong)]
     near = near_names(wrong, known) or (tuple(alike) if len(alike) == 1 else ())
     if near:
@@ -382,6 +384,7 @@ def _other_field(owner: str, known: tuple[str, ...], wrong: str, source: str) ->
         return f"{owner} has only {known[0]}", _line_with(source, wrong, known[0])
     way = [
         field
+        # A field often has the name of its type in small letters: `pose`, a Pose.
         for field in known
         if any(wrong in types.get(field.capitalize(), ()) for types in noetic_messages().values())
     ]

@@ -221,6 +221,7 @@ def explain_by_unread_parameter(check: Check, _package: PackageFacts, run: Run, 
     """Return a lost mark with the parameter that the run sets and that no node asked for, whatever it did instead."""
     if not _may_rest_on_one(check, verdict):
         return verdict
+    # Why it failed says more than what it did not read.
     if (early := early_end(run)) and (early.end is None or early.end.exit_code != 0):
         return verdict
     reads = [(e.actor, absolute_name(e.topic or "")) for _, e in run.actors if e.action == "read"]
@@ -229,6 +230,7 @@ def explain_by_unread_parameter(check: Check, _package: PackageFacts, run: Run, 
     unread = [
         one
         for name, one in params_given(run).items()
+        # To read a map is to read what is in it, and a name below another one asks for a part of it.
         if not any(f"{name}/".startswith(f"{n}/") or f"{n}/".startswith(f"{name}/") for n in names)
     ]
     if not asked or not unread or (verdict.unjudged and not published_topics(run)):
@@ -354,6 +356,7 @@ def is_printed(value: object, lines: Sequence[Line]) -> bool:
     if isinstance(value, list | tuple):
         return all(is_printed(item, lines) for item in value)
     text = str(value).strip()
+    # A number stands alone: 12 is neither in 127 nor in 12.5.
     edges = (r"(?<!\w)(?<!\d\.)", r"(?!\w|\.\d)") if text[-1:].isdigit() else ("", "")
     word = re.compile(re.escape(text).join(edges))
     if any(word.search(line.text) for line in lines):
@@ -407,6 +410,7 @@ def explain_yaml(lines: Sequence[str]) -> Words | None:
     """Return the cause among the lines that were printed; None where none is known."""
     text = "\n".join(lines)
     places = _PLACE.findall(text)
+    # YAML's parser names first where it began to read something, and last where the fault is.
     line = int(places[-1][0]) if places else None
     if "found character '\\t'" in text and _is_within(lines):
         return Words(_IN_LINE.format(line=line), "replace the tab with a space", line)

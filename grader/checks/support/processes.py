@@ -53,6 +53,7 @@ class Life(NamedTuple):
     @property
     def ended_early(self) -> bool:
         """It ended before the grader pressed Ctrl-C: by itself, or because it broke a limit."""
+        # Killed without a Ctrl-C before it, it broke a limit.
         return self.end is not None and self.interrupt_ns is None and self.end.stopped_by in {None, "KILL"}
 
     @property
@@ -151,6 +152,7 @@ def life(run: Run, process: str) -> Life | None:
 
 def life_of(run: Run, node: str) -> Life | None:
     """Return the process that a node belongs to; None where it cannot be told, or is not the student's."""
+    # From the end, as another process may have taken the name.
     return life(run, next((e.processes[node] for _, e in reversed(run.graph) if node in e.processes), ""))
 
 
@@ -266,6 +268,7 @@ def is_flood(run: Run) -> bool:
     """Return whether so many messages came that Ctrl-C most likely comes in the middle of one."""
     return any(
         len(c.times_ns) > FLOOD_HZ
+        # Multiplied, not divided: all may have come at one moment.
         and (len(c.times_ns) - 1) * 1e9 >= FLOOD_HZ * (c.times_ns[-1] - c.times_ns[0])
         for c in run.student_channels()
     )

@@ -257,7 +257,9 @@ def _no_type(message: str, source: str, topic: ast.expr, type_: ast.expr) -> Mea
 
 def rewritten(source: str, *changes: tuple[ast.expr, ast.expr | str], span_to: ast.expr | None = None) -> str:
     """Return the advice to write the line with other text in these places of it, the first one up to `span_to`."""
+    # `col_offset` counts the bytes of UTF-8.
     line = source.encode()
+    # From behind, so that the places of the others stay true.
     for old, new in sorted(changes, key=lambda change: change[0].col_offset, reverse=True):
         text = new if isinstance(new, str) else ast.get_source_segment(source, new) or ""
         line = line[: old.col_offset] + text.encode() + line[(span_to or old).end_col_offset :]

@@ -276,6 +276,7 @@ def lines_that_call(lines: Sequence[SourceLine], service: str) -> list[SourceLin
     own = _names_given(lines, r"ServiceProxy|serviceClient|SimpleActionClient", service)
     if not own:
         return []
+    # `def` in front of the name defines a function, and calls nothing.
     calls = re.compile(rf"(?<!def )\b(?:{'|'.join(own)})(?:(?:\.|->)(?:call|send_?[gG]oal)\w*)?\s*\(")
     return [line for line in lines if calls.search(line.text)]
 
@@ -322,6 +323,7 @@ def lines_that_transform(lines: Sequence[SourceLine]) -> list[SourceLine]:
 
 def lines_that_set(lines: Sequence[SourceLine], field: str) -> list[SourceLine]:
     """Return the lines that give a field of a message its value: `linear.x` of `msg.linear.x = 1`."""
+    # Blanks may stand around the dots, and `==` compares.
     path = re.escape(re.sub(r"\[[^]]*\]", "", field)).replace(r"\.", r"\s*\.\s*")
     sets = re.compile(rf"[.>]\s*{path}\s*(?:\[[^]]*\]\s*)?[-+*/]?=(?!=)|[(,]\s*{path}\s*=(?!=)")
     return [line for line in lines if sets.search(line.text)]
@@ -348,6 +350,7 @@ def commented_calls(
 
 def commented_call(lines: Sequence[str], name: str) -> tuple[int, int] | None:
     """Return the first and the last line (from 0) of a call that is commented out; `name(…)` in a sentence is none."""
+    # `find_package(Boost …)` is an example in catkin's template, as is what ends in `...)`.
     arguments = r"\s*catkin\b" if name == "find_package" else r"(?!.*\.\.\.\s*\))"
     pattern = re.compile(rf"\s*#[#\s]*{name}\s*\({arguments}")
     first = next((i for i, text in enumerate(lines) if pattern.match(text[:LINE_CHARS_MAX])), None)

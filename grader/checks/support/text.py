@@ -29,6 +29,7 @@ VALUE = "{value}"
 PLACE = "{number}"
 PLACES = frozenset({SECONDS, VALUE, PLACE})
 """What stands for a time, a message or a number in the texts that rubrics ask for."""
+# `\d` would take the digits of other scripts, too.
 NUMBER = r"[-+]?[0-9]+(?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?"
 
 
@@ -54,6 +55,7 @@ def near_names(wanted: str, names: Iterable[str]) -> tuple[str, ...]:
 
 def _is_near(wanted: str, name: str) -> bool:
     last_wanted, last_name = (n.rstrip("/").rpartition("/")[2] for n in (wanted, name))
+    # The same words in another order: `numeric_talker` and `talker_numeric`.
     same_words = sorted(_words(last_wanted)) == sorted(_words(last_name)) != []
     squeezed = _joined_words(last_wanted), _joined_words(last_name)
     same = same_words or squeezed[0] == squeezed[1]
@@ -64,6 +66,7 @@ def _is_near(wanted: str, name: str) -> bool:
 def _is_similar(first: str, second: str) -> bool:
     """The quick ratios are never less than the ratio."""
     matcher = _matcher(first, second)
+    # The quickest first: most names are told apart by it.
     return all(
         ratio() >= SIMILARITY for ratio in (matcher.real_quick_ratio, matcher.quick_ratio, matcher.ratio)
     )
@@ -137,6 +140,7 @@ def in_words(template: str) -> str:
 
 Language = Literal["python", "cpp"]
 
+# Letters of Unicode's private use, which stand in no other text.
 _PAIR = re.compile("\ue000([^\ue000-\ue002]*)\ue001([^\ue000-\ue002]*)\ue002")
 
 
@@ -258,6 +262,7 @@ SAID_VALUE, SAID_DATA = "{}", "{data}"
 _GAP = re.compile(r"\{(?:data)?\}")
 _STRING = re.compile(r'"((?:[^"\\]|\\.)*)"')
 _PLACED = re.compile(r"%[-+ #0-9.]*(?:l|ll|h)?[a-zA-Z]")
+# `cout <<` prints, while any other `name <<` fills a text.
 _CPP_PUBLISHES = re.compile(r"\s*(?!(?:std::)?c(?:out|err)\b)\w+\s*<<|.*\.data\s*=[^=]")
 _CPP_PRINTS = re.compile(
     r"\s*(?:ROS_(?:INFO|WARN|ERROR|DEBUG)\w*\s*\(|printf\s*\(|(?:std::)?c(?:out|err)\s*<<)"
@@ -273,6 +278,7 @@ def could_say(said: str, wanted: str) -> bool:
     *inner, last = inner
     if not text.startswith(first) or not text.endswith(last):
         return False
+    # First and last part stand at the ends, so the others have to fit between them.
     at, end = len(first), len(text) - len(last)
     for part in inner:
         at = text.find(part, at, end)
@@ -344,6 +350,7 @@ def _usage_hint(given: Sequence[str]) -> str:
 
 
 def _parser_hint(last: str, given: Sequence[str]) -> str:
+    # roslaunch and rosrun pass `__name:=…` and remappings behind a program's own arguments.
     if ":=" in last:
         return "write `parse_args(rospy.myargv()[1:])`: the last arguments are for ROS"
     if not given:

@@ -76,6 +76,7 @@ def nodes_on(run: Run, topic: str, end: End, fits: Callable[[str], bool] | None 
 def topics_with(run: Run, end: End, fits: Callable[[str], bool] | None = None) -> tuple[str, ...]:
     """Return the topics with such a node at this end; `/rosout` is left out."""
     topics = dict.fromkeys(topic for _, event in run.graph for topic in getattr(event, end))
+    # Every node publishes on `/rosout`.
     return tuple(topic for topic in topics if topic != "/rosout" and nodes_on(run, topic, end, fits))
 
 
@@ -99,6 +100,7 @@ def published_topics(run: Run) -> dict[str, str]:
     for _, event in run.graph:
         for topic, nodes in event.publishers.items():
             if any(run.is_student_node(n) for n in nodes):
+                # The recorded type goes first: the master may not know one yet.
                 found.setdefault(topic, plain_type(event.topic_types.get(topic, "")))
     return {topic: kind for topic, kind in found.items() if topic not in SYSTEM_TOPICS}
 
@@ -182,6 +184,7 @@ def _namespaced_node(package: PackageFacts, run: Run, topic: str) -> LaunchNode 
     if not lives(run) or any(run_scripts(run)):
         return None
     nodes = [n for f in package.launch_files for n in f.brings if n.remaps and topic.startswith(n.namespace)]
+    # Of namespaces in one another, the innermost is the node's.
     return max(nodes, key=lambda n: len(n.namespace), default=None)
 
 
@@ -202,6 +205,7 @@ def _not_advertised(
         hint = f"send it with a `tf2_ros.{'Static' * (topic != TF_TOPICS[0])}TransformBroadcaster()`"
     if slip := call_in_comment(package, run, "Publisher"):
         sent = call_in_comment(package, run, "publish")
+        # Both have to come back: a publisher alone sends nothing.
         if sent and sent.file == slip.file and sent.fix == f"remove the `#` from line {sent.line}":
             slip = slip.model_copy(update={"fix": f"{slip.fix} and from line {sent.line}"})
         return _commented_out(what, slip, of_node).about(measured=measured)
@@ -211,6 +215,7 @@ def _not_advertised(
         hint = f"write {topic} on the one of {copied} that is for it"
         message = f"{what}; the node publishes on {join_words(published)}, on {copied}"
         return of_node(message, measured=measured, hint=hint)
+    # A topic of the right type is likelier to be the one that is meant.
     meant = [name for name, type_ in published.items() if kind and type_ == plain_type(kind)] or list(
         published
     )
@@ -239,6 +244,7 @@ def _judge_advertised(
         return verdict.model_copy(update={"cause": deaf.message})
     if slip := call_in_comment(package, run, "publish"):
         return _commented_out(message, slip, of_node)
+    # A node that hears something may have good reason to publish on a condition only.
     kinds: tuple[SlipKind, ...] = ("never-published", *(() if _heard_topics(run) else ("published-in-part",)))
     unused = [s for s in run_slips(package, run, *kinds) if is_written_as(s.name, topic)]
     if unused:
@@ -310,6 +316,7 @@ def refused_type(run: Run, topic: str) -> Verdict | None:
     asked = next((e for _, e in run.actors if e.action == "note" and e.topic == topic and e.type), None)
     if asked is None:
         return None
+    # The same name was refused, so it is the fields that differ.
     other = f"another definition of {asked.type}" if asked.type == asked.value else asked.type
     message = f"{asked.actor} subscribes to {topic} with {other}, so nothing arrives"
     wanted = f"{asked.value}, the type" if isinstance(asked.value, str) else "the type"
@@ -332,10 +339,12 @@ def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
     connected = {
         one.topic for _, e in run.graph for one in e.connections if run.is_student_node(one.subscriber)
     }
+    # Subscribed and never connected: their types may differ.
     heard = [topic for topic in topics if topic not in missed and topic not in connected]
     if refused := next(filter(None, (refused_type(run, topic) for topic in heard)), None):
         return refused
     near = next(((topic, found) for topic in missed if (found := near_names(topic, others))), None)
+    # A node need not hear every topic: one that is missed counts if all are, or if a name is nearly the same.
     if not missed or not run.student_nodes() or (near is None and len(missed) < len(topics)):
         return None
     topic, found = near or (missed[0], offered.get(missed[0], others))
@@ -443,6 +452,7 @@ def explain_by_waiting_callback(check: Check, package: PackageFacts, run: Run, v
     of_callbacks = check.of_callbacks or check.name in OF_RESULTS
     files = _files_that_run(package, run) if of_callbacks and not verdict.cause else ()
     slip = next((s for s in package.slips if s.kind == "callback-waits" and s.file in files), None)
+    # What should come before any callback does not wait for one.
     if slip is None or verdict.callbacks == "before":
         return verdict
     if slip.is_endless and verdict.dropped and verdict.status is Status.INCONCLUSIVE:
@@ -497,6 +507,7 @@ def misfit(run: Run, topic: str = "") -> Verdict | None:
     if note is None:
         return None
     message = f"nothing could be sent on {note.topic}: {note.detail}"
+    # A mistake of the rubric is not the student's.
     if note.detail.startswith(UNSENDABLE):
         return inconclusive(message, hint=f"{NOTHING_TO_DO}tell your instructor")
     return failed(message, hint="use the handout's names and types in the .msg file, and build again")
@@ -504,6 +515,7 @@ def misfit(run: Run, topic: str = "") -> Verdict | None:
 
 def _judge_refused(run: Run, topic: str) -> Verdict | None:
     refused = [e for _, e in run.recorder if e.topic == topic and e.event in {"refused", "invalid"}]
+    # Where messages came all the same, the refusal is not the reason.
     if not refused or run.student_channels(topic):
         return None
     message = f"the recorder could not listen to {topic}: {refused[0].detail or refused[0].event}"
