@@ -32,6 +32,7 @@ _TRACE_LINES_MAX = 500_000
 _TRACE_BYTES_MAX = 64_000_000
 _CALLS_MAX = 20_000
 _CHARS_MAX = 4_000_000
+# CMake keeps lists as text with `;` between the items; `\;` is a semicolon of an item
 _SEPARATOR = re.compile(r"(?<!\\);")
 LINES_MAX = 20_000
 FILES_BYTES_MAX = 400_000
@@ -67,7 +68,9 @@ def refine_cmake(
     calls = read_trace(trace, names, root)
     if facts.source == "trace" or not calls:
         return facts
+    # What stands below a fatal error was never traced
     reached = max(call.line for call in calls if call.file == CMAKE)
+    # `return()` ends the file early on purpose: nothing below it is called
     returned = any(call.name == "return" for call in calls)
     stopped = not returned and facts.last_line is not None and reached < facts.last_line
     rest = tuple(c for c in facts.calls if stopped and c.file == CMAKE and c.line > reached)
@@ -95,6 +98,7 @@ def read_trace(trace: Path, names: tuple[str, ...], root: str | None = None) -> 
     root = posixpath.normpath(root) if root else _guessed_root(calls, names)
     if root is None:
         return ()
+    # With the slash, as `/ws/src/lab` is no folder of `/ws/src/lab_two`
     prefix = root.rstrip("/") + "/"
     inside = tuple(
         call.model_copy(update={"file": call.file.removeprefix(prefix)})
@@ -117,10 +121,12 @@ def _calls(trace: Path) -> list[CMakeCall]:
     letters = 0
     for entry in _entries(trace):
         version = entry.get("version")
+        # Another major version may name its keys otherwise
         if isinstance(version, dict) and version.get("major") != 1:
             return []
         call = _call(entry)
         if call is not None:
+            # An argument takes memory even if it is empty
             letters += sum(map(len, call.args)) + 100 * len(call.args)
             if letters > _CHARS_MAX:
                 break
@@ -193,6 +199,7 @@ def written_calls(trace: bytes, folder: Path, root: str) -> Written:
     for line in lines[:LINES_MAX]:
         call = _decode(line)
         path = posixpath.normpath(call["file"]) if _is_call(call) else ""
+        # Only the package's own files are at hand here; catkin's are left as they are
         if not path.startswith(prefix) or _fits(call, files.commands(path.removeprefix(prefix))):
             kept.append(line)
     return Written(b"\n".join(kept), too_many or files.too_much)
@@ -219,6 +226,7 @@ class _Files:
             return {} if data.kind == "Missing" else None
         if len(data) > _SOURCE_BYTES_MAX:
             return None
+        # A limit for each file is not enough: a package may have any number of them
         self._left_bytes -= len(data)
         if self._left_bytes < 0:
             self.too_much = f"CMake's files are more than {FILES_BYTES_MAX // 1000} kB together"
@@ -236,6 +244,7 @@ def _fits(call: dict[str, Any], found: _Commands | None) -> bool:
     if found is None or (line, _BY_NAME) in found:
         return True
     written = found.get((line, name), ())
+    # CMake expands the words of conditions and of variables: only that the command is there can be compared
     if name in _FLOW or None in written:
         return bool(written)
     return split_lists([a for a in call["args"] if isinstance(a, str)]) in written
@@ -244,6 +253,7 @@ def _fits(call: dict[str, Any], found: _Commands | None) -> bool:
 def _words(command: nodes.Command) -> tuple[str, ...] | None:
     """Return the arguments as they are written; None where something in them is expanded."""
     words = [token for token in command.args if token.kind != "COMMENT"]
+    # Quotes, `$`, `@` and escapes: CMake shows what became of them, and not how they were written
     if any(t.kind != "RAW" or _EXPANDED & set(t.value) for t in words):
         return None
     return split_lists([t.value for t in words])

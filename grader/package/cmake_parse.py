@@ -65,6 +65,7 @@ class _Variables(dict[str, str]):
         self.prefix = prefix
 
     def get(self, key: str, _default: object = None) -> str:
+        # CMake may know it from a module that is not read here
         return super().get(key, f"{self.prefix}{{{key}}}")
 
 
@@ -76,6 +77,7 @@ def parse_cmake(folder: Path, name: str) -> CMakeFacts | None:
     data = read_markup(folder, CMAKE, FILE_BYTES_MAX)
     if isinstance(data, Fault):
         is_link = (folder / CMAKE).is_symlink()
+        # A link to nothing is a fault of the file, a package without the file has none
         if data.kind == "Missing" and not is_link:
             return None
         return CMakeFacts(file=CMAKE, source="parser", calls=(), fault=data)
@@ -199,6 +201,7 @@ class _Reader:
 
     def _arguments(self, tokens: list[Token], file: str) -> list[str]:
         references = sum(token.value.count("${") for token in tokens)
+        # Each reference may become the longest value there is: too much is noticed before anything is expanded
         if references * max(map(len, self.variables.values())) > _CHARS_MAX:
             return [printable(token.value[:_VALUE_CHARS_MAX]) for token in tokens]
         try:
@@ -224,6 +227,7 @@ def _escape(token: Token) -> Token:
 
 def parse_tree_of(data: bytes, file: str) -> tuple[list[nodes.AstFileNode], Fault | None]:
     """Return the top-level commands and blocks of a CMake file, up to the fault where there is one. Never raises."""
+    # Windows PowerShell writes such files when output is sent to one by `>`
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return [], _fault(file, 1, "is UTF-16", f"`{file}` is saved as UTF-16", fix="save it as UTF-8")
     text = _readable(data)
@@ -257,6 +261,7 @@ def commands_of(data: bytes) -> tuple[nodes.Command, ...] | None:
 def _readable(data: bytes) -> str | None:
     """Return the text as the library takes it; None where that would take it too long."""
     text = data.decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\0", " ")
+    # The library looks for the end of each `[[` through the rest of the file
     if len(_OPENERS.findall(text)) * len(text) > _WORK_MAX:
         return None
     return _COMMENTS.sub(lambda found: found["keep"] or "# ", text)
@@ -348,6 +353,7 @@ def join_half_comment(text: str) -> HalfComment | None:
     """Return the call of which a part is in comments, where the text is right without the `#` of these."""
     lines = text.split("\n")
     found = (half for at in range(len(lines)) if (half := _half_comment(lines, at)) is not None)
+    # Each try reads the whole file
     for name, first, end in islice(found, _HALVES_MAX):
         plain = [re.sub(r"#+ ?", "", line, count=1) for line in lines[first:end]]
         changed = "\n".join([*lines[:first], *plain, *lines[end:]])
@@ -369,6 +375,7 @@ def _half_comment(lines: list[str], at: int) -> tuple[str, int, int] | None:
         return None
     numbers = range(at, at + closing + 2)
     commented = [number for number in numbers if lines[number].lstrip().startswith("#")]
+    # Comments in the middle of a call are no fault: both of its ends are there, or neither is
     is_half = (numbers[0] in commented) != (numbers[-1] in commented)
     return (begun[1], commented[0], commented[-1] + 1) if is_half else None
 
@@ -411,6 +418,7 @@ def _balance(commands: list[nodes.Command], file: str) -> tuple[list[nodes.Comma
         if len(open_blocks) > _NESTING_MAX:
             fault = _fault(file, command.line, "nested too deep", "blocks are nested too deep")
             return commands[:whole], fault
+        # Only here is no block open, so that the text up to here can be read on its own
         whole = whole if open_blocks else count
     if open_blocks:
         name = open_blocks[0].identifier.lower()

@@ -24,10 +24,12 @@ MESSAGE_CHARS = 300
 
 
 def main(folder):
+    # The arena stops programs by SIGINT: a KeyboardInterrupt would leave a traceback in the log
     signal.signal(signal.SIGINT, lambda *_: os._exit(0))
     child = test = None
     for line in sys.stdin:
         request = json.loads(line)
+        # A new process for each test: what one test changes in a module must not reach the next
         if child is None or child.ended or request["test"] != test:
             if child is not None:
                 child.end()
@@ -42,6 +44,7 @@ class Child:
         requests, self._requests = os.pipe()
         self._answers, answers = os.pipe()
         self.ended = False
+        # A process and not a thread: only a process can be stopped in the middle of an endless loop
         self._pid = os.fork()
         if self._pid == 0:
             os.close(self._requests)
@@ -55,6 +58,7 @@ class Child:
         data, until_s = b"", time.monotonic() + LIMIT_S
         with contextlib.suppress(BrokenPipeError):  # the answers end, too
             os.write(self._requests, line.encode())
+        # The child writes as it likes: part of a line, nothing, or too much
         while not data.endswith(b"\n"):
             left_s = until_s - time.monotonic()
             if left_s <= 0 or not select.select([self._answers], [], [], left_s)[0]:
@@ -83,12 +87,15 @@ class Child:
 def serve(folder, requests, answers):
     """Answer requests until there are none. What the package prints goes to stderr; its stdin is empty."""
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    # Only answers may be on stdout, or a `print` of the package's could pass for one
     os.dup2(2, 1)
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    # Otherwise a script that reads its arguments would find the folder in them
     sys.argv = [""]
     modules = {}
     with os.fdopen(requests) as lines:
         for line in lines:
+            # `json.dumps` writes ASCII only and no line ends, so that an answer is one line
             data = json.dumps(answer(folder, json.loads(line), modules)).encode()
             os.write(answers, data + b"\n")
     os._exit(0)
@@ -127,9 +134,11 @@ def find(folder, name):
 
 def load(path):
     """Import the file, which finds what lies beside it. Its name is not `__main__`."""
+    # As Python does for a script that it runs
     sys.path.insert(0, str(path.parent))
     spec = importlib.util.spec_from_file_location(path.stem, str(path))
     module = importlib.util.module_from_spec(spec)
+    # Before it is executed, as `import` does, for modules that import each other
     sys.modules[path.stem] = module
     spec.loader.exec_module(module)
     return module
@@ -138,9 +147,12 @@ def load(path):
 def describe(error, folder):
     """Return what was raised, and the last line of the package's own that took part."""
     frames = [(f.filename, f.lineno, f.line or "") for f in traceback.extract_tb(error.__traceback__)]
+    # A file that does not compile was never run, so that no frame names it
     if isinstance(error, SyntaxError) and error.filename:
         frames.append((error.filename, error.lineno, (error.text or "").strip()))
+    # Students can change only their own lines, not those of a library that raised it
     own = [frame for frame in frames if frame[0].startswith(folder + os.sep)]
+    # A check that expects ValueError accepts a class of their own that is derived from it
     builtin = next(base.__name__ for base in type(error).__mro__ if base.__module__ == "builtins")
     try:
         message = str(error).strip().split("\n")[0]
@@ -165,6 +177,7 @@ def encode(value):
         return {"tuple": [encode(item) for item in value]}
     if isinstance(value, (set, frozenset)):
         return {"set": [encode(item) for item in value]}
+    # Known by what genpy gives each message, as nothing of ROS is imported here
     if hasattr(value, "__slots__") and hasattr(value, "_md5sum"):  # a message
         value = {name: getattr(value, name) for name in value.__slots__}
     if isinstance(value, dict):

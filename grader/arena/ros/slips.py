@@ -52,6 +52,7 @@ def slips(tree):
     )  # fmt: skip
     found = [one for find in finders for one in find(tree)]
     # of two that say why a name is not there, the first is about the class that it belongs to
+    # reversed: of several with the same key the last one stays in a dict, and the first is wanted
     first = {(one["line"], one["name"]): one for one in reversed(found) if one["kind"] == "undefined"}
     found = [one for one in found if one["kind"] != "undefined" or first[one["line"], one["name"]] is one]
     return sorted(found, key=lambda one: one["line"])[:SLIPS_LIMIT]
@@ -82,6 +83,7 @@ def uncalled_and_asked(tree):
 def without_node(tree):
     """A script with topics, or one that does more than define names, that makes no node."""
     calls = {called_name(n) for n in all_of(tree, ast.Call)}
+    # A file that only defines names is there to be imported, and needs no node of its own
     if "init_node" not in calls and (calls & {"Publisher", "Subscriber"} or does_something(tree)):
         fix = "make it a node: `rospy.init_node(…)`, then its topics, then `rospy.spin()` or a loop"
         yield slip(1, "no-init", "nothing in the script calls `rospy.init_node(…)`", fix)
@@ -117,7 +119,9 @@ def never_run(tree):
             plain.discard(one.name)
             named |= {f.name for f in one.body if isinstance(f, ast.FunctionDef)}
     for node in walk(tree):
+        # A decorator may hand the function on to what calls it
         if isinstance(node, ast.FunctionDef) and node.name not in named and not node.decorator_list:
+            # Python itself calls `__init__` and its like
             if calls_in(node, *WORKS) and not node.name.startswith("__"):
                 message, owner = "nothing calls `%s()`" % node.name, of_class.get(id(node), "")
                 owner = owner and (made_of.get(owner) or owner + "()") + "."
@@ -135,6 +139,7 @@ def handed_over(function, tree, owner):
     taken = [one.arg for one in function.args.args if one.arg != "self"]
     if len(taken) > 1 and not function.args.defaults:
         return "call `%s%s(…)` with values for %s" % (owner, function.name, ", ".join(taken))
+    # A callback is given one message, and a function that makes the node is the program's own beginning
     if len(taken) != 1 or function.args.defaults or calls_in(function, "init_node"):
         return ""
     name = (owner and "self.") + function.name
@@ -190,6 +195,7 @@ def unfilled_answer(function):
     and always returns; None where there is none."""
     own = list(walk_own(function))
     made = [n for n in own if isinstance(n, ast.Assign) and called_name(n.value).endswith("Response")]
+    # Values that are given in the call need no field to be set below it
     made = [n for n in made if not n.value.args + n.value.keywords and isinstance(n.targets[0], ast.Name)]
     returned = {dotted(n.value) for n in own if isinstance(n, ast.Return) and n.value is not None}
     variable = dotted(made[0].targets[0]) if len(made) == 1 else ""
@@ -197,6 +203,7 @@ def unfilled_answer(function):
     uses = [n for n in ast.walk(function) if isinstance(n, ast.Name) and n.id == variable]
     is_alone = returned == {variable} and len(uses) == 1 + sum(isinstance(n, ast.Return) for n in own)
     name = called_name(made[0].value) if made else ""
+    # std_srvs/Empty has no field that could be set
     return (variable, name, made[0].lineno) if is_alone and variable and name != "EmptyResponse" else None
 
 
@@ -211,6 +218,7 @@ def finished_goals(tree):
     """Where an `if` of an action's callback ends the goal last of all, and the callback goes on below it."""
     parents = parents_of(tree)
     for node in all_of(tree, ast.If):
+        # With an `else`, what stands below is meant for both cases
         if node.orelse or not is_call_alone(node.body[-1]):
             continue
         call, around = node.body[-1].value, parents.get(node)
@@ -232,6 +240,7 @@ def is_other_case(node, before):
     """Whether an `if` asks for the opposite of one above it, or whether the goal is still active."""
     if not isinstance(node, ast.If):
         return False
+    # `if not done:` below `if done:` does not run in the same turn
     opposite = isinstance(node.test, ast.UnaryOp) != isinstance(before.test, ast.UnaryOp)
     asked = [ast.dump(getattr(one.test, "operand", one.test)) for one in (node, before) if opposite]
     return bool(calls_in(node.test, "is_active")) or (opposite and asked[0] == asked[1])
@@ -241,6 +250,7 @@ def is_last_turn(loop, node, call):
     """Whether an `if` that ends a goal also ends the loop around it by what it sets, or the loop has one goal after the
     other."""
     if isinstance(loop, ast.For):
+        # Each turn ends another goal, so that none is ended twice
         return dotted(loop.target) == dotted(call.func.value)
     stored = {dotted(target) for n in node.body if isinstance(n, ast.Assign) for target in n.targets}
     takes = any(calls_in(one, "accept_new_goal") for one in loop.body[:BELOW_LIMIT])
