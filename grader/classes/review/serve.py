@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import logging
 import os
 import secrets
 import socket
@@ -24,6 +25,8 @@ from grader.files import temporary_folder
 
 HOST = "127.0.0.1"
 THREADS = 6
+# A browser asks for a page's parts at once; that one waits for a moment is nothing to tell an instructor.
+logging.getLogger("waitress.queue").setLevel(logging.ERROR)
 
 
 def serve(
@@ -37,7 +40,7 @@ def serve(
     """Serve `review` until interrupted; `opened` is given the address with its token, and `ending` how many reports are
     still to be written at the end. Port 0 is any that is free.
 
-    Gives whether all that follows a decision is written. Raises UsageError where the port cannot be had.
+    Return whether all that follows a decision is written. Raises UsageError where the port cannot be had.
     """
     with _bound(port) as listening:
         token = secrets.token_urlsafe(TOKEN_BYTES)
