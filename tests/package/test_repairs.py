@@ -290,6 +290,24 @@ def test_a_program_waits_for_no_header_of_a_package_that_is_not_there(tmp_path: 
     assert not any("headers" in one.message for one in find_repairs(folder, facts_of(folder, "lab"), WANTED))
 
 
+@pytest.mark.parametrize(
+    ("text", "changed"),
+    [
+        ("start = time.time()\nwhile time.time() < start + 1:\n", "rospy.get_time() < start"),
+        ("from time import sleep\nsleep(1)\n", "from rospy import sleep"),
+        ("time.sleep(0.1)  # a while\n", "rospy.sleep(0.1)"),
+        ("start = self.time.time()\n", ""),
+        ("start = rospy.get_time()\n", ""),
+        ("# time.sleep(1)\n", ""),
+    ],
+)
+def test_the_clock_of_ros_takes_the_place_of_the_computers(tmp_path: Path, text: str, changed: str) -> None:
+    (tmp_path / "drive.py").write_text(f"import rospy\n{text}")
+    found = ros_clock(tmp_path, "drive.py")
+    assert (found is None) == (not changed)
+    assert found is None or changed in found.after
+
+
 def test_what_to_write_for_the_clock_of_ros_is_right_on_each_line(tmp_path: Path) -> None:
     text = "import rospy\n# time.time()\nfrom time import sleep  # a while\nstart = time.time()\n"
     (tmp_path / "drive.py").write_text(text)

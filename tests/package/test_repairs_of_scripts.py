@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.package.repairs.python import ros_clock, turn_sign
+from grader.package.repairs.python import turn_sign
 from tests.package.repairing import (
     CMAKELISTS,
     LAUNCHED,
@@ -585,21 +585,3 @@ def test_the_only_turn_to_a_side_gets_the_other_sign(tmp_path: Path, text: str, 
     found = turn_sign(tmp_path, "drive.py", side)
     assert (found is None) == (not line)
     assert found is None or line in found.after
-
-
-@pytest.mark.parametrize(
-    ("text", "changed"),
-    [
-        ("start = time.time()\nwhile time.time() < start + 1:\n", "rospy.get_time() < start"),
-        ("from time import sleep\nsleep(1)\n", "from rospy import sleep"),
-        ("time.sleep(0.1)  # a while\n", "rospy.sleep(0.1)"),
-        ("start = self.time.time()\n", ""),
-        ("start = rospy.get_time()\n", ""),
-        ("# time.sleep(1)\n", ""),
-    ],
-)
-def test_the_clock_of_ros_takes_the_place_of_the_computers(tmp_path: Path, text: str, changed: str) -> None:
-    (tmp_path / "drive.py").write_text(f"import rospy\n{text}")
-    found = ros_clock(tmp_path, "drive.py")
-    assert (found is None) == (not changed)
-    assert found is None or changed in found.after
