@@ -275,7 +275,7 @@ def _never(package: PackageFacts, run: Run, params: CallsParams) -> Verdict:
 
 
 def _waits_for_another(run: Run, asked: Sequence[ActorEvent], what: str) -> Verdict | None:
-    """The last service for which a node asks, again and again, is another one, and nothing offers it."""
+    """Return the loss where the node waits for another service, again and again, and nothing offers that."""
     offered = {name for _, event in run.graph for name in event.services if not name.endswith(LOGGERS)}
     name = (asked[-1].topic or "") if asked else ""
     again = [e for e in asked if e.detail and e.topic == name]

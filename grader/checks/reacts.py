@@ -457,15 +457,10 @@ def _silent_without_reason(
         [to_s(until_ns) - to_s(from_ns) - params.within_s for from_ns, until_ns in spans] if to_s else []
     )
     unseen = params.cause is not None and max(silent_s, default=0) <= 0
-    return (
-        (
-            _unanswered(package, run, causes, params)
-            or _never_caused(causes, run, params)
-            or _caused_too_late(params)
-        )
-        if unseen
-        else None
-    )
+    if not unseen:
+        return None
+    unanswered = _unanswered(package, run, causes, params)
+    return unanswered or _never_caused(causes, run, params) or _caused_too_late(params)
 
 
 def _unanswered(
