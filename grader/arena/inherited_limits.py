@@ -23,7 +23,7 @@ STATUS = re.compile(rb"^Uid:\s+(\d+)\s.*^Threads:\s+(\d+)$", re.MULTILINE | re.D
 ALL_UIDS = ["0", "0", "4294967295"]
 MB = 1 << 20
 TASKS = 512
-"""What one process tree may have (`sandbox.py`)."""
+"""What one process tree may have, as in `RunLimits` (`limits.py`); a test compares the two."""
 OTHER_TASKS = 256
 """All others of one grading: the grader, its arenas, and the trees beside that one. The Leeds lab has 110 at most."""
 FURTHER_TASKS = 128

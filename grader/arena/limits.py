@@ -1,6 +1,7 @@
 """How much one run of a student's code may use and leave behind: memory, processes, output, messages, files.
 
-`sandbox.py` and `control_groups.py` hold a process tree to these limits, the recorder the messages.
+`ros/process_tree.py` holds a process tree to these limits, by a control group where `control_groups.py` finds room for
+one, else `ros/processes.py` watches it and ends it; rlimits come from `sandbox.py`. The recorder limits messages.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Whether a run has seen enough, and whether anything may yet come of it: pure, from what has been seen of it so far.
 
-How long a patience is, is what rospy itself may take: `spin()` wakes twice a second, and a node registers its topics
-one after the other.
+The times follow rospy's own delays: `spin()` wakes twice a second, and a node registers its topics one after the
+other.
 """
 
 from __future__ import annotations
@@ -15,8 +15,10 @@ from grader.rubric.scenario import Until
 
 Outcome = tuple[str, str]
 HEARD_S, HEARD_LOST_S_MAX = 2.0, 6.0
+"""A value that is not printed so long after the last probe and the last line will not be; the second is the most that
+may be added because other programs kept the machine busy."""
 CONNECTED_S = 1.0
-"""So long after the last probe and the last line, a value that is not printed will not be."""
+"""Nodes that are not connected so long after both are there will not be."""
 FED = 2.0
 """A topic whose nodes are sent messages has so many times as long for its first."""
 HEARD_AT_MOST_S = 8.0

@@ -285,7 +285,7 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     hz = significant(params.rate_hz)
     about = f"{float(f'{found.mean_hz:.2g}'):,.0f}"
     made = both(f"rate = rospy.Rate({hz})", f"ros::Rate rate({hz})")
-    hint = f"call rate.sleep(), with parentheses, in every iteration; {made}"
+    hint = f"call rate.sleep(), with brackets, in every iteration; {made}"
     # There is a `sleep()` already, behind the loop or in a comment: the slip says what to do with it.
     if slips and slips[0].kind in {"sleep-outside", "commented-out"}:
         hint = slips[0].fix

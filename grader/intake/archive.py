@@ -1,7 +1,12 @@
 """An archive becomes a folder. What kind it is, its content says, not its name.
 
 A child process with limits unpacks it (`limited_child.py`): `unpack` starts it, and `unpack_here` is what runs there.
-What is written where, and how much of it, is decided by `Unpacked` and in `limits.py`.
+What is hostile in an archive is stopped here:
+
+- size: `Meter` (`limits.py`) counts what is written, `_Counted` what is read, and the child has limits of its own;
+- a zip file whose entries share their data: `_unpack_zip`;
+- names that lead out (`..`, an absolute path): `Unpacker.admit`, links that do: `Unpacker.finish`;
+- devices and other things that are no files: `_unpack_member`, `_unpack_entry`.
 """
 
 from __future__ import annotations

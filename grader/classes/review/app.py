@@ -1,4 +1,5 @@
-"""The pages of a review and what their forms do. Begin reading at `create_app`."""
+"""The pages of a review and what their forms do. Begin reading at `create_app`; the pages are Jinja templates in
+`templates/`."""
 
 from __future__ import annotations
 

@@ -3,9 +3,15 @@
 A package's folder, its facts and what the rubric names come in, `model.repair.Repair`s go out; `apply_repair` makes
 one on a copy, or on the student's own files. Nothing of the student's is executed, and no link is followed.
 
-A new kind needs its name, its share and how it is done by hand (`RepairKind`, `DEFAULT_SHARES` and `BY_HAND` in
-`model/repair.py`), a function that finds it in one of the modules here, and a call of that in `find_repairs`. One more
-line of Python for a kind that is there is a correction in `syntax_fixes.py`, or a step in `package/source_repair.py`.
+A new kind needs
+1. its name in `RepairKind` and how it is done by hand in `BY_HAND` (`model/repair.py`), and its name in `HALVING` there
+   if it costs half of the points;
+2. a function that finds it in one of the modules here, and a call of that in `find_repairs`;
+3. its name in the sets of `judging/repair_charges.py` that fit, which decide to which criterion it is charged;
+4. its name in `FIXED` of `cli/fixing.py` if `grader check --fix` may do it: never what decides what a program does.
+
+One more line of Python for a kind that is there is a correction in `syntax_fixes.py`, or a step in
+`package/source_repair.py`.
 """
 
 from __future__ import annotations
