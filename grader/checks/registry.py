@@ -68,16 +68,7 @@ ProgramName = Annotated[str, Refers("program")]
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """One check: function, record of its parameters, the facts it asks for, its docstring in parts.
-
-    `messages_only` checks ask a run for its messages alone, so they judge another tool's recording too. For such a
-    run `package` is empty where there is none. `heeds_losses` checks look for themselves at what the recorder lost.
-    What a check of `run_anyway` finds wrong with files is repaired before anything is run, so it explains no empty
-    run, unless the file is not there at all. `of_callbacks` checks judge what a node does upon what it hears: an
-    exception in a callback explains what they miss. `of_lives` checks judge how a node is called, lives and ends:
-    where it was there, its name or its end on Ctrl-C explains nothing that did not come. `source` is the file of an
-    instructor's own check.
-    """
+    """One check: its function, the record of its parameters, the facts that it asks for, its docstring in parts."""
 
     name: str
     function: Callable[..., Verdict]
@@ -86,11 +77,20 @@ class Check:
     title: str
     sections: dict[str, str]
     messages_only: bool = False
+    """It asks a run for its messages alone, so it judges another tool's recording too. For such a run, `package` is
+    empty where there is none."""
     heeds_losses: bool = False
+    """It considers for itself what the recorder lost."""
     run_anyway: bool = False
+    """What it finds wrong with files is repaired before anything is run, so it explains no empty run, unless the file
+    is not there at all."""
     of_callbacks: bool = False
+    """It judges what a node does upon what it hears: an exception in a callback explains what it misses."""
     of_lives: bool = False
+    """It judges how a node is called, lives and ends: where the node was there, its name or its end on Ctrl-C explains
+    nothing that did not come."""
     source: str = ""
+    """The file of an instructor's own check."""
 
     @property
     def needs_run(self) -> bool:

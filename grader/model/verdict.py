@@ -140,49 +140,54 @@ Span = tuple[int, int]
 
 
 class Verdict(Record):
-    """One check's judgement.
-
-    `score` is the share of the points, 0 to 1. `unjudged` marks a verdict that rests on the absence of evidence: the
-    judge turns it, even a pass, into `blocked` where a required criterion explains the absence; `unbuilt`: what is
-    absent is made by the build alone; `silent`: a process was there and alive, and only something that is absent
-    explains it. `timing` marks a loss that one run's timing could have made: it counts only if it is seen twice.
-    `of_machine`: it is open until the machine has what it lacks, and grading again before changes nothing. `cause` is
-    what a process ended of, in words that are the same in every verdict that rests on it. `blocked_by` is the criterion
-    that explains the absence, `right` what earned a part of the points, `mistake` the kind of what was done wrong,
-    `meant` the file that is told to become the one that is missing. `said` is what a node printed, logged or published
-    in place of what was asked, `sought` names: the lines of both are cited. `wrong`: a value is another one, or NaN is
-    in its place, or a service's callback returns nothing. `callbacks`: a callback came too `late` to what was sent, or
-    never; or it is about what came `before` any callback could keep the node waiting. `excused`: what would be lost if
-    the machine had not been late; `own_load`: it was late by the run's own doing. `dropped`: so much came on its topics
-    that the recorder dropped some. `due`: the stretches of time (ns) in which what is missing had to come: an exception
-    at another time does not explain that.
-    """
+    """One check's judgement."""
 
     status: Status
     score: float
+    """The share of the points, 0 to 1."""
     message: str
     expected: str = ""
     measured: str = ""
     hint: str = ""
     citations: Citations = ()
     unjudged: bool = False
+    """It rests on the absence of evidence: the judge turns it, even a pass, into `blocked` where a required criterion
+    explains the absence."""
     unbuilt: bool = False
+    """What is absent is made by the build alone."""
     silent: bool = False
+    """A process was there and alive, and only something that is absent explains it."""
     timing: bool = False
+    """A loss that one run's timing could have made: it counts only if it is seen twice."""
     of_machine: bool = False
+    """It is open until the machine has what it lacks, and grading again before changes nothing."""
     cause: str = ""
+    """What a process ended of, in words that are the same in every verdict that rests on it."""
     blocked_by: str = ""
+    """The criterion that explains the absence."""
     right: str = ""
+    """What earned a part of the points."""
     mistake: Mistake | None = None
+    """The kind of what was done wrong."""
     meant: str = ""
+    """The file that is told to become the one that is missing."""
     said: str = ""
+    """What a node printed, logged or published in place of what was asked: its lines in the sources are cited."""
     sought: tuple[Sought, ...] = ()
+    """Names whose lines are cited."""
     wrong: Literal["", "value", "nan", "nothing"] = ""
+    """A value is another one, or NaN is in its place, or a service's callback returns nothing."""
     callbacks: Literal["", "late", "before"] = ""
+    """A callback came too `late` to what was sent, or never; or it is about what came `before` any callback could keep
+    the node waiting."""
     excused: str = ""
+    """What would be lost if the machine had not been late."""
     own_load: bool = False
+    """The machine was late by the run's own doing."""
     dropped: bool = False
+    """So much came on its topics that the recorder dropped some."""
     due: tuple[Span, ...] = ()
+    """When what is missing had to come: an exception at another time does not explain that."""
 
     def about(
         self,
