@@ -20,7 +20,7 @@ from grader.wording import join_words, number
 BYTES_MAX = 60_000
 """A comment on GitHub has 65,536 characters, a step's summary 1 MiB."""
 GRAPHS_MAX = 3
-SHORT_CHARS = 300
+SHORT_CHARS = 500
 T = TypeVar("T")
 
 
