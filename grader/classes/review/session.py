@@ -19,7 +19,7 @@ from pathlib import Path
 from grader.classes.batch.folder import BatchFolder, open_batch, write_run
 from grader.classes.batch.renew_results import Settler, rewrite, rewrite_all
 from grader.classes.batch.run import GRADEBOOK, hold_folder, ids_of, write_books
-from grader.classes.feedback.publish import read_published
+from grader.classes.feedback.publish import read_published, refuse_other_rubric
 from grader.classes.overrides import COMMENTS_FILE as BANK
 from grader.classes.overrides import (
     FILE,
@@ -66,13 +66,8 @@ def open_session(path: Path, pace: Pace | None = None) -> ReviewSession:
     changed, EvidenceError where a newer grader wrote results in it."""
     batch = open_batch(path)
     batch.refuse_newer()
-    run = batch.run
-    rubric = load_rubric(run.rubric_source)
-    if rubric.digest != run.rubric.digest:
-        raise UsageError(
-            f"{run.rubric_source}: the rubric has changed since the class was graded",
-            hint=f"grader regrade {path} judges it by today's rubric; then review it",
-        )
+    rubric = load_rubric(batch.run.rubric_source)
+    refuse_other_rubric(batch, rubric, "review it")
     return ReviewSession(path, rubric, pace or Pace())
 
 
