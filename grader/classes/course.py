@@ -409,18 +409,17 @@ def _best_so_far(attempts: Sequence[Attempt], last: Attempt, rubric: Rubric) -> 
     until = [one for one in attempts if one.number <= last.number]
     judged = [(one.number, {c.id: c for c in unsettled(one.result, rubric).criteria}) for one in until]
     automatic = unsettled(last.result, rubric)
-    criteria = tuple(_best(c, last.number, judged) for c in automatic.criteria)
+    criteria = tuple(_best(c, judged) for c in automatic.criteria)
     return automatic.model_copy(update={"criteria": criteria, **total_fields(rubric, criteria)})
 
 
 def _best(
-    criterion: CriterionResult, number: int, attempts: Sequence[tuple[int, dict[str, CriterionResult]]]
+    criterion: CriterionResult, attempts: Sequence[tuple[int, dict[str, CriterionResult]]]
 ) -> CriterionResult:
-    known = [(n, criteria[criterion.id]) for n, criteria in attempts if criterion.id in criteria]
+    """Return the criterion as the attempt has it that earned most for it, the later one of two that earned as much."""
+    known = [(number, criteria[criterion.id]) for number, criteria in attempts if criterion.id in criteria]
     better = [(n, one) for n, one in known if not one.status.is_open and one.points > criterion.points]
     if not better:
         return criterion
-    best = max(better, key=lambda one: (one[1].points, one[0]))
-    if best[0] == number:
-        return criterion
-    return best[1].model_copy(update={"message": f"in attempt {best[0]}: {best[1].message}".rstrip(": ")})
+    number, best = max(better, key=lambda one: (one[1].points, one[0]))
+    return best.model_copy(update={"message": f"in attempt {number}: {best.message}".rstrip(": ")})

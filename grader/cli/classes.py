@@ -151,7 +151,7 @@ def executor(options: BatchOptions, exchange: str | None) -> Executor:
         for flag in (name for name, there in given.items() if there):
             raise UsageError(f"{flag} goes with --cluster", hint="leave it out")
         return LocalExecutor(options.jobs)
-    from grader.classes.cluster import ClusterExecutor  # noqa: PLC0415 - an extra
+    from grader.classes.cluster.executor import ClusterExecutor  # noqa: PLC0415 - an extra
 
     return ClusterExecutor(
         options.cluster,

@@ -47,7 +47,7 @@ def publish(
     batch = open_batch(folder)
     batch.refuse_newer()
     rubric = load_rubric(batch.run.rubric_source)
-    refuse_other_rubric(batch, rubric)
+    refuse_other_rubric(batch, rubric, "publish it")
     if dry_run:
         steps = tuple(plan(batch, read_published(folder), only))
     else:

@@ -23,7 +23,15 @@ from typing import Any, BinaryIO
 
 from grader.classes.batch.job import GradingJob, SubmissionOutcome, failed_outcome
 from grader.classes.cluster import worker
-from grader.classes.cluster.connect import LOCAL, Needs, Recruits, check_address, connect, is_encrypted
+from grader.classes.cluster.connect import (
+    GOES_ON,
+    LOCAL,
+    Needs,
+    Recruits,
+    check_address,
+    connect,
+    is_encrypted,
+)
 from grader.classes.cluster.worker import (
     Exchange,
     GradeRequest,
@@ -51,7 +59,6 @@ RESULT_S = 10.0
 READS, PAUSE_S = 5, 1.0
 LEAVE_S = 45.0
 LOST = "the workers that graded it were lost"
-GOES_ON = "then run the same command again: it continues where it stopped"
 
 
 class ParcelLost(HostError):
@@ -264,7 +271,7 @@ class _Tasks:
         if self._recruits.fit:
             self._idle_since_s = now_s
         elif now_s - self._idle_since_s > self._patience_s * (ANSWERING if self._recruits.asked else 1):
-            raise self._recruits.none_fit(self._patience_s, GOES_ON)
+            raise self._recruits.none_fit(self._patience_s)
 
     def _scheduler_lost(self) -> HostError:
         message = f"the connection to the scheduler at {self._recruits.address} is lost"

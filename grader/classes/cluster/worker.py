@@ -20,6 +20,7 @@ import threading
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 from urllib.parse import urlsplit
@@ -276,8 +277,6 @@ async def describe(exchange: str, word: str) -> dict[str, str]:
 
 
 def _describe(exchange: str, word: str) -> dict[str, str]:
-    # now, since its files may be updated while it runs with those that it has loaded
-    _Code.digest = _digest_code()
     ros = kept_out = ""
     with suppress(GraderError):
         found = find_ros()
@@ -290,16 +289,10 @@ def _describe(exchange: str, word: str) -> dict[str, str]:
     return {**versions(), "host": socket.gethostname(), "ros": ros, "kept_out": kept_out}
 
 
-class _Code:
-    """What a worker remembers of its own files."""
-
-    digest = ""
-
-
+# once: a worker's files may be updated while it runs with those that it has loaded
+@cache
 def _digest_code() -> str:
-    """Return a digest of the grader's own files: two of one version may differ. A worker's is of those it loaded."""
-    if _Code.digest:
-        return _Code.digest
+    """Return a digest of the grader's own files: two of one version may differ."""
     folder = Path(__file__).resolve().parents[2]
     digest = hashlib.sha256()
     for path in sorted(folder.rglob("*.py")):

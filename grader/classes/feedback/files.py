@@ -177,7 +177,7 @@ class FeedbackFolder(Sender):
     def send(self, feedback: Feedback, *, look: bool = False) -> str:
         """Write both files. Raises OutputError, which ends the run."""
         del look
-        folder = (self.settings.out or self.settings.folder / "feedback") / feedback.name
+        folder = Path(self.place(feedback))
         atomic_write(folder / TEXT, feedback.text.encode())
         atomic_write(folder / PAGE, feedback.page)
         return str(folder)

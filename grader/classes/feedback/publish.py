@@ -175,7 +175,7 @@ def publish(folder: BatchFolder, rubric: LoadedRubric, how: Publishing) -> tuple
     Raises UsageError if the class was judged by another rubric, Busy if a batch works in the folder or feedback is
     being sent, OutputError, KeyboardInterrupt.
     """
-    refuse_other_rubric(folder, rubric)
+    refuse_other_rubric(folder, rubric, "publish it")
     make_folder(folder.path / FOLDER)
     # sending holds the second one alone, so that a class can be graded while it lasts
     with hold_folder(folder.path), hold_folder(folder.path / FOLDER, "feedback is being sent"):
@@ -199,12 +199,13 @@ def publish(folder: BatchFolder, rubric: LoadedRubric, how: Publishing) -> tuple
     return tuple(steps)
 
 
-def refuse_other_rubric(folder: BatchFolder, rubric: LoadedRubric) -> None:
-    """Raise UsageError unless the class was judged by this rubric, by which its reports are written."""
+def refuse_other_rubric(folder: BatchFolder, rubric: LoadedRubric, then: str) -> None:
+    """Raise UsageError unless the class was judged by this rubric, by which its reports are written; `then` is what to
+    do once it is."""
     if rubric.digest != folder.run.rubric.digest:
         raise UsageError(
             f"{folder.run.rubric_source}: the rubric has changed since the class was graded",
-            hint=f"grader regrade {folder.path} judges it by today's rubric; then publish it",
+            hint=f"grader regrade {folder.path} judges it by today's rubric; then {then}",
         )
 
 

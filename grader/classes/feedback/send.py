@@ -232,7 +232,7 @@ def _drafts(
     jobs: int,
 ) -> dict[str, tuple[Publication, Path]]:
     """Return the reports of results as they are now, written into `room`."""
-    refuse_other_rubric(folder, rubric)
+    refuse_other_rubric(folder, rubric, "publish it")
     wanted = {
         safe_name(step.entry.id): Freezing(
             publication=publication_of(step.entry, step.result),

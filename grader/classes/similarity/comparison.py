@@ -29,18 +29,6 @@ HEAD = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True)
-class ComparisonRequest:
-    """`folders` of results by id, starter code as folders and files, groups by id, a share from 0 to 1, and how many
-    are read side by side."""
-
-    folders: Mapping[str, Path]
-    starter: Sequence[Path]
-    groups: Mapping[str, str]
-    threshold: float
-    jobs: int
-
-
 def compare(
     folders: Mapping[str, Path],
     *,
@@ -61,14 +49,9 @@ def compare(
     from grader.classes.similarity.matching import compare_class  # noqa: PLC0415 - of the extra `similarity`
 
     with temporary_folder("source") as place:
-        request = ComparisonRequest(
-            folders={name: folder.absolute() for name, folder in folders.items()},
-            starter=tuple(_unpack(path, place / str(number)) for number, path in enumerate(starter)),
-            groups=groups or {},
-            threshold=threshold,
-            jobs=max(1, jobs),
-        )
-        return compare_class(request)
+        given = [_unpack(path, place / str(number)) for number, path in enumerate(starter)]
+        whole = {name: folder.absolute() for name, folder in folders.items()}
+        return compare_class(whole, given, groups or {}, threshold=threshold, jobs=jobs)
 
 
 def _unpack(path: Path, into: Path) -> Path:
@@ -200,7 +183,8 @@ def _choose(name: str, files: list[tuple[str, bytes]]) -> Sources:
     chosen: list[ProgramText] = []
     left_out: list[NotCompared] = []
     room_bytes = SUBMISSION_BYTES_MAX
-    for path, data, language in sorted(_programs(files), key=lambda one: len(one[1])):
+    programs = [(path, data, found) for path, data in files if (found := language_of(path, data))]
+    for path, data, language in sorted(programs, key=lambda one: len(one[1])):
         reason = _why_not(data, room_bytes, len(chosen))
         if reason:
             left_out.append(NotCompared(id=name, file=path, reason=reason))
@@ -209,13 +193,6 @@ def _choose(name: str, files: list[tuple[str, bytes]]) -> Sources:
         chosen.append(ProgramText(path=path, code=data.decode(errors="replace"), language=language))
     chosen.sort(key=lambda one: one.path)
     return Sources(files=tuple(chosen), left_out=tuple(left_out[:FILES_MAX]))
-
-
-def _programs(files: list[tuple[str, bytes]]) -> Iterator[tuple[str, bytes, Language]]:
-    for path, data in files:
-        language = language_of(path, data)
-        if language is not None:
-            yield path, data, language
 
 
 def _why_not(data: bytes, room_bytes: int, count: int) -> str:

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.cluster import ClusterExecutor, connect
+from grader.classes.cluster import connect
 from grader.classes.cluster.connect import Answer, Needs, Recruits, check_address, why_not
+from grader.classes.cluster.executor import ClusterExecutor
 from grader.errors import HostError, UsageError
 from tests.classes.cluster.jobs import jobs_for
 from tests.support.processes import until
