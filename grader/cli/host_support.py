@@ -230,10 +230,15 @@ MIN_MEMORY_BYTES, MIN_DISK_BYTES = GIB, GIB
 def diagnose() -> tuple[DoctorRow, ...]:
     """Return every row, in the order in which things are needed; on other systems than Linux, only what helps there."""
     if system():
-        return (_python(), _git(), *platform_rows(), *_resources(), _encoding())
+        # of all programs git alone is of use there: by it `check` says what is not pushed
+        git = program_row("git", shutil.which("git"), "limited", "https://git-scm.com/downloads")
+        return (_python(), git, *platform_rows(), *_resources(), _encoding())
     return (
         _python(),
-        *_programs(),
+        *(
+            program_row(name, shutil.which(name), "missing", f"apt-get install {package}")
+            for name, package in ROS_TOOLS.items()
+        ),
         *_ros(),
         *sandbox_rows(),
         DoctorRow("user", "ok", ROOT if user_id() == 0 else f"uid {user_id()}"),
@@ -307,15 +312,6 @@ def _distro(ros: RosInstallation | None) -> str:
 
 def _python() -> DoctorRow:
     return DoctorRow("Python", "ok", f"{platform.python_version()} ({sys.executable})")
-
-
-def _programs() -> Iterator[DoctorRow]:
-    for name, package in ROS_TOOLS.items():
-        yield program_row(name, shutil.which(name), "missing", f"apt-get install {package}")
-
-
-def _git() -> DoctorRow:
-    return program_row("git", shutil.which("git"), "limited", "https://git-scm.com/downloads")
 
 
 def _ros() -> Iterator[DoctorRow]:

@@ -152,7 +152,11 @@ def send(
             done = len(delivery.sent)
             say_beside(f"{done} of {len(selection.todo)} sent; the same command continues")
             raise
-        _end(form, selection, delivery)
+        _say_failures(delivery.failures)
+        sent = [f"{len(delivery.sent)} sent by {form.name}"]
+        say(", ".join([*sent, *_others(selection), *_failure_words(delivery.failures)]))
+        if selection.unpublished:
+            say(f"  not published: {first_few(selection.unpublished, NAMES_SHOWN)}")
     return ExitCode.NOT_GRADED if delivery.failures else ExitCode.PASSED
 
 
@@ -174,14 +178,6 @@ def _show(
     ready = len(selection.todo) - len(failures)
     say(", ".join([f"{ready} would be sent by {form.name}", *_others(selection), *_failure_words(failures)]))
     return ExitCode.NOT_GRADED if failures else ExitCode.PASSED
-
-
-def _end(form: FeedbackForm, selection: Selection, delivery: Delivery) -> None:
-    _say_failures(delivery.failures)
-    sent = [f"{len(delivery.sent)} sent by {form.name}"]
-    say(", ".join([*sent, *_others(selection), *_failure_words(delivery.failures)]))
-    if selection.unpublished:
-        say(f"  not published: {first_few(selection.unpublished, NAMES_SHOWN)}")
 
 
 def _say_failures(failures: Sequence[SendFailure], what: str = "got nothing") -> None:

@@ -295,14 +295,6 @@ class _Kind:
     text: Callable[[SubmissionRow], str] = lambda _: ""
 
 
-def _problem(found: SubmissionRow) -> str:
-    return (
-        " ".join(part for part in (found.problem.message, found.problem.hint) if part)
-        if found.problem
-        else ""
-    )
-
-
 KINDS = (
     _Kind(
         anchor="missing",
@@ -325,7 +317,7 @@ KINDS = (
         title="Could not be graded",
         advice="If a submission is at fault, its student has to fix it. Then run only these again:",
         holds=lambda found: found.problem is not None and not found.problem.roster,
-        text=_problem,
+        text=lambda found: f"{found.problem.message} {found.problem.hint}".strip() if found.problem else "",
         command=lambda run, out: again(run, out, "failed"),
     ),
     _Kind(

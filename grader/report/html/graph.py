@@ -28,11 +28,11 @@ def graph_plot(figure: GraphFigure, name: str) -> Markup | None:
     if not vertices or len(vertices) > MOST or not (figure.edges or figure.wrong):
         return None
     known = set(vertices)
-    arrows = [
-        arrow
-        for arrow in map(_arrow, ((edge.node, edge.topic, edge.publishes) for edge in figure.edges))
-        if known.issuperset(arrow)
-    ]
+    # what a node publishes flows to the topic, and what it subscribes to comes from there
+    ends = (
+        (f"n{e.node}", f"t{e.topic}") if e.publishes else (f"t{e.topic}", f"n{e.node}") for e in figure.edges
+    )
+    arrows = [(begin, end) for begin, end in ends if known.issuperset((begin, end))]
     layers = layered(vertices, arrows)
     places, size = _places(layers, figure)
     children = [_heads(name)]
@@ -60,11 +60,6 @@ def graph_rows(figure: GraphFigure) -> Iterator[tuple[str, str, str, str]]:
             ", ".join(publishers) or "none",
             ", ".join(listeners) or "none",
         )
-
-
-def _arrow(edge: tuple[str, str, bool]) -> Arrow:
-    node, topic, publishes = f"n{edge[0]}", f"t{edge[1]}", edge[2]
-    return (node, topic) if publishes else (topic, node)
 
 
 def _clip_name(name: str) -> str:
