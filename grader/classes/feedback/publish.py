@@ -56,8 +56,8 @@ class Published:
         return self.history.get(safe_name(entry.id), ())
 
     def folder(self, publication: Publication) -> Path:
-        """Return where the frozen result lies, with the student's reports."""
-        return frozen_folder(self.path, publication)
+        """Return where a frozen result lies, with the student's reports; what lies there never changes."""
+        return self.path / FOLDER / safe_name(publication.id) / publication.digest[:NAME_CHARS]
 
     def result(self, entry: Entry) -> GradingResult | None:
         """Return the result that is published. Raises EvidenceError if it cannot be read."""
@@ -82,11 +82,6 @@ class PublishStep:
     changes: tuple[str, ...] = ()
     why: str = ""
     failed: bool = False
-
-
-def frozen_folder(path: Path, publication: Publication) -> Path:
-    """Return where a publication's result and reports lie; what lies there never changes."""
-    return path / FOLDER / safe_name(publication.id) / publication.digest[:NAME_CHARS]
 
 
 def read_published(path: Path) -> Published:
@@ -230,7 +225,7 @@ def _job(folder: BatchFolder, published: Published, how: Publishing, step: Publi
         publication=publication,
         result=step.result,
         evidence=folder.folder_of(step.entry),
-        into=frozen_folder(folder.path, publication),
+        into=published.folder(publication),
         changes=history_words([*published.of(step.entry), publication]),
         hidden=how.hidden,
     )

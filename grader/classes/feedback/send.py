@@ -290,7 +290,7 @@ def deliver(
     """
     together: list[Publication] = []
     place = ""
-    with sender:
+    with sender.opened():
         for feedback in selection.todo:
             publication = feedback.publication
             if (fault := _fault(sender, feedback)) is not None:  # what has no address is not begun

@@ -76,12 +76,6 @@ class RequestRow:
     criterion: str
     request: StudentRequest
 
-    def cells(self) -> tuple[str, ...]:
-        """Return the row in the order of `COLUMNS`, without control characters."""
-        asked = self.request
-        cells = (self.student, self.criterion, asked.text, asked.when, asked.source)
-        return tuple(visible(cell, lines=True) for cell in cells)
-
 
 def waiting(asked: Sequence[StudentRequest], decided: Override | None) -> list[StudentRequest]:
     """Return those of a criterion's questions that have no answer. One by hand, which names none, is to all."""
@@ -101,7 +95,10 @@ def write_requests(path: Path, rows: Sequence[RequestRow]) -> None:
     writer = csv.writer(out, lineterminator="\r\n")
     writer.writerow(COLUMNS)
     for row in rows:
-        writer.writerow([f"'{cell}" if _FORMULA.match(cell) else cell for cell in row.cells()])
+        asked = row.request
+        cells = (row.student, row.criterion, asked.text, asked.when, asked.source)
+        shown = [visible(cell, lines=True) for cell in cells]
+        writer.writerow([f"'{cell}" if _FORMULA.match(cell) else cell for cell in shown])
     atomic_write(path, out.getvalue().encode())
 
 

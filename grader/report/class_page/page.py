@@ -121,18 +121,13 @@ def _page(run: BatchRun, found: Gathered, out: Path | None) -> str:
 
 def _list_diagnoses(run: BatchRun, found: Sequence[Diagnosis]) -> tuple[list[Listed], list[Listed]]:
     """Return the diagnoses that several share, and those that one has alone."""
-    worth: Mapping[str, Any] = {criterion.id: criterion for criterion in run.criteria}
+    known = {criterion.id: (criterion.title, criterion.max_points) for criterion in run.criteria}
     shared = [one for one in found if len(one.members) > 1][:SHARED_MAX]
     alone = [one for one in found if len(one.members) == 1][:ALONE_MAX]
-    listed = [
-        Listed(
-            place=place,
-            title=worth[one.criterion].title if one.criterion in worth else "",
-            worth=worth[one.criterion].max_points if one.criterion in worth else 0.0,
-            found=one,
-        )
-        for place, one in enumerate((*shared, *alone))
-    ]
+    listed = []
+    for place, one in enumerate((*shared, *alone)):
+        title, worth = known.get(one.criterion, ("", 0.0))  # what could not be graded has no criterion
+        listed.append(Listed(place=place, title=title, worth=worth, found=one))
     return listed[: len(shared)], listed[len(shared) :]
 
 
