@@ -87,6 +87,7 @@ def check_package(chosen: Chosen, check: CheckSession) -> ExitCode:
     """Grade one package and print its report."""
     say_choice(chosen)
     options = check.options
+    # else all would be called like the folder that was given, and `--out` would keep the last one alone
     if check.several and chosen.package is not None:
         options = replace(options, submission_id=safe_name(chosen.package.resolve().name))
         say("")
@@ -94,6 +95,7 @@ def check_package(chosen: Chosen, check: CheckSession) -> ExitCode:
         source = chosen.source
         if check.staged:
             package = _package(chosen)
+            # git tells a hook which index the commit is made of: `git commit -a` has one of its own
             source = str(write_staged(package, own / "index", index=os.environ.get("GIT_INDEX_FILE", "")))
             options = replace(options, submission_id=safe_name(package.resolve().name))
         static = options.static_only

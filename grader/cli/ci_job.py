@@ -151,6 +151,7 @@ def _counting_result(result: GradingResult, rubric: Rubric, *, static: bool) -> 
     update = {
         "criteria": criteria,
         **total_fields(rubric, criteria),
+        # of thirds and the like, floating point leaves something in the last digits
         "max_points": round(sum(c.max_points for c in criteria), 6),
         "status": overall_status(criteria),
     }

@@ -254,16 +254,12 @@ def print_status(path: Path, *, as_json: bool) -> ExitCode:
     return ExitCode.PASSED
 
 
-def _cells(one: LabStatus) -> Iterator[str]:
+def _cells(one: LabStatus) -> tuple[str, ...]:
     due = f"{one.deadline:%Y-%m-%d %H:%M %Z}" if one.deadline else "-"
     changed = f" ({one.changed} changed)" if one.changed else ""
-    yield from (
-        one.name,
-        due,
-        f"{one.graded} of {one.submissions}" if one.submissions else "-",
-        str(one.open),
-    )
-    yield from (str(one.error + one.missing), f"{one.published}{changed}", str(one.sent))
+    graded = f"{one.graded} of {one.submissions}" if one.submissions else "-"
+    counts = (str(one.open), str(one.error + one.missing), f"{one.published}{changed}", str(one.sent))
+    return (one.name, due, graded, *counts)
 
 
 def write_course_gradebook(path: Path, wanted: WantedBook) -> ExitCode:

@@ -337,7 +337,7 @@ def _modules(ros: RosInstallation) -> Iterator[DoctorRow]:
         done = subprocess.run(
             command,
             env=ros.env,
-            cwd="/",
+            cwd="/",  # `-c` looks into the current folder first, which may be a student's
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,

@@ -81,6 +81,7 @@ def _finding(criterion: CriterionResult, result: GradingResult, prefix: str, lim
         for one in ([c for c in cited if c.line] or cited[:1])
         if (path := repository_path(prefix, one.file))
     )
+    # joined with a sign that none of them can have, so that no two findings have the same text
     told = (result.rubric.id, criterion.id, places[0].path if places else "")
     return Finding(
         criterion=criterion,

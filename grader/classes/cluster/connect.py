@@ -170,7 +170,7 @@ class Needs:
     encrypted: bool = False
 
 
-class Recruits:
+class GradingWorkers:
     """The workers of a cluster that can grade: each is asked once who it is, and left out by name if it differs.
 
     `known` are the addresses of all workers, `fit` maps those that can grade to their number of threads. `changed` is
@@ -222,7 +222,7 @@ class Recruits:
             # a thread each, since asking waits for as long as a worker is silent
             threading.Thread(target=self._ask, args=(address,), daemon=True).start()
 
-    def settle(self) -> None:
+    def take_answers(self) -> None:
         """Take in the answers that have come."""
         with suppress(Empty):
             while True:

@@ -18,7 +18,7 @@ from typing import Literal
 from pydantic import ValidationError
 
 from grader.classes.batch.folder import BatchFolder
-from grader.classes.batch.regrade import pairs, states_of
+from grader.classes.batch.regrade import compare_criteria, states_of
 from grader.classes.batch.renew_results import figures_in
 from grader.classes.batch.run import hold_folder
 from grader.classes.feedback.forms import PAGE, TEXT
@@ -340,7 +340,7 @@ def _total(result: GradingResult) -> str:
 def _criteria(before: GradingResult, after: GradingResult, hidden: Collection[str]) -> Iterator[str]:
     overrides = [{o.criterion: o for o in result.overrides} for result in (before, after)]
     unseen = 0
-    for change in pairs(states_of(before), after):
+    for change in compare_criteria(states_of(before), after):
         was, now = (found.get(change.criterion) for found in overrides)
         decided, same = _decision(was) != _decision(now), change.before == change.after
         if not decided and same:

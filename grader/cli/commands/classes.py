@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from grader.classes.feedback.forms import FORGES, FORMS
+from grader.cli.commands.grading import DEFAULT_OUT
 from grader.cli.declare import (
     BATCH_FOLDER,
     CLASS_EXIT_CODES,
@@ -42,7 +43,6 @@ from grader.errors import ExitCode, UsageError
 from grader.installable import require_extra
 from grader.report.forms import FORMS as REPORT_FORMS
 
-DEFAULT_OUT = Path("grader-results")
 CLASS = Argument("DIR", BATCH_FOLDER)
 ROSTER = Argument(
     "ROSTER|FOLDER",

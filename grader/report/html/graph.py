@@ -73,7 +73,7 @@ def _width(vertex: str, figure: GraphFigure) -> float:
     name = LETTER * len(_clip_name(vertex[1:]))
     said = SMALL_LETTER * len(_clip_name(figure.wrong.get(vertex[1:], ""))) - 2 * EDGE
     if vertex[0] == "n":
-        return max(72.0, name * 1.15 + 34, said)
+        return max(72.0, name * 1.15 + 34, said)  # an ellipse narrows above and below its middle
     return max(72.0, name + 22, said, SMALL_LETTER * len(_clip_name(figure.types.get(vertex[1:], ""))) + 22)
 
 
@@ -88,6 +88,7 @@ def _places(layers: Layers, figure: GraphFigure) -> tuple[dict[str, Place], tupl
         for row, vertex in enumerate(column):
             places[vertex] = (left + wide / 2, above + row * ROW, _width(vertex, figure))
         left += wide + COLUMN_GAP
+    # 16: what is wrong with a vertex of the last row is written below it
     return places, (left - COLUMN_GAP + EDGE, (tallest - 1) * ROW + HEIGHT + 2 * EDGE + 16)
 
 
