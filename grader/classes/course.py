@@ -252,12 +252,12 @@ def rows_of(course: CourseFile, marks: tuple[LabMarks, ...]) -> Iterator[Gradebo
 def _lab(marks: LabMarks, row: GradebookRow | None) -> CriterionResult:
     """Return a lab's row as a criterion: open where it is, not published, or not handed in at all."""
     result = row.result if row else None
-    known = result is not None and result.status == "graded"
+    graded = result if result is not None and result.status == "graded" else None
     return CriterionResult.unmeasured(
         id=marks.name,
         title=marks.title,
-        status=Status.PASS if known else Status.MANUAL,
-        points=result.points if known and result else 0.0,
+        status=Status.PASS if graded else Status.MANUAL,
+        points=graded.points if graded else 0.0,
         max_points=marks.max_points,
         message="" if result else "not handed in",
     )

@@ -176,7 +176,11 @@ def check_url(text: str) -> str:
         return str(Path(text).absolute())
     import fsspec  # noqa: PLC0415 - of the extra `cluster`
 
-    parts = urlsplit(text)
+    known = "a path, s3://bucket/folder, gs://…, abfs://… or sftp://host/folder"
+    try:
+        parts = urlsplit(text)
+    except ValueError as error:
+        raise UsageError(f"--exchange {text}: {error}", hint=f"give {known}") from error
     if parts.password is not None:
         raise UsageError(
             "--exchange holds a password, which every worker and its logs would see",
@@ -191,7 +195,6 @@ def check_url(text: str) -> str:
     except ImportError as error:
         raise UsageError(f"--exchange {text}: {error}", hint="install it here and on every worker") from error
     except ValueError as error:
-        known = "a path, s3://bucket/folder, gs://…, abfs://… or sftp://host/folder"
         raise UsageError(f"--exchange {text}: {error}", hint=f"give {known}") from error
     return text
 

@@ -147,19 +147,13 @@ class MailServer:
     """
 
     def __init__(self, address: str, sender: str) -> None:
-        parts = urlsplit(address if "://" in address else f"smtp://{address}")
         try:
+            parts = urlsplit(address if "://" in address else f"smtp://{address}")
             port = parts.port
-        except ValueError:
-            port = -1
+        except ValueError:  # as of `smtp://[::1`, or a port above 65535
+            parts, port = urlsplit(""), -1
         # a user's name is refused too: what comes with the command can be seen in the list of processes
-        if (
-            parts.scheme not in PORTS
-            or not parts.hostname
-            or port == -1
-            or parts.path.strip("/")
-            or parts.username
-        ):
+        if parts.scheme not in PORTS or not parts.hostname or parts.path.strip("/") or parts.username:
             hint = f"write it like smtp://mail.example.org:587 or smtps://mail.example.org; {USER} logs in"
             raise UsageError("--smtp: this is not the address of a mail server", hint=hint)
         self.host, self.port = parts.hostname, port or PORTS[parts.scheme]

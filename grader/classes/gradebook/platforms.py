@@ -67,12 +67,9 @@ def letters_and_digits(text: str) -> str:
 
 def key(text: str) -> str:
     """Return the same for all that is written alike: invisible signs, case and blanks do not tell students apart."""
-    shown = "".join(
-        # Cf: signs that only format, and cannot be seen
-        sign
-        for sign in unicodedata.normalize("NFKC", text)
-        if unicodedata.category(sign) != "Cf"
-    )
+    signs = unicodedata.normalize("NFKC", text)
+    # Cf: signs that only format, and cannot be seen
+    shown = "".join(sign for sign in signs if unicodedata.category(sign) != "Cf")
     return " ".join(shown.casefold().split())
 
 

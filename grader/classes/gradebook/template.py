@@ -305,7 +305,8 @@ def read_sheet(path: Path) -> Sheet:
     sheet = Sheet(
         path=path, mark=mark, encoding=encoding, delimiter=delimiter, records=list(_records(text, delimiter))
     )
-    if not any(name.strip() for name in sheet.header):
+    # a file with nothing but a byte order mark has no row at all
+    if not sheet.records or not any(name.strip() for name in sheet.header):
         raise UsageError(f"{path}:1: no columns are named", hint=_EXPORT)
     return sheet
 
