@@ -59,6 +59,7 @@ def run_job(system: str) -> ExitCode:
     if warning:
         say(warning)
     say(f"sandbox: {graded.result.environment.sandbox}")
+    # each outcome is that of one code
     code = next(code for code, outcome in OF_CODE.items() if outcome is graded.outcome)
     return code if graded.fails else ExitCode.PASSED
 

@@ -101,6 +101,7 @@ def sandbox_rows() -> Iterator[DoctorRow]:
     yield _probe(
         "user namespaces", [*words_to_drop_root(), unshare, "--user", "--pid", "--fork", "/bin/true"]
     )
+    # -I: nothing that lies in the current folder or is set by the user is loaded
     yield _probe("network", [sys.executable, "-I", str(NAMESPACES), "/bin/true"])
     yield _limits_of_trees()
     yield from _inherited_rows()

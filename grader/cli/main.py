@@ -255,7 +255,8 @@ def overview() -> str:
 
 def commands(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
     """Return the parser of every command that can be run, in the order of `--help`; `prog` is how it is called."""
-    below = list(_below(parser))
+    groups = (a for a in parser._actions if isinstance(a, argparse._SubParsersAction))  # noqa: SLF001 - no public way
+    below = [each for action in groups for each in action.choices.values()]
     if not below:
         yield parser
     for each in below:
@@ -283,9 +284,3 @@ def value_of(action: argparse.Action) -> str:
 def _ordered_commands() -> list[Command]:
     order = (STUDENTS, INSTRUCTORS, REST)
     return sorted(COMMANDS.values(), key=lambda command: order.index(command.group))
-
-
-def _below(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
-    for action in parser._actions:  # noqa: SLF001 - as above
-        if isinstance(action, argparse._SubParsersAction):  # noqa: SLF001 - as above
-            yield from action.choices.values()

@@ -50,7 +50,7 @@ def write_document(out: str, made: Callable[[bool], str], *, public: bool = Fals
     if out == STDOUT:
         say_document(made)
     else:
-        atomic_write(Path(out), made(False).encode(), public=public)
+        atomic_write(Path(out), made(False).encode(), public=public)  # a file is UTF-8, whatever stdout is
 
 
 ERROR_CHARS, NARROWEST = 2000, 40

@@ -20,7 +20,7 @@ from grader.files import atomic_write, open_untrusted, temporary_folder
 from grader.installable import require_extra
 from grader.intake.archive import unpack
 from grader.intake.limits import IntakeLimits
-from grader.model.batch import Lines, NotCompared, Pair, Similarity
+from grader.model.batch import Lines, NotCompared, Similarity
 from grader.report.text import csv_text, json_text
 
 THRESHOLD = 0.8
@@ -101,14 +101,11 @@ def _rows(similarity: Similarity, names: Mapping[str, str]) -> Iterator[tuple[st
     for pair in similarity.pairs:
         shares = (percent(pair.similarity_a), percent(pair.similarity_b))
         known = (pair.a, names.get(pair.a, ""), pair.b, names.get(pair.b, ""))
-        yield (*known, *shares, pair.lines_a, pair.lines_b, _files(pair))
-
-
-def _files(pair: Pair) -> str:
-    return "; ".join(
-        f"{match.file_a}:{stretches(match.lines_a)} ~ {match.file_b}:{stretches(match.lines_b)}"
-        for match in pair.files
-    )
+        files = (
+            f"{match.file_a}:{stretches(match.lines_a)} ~ {match.file_b}:{stretches(match.lines_b)}"
+            for match in pair.files
+        )
+        yield (*known, *shares, pair.lines_a, pair.lines_b, "; ".join(files))
 
 
 Language = Literal["python", "cpp"]

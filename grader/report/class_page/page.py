@@ -194,6 +194,7 @@ def page_data(
         "heat": [list(column) for column in heat.columns] if heat else [],
         "heatRows": list(heat.rows) if heat else [],
     }
+    # NaN and infinity are no JSON: a browser would show nothing at all
     return in_script(json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":")))
 
 

@@ -133,7 +133,7 @@ def histogram(found: Spread) -> Markup:
                 "rect",
                 svg.element("title", svg.escaped(one.words)),
                 class_="pile",
-                x=x + 1,
+                x=x + 1,  # with a gap between the bars
                 y=TOP + room - height,
                 width=max(1.0, step - 2),
                 height=height,
