@@ -252,12 +252,12 @@ def rows_of(course: CourseFile, marks: tuple[LabMarks, ...]) -> Iterator[Gradebo
 def _lab(marks: LabMarks, row: GradebookRow | None) -> CriterionResult:
     """Return a lab's row as a criterion: open where it is, not published, or not handed in at all."""
     result = row.result if row else None
-    known = result is not None and result.status == "graded"
+    graded = result if result is not None and result.status == "graded" else None
     return CriterionResult.unmeasured(
         id=marks.name,
         title=marks.title,
-        status=Status.PASS if known else Status.MANUAL,
-        points=result.points if known and result else 0.0,
+        status=Status.PASS if graded else Status.MANUAL,
+        points=graded.points if graded else 0.0,
         max_points=marks.max_points,
         message="" if result else "not handed in",
     )
@@ -409,18 +409,17 @@ def _best_so_far(attempts: Sequence[Attempt], last: Attempt, rubric: Rubric) -> 
     until = [one for one in attempts if one.number <= last.number]
     judged = [(one.number, {c.id: c for c in unsettled(one.result, rubric).criteria}) for one in until]
     automatic = unsettled(last.result, rubric)
-    criteria = tuple(_best(c, last.number, judged) for c in automatic.criteria)
+    criteria = tuple(_best(c, judged) for c in automatic.criteria)
     return automatic.model_copy(update={"criteria": criteria, **total_fields(rubric, criteria)})
 
 
 def _best(
-    criterion: CriterionResult, number: int, attempts: Sequence[tuple[int, dict[str, CriterionResult]]]
+    criterion: CriterionResult, attempts: Sequence[tuple[int, dict[str, CriterionResult]]]
 ) -> CriterionResult:
-    known = [(n, criteria[criterion.id]) for n, criteria in attempts if criterion.id in criteria]
+    """Return the criterion as the attempt has it that earned most for it, the later one of two that earned as much."""
+    known = [(number, criteria[criterion.id]) for number, criteria in attempts if criterion.id in criteria]
     better = [(n, one) for n, one in known if not one.status.is_open and one.points > criterion.points]
     if not better:
         return criterion
-    best = max(better, key=lambda one: (one[1].points, one[0]))
-    if best[0] == number:
-        return criterion
-    return best[1].model_copy(update={"message": f"in attempt {best[0]}: {best[1].message}".rstrip(": ")})
+    number, best = max(better, key=lambda one: (one[1].points, one[0]))
+    return best.model_copy(update={"message": f"in attempt {number}: {best.message}".rstrip(": ")})

@@ -35,7 +35,7 @@ from grader.report.terminal import fit_encoding, open_console
 from grader.report.text import line
 from grader.report.view import hidden_ids, without_hidden
 from grader.rubric.find import named_labs
-from grader.rubric.load import LoadedRubric, needs_ros
+from grader.rubric.load import needs_ros
 from grader.student.git_status import advise, read_environment
 
 TITLE = "Only pushed work is marked. These changes aren't pushed yet:"
@@ -59,35 +59,21 @@ class CheckSession:
     told: set[str] = field(default_factory=set)
 
 
-def check_packages(
-    path: str,
-    chosen: Sequence[Chosen],
-    options: pipeline.GradeOptions,
-    *,
-    watch: bool,
-    out: Path | None,
-    as_json: bool,
-    staged: bool,
-    full: bool = False,
-) -> ExitCode:
+def check_packages(path: str, chosen: Sequence[Chosen], check: CheckSession, *, watch: bool) -> ExitCode:
     """Check the packages chosen for `path` one after the other, or watch the only one. Return the worst exit code."""
-    if watch or as_json:
+    if watch or check.as_json:
         only(chosen)
     if watch and not Path(chosen[0].source).is_dir():
         raise UsageError(
             f"{path} is not a folder, so it cannot be watched", hint="watch your package's folder"
         )
-    if out is not None:
-        check_writable(out)
-    if not options.static_only and any(needs_ros(one.rubric) for one in chosen):
-        warn_without_sandbox(options.sandbox)
+    if check.out is not None:
+        check_writable(check.out)
+    if not check.options.static_only and any(needs_ros(one.rubric) for one in chosen):
+        warn_without_sandbox(check.options.sandbox)
     if watch:
         say_choice(chosen[0])
-        source = str(Path(chosen[0].source).resolve())
-        return watch_package(source, chosen[0].rubric, options, out=out, as_json=as_json)
-    check = CheckSession(
-        options=options, out=out, as_json=as_json, staged=staged, several=len(chosen) > 1, full=full
-    )
+        return watch_package(chosen[0], check)
     return worst(check_package(one, check) for one in chosen)
 
 
@@ -101,6 +87,7 @@ def check_package(chosen: Chosen, check: CheckSession) -> ExitCode:
     """Grade one package and print its report."""
     say_choice(chosen)
     options = check.options
+    # else all would be called like the folder that was given, and `--out` would keep the last one alone
     if check.several and chosen.package is not None:
         options = replace(options, submission_id=safe_name(chosen.package.resolve().name))
         say("")
@@ -108,6 +95,7 @@ def check_package(chosen: Chosen, check: CheckSession) -> ExitCode:
         source = chosen.source
         if check.staged:
             package = _package(chosen)
+            # git tells a hook which index the commit is made of: `git commit -a` has one of its own
             source = str(write_staged(package, own / "index", index=os.environ.get("GIT_INDEX_FILE", "")))
             options = replace(options, submission_id=safe_name(package.resolve().name))
         static = options.static_only
@@ -170,31 +158,34 @@ def _package(chosen: Chosen) -> Path:
     return chosen.package
 
 
-def watch_package(
-    source: str, rubric: LoadedRubric, options: pipeline.GradeOptions, *, out: Path | None, as_json: bool
-) -> ExitCode:
+def watch_package(chosen: Chosen, check: CheckSession) -> ExitCode:
     """Grade the package whenever one of its files is saved, until Ctrl-C."""
     from grader.student.watching import Grading, JsonLines, TerminalScreen, watch  # noqa: PLC0415 - slow to load
 
-    static, hidden = options.static_only, len(hidden_ids(rubric.rubric))
+    static, rubric, source = check.options.static_only, chosen.rubric, Path(chosen.source).resolve()
 
     def code(result: GradingResult) -> ExitCode:
         return exit_code(judged_criteria(result.criteria) if static else result.criteria, rubric.rubric)
 
     def progress(first: bool) -> AbstractContextManager[Progress]:
-        return nullcontext(Silence()) if static else open_progress(early=first and not as_json)
+        return nullcontext(Silence()) if static else open_progress(early=first and not check.as_json)
 
-    without = out.resolve() if out is not None else None
-    name = Path(source).name
+    without = check.out.resolve() if check.out is not None else None
+    hidden = len(hidden_ids(rubric.rubric))
     screen = (
         JsonLines(sys.stdout)
-        if as_json
-        else TerminalScreen(name, rubric.rubric, sys.stdout, hidden=hidden, static=static)
+        if check.as_json
+        else TerminalScreen(source.name, rubric.rubric, sys.stdout, hidden=hidden, static=static)
     )
     with ExitStack() as stack:
         folder = without or stack.enter_context(temporary_folder("check"))
         grading = Grading(
-            source=source, rubric=rubric, out=folder, options=options, progress=progress, code=code
+            source=str(source),
+            rubric=rubric,
+            out=folder,
+            options=check.options,
+            progress=progress,
+            code=code,
         )
         return watch(grading, screen, without=without)
 

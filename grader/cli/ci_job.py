@@ -59,6 +59,7 @@ def run_job(system: str) -> ExitCode:
     if warning:
         say(warning)
     say(f"sandbox: {graded.result.environment.sandbox}")
+    # each outcome is that of one code
     code = next(code for code, outcome in OF_CODE.items() if outcome is graded.outcome)
     return code if graded.fails else ExitCode.PASSED
 
@@ -151,6 +152,7 @@ def _counting_result(result: GradingResult, rubric: Rubric, *, static: bool) -> 
     update = {
         "criteria": criteria,
         **total_fields(rubric, criteria),
+        # of thirds and the like, floating point leaves something in the last digits
         "max_points": round(sum(c.max_points for c in criteria), 6),
         "status": overall_status(criteria),
     }

@@ -109,6 +109,7 @@ class BatchProgress:
         """
         if len(self._ends_s) < 2:
             return None
+        # of few, from the beginning of the first one; of many, from the end of the one before the last ones
         few = len(self._ends_s) <= LATELY
         begin_s, count = (self._paced_s, len(self._ends_s)) if few else (self._ends_s[0], LATELY)
         return (self.clock() - begin_s) / count * (self.total - self.done)

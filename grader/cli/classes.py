@@ -19,7 +19,6 @@ from grader.classes.batch.folder import RUN, BatchFolder, open_batch
 from grader.classes.batch.job import Executor, LocalExecutor
 from grader.classes.batch.run import RESULTS, BatchOptions, run_batch
 from grader.classes.course import (
-    LabMarks,
     LabStatus,
     attempt_folder,
     book_of,
@@ -50,7 +49,7 @@ from grader.model.batch import BatchRun, Pair, Similarity
 from grader.portable import cores
 from grader.report.terminal import emit, open_console
 from grader.report.text import line
-from grader.rubric.course import CourseFile, load_course, split_name
+from grader.rubric.course import load_course, split_name
 from grader.rubric.load import PIN, LoadedRubric, load_rubric, needs_ros, split_pin
 from grader.wording import first_few, plural
 
@@ -85,17 +84,14 @@ def grade_class(
                 roster, rubric_source(rubric), loaded, options, executor=chosen, watcher=watcher
             )
         except KeyboardInterrupt:
-            _say_interrupted(options.out)
+            # it may be too early for a `run.json`
+            with suppress(GraderError):
+                counts = open_batch(options.out).run.counts
+                done = counts.submissions - counts.missing
+                say_beside(f"{done} of {counts.submissions} done; the same command continues")
             raise
     print_batch(folder, as_json=as_json)
     return exit_code(folder.run)
-
-
-def _say_interrupted(out: Path) -> None:
-    with suppress(GraderError):
-        counts = open_batch(out).run.counts
-        done = counts.submissions - counts.missing
-        say_beside(f"{done} of {counts.submissions} done; the same command continues")
 
 
 def rubric_source(rubric: str) -> str:
@@ -151,7 +147,7 @@ def executor(options: BatchOptions, exchange: str | None) -> Executor:
         for flag in (name for name, there in given.items() if there):
             raise UsageError(f"{flag} goes with --cluster", hint="leave it out")
         return LocalExecutor(options.jobs)
-    from grader.classes.cluster import ClusterExecutor  # noqa: PLC0415 - an extra
+    from grader.classes.cluster.executor import ClusterExecutor  # noqa: PLC0415 - an extra
 
     return ClusterExecutor(
         options.cluster,
@@ -258,16 +254,12 @@ def print_status(path: Path, *, as_json: bool) -> ExitCode:
     return ExitCode.PASSED
 
 
-def _cells(one: LabStatus) -> Iterator[str]:
+def _cells(one: LabStatus) -> tuple[str, ...]:
     due = f"{one.deadline:%Y-%m-%d %H:%M %Z}" if one.deadline else "-"
     changed = f" ({one.changed} changed)" if one.changed else ""
-    yield from (
-        one.name,
-        due,
-        f"{one.graded} of {one.submissions}" if one.submissions else "-",
-        str(one.open),
-    )
-    yield from (str(one.error + one.missing), f"{one.published}{changed}", str(one.sent))
+    graded = f"{one.graded} of {one.submissions}" if one.submissions else "-"
+    counts = (str(one.open), str(one.error + one.missing), f"{one.published}{changed}", str(one.sent))
+    return (one.name, due, graded, *counts)
 
 
 def write_course_gradebook(path: Path, wanted: WantedBook) -> ExitCode:
@@ -280,7 +272,12 @@ def write_course_gradebook(path: Path, wanted: WantedBook) -> ExitCode:
         )
     suffix = wanted.template.suffix if wanted.template else ENDINGS.get(wanted.form, f"-{wanted.form}.csv")
     usual = path.with_name(f"gradebook{suffix}")
-    more = _drafts(course, marks, drafts=wanted.drafts)
+    publish = f"grader course publish {course.path}"
+    more = (
+        f"{one.name}: these are drafts: none of it is published yet ({publish} {one.name})"
+        for one in marks
+        if one.drafts and not wanted.drafts
+    )
     return _write_book(book_of(course, marks), rows_of(course, marks), usual, wanted, more)
 
 
@@ -330,13 +327,6 @@ def _write_book(
         else:
             say(str(target))
     return ExitCode.PASSED
-
-
-def _drafts(course: CourseFile, marks: Sequence[LabMarks], *, drafts: bool) -> Iterator[str]:
-    for one in marks:
-        if one.drafts and not drafts:
-            command = f"grader course publish {course.path} {one.name}"
-            yield f"{one.name}: these are drafts: none of it is published yet ({command})"
 
 
 def reviewer(named: str | None) -> str:

@@ -88,6 +88,7 @@ class Command(NamedTuple):
     @property
     def summary(self) -> str:
         """The first sentence of the function's docstring, with its full stop."""
+        # one that is long goes on in the next line of the source, which is indented
         return (self.run.__doc__ or "").partition("\n\n")[0].replace("\n    ", " ")
 
 
@@ -130,6 +131,7 @@ def _add(parser: argparse.ArgumentParser, name: str, kind: object, spec: Spec, d
         return
     several = get_origin(kind) is Sequence
     parts = get_args(kind) if several or get_origin(kind) in {Union, UnionType} else (kind,)
+    # what may be left out is `X | None`: only X is ever typed
     (plain,) = (part for part in parts if part is not NoneType)
     choices = spec.choices or (get_args(plain) if get_origin(plain) is Literal else ())
     how: dict[str, Any] = {
@@ -149,7 +151,7 @@ def _add(parser: argparse.ArgumentParser, name: str, kind: object, spec: Spec, d
     if default is REQUIRED:
         how["required"] = True
     elif several and spec.repeated:
-        how |= {"action": "append", "default": []}
+        how |= {"action": "append", "default": []}  # argparse appends to a copy of it
     else:
         how["default"] = default
     if several and not spec.repeated:

@@ -88,6 +88,7 @@ class Steps:
         with self.lock:
             before = self.steps.get(name)
             after = replace(before or Step(name=name, state=state), state=state, detail=detail)
+            # how long it takes is said once, when it is planned
             if expected_s is not None:
                 after = replace(after, expected_s=expected_s)
             if after.begun_s is None and state != "waiting":

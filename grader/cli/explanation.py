@@ -52,6 +52,7 @@ def print_explanation(name: str, rubric: str | None) -> None:
     """
     lab, slash, criterion = ("", "", name) if rubric is not None else name.rpartition("/")
     loaded = [load_rubric(rubric or lab)] if rubric is not None or slash else list(all_rubrics())
+    # students ask here: hidden criteria are as if there were none
     found = [
         (r, c) for r in loaded for c in r.rubric.criteria if c.id == criterion and c.visibility == "visible"
     ]

@@ -101,6 +101,7 @@ def sandbox_rows() -> Iterator[DoctorRow]:
     yield _probe(
         "user namespaces", [*words_to_drop_root(), unshare, "--user", "--pid", "--fork", "/bin/true"]
     )
+    # -I: nothing that lies in the current folder or is set by the user is loaded
     yield _probe("network", [sys.executable, "-I", str(NAMESPACES), "/bin/true"])
     yield _limits_of_trees()
     yield from _inherited_rows()
@@ -230,10 +231,15 @@ MIN_MEMORY_BYTES, MIN_DISK_BYTES = GIB, GIB
 def diagnose() -> tuple[DoctorRow, ...]:
     """Return every row, in the order in which things are needed; on other systems than Linux, only what helps there."""
     if system():
-        return (_python(), _git(), *platform_rows(), *_resources(), _encoding())
+        # of all programs git alone is of use there: by it `check` says what is not pushed
+        git = program_row("git", shutil.which("git"), "limited", "https://git-scm.com/downloads")
+        return (_python(), git, *platform_rows(), *_resources(), _encoding())
     return (
         _python(),
-        *_programs(),
+        *(
+            program_row(name, shutil.which(name), "missing", f"apt-get install {package}")
+            for name, package in ROS_TOOLS.items()
+        ),
         *_ros(),
         *sandbox_rows(),
         DoctorRow("user", "ok", ROOT if user_id() == 0 else f"uid {user_id()}"),
@@ -309,15 +315,6 @@ def _python() -> DoctorRow:
     return DoctorRow("Python", "ok", f"{platform.python_version()} ({sys.executable})")
 
 
-def _programs() -> Iterator[DoctorRow]:
-    for name, package in ROS_TOOLS.items():
-        yield program_row(name, shutil.which(name), "missing", f"apt-get install {package}")
-
-
-def _git() -> DoctorRow:
-    return program_row("git", shutil.which("git"), "limited", "https://git-scm.com/downloads")
-
-
 def _ros() -> Iterator[DoctorRow]:
     try:
         ros = find_ros()
@@ -341,7 +338,7 @@ def _modules(ros: RosInstallation) -> Iterator[DoctorRow]:
         done = subprocess.run(
             command,
             env=ros.env,
-            cwd="/",
+            cwd="/",  # `-c` looks into the current folder first, which may be a student's
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,

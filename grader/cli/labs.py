@@ -32,7 +32,6 @@ from grader.authoring.mutation.faulty_packages import (
 from grader.authoring.mutation.rubric_test import Plan, run_test
 from grader.authoring.mutation.solution import (
     Solution,
-    Tree,
     find_reference,
     load_solution,
     reference_at,
@@ -247,7 +246,10 @@ def write_example(lab: str, folder: Path, mistake: str | None) -> None:
     """Write a lab's correct package into `folder`, or one with a mistake. Raises UsageError if the folder is in use."""
     loaded, correct = _correct(lab)
     wanted = None if mistake is None else _find_mistake(_mistakes(loaded, correct), mistake)
-    _write(correct.tree if wanted is None else wanted.tree, folder)
+    if folder.is_symlink() or (folder.exists() and (not folder.is_dir() or any(folder.iterdir()))):
+        raise UsageError(f"{folder} is in use", hint="give a new or an empty folder")
+    check_writable(folder.absolute())
+    write_tree(correct.tree if wanted is None else wanted.tree, folder)
     package = folder / correct.folder
     if wanted is None:
         say(f"{package}: a correct package for {loaded.rubric.id}")
@@ -295,11 +297,3 @@ def _find_mistake(planned: list[Planned], name: str) -> Planned:
         f'there is no mistake "{name}"{did_you_mean(name, [mutant.name for mutant in planned])}',
         hint="without DIR, grader example lists the lab's mistakes",
     )
-
-
-def _write(tree: Tree, folder: Path) -> None:
-    """Write the files. Raises UsageError if the folder is not empty."""
-    if folder.is_symlink() or (folder.exists() and (not folder.is_dir() or any(folder.iterdir()))):
-        raise UsageError(f"{folder} is in use", hint="give a new or an empty folder")
-    check_writable(folder.absolute())
-    write_tree(tree, folder)

@@ -255,7 +255,8 @@ def overview() -> str:
 
 def commands(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
     """Return the parser of every command that can be run, in the order of `--help`; `prog` is how it is called."""
-    below = list(_below(parser))
+    groups = (a for a in parser._actions if isinstance(a, argparse._SubParsersAction))  # noqa: SLF001 - no public way
+    below = [each for action in groups for each in action.choices.values()]
     if not below:
         yield parser
     for each in below:
@@ -264,7 +265,9 @@ def commands(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParse
 
 def options(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
     """Return what a command takes beside `--help` and further commands: positional arguments, then options."""
-    taken = [action for action in parser._actions if not _is_other(action)]  # noqa: SLF001 - argparse has no public way
+    other = (argparse._HelpAction, argparse._SubParsersAction)  # noqa: SLF001 - argparse has no public way
+    shown = [a for a in parser._actions if a.help != argparse.SUPPRESS]  # noqa: SLF001 - as above
+    taken = [action for action in shown if not isinstance(action, other)]
     yield from (action for action in taken if not action.option_strings)
     yield from (action for action in taken if action.option_strings)
 
@@ -281,14 +284,3 @@ def value_of(action: argparse.Action) -> str:
 def _ordered_commands() -> list[Command]:
     order = (STUDENTS, INSTRUCTORS, REST)
     return sorted(COMMANDS.values(), key=lambda command: order.index(command.group))
-
-
-def _below(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
-    for action in parser._actions:  # noqa: SLF001 - as above
-        if isinstance(action, argparse._SubParsersAction):  # noqa: SLF001 - as above
-            yield from action.choices.values()
-
-
-def _is_other(action: argparse.Action) -> bool:
-    other = (argparse._HelpAction, argparse._SubParsersAction)  # noqa: SLF001 - as above
-    return isinstance(action, other) or action.help == argparse.SUPPRESS

@@ -50,7 +50,7 @@ def write_document(out: str, made: Callable[[bool], str], *, public: bool = Fals
     if out == STDOUT:
         say_document(made)
     else:
-        atomic_write(Path(out), made(False).encode(), public=public)
+        atomic_write(Path(out), made(False).encode(), public=public)  # a file is UTF-8, whatever stdout is
 
 
 ERROR_CHARS, NARROWEST = 2000, 40
@@ -63,7 +63,9 @@ def guarded(command: Callable[[], int], *, debug: bool) -> int:
         code = int(command())
         flush()
     except BrokenPipeError:
-        _drop_stdout()
+        # else the interpreter's own flush at its end would complain
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return SIGPIPE_CODE
     except KeyboardInterrupt:
         _say("grader: interrupted")
@@ -123,9 +125,3 @@ def _trace(debug: bool) -> None:
     if debug:
         with suppress(OSError, ValueError):
             sys.stderr.write(visible(traceback.format_exc(), lines=True))
-
-
-def _drop_stdout() -> None:
-    """Let the interpreter's own flush at its end go nowhere."""
-    with suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -12,7 +12,7 @@ from typing import cast
 from grader.classes.batch.folder import BatchFolder, open_batch
 from grader.classes.feedback import publish as publishing
 from grader.classes.feedback.forges import Comments
-from grader.classes.feedback.forms import FORMS, FeedbackForm, SendSettings
+from grader.classes.feedback.forms import FORMS, FeedbackForm, Sender, SendSettings
 from grader.classes.feedback.publish import Publishing, PublishStep, plan, read_published, refuse_other_rubric
 from grader.classes.feedback.send import (
     Delivery,
@@ -47,7 +47,7 @@ def publish(
     batch = open_batch(folder)
     batch.refuse_newer()
     rubric = load_rubric(batch.run.rubric_source)
-    refuse_other_rubric(batch, rubric)
+    refuse_other_rubric(batch, rubric, "publish it")
     if dry_run:
         steps = tuple(plan(batch, read_published(folder), only))
     else:
@@ -143,26 +143,29 @@ def send(
     with open_selection(batch, form, wanted, jobs=cores()) as (selection, log):
         sender = form.open(settings)
         if dry_run:
-            return _show(form, selection, list(faults(sender, selection)), settings)
+            return _show(form, sender, selection)
         delivery = Delivery()
         try:
             if selection.todo:
                 deliver(sender, selection, log, delivery, again=wanted.again, told=say)
+        # Ctrl-C too
         except BaseException:
             done = len(delivery.sent)
             say_beside(f"{done} of {len(selection.todo)} sent; the same command continues")
             raise
-        _end(form, selection, delivery)
+        _say_failures(delivery.failures)
+        sent = [f"{len(delivery.sent)} sent by {form.name}"]
+        say(", ".join([*sent, *_others(selection), *_failure_words(delivery.failures)]))
+        if selection.unpublished:
+            say(f"  not published: {first_few(selection.unpublished, NAMES_SHOWN)}")
     return ExitCode.NOT_GRADED if delivery.failures else ExitCode.PASSED
 
 
-def _show(
-    form: FeedbackForm, selection: Selection, failures: Sequence[SendFailure], settings: SendSettings
-) -> ExitCode:
+def _show(form: FeedbackForm, sender: Sender, selection: Selection) -> ExitCode:
+    failures = list(faults(sender, selection))
     failed = {failure.id for failure in failures}
     first = next((one for one in selection.todo if one.entry.id not in failed), None)
     if first is not None:
-        sender = form.open(settings)
         say(f"{first.entry.id} → {sender.place(first)}")
         shown = visible(sender.show(first), lines=True)
         cut = f"{shown[:SHOWN_CHARS]}\n… and {len(shown) - SHOWN_CHARS} more characters\n"
@@ -174,14 +177,6 @@ def _show(
     ready = len(selection.todo) - len(failures)
     say(", ".join([f"{ready} would be sent by {form.name}", *_others(selection), *_failure_words(failures)]))
     return ExitCode.NOT_GRADED if failures else ExitCode.PASSED
-
-
-def _end(form: FeedbackForm, selection: Selection, delivery: Delivery) -> None:
-    _say_failures(delivery.failures)
-    sent = [f"{len(delivery.sent)} sent by {form.name}"]
-    say(", ".join([*sent, *_others(selection), *_failure_words(delivery.failures)]))
-    if selection.unpublished:
-        say(f"  not published: {first_few(selection.unpublished, NAMES_SHOWN)}")
 
 
 def _say_failures(failures: Sequence[SendFailure], what: str = "got nothing") -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -394,15 +395,10 @@ def package_prefix(result: GradingResult, here: Path) -> str | None:
     cited = {
         c.file for criterion in result.criteria for c in criterion.citations if isinstance(c, FileCitation)
     }
-    for name, folder in _packages(root):
-        if name == result.submission.package and all((folder / file).exists() for file in cited):
-            return folder.relative_to(root).as_posix()
+    with suppress(OSError):
+        # one around `root` is none of its own
+        own = ((name, folder) for name, folder in find_packages(root) if folder.is_relative_to(root))
+        for name, folder in own:
+            if name == result.submission.package and all((folder / file).exists() for file in cited):
+                return folder.relative_to(root).as_posix()
     return None
-
-
-def _packages(root: Path) -> Iterator[tuple[str, Path]]:
-    try:
-        found = find_packages(root)
-    except OSError:
-        return
-    yield from ((name, folder) for name, folder in found if folder.is_relative_to(root))

@@ -16,7 +16,7 @@ import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import resources
-from importlib.metadata import Distribution, PackageNotFoundError, distribution
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any, Literal
 
@@ -103,10 +103,6 @@ class Bundle:
         """Add a file, or replace the one of the same path."""
         self._files[path] = (data, executable)
 
-    def add_file(self, path: str, file: Path) -> None:
-        """Add a file from the disk with its executable bit."""
-        self.add(path, file.read_bytes(), executable=os.access(file, os.X_OK))
-
     def entries(self) -> Iterator[tuple[str, bytes, bool]]:
         """Return the path, content and executable bit of each file, sorted by path."""
         for path, (data, executable) in sorted(self._files.items()):
@@ -151,11 +147,12 @@ def wheel() -> tuple[str, bytes]:
         ) from error
     bundle = Bundle()
     for path, file in _package_files():
-        bundle.add_file(path, file)
+        bundle.add(path, file.read_bytes(), executable=os.access(file, os.X_OK))
     stem = f"{NAME.replace('-', '_')}-{installed.version}"
     info = f"{stem}.dist-info"
-    for name, text in _metadata(installed):
-        bundle.add(f"{info}/{name}", text.encode())
+    for name in METADATA_FILES:
+        if (text := installed.read_text(name)) is not None:
+            bundle.add(f"{info}/{name}", text.encode())
     bundle.add(f"{info}/WHEEL", WHEEL.encode())
     bundle.add(f"{info}/RECORD", _record(bundle, f"{info}/RECORD"))
     return f"{stem}-py3-none-any.whl", bundle.zipped()
@@ -193,13 +190,6 @@ def _files(source: Path, target: str) -> Iterator[tuple[str, Path]]:
         # what Python compiled has times and paths of this machine in it
         if file.is_file() and file.suffix != ".pyc" and "__pycache__" not in inside.parts:
             yield f"{target}/{inside.as_posix()}", file
-
-
-def _metadata(installed: Distribution) -> Iterator[tuple[str, str]]:
-    for name in METADATA_FILES:
-        text = installed.read_text(name)
-        if text is not None:
-            yield name, text
 
 
 def _record(bundle: Bundle, own: str) -> bytes:

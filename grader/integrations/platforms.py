@@ -171,13 +171,12 @@ def _prairielearn_results(result: GradingResult, rubric: LoadedRubric) -> dict[s
     }
 
 
-def _prairielearn_fault(fault: GraderError) -> dict[str, Any]:
-    """Return a document that costs neither points nor an attempt."""
-    return _invalid(fault.message, fault.hint)
-
-
 PRAIRIELEARN = ContainerLayout(
-    lab="tests", upload="student", graded=_prairielearn_results, not_graded=_prairielearn_fault
+    lab="tests",
+    upload="student",
+    graded=_prairielearn_results,
+    # costs neither points nor an attempt
+    not_graded=lambda fault: _invalid(fault.message, fault.hint),
 )
 """Its folders lie below /grade."""
 

@@ -81,6 +81,7 @@ def _finding(criterion: CriterionResult, result: GradingResult, prefix: str, lim
         for one in ([c for c in cited if c.line] or cited[:1])
         if (path := repository_path(prefix, one.file))
     )
+    # joined with a sign that none of them can have, so that no two findings have the same text
     told = (result.rubric.id, criterion.id, places[0].path if places else "")
     return Finding(
         criterion=criterion,
@@ -147,14 +148,11 @@ def _annotations(found: tuple[Finding, ...], each_max: int) -> Iterator[str]:
         alike = [finding for finding in found if finding.severity is severity]
         for finding in alike[:each_max]:
             message = "\n".join(text for text in (finding.message, finding.hint) if text)
-            yield _github_command(severity, _properties(finding), message)
+            at = finding.places[0] if finding.places else None
+            where = {"file": at.path, "line": str(at.line)} if at else {}
+            yield _github_command(severity, {**where, "title": finding.title}, message)
         if len(alike) > each_max:
             yield f"and {len(alike) - each_max} more of these: they are in the report"
-
-
-def _properties(finding: Finding) -> dict[str, str]:
-    where = {"file": finding.places[0].path, "line": str(finding.places[0].line)} if finding.places else {}
-    return {**where, "title": finding.title}
 
 
 def _not_graded(result: GradingResult) -> Iterator[str]:

@@ -72,6 +72,7 @@ class Form:
         make = getattr(import_module(f"{__package__}.{module}"), name)
         given = {one.name for one in fields(ReportInput)} | {"figures"}
         made = make(**{key: getattr(shown, key) for key in signature(make).parameters if key in given})
+        # half of a surrogate pair, as a name that is no UTF-8 becomes in Python, cannot be encoded
         return made if isinstance(made, bytes) else made.encode("utf-8", "backslashreplace")
 
 

@@ -44,6 +44,7 @@ class _Writer:
 
     def document(self, result: GradingResult) -> bytes:
         suite = etree.Element("testsuite", {"name": self._text(result.rubric.id), **_counts(result)})
+        properties = etree.SubElement(suite, "properties")
         about = {"submission": result.submission.id, "package": result.submission.package}
         points = {"points": number(result.points), "max_points": number(result.max_points)}
         late = (
@@ -52,7 +53,8 @@ class _Writer:
             else {}
         )
         each = {f"points:{c.id}": points_of(c) for c in result.criteria}
-        self._properties(suite, {**about, **points, **late, **each})
+        for name, value in {**about, **points, **late, **each}.items():
+            etree.SubElement(properties, "property", name=self._text(name), value=self._text(value))
         decided = {override.criterion: override for override in result.overrides}
         for criterion in result.criteria:
             suite.append(self._case(criterion, result.rubric.id, decided.get(criterion.id)))
@@ -70,11 +72,12 @@ class _Writer:
         self, criterion: CriterionResult, rubric_id: str, override: AppliedOverride | None
     ) -> etree._Element:
         cited = next((c for c in criterion.citations if isinstance(c, FileCitation)), None)
+        file = (repository_path(self._prefix, cited.file) if self._prefix else cited.file) if cited else ""
         # the schema asks for a time, and a criterion has none
         attributes = {"classname": self._text(rubric_id), "name": self._text(criterion.id), "time": "0"}
-        file = self._file(cited) if cited is not None else ""
+        # empty for a file that is not in the repository
         if cited is not None and file:
-            attributes["file"] = file
+            attributes["file"] = self._text(file)
             if cited.line is not None:
                 attributes["line"] = str(cited.line)
         case = etree.Element("testcase", attributes)
@@ -86,9 +89,6 @@ class _Writer:
             {**about, **_decision_words(criterion, override)}
         )
         return case
-
-    def _file(self, cited: FileCitation) -> str:
-        return self._text(repository_path(self._prefix, cited.file) if self._prefix else cited.file)
 
     def _error(self, suite: etree._Element, rubric_id: str, error: ErrorInfo) -> None:
         case = etree.SubElement(suite, "testcase", classname=self._text(rubric_id), name="grading", time="0")
@@ -122,11 +122,6 @@ class _Writer:
             return
         outcome = etree.SubElement(case, tag, type=self._text(kind), message=self._text(message))
         outcome.text = visible(details, lines=True)
-
-    def _properties(self, parent: etree._Element, values: dict[str, str]) -> None:
-        properties = etree.SubElement(parent, "properties")
-        for name, value in values.items():
-            etree.SubElement(properties, "property", name=self._text(name), value=self._text(value))
 
     def _text(self, text: str) -> str:
         return line(text, self._limit)

@@ -169,7 +169,9 @@ class Terminal:
         """Return what was lost, as a compiler says it: the criterion and its place, the cause, the code, the fix."""
         c = loss.criterion
         place, *others = file_places(c) or [""]
-        code = [row for pair in pointed_at(c, self._source_chars) for row in self._code(*pair)]
+        # beside the line's number, which takes up to twelve columns with its bar
+        room = max(SOURCE_CHARS_MIN, self.console.width - INDENT - 12)
+        code = [row for pair in pointed_at(c, room) for row in self._code(*pair)]
         alike = {a.id for a in loss.alike}
         files = missing_files(loss)
         several = len(files) > 1
@@ -256,11 +258,6 @@ class Terminal:
         shown = Text("\n".join(blank + row for row in rows), style, no_wrap=True, overflow="ignore")
         shown.stylize("dim", indent, indent + len(label))
         return shown
-
-    @property
-    def _source_chars(self) -> int:
-        """Return how much of a line of code has room beside its number."""
-        return max(SOURCE_CHARS_MIN, self.console.width - INDENT - 12)
 
     def _code(self, text: str, carets: str) -> list[RenderableType]:
         """Return a line of code and the carets below it, which three dots in place of an ellipsis move."""

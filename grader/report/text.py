@@ -75,7 +75,7 @@ _TOKEN = re.compile(rf"(?:(?<!`)`(?! )[^`]*[^` ]`(?!`)|(?<![\w.]){_CALL}|[^\s])+
 """A word, whose code may have blanks in it, and so may a call: `rospy.Service('~count', …)`."""
 _FIRST = re.compile(r"[#=:{]|[-+](?![^\s+-])")
 _NUMBERED = re.compile(r"(\d{1,9})([.)])(?!\S)")
-_ENTITIES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
+_ENTITIES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;"})
 
 
 def markdown(text: str, *, cell: bool = False) -> str:
@@ -145,8 +145,7 @@ def _close_brackets(rest: str, middle: str) -> str:
 
 
 def _escape(text: str) -> str:
-    text = "".join(_ENTITIES.get(character, character) for character in text)
-    return _MARKUP.sub(lambda match: "\\" + match.group(), text)
+    return _MARKUP.sub(r"\\\g<0>", text.translate(_ENTITIES))
 
 
 def _escape_line_start(shown: str) -> str:

@@ -35,6 +35,7 @@ def is_students_fault(result: GradingResult) -> bool:
 
 def blame(kind: str) -> str:
     """Return whose fault an error of this kind is: `submission`, `machine` or `grader`."""
+    # kinds without a class, such as `killed` and `worker-lost`, are the grader's own
     return next((found.blame for found in _kinds(GraderError) if found.kind == kind), "grader")
 
 

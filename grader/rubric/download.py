@@ -29,8 +29,12 @@ def fetch_rubric(url: str, digest: str) -> Path:
 
     Raises UsageError where the address has no digest or another file, HostError where it cannot be fetched.
     """
+    try:
+        parts = urlsplit(url)
+    except ValueError:  # as of `https://[x`
+        parts = urlsplit("")
     # A password would be in results and logs, where the rubric's name is.
-    if urlsplit(url).scheme.lower() != "https" or "@" in urlsplit(url).netloc:
+    if parts.scheme != "https" or "@" in parts.netloc:
         raise UsageError(
             f"{_printable(url.rpartition('@')[2])}: a rubric is fetched by https:// without a password only"
         )
@@ -40,7 +44,7 @@ def fetch_rubric(url: str, digest: str) -> Path:
             hint="write #sha256: and the digest after it, as `grader rubric validate` prints it",
         )
     # The name is for people, since the folder has the digest. It comes from an address and must not be a path.
-    name = re.sub(r"[^\w.-]", "", urlsplit(url).path.rpartition("/")[2]).removesuffix(".yaml").strip(".")
+    name = re.sub(r"[^\w.-]", "", parts.path.rpartition("/")[2]).removesuffix(".yaml").strip(".")
     file = user_folder("cache") / "rubrics" / digest / f"{name or 'rubric'}.yaml"
     kept = read_untrusted(file, BYTES_MAX)
     if kept is not None and hashlib.sha256(kept).hexdigest() == digest:

@@ -145,10 +145,9 @@ class _Advice:
         if self._files.hidden:
             names = listing(list(self._files.hidden))
             return _unknown(f"git was told not to look at {names} (assume-unchanged, skip-worktree)")
-        # in CI the commit was pushed; before a commit there is none to push
-        early = self._environment.ci or self._environment.committing
         points = [*self._in_git()]
-        if early:
+        # in CI the commit was pushed; before a commit there is none to push
+        if self._environment.ci or self._environment.committing:
             return GitStatus(points=tuple(points))
         server = read_server(self._view, self._package, self._branch, self._commit)
         points += self._push_advice(server)
@@ -302,8 +301,12 @@ def read_files(view: View, package: Path) -> tuple[str | None, str | None, Uncom
         pointers=tuple(path for path, (_, mode) in index.items() if mode == GITLINK),
         ignored=tuple(sorted(p for p in others["!"] if _is_used(package, p))),
         modes=tuple(_missing_modes(package, index)),
+        # git leaves these as they are in the index, whatever is on the disk: a small letter says
+        # assume-unchanged, and S skip-worktree
         hidden=tuple(
-            p for p, (tag, mode) in index.items() if _is_hidden(tag) and p in on_disk and mode != GITLINK
+            path
+            for path, (tag, mode) in index.items()
+            if (tag.islower() or tag == "S") and path in on_disk and mode != GITLINK
         ),
     )
     return None if branch == "(detached)" else branch, None if commit == "(initial)" else commit, files
@@ -353,11 +356,6 @@ def _is_executable(path: Path) -> bool:
     except (OSError, ValueError):
         return False
     return stat.S_ISREG(mode) and bool(mode & stat.S_IXUSR)
-
-
-def _is_hidden(tag: str) -> bool:
-    """Return whether git leaves the file as it is in the index, whatever is on the disk."""
-    return tag.islower() or tag == "S"
 
 
 def _is_own(path: str) -> bool:

@@ -134,7 +134,9 @@ class Grading:
             # at the start nobody has seen a result yet, and a save does not repair the machine
             if isinstance(error, UsageError) or (error.blame != "submission" and not self._begun):
                 raise
-            result = self._error_result(error)
+            name, source = identify(self.source) or (Path(self.source).name, self.source)
+            about = SubmissionInfo(id=name, source=source, commit=None, digest="", package="")
+            result = error_result(error, about, self.rubric)
         self._begun = True
         undecided = not self.options.static_only and any(c.status.is_retryable for c in result.criteria)
         shown = without_hidden(result, self.rubric.rubric)
@@ -142,11 +144,6 @@ class Grading:
         if shown.status == "error":
             return WatchedResult(result=shown, code=ExitCode.NOT_GRADED, undecided=True)
         return WatchedResult(result=shown, code=self.code(shown), undecided=undecided)
-
-    def _error_result(self, error: GraderError) -> GradingResult:
-        name, source = identify(self.source) or (Path(self.source).name, self.source)
-        about = SubmissionInfo(id=name, source=source, commit=None, digest="", package="")
-        return error_result(error, about, self.rubric)
 
 
 class Watch:
@@ -327,12 +324,9 @@ class Saves:
                     # suppressed: a file may vanish between walk and stat
                     with suppress(OSError):
                         if not is_ignored(name):
-                            yield str(here / name), _stamp(here / name)
-
-
-def _stamp(path: Path) -> tuple[int, ...]:
-    about = path.lstat()
-    return about.st_mtime_ns, about.st_size, about.st_mode, about.st_ino
+                            about = (here / name).lstat()
+                            stamp = (about.st_mtime_ns, about.st_size, about.st_mode, about.st_ino)
+                            yield str(here / name), stamp
 
 
 def watch(grading: Grading, screen: Screen, *, without: Path | None = None) -> ExitCode:

@@ -155,3 +155,8 @@ def test_a_rubric_is_fetched_by_https_with_its_digest_once(
         assert len(server.asked) == asked
     with pytest.raises(HostError, match="cannot be fetched"):
         load_rubric(url)
+
+
+def test_an_address_that_cannot_be_read_is_refused() -> None:
+    with pytest.raises(UsageError, match="https:// without a password only"):
+        load_rubric("https://[x/lab1.yaml")

@@ -23,8 +23,7 @@ from grader.model.result import (
 from grader.model.verdict import Status
 from grader.model.version import RUN as RUN_FORMAT
 from grader.model.version import UPDATE
-from grader.results import EVIDENCE, finish_killed
-from grader.results import read_result as read_result  # noqa: PLC0414 - for code that has a batch's folder
+from grader.results import EVIDENCE, finish_killed, read_result
 from grader.untrusted_text import json_text
 
 RUN = "run.json"

@@ -18,7 +18,8 @@ from typing import Literal, Protocol
 from pydantic import Field
 
 from grader import __version__
-from grader.classes.fetching import NothingInTime, Obtained, Rule, obtain
+from grader.classes.fetching.history import NothingInTime, Rule
+from grader.classes.fetching.obtain import Obtained, obtain
 from grader.errors import GraderError, SubmissionError, UsageError
 from grader.faults import GradingContext, classify_errors, fault_of
 from grader.files import temporary_folder

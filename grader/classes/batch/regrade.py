@@ -94,7 +94,7 @@ def states_of(result: GradingResult) -> dict[str, CriterionState]:
     }
 
 
-def pairs(before: Mapping[str, CriterionState], after: GradingResult) -> Iterator[CriterionChange]:
+def compare_criteria(before: Mapping[str, CriterionState], after: GradingResult) -> Iterator[CriterionChange]:
     """Yield every criterion of two results, changed or not, in the order of the later one."""
     now = states_of(after)
     for one in after.criteria:
@@ -107,7 +107,7 @@ def pairs(before: Mapping[str, CriterionState], after: GradingResult) -> Iterato
 
 
 def _changes(before: Mapping[str, CriterionState], after: GradingResult) -> tuple[CriterionChange, ...]:
-    return tuple(c for c in pairs(before, after) if (c.before or ())[:3] != (c.after or ())[:3])
+    return tuple(c for c in compare_criteria(before, after) if (c.before or ())[:3] != (c.after or ())[:3])
 
 
 def _replaced_before(journal: Path) -> dict[str, int]:

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from grader.checks import CHECKS
 from grader.errors import EvidenceError, GraderError, OutputError, UsageError
 from grader.evidence.reader import SUFFIXES, load_evidence
 from grader.evidence.run import Run
@@ -249,18 +248,17 @@ def rewrite(
     folder: Path,
     result: GradingResult,
     rubric: Rubric,
-    docs: Mapping[str, Mapping[str, str]] | None = None,
+    docs: Mapping[str, Mapping[str, str]],
     *,
     of: Path | None = None,
 ) -> None:
     """Write the result's reports; its evidence and its log stay, or are those of the folder `of`. Raises as `Results`
     does.
 
-    `docs` has the sections of the checks' docstrings; by default those of the grader's own checks.
+    `docs` has the sections of the checks' docstrings.
     """
     with Results(folder) as results:
         figures = figures_in(of or folder, result, rubric)
-        docs = docs or {name: check.sections for name, check in CHECKS.items()}
         write_reports(result, results.new, console="", rubric=rubric, figures=figures, docs=docs)
         (results.new / CONSOLE).unlink()
         if of is not None:

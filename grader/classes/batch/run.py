@@ -37,18 +37,10 @@ from grader.rubric.model import Rubric
 from grader.untrusted_text import line
 
 GRADEBOOK, RESULTS, INDEX = "gradebook.csv", "results.jsonl", "index.html"
-OWN_FILES = (
-    RUN,
-    GRADEBOOK,
-    RESULTS,
-    INDEX,
-    OVERRIDES,
-    BANK,
-    "changes.csv",
-    "similarity.csv",
-    "similarity.json",
+RESERVED = frozenset(
+    {RUN, GRADEBOOK, RESULTS, INDEX, OVERRIDES, BANK, "changes.csv", "similarity.csv", "similarity.json"}
+    | {"published.jsonl", "sent.jsonl", "feedback", "mails", "markers.json"}
 )
-RESERVED = frozenset({*OWN_FILES, "published.jsonl", "sent.jsonl", "feedback", "mails"})
 """No submission may be called so: its folder of results would lie there."""
 FAILED, INCONCLUSIVE, CHANGED = "failed", "inconclusive", "changed"
 WORDS = (FAILED, INCONCLUSIVE, CHANGED)

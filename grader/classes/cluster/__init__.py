@@ -3,7 +3,3 @@
 Jobs go out as tasks, results come back as files: a worker packs a submission's folder into one file in the exchange,
 and the client, which alone writes into the batch's folder, unpacks it into place.
 """
-
-from grader.classes.cluster.executor import ClusterExecutor
-
-__all__ = ["ClusterExecutor"]

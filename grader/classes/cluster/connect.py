@@ -30,6 +30,7 @@ LOCAL = "local"
 ENCRYPTED = ("tls", "wss")
 """Of Dask's protocols, those in which both ends show certificates."""
 _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://(\[[0-9A-Fa-f:.%]+\]|[^\s:/\[\]@]+):[0-9]{1,5}/?")
+GOES_ON = "then run the same command again: it continues where it stopped"
 OPEN = "it listens without certificates: start it with the protocol of its scheduler"
 Answer = Mapping[str, str] | BaseException | None
 
@@ -169,7 +170,7 @@ class Needs:
     encrypted: bool = False
 
 
-class Recruits:
+class GradingWorkers:
     """The workers of a cluster that can grade: each is asked once who it is, and left out by name if it differs.
 
     `known` are the addresses of all workers, `fit` maps those that can grade to their number of threads. `changed` is
@@ -221,20 +222,20 @@ class Recruits:
             # a thread each, since asking waits for as long as a worker is silent
             threading.Thread(target=self._ask, args=(address,), daemon=True).start()
 
-    def settle(self) -> None:
+    def take_answers(self) -> None:
         """Take in the answers that have come."""
         with suppress(Empty):
             while True:
                 self._take_in(*self._answers.get_nowait())
 
-    def none_fit(self, patience_s: float, goes_on: str) -> HostError:
+    def none_fit(self, patience_s: float) -> HostError:
         """Return the error that no worker can grade."""
         left_out = "; ".join(self._left_out.values())
         what = f"no worker that can grade ({left_out})" if left_out else "no worker"
         files = " --tls-ca-file CA --tls-cert CERT --tls-key KEY" if is_encrypted(self.address) else ""
         return HostError(
             f"{what} at {self.address} for {patience_s:g} s",
-            hint=f"start one with `dask worker {self.address} --nthreads 4{files}`, {goes_on}",
+            hint=f"start one with `dask worker {self.address} --nthreads 4{files}`, {GOES_ON}",
         )
 
     def _ask(self, address: str) -> None:

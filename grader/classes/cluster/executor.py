@@ -23,11 +23,19 @@ from typing import Any, BinaryIO
 
 from grader.classes.batch.job import GradingJob, SubmissionOutcome, failed_outcome
 from grader.classes.cluster import worker
-from grader.classes.cluster.connect import LOCAL, Needs, Recruits, check_address, connect, is_encrypted
+from grader.classes.cluster.connect import (
+    GOES_ON,
+    LOCAL,
+    GradingWorkers,
+    Needs,
+    check_address,
+    connect,
+    is_encrypted,
+)
 from grader.classes.cluster.worker import (
     Exchange,
     GradeRequest,
-    Parcel,
+    PackedFolder,
     Report,
     check_url,
     is_machines,
@@ -51,10 +59,9 @@ RESULT_S = 10.0
 READS, PAUSE_S = 5, 1.0
 LEAVE_S = 45.0
 LOST = "the workers that graded it were lost"
-GOES_ON = "then run the same command again: it continues where it stopped"
 
 
-class ParcelLost(HostError):
+class PackedFolderLost(HostError):
     """What a worker left cannot be had: the job is done once more."""
 
 
@@ -103,9 +110,9 @@ class ClusterExecutor:
             self._exchange.make()
             try:
                 self._exchange.greet(batch)
-                recruits = Recruits(client, self._exchange.url, batch, needs, self._say)
+                workers = GradingWorkers(client, self._exchange.url, batch, needs, self._say)
                 lab = put_lab(first.rubric, self._exchange)
-                tasks = _Tasks(client, self._exchange, batch, recruits, self._patience_s, lab=lab)
+                tasks = _Tasks(client, self._exchange, batch, workers, self._patience_s, lab=lab)
                 yield from tasks.run(chain([first], waiting), begun)
             finally:
                 with suppress(GraderError, OSError):  # what is left is removed by the next batch
@@ -138,14 +145,14 @@ class _Tasks:
         client: Any,  # noqa: ANN401 - Dask has no types
         exchange: Exchange,
         batch: str,
-        recruits: Recruits,
+        workers: GradingWorkers,
         patience_s: float,
         *,
-        lab: Parcel | None = None,
+        lab: PackedFolder | None = None,
     ) -> None:
         self._lab = lab
         self._client, self._exchange, self._batch = client, exchange, batch
-        self._recruits, self._patience_s = recruits, patience_s
+        self._workers, self._patience_s = workers, patience_s
         self._running: list[_Task] = []
         self._back: deque[_Task] = deque()
         self._count = 0
@@ -157,7 +164,7 @@ class _Tasks:
         try:
             while True:
                 # before looking, so that an answer that comes in between ends the wait below
-                self._recruits.changed.clear()
+                self._workers.changed.clear()
                 yield from self._look()
                 more = self._submit(waiting, begun)
                 if not (more or self._running or self._back):
@@ -171,13 +178,13 @@ class _Tasks:
                     if outcome is not None:
                         yield outcome
                 if not done:
-                    self._recruits.changed.wait(LOOK_S)
+                    self._workers.changed.wait(LOOK_S)
         finally:
             self._stop()
 
     def _submit(self, waiting: Iterator[GradingJob], begun: Callable[[str], None]) -> bool:
         """Give each thread that can grade a task. Return whether there may be more jobs."""
-        while len(self._running) < self._recruits.threads:
+        while len(self._running) < self._workers.threads:
             task = self._back.popleft() if self._back else None
             if task is None:
                 job = next(waiting, None)
@@ -194,7 +201,7 @@ class _Tasks:
         request = GradeRequest(
             job=task.job, exchange=self._exchange.url, batch=self._batch, seen=seen, lab=self._lab
         )
-        task.workers = frozenset(self._recruits.fit)
+        task.workers = frozenset(self._workers.fit)
         task.future = self._client.submit(
             worker.perform,
             pickle.dumps(request),
@@ -204,7 +211,7 @@ class _Tasks:
             workers=list(task.workers),
             allow_other_workers=False,
         )
-        task.future.add_done_callback(lambda _: self._recruits.changed.set())
+        task.future.add_done_callback(lambda _: self._workers.changed.set())
         self._count += 1
         self._running.append(task)
 
@@ -218,12 +225,12 @@ class _Tasks:
         except (TimeoutError, asyncio.TimeoutError):  # lost with its worker: Dask has it done again
             self._running.append(task)
             return None
-        except (ParcelLost, CancelledError, KilledWorker) as error:
+        except (PackedFolderLost, CancelledError, KilledWorker) as error:
             if self._client.status != "running":
                 raise self._scheduler_lost() from error
             # Dask gives this up only after it has lost several workers by it
             task.losses += LOSSES if isinstance(error, KilledWorker) else 0
-            return self._repeat(task, error.message if isinstance(error, ParcelLost) else LOST)
+            return self._repeat(task, error.message if isinstance(error, PackedFolderLost) else LOST)
         except GraderError as error:
             return failed_outcome(task.job, kind=error.kind, message=error.message, hint=error.hint)
         except Exception as error:  # noqa: BLE001 - whatever a worker's environment lacks, the others are graded
@@ -246,28 +253,28 @@ class _Tasks:
 
     def _look(self) -> Iterator[SubmissionOutcome]:
         """Once a second, look which workers there are. Repeat what was given only to workers that are gone."""
-        self._recruits.settle()
+        self._workers.take_answers()
         now_s = time.monotonic()
         if now_s - self._looked_s < LOOK_S:
             return
         self._looked_s = now_s
         try:
-            self._recruits.look()
+            self._workers.look()
         except Exception as error:
             raise self._scheduler_lost() from error
         for task in list(self._running):
-            if not task.future.done() and not task.workers & self._recruits.known:
+            if not task.future.done() and not task.workers & self._workers.known:
                 self._running.remove(task)
                 outcome = self._repeat(task, LOST)
                 if outcome is not None:
                     yield outcome
-        if self._recruits.fit:
+        if self._workers.fit:
             self._idle_since_s = now_s
-        elif now_s - self._idle_since_s > self._patience_s * (ANSWERING if self._recruits.asked else 1):
-            raise self._recruits.none_fit(self._patience_s, GOES_ON)
+        elif now_s - self._idle_since_s > self._patience_s * (ANSWERING if self._workers.asked else 1):
+            raise self._workers.none_fit(self._patience_s)
 
     def _scheduler_lost(self) -> HostError:
-        message = f"the connection to the scheduler at {self._recruits.address} is lost"
+        message = f"the connection to the scheduler at {self._workers.address} is lost"
         return HostError(message, hint=f"start the scheduler and its workers, {GOES_ON}")
 
     def _stop(self) -> None:
@@ -276,7 +283,7 @@ class _Tasks:
             return
         with suppress(Exception):  # it ends in any case
             self._client.cancel([task.future for task in self._running])
-        if self._recruits.fit:
+        if self._workers.fit:
             # in a thread, since a worker that hangs would never answer
             thread = threading.Thread(target=self._dismiss, daemon=True)
             thread.start()
@@ -284,11 +291,11 @@ class _Tasks:
 
     def _dismiss(self) -> None:
         with suppress(Exception):  # a worker that is gone needs no dismissal
-            workers = list(self._recruits.fit)
+            workers = list(self._workers.fit)
             self._client.run(worker.dismiss, self._batch, workers=workers, on_error="ignore")
 
 
-def put_lab(rubric: LoadedRubric, exchange: Exchange) -> Parcel | None:
+def put_lab(rubric: LoadedRubric, exchange: Exchange) -> PackedFolder | None:
     """Put the rubric and what it brings along into the exchange; None where that is its file alone."""
     files = read_beside_rubric(rubric)
     if not files:
@@ -306,41 +313,41 @@ def put_lab(rubric: LoadedRubric, exchange: Exchange) -> Parcel | None:
 def store_results(job: GradingJob, report: Report, exchange: Exchange) -> SubmissionOutcome:
     """Unpack a report's results into `job.out`, and return the outcome.
 
-    A complete result is replaced by no error but the submission's own. Raises ParcelLost, and what `Results` raises.
+    A complete result is replaced by no error but the submission's own. Raises PackedFolderLost, and as `Results` does.
     """
-    outcome, parcel = report.outcome, report.parcel
-    if parcel is None:
+    outcome, packed = report.outcome, report.packed
+    if packed is None:
         return outcome
     with Results(job.out / safe_name(job.entry.id)) as results:
         if is_machines(outcome) and results.complete:
             stays = f"the result of an earlier run stays as it is: {results.folder / RESULT}"
             outcome = outcome.model_copy(update={"hint": stays})
         else:
-            _unpack(parcel, exchange, results)
+            _unpack(packed, exchange, results)
             results.commit()
     with suppress(HostError, OSError):  # whatever is left goes with the exchange
-        exchange.delete(parcel)
+        exchange.delete(packed)
     return outcome
 
 
-def _unpack(parcel: Parcel, exchange: Exchange, results: Results) -> None:
+def _unpack(packed: PackedFolder, exchange: Exchange, results: Results) -> None:
     try:
-        with _open(exchange, parcel) as stream:
-            unpack(stream, parcel, results.new)
+        with _open(exchange, packed) as stream:
+            unpack(stream, packed, results.new)
     except (HostError, OSError) as error:
         message = getattr(error, "message", "") or str(error)
-        raise ParcelLost(message, hint=getattr(error, "hint", "")) from error
+        raise PackedFolderLost(message, hint=getattr(error, "hint", "")) from error
     # of a submission that could not be graded: as if it had been graded here
     if not any(results.evidence.iterdir()):
         results.evidence.rmdir()
     if not (results.new / RESULT).is_file():
-        raise ParcelLost(f"{parcel.name} holds no {RESULT}")
+        raise PackedFolderLost(f"{packed.name} holds no {RESULT}")
 
 
-def _open(exchange: Exchange, parcel: Parcel) -> BinaryIO:
+def _open(exchange: Exchange, packed: PackedFolder) -> BinaryIO:
     """A shared folder may show a new file some time later."""
     for _ in range(READS - 1):
         with suppress(FileNotFoundError):
-            return exchange.open(parcel)
+            return exchange.open(packed)
         time.sleep(PAUSE_S)
-    return exchange.open(parcel)
+    return exchange.open(packed)

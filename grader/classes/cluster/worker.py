@@ -20,6 +20,7 @@ import threading
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 from urllib.parse import urlsplit
@@ -38,7 +39,7 @@ from grader.workers import Worker, WorkerEnded, WorkerLimits
 
 TOKEN_BYTES = 8
 CHUNK_BYTES = 1 << 20
-PARCEL_BYTES = 1 << 30
+PACKED_BYTES = 1 << 30
 UNPACKED_BYTES = 2 << 30
 ENTRIES = 10_000
 LEVEL = 1  # evidence is compressed already
@@ -46,7 +47,7 @@ OWN_MEMORY = ("memory", "local+memory")
 HELLO = "hello"
 
 
-class Parcel(Record):
+class PackedFolder(Record):
     """A packed folder in the exchange, under `name`: its size in bytes and the sha256 of its bytes."""
 
     name: str
@@ -65,14 +66,14 @@ class GradeRequest(Record):
     exchange: str
     batch: str
     seen: bool
-    lab: Parcel | None = None
+    lab: PackedFolder | None = None
 
 
 class Report(Record):
-    """What became of a request. Without a `parcel` there are no results to put into place."""
+    """What became of a request. Without a `packed` there are no results to put into place."""
 
     outcome: SubmissionOutcome
-    parcel: Parcel | None = None
+    packed: PackedFolder | None = None
 
 
 def is_machines(outcome: SubmissionOutcome) -> bool:
@@ -83,7 +84,7 @@ def is_machines(outcome: SubmissionOutcome) -> bool:
 class Exchange:
     """The folder at `url`. Each machine reaches it with credentials of its own.
 
-    What cannot be read or written raises HostError, or FileNotFoundError for a parcel that is not there.
+    What cannot be read or written raises HostError, or FileNotFoundError for a packed folder that is not there.
     """
 
     def __init__(self, url: str) -> None:
@@ -104,7 +105,7 @@ class Exchange:
             if files.exists(root):
                 files.rm(root, recursive=True)
 
-    def put(self, local: Path, job_id: str) -> Parcel:
+    def put(self, local: Path, job_id: str) -> PackedFolder:
         """Upload a file under a name of its own: another attempt at the same job does not overwrite it."""
         digest = hashlib.sha256()
         with local.open("rb") as file:
@@ -113,17 +114,17 @@ class Exchange:
         name = f"{job_id}.{secrets.token_hex(TOKEN_BYTES)}.tar.gz"
         with self._open("written") as (files, root):
             files.put_file(str(local), f"{root}/{name}")
-        return Parcel(name=name, size=local.stat().st_size, sha256=digest.hexdigest())
+        return PackedFolder(name=name, size=local.stat().st_size, sha256=digest.hexdigest())
 
-    def open(self, parcel: Parcel) -> BinaryIO:
-        """Return a stream of the parcel's bytes."""
+    def open(self, packed: PackedFolder) -> BinaryIO:
+        """Return a stream of the packed folder's bytes."""
         with self._open("read") as (files, root):
-            return cast("BinaryIO", files.open(f"{root}/{parcel.name}", "rb"))
+            return cast("BinaryIO", files.open(f"{root}/{packed.name}", "rb"))
 
-    def delete(self, parcel: Parcel) -> None:
-        """Delete the parcel."""
+    def delete(self, packed: PackedFolder) -> None:
+        """Delete the packed folder."""
         with self._open("written") as (files, root):
-            files.rm_file(f"{root}/{parcel.name}")
+            files.rm_file(f"{root}/{packed.name}")
 
     def greet(self, word: str) -> None:
         """Leave a word: a worker that reads it reaches the same folder."""
@@ -175,7 +176,11 @@ def check_url(text: str) -> str:
         return str(Path(text).absolute())
     import fsspec  # noqa: PLC0415 - of the extra `cluster`
 
-    parts = urlsplit(text)
+    known = "a path, s3://bucket/folder, gs://…, abfs://… or sftp://host/folder"
+    try:
+        parts = urlsplit(text)
+    except ValueError as error:
+        raise UsageError(f"--exchange {text}: {error}", hint=f"give {known}") from error
     if parts.password is not None:
         raise UsageError(
             "--exchange holds a password, which every worker and its logs would see",
@@ -190,7 +195,6 @@ def check_url(text: str) -> str:
     except ImportError as error:
         raise UsageError(f"--exchange {text}: {error}", hint="install it here and on every worker") from error
     except ValueError as error:
-        known = "a path, s3://bucket/folder, gs://…, abfs://… or sftp://host/folder"
         raise UsageError(f"--exchange {text}: {error}", hint=f"give {known}") from error
     return text
 
@@ -203,31 +207,31 @@ def pack(folder: Path, file: Path) -> None:
                 archive.add(path, arcname=path.name)
 
 
-def unpack(stream: BinaryIO, parcel: Parcel, folder: Path) -> None:
-    """Unpack the parcel's files into `folder`. Raises HostError for other content than was sent, for more than results
+def unpack(stream: BinaryIO, packed: PackedFolder, folder: Path) -> None:
+    """Unpack a folder's files into `folder`. Raises HostError for other content than was sent, for more than results
     ever are, and for anything that is neither file nor folder or leads out; `folder` is then to be thrown away."""
-    measured = _Measured(stream, parcel)
+    measured = _Measured(stream, packed)
     try:
         with tarfile.open(fileobj=cast("BinaryIO", measured), mode="r|gz") as archive:
-            _extract(archive, parcel, folder)
+            _extract(archive, packed, folder)
         # to the end of the file, so that size and digest are those of all of it
         while measured.read(CHUNK_BYTES):
             pass
     except (tarfile.TarError, zlib.error, EOFError, ValueError, OSError) as error:
-        raise _refuse(parcel, str(error) or type(error).__name__) from error
-    if (measured.size, measured.digest.hexdigest()) != (parcel.size, parcel.sha256):
-        raise _refuse(parcel, "it is not what the worker sent")
+        raise _refuse(packed, str(error) or type(error).__name__) from error
+    if (measured.size, measured.digest.hexdigest()) != (packed.size, packed.sha256):
+        raise _refuse(packed, "it is not what the worker sent")
 
 
-def _extract(archive: tarfile.TarFile, parcel: Parcel, folder: Path) -> None:
+def _extract(archive: tarfile.TarFile, packed: PackedFolder, folder: Path) -> None:
     size, count = 0, 0
     while (member := archive.next()) is not None:
         size, count = size + member.size, count + 1
         if count > ENTRIES or size > UNPACKED_BYTES:
-            raise _refuse(parcel, "it holds more than results ever are")
+            raise _refuse(packed, "it holds more than results ever are")
         if not (member.isreg() or member.isdir()):
             # with neither links nor devices among them, no name leads anywhere but below `folder`
-            raise _refuse(parcel, "it holds something that is neither file nor folder")
+            raise _refuse(packed, "it holds something that is neither file nor folder")
         archive.extract(member, folder, set_attrs=False, filter="data")
         archive.members = []  # type: ignore[attr-defined] # it would keep all of them in memory
 
@@ -235,22 +239,22 @@ def _extract(archive: tarfile.TarFile, parcel: Parcel, folder: Path) -> None:
 class _Measured:
     """A stream that counts and digests what is read from it."""
 
-    def __init__(self, stream: BinaryIO, parcel: Parcel) -> None:
-        self._stream, self._parcel = stream, parcel
+    def __init__(self, stream: BinaryIO, packed: PackedFolder) -> None:
+        self._stream, self._packed = stream, packed
         self.size, self.digest = 0, hashlib.sha256()
 
     def read(self, size: int) -> bytes:
         data = self._stream.read(size)
         self.size += len(data)
         self.digest.update(data)
-        if self.size > min(self._parcel.size, PARCEL_BYTES):
-            raise _refuse(self._parcel, "it is larger than what the worker sent")
+        if self.size > min(self._packed.size, PACKED_BYTES):
+            raise _refuse(self._packed, "it is larger than what the worker sent")
         return data
 
 
-def _refuse(parcel: Parcel, why: str) -> HostError:
+def _refuse(packed: PackedFolder, why: str) -> HostError:
     hint = "check whether another program writes into the exchange"
-    return HostError(f"{parcel.name} cannot be unpacked: {why}", hint=hint)
+    return HostError(f"{packed.name} cannot be unpacked: {why}", hint=hint)
 
 
 WATCH_S = 1.0
@@ -276,8 +280,6 @@ async def describe(exchange: str, word: str) -> dict[str, str]:
 
 
 def _describe(exchange: str, word: str) -> dict[str, str]:
-    # now, since its files may be updated while it runs with those that it has loaded
-    _Code.digest = _digest_code()
     ros = kept_out = ""
     with suppress(GraderError):
         found = find_ros()
@@ -290,16 +292,10 @@ def _describe(exchange: str, word: str) -> dict[str, str]:
     return {**versions(), "host": socket.gethostname(), "ros": ros, "kept_out": kept_out}
 
 
-class _Code:
-    """What a worker remembers of its own files."""
-
-    digest = ""
-
-
+# once: a worker's files may be updated while it runs with those that it has loaded
+@cache
 def _digest_code() -> str:
-    """Return a digest of the grader's own files: two of one version may differ. A worker's is of those it loaded."""
-    if _Code.digest:
-        return _Code.digest
+    """Return a digest of the grader's own files: two of one version may differ."""
     folder = Path(__file__).resolve().parents[2]
     digest = hashlib.sha256()
     for path in sorted(folder.rglob("*.py")):
@@ -332,7 +328,7 @@ def grade(request: GradeRequest, is_wanted: Callable[[], bool]) -> Report:
     if request.seen and not os.path.lexists(source):
         hint = "submissions that are folders or archives must lie on a path that all machines share"
         raise HostError(f"{source} cannot be seen on {host}", hint=hint)
-    parcel = None
+    packed = None
     try:
         with temporary_folder("run") as folder, _lab(request) as job:
             outcome = _grade_in(folder, request.model_copy(update={"job": job}), is_wanted)
@@ -340,11 +336,11 @@ def grade(request: GradeRequest, is_wanted: Callable[[], bool]) -> Report:
                 outcome = outcome.model_copy(update={"message": f"{outcome.message} (on {host})"})
             # the client has no use for anything else, and would have to clear it away
             if not outcome.kept and outcome.kind != "interrupted" and is_wanted():
-                parcel = _deliver(folder, request)
+                packed = _deliver(folder, request)
     except (GraderError, OSError) as error:
         message = getattr(error, "message", "") or str(error)
         raise HostError(f"{message} (on {host})", hint=getattr(error, "hint", "")) from error
-    return Report(outcome=outcome, parcel=parcel)
+    return Report(outcome=outcome, packed=packed)
 
 
 @contextmanager
@@ -370,7 +366,7 @@ def _grade_in(folder: Path, request: GradeRequest, is_wanted: Callable[[], bool]
             return outcome_of_ended(job, error)
 
 
-def _deliver(folder: Path, request: GradeRequest) -> Parcel | None:
+def _deliver(folder: Path, request: GradeRequest) -> PackedFolder | None:
     """Put the results into the exchange; None if the job left none."""
     name = safe_name(request.job.entry.id)
     if not (folder / name).is_dir():

@@ -106,7 +106,8 @@ class _Push:
         """Return the commit that the branch has then."""
         self._git.run("init", "--quiet", "--template=", ".", cwd=self._top)
         self._refuse_settings()
-        tip = self._tip()
+        listed = self._ask("ls-remote", "--quiet", refspecs=(self._ref,))
+        tip = parse_refs(os.fsdecode(listed)).get(self._ref, "")
         if tip:
             # one commit is enough: to see whose the branch is, and as the parent of the next
             self._ask("fetch", "--quiet", "--no-tags", "--depth=1", refspecs=(self._ref,))
@@ -115,7 +116,10 @@ class _Push:
                     f"its branch {self._branch} is not the grader's, and stays as it is",
                     hint="give another name with --branch",
                 )
-        tree = self._tree(feedback)
+        (self._top / TEXT).write_bytes(feedback.text.encode())
+        (self._top / PAGE).write_bytes(feedback.page)
+        self._run("add", "--force", "--", TEXT, PAGE)
+        tree = self._run("write-tree")
         if tip and self._run("rev-parse", f"{tip}^{{tree}}") == tree:
             return tip
         parents = ("-p", tip) if tip else ()
@@ -137,16 +141,6 @@ class _Push:
                 f"this repository has settings of its own: {printable(unknown[0]) if unknown else 'alternates'}",
                 hint="push to it through a server, or by another user",
             )
-
-    def _tip(self) -> str:
-        listed = self._ask("ls-remote", "--quiet", refspecs=(self._ref,))
-        return parse_refs(os.fsdecode(listed)).get(self._ref, "")
-
-    def _tree(self, feedback: Feedback) -> str:
-        (self._top / TEXT).write_bytes(feedback.text.encode())
-        (self._top / PAGE).write_bytes(feedback.page)
-        self._run("add", "--force", "--", TEXT, PAGE)
-        return self._run("write-tree")
 
     def _receiver(self) -> str:
         """Return what receives the push: the server's own program, and on this machine one that runs nothing else."""

@@ -12,13 +12,10 @@ import re
 import tarfile
 import zipfile
 from abc import abstractmethod
-from collections.abc import Mapping
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Literal
-
-from typing_extensions import Self
 
 from grader.classes.feedback.forms import PAGE, TEXT, Feedback, Sender, SendSettings
 from grader.classes.gradebook.platforms import kinds
@@ -40,6 +37,10 @@ YEAR = (1980, 1, 1, 0, 0, 0)
 """The time of each file in a zip: the same feedback gives the same bytes."""
 
 
+class _Empty(Exception):
+    """No zip is better than an empty one."""
+
+
 class Archive(Sender):
     """One zip. Without `--out` it gets a name that is free: an earlier one may not be uploaded yet."""
 
@@ -52,18 +53,14 @@ class Archive(Sender):
             raise UsageError(f"{settings.out} is there already", hint="give another name with --out")
         self.target = settings.out or _free(settings.folder, f"feedback-{self.platform.lower()}")
 
-    def __enter__(self) -> Self:
-        self._stack = ExitStack()
-        beside = self._stack.enter_context(whole_file(self.target))
-        self._zip = self._stack.enter_context(zipfile.ZipFile(beside, "w", zipfile.ZIP_DEFLATED))
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if kind is None and not self._zip.namelist():  # no zip is better than an empty one
-            kind, error = NotSent, NotSent("nothing to send")
-        self._stack.__exit__(kind, error, trace)
+    @contextmanager
+    def opened(self) -> Iterator[None]:
+        """Make the zip; none if nothing is put into it."""
+        with suppress(_Empty), whole_file(self.target) as beside:
+            with zipfile.ZipFile(beside, "w", zipfile.ZIP_DEFLATED) as self._zip:
+                yield
+            if not self._zip.namelist():  # an exception keeps the file from its place
+                raise _Empty
 
     def place(self, feedback: Feedback) -> str:
         """Return the file's name in the zip."""
@@ -177,7 +174,7 @@ class FeedbackFolder(Sender):
     def send(self, feedback: Feedback, *, look: bool = False) -> str:
         """Write both files. Raises OutputError, which ends the run."""
         del look
-        folder = (self.settings.out or self.settings.folder / "feedback") / feedback.name
+        folder = Path(self.place(feedback))
         atomic_write(folder / TEXT, feedback.text.encode())
         atomic_write(folder / PAGE, feedback.page)
         return str(folder)

@@ -21,7 +21,7 @@ from itertools import chain
 from types import MappingProxyType
 from typing import Any
 from urllib.error import HTTPError, URLError
-from urllib.parse import quote, unquote, urljoin, urlsplit
+from urllib.parse import SplitResult, quote, unquote, urljoin, urlsplit
 from urllib.request import HTTPRedirectHandler, Request, build_opener
 
 from grader import __version__
@@ -59,8 +59,11 @@ class NoAnswer(Exception):
 class _NoRedirect(HTTPRedirectHandler):
     """A redirect could carry the token to another server."""
 
-    def redirect_request(self, *_args: object, **_words: object) -> None:
+    # not `redirect_request`: before that, Python parses the address, which may be none
+    def http_error_302(self, *_args: object, **_words: object) -> None:
         """Follow none."""
+
+    http_error_301 = http_error_303 = http_error_307 = http_error_308 = http_error_302
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,7 @@ class Api:
         told: Callable[[str], None],
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        parts = urlsplit(base)
+        parts = split_address(base)
         if parts.scheme != "https" and not (parts.scheme == "http" and parts.hostname in _LOCAL):
             raise UsageError(f"{line(base, 200)}: a token is sent by https:// only")
         self.base = base.rstrip("/")
@@ -158,10 +161,19 @@ class Api:
 
     def _new_address(self, url: str, answer: _Answer) -> str:
         """Return where a repository that was renamed is, on the same server."""
-        there = urljoin(url, answer.headers.get("location", ""))
-        if urlsplit(there)[:2] != urlsplit(url)[:2]:
-            raise Refused(answer.status, "it is on another server now")
-        return there
+        with suppress(ValueError):  # as of `https://[`
+            there = urljoin(url, answer.headers.get("location", ""))
+            if urlsplit(there)[:2] == urlsplit(url)[:2]:
+                return there
+        raise Refused(answer.status, "it is on another server now")
+
+
+def split_address(address: str) -> SplitResult:
+    """Return the parts of a server's address. Raises UsageError."""
+    try:
+        return urlsplit(address)
+    except ValueError as error:
+        raise UsageError(f"{line(address, 200)}: this is not the address of a server") from error
 
 
 def _lower(headers: Any) -> dict[str, str]:  # noqa: ANN401 - a message of http.client
@@ -454,8 +466,8 @@ class GitHubComments(Comments):
     def __init__(self, settings: SendSettings) -> None:
         super().__init__(settings)
         server = os.environ.get("GITHUB_SERVER_URL") or "https://github.com"
+        self.server = split_address(server).netloc.lower()
         token = token_for(server, self.token, "GH_TOKEN")
-        self.server = urlsplit(server).netloc.lower()
         own = "https://api.github.com" if self.server == "github.com" else f"{server.rstrip('/')}/api/v3"
         headers = {
             "Accept": "application/vnd.github+json",
@@ -490,9 +502,9 @@ class GitLabComments(Comments):
         server = (
             os.environ.get("CI_SERVER_URL") or f"https://{os.environ.get('CI_SERVER_HOST') or 'gitlab.com'}"
         )
+        self.server = split_address(server).netloc.lower()
         token = token_for(server, self.token)
         self._address = server.rstrip("/")
-        self.server = urlsplit(server).netloc.lower()
         base = os.environ.get("CI_API_V4_URL") or f"{self._address}/api/v4"
         self.api = Api(base, {"Authorization": f"Bearer {token}"}, settings.told)
         # in a project that others can read, only members see an issue

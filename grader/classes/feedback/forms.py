@@ -7,19 +7,17 @@ have it, and its row in `docs/how-to/feedback.md`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Literal
 
 from grader.errors import NotSent
 from grader.untrusted_text import line
 
 if TYPE_CHECKING:  # the parser of the command line reads the names of forms, and must start fast
-    from typing_extensions import Self
-
     from grader.model.batch import Entry, Publication
 
 WhenUnsure = Literal["again", "look", "ask"]
@@ -84,7 +82,7 @@ class SendSettings:
 
 
 class Sender(ABC):
-    """Sends by one form, inside of a `with` block. Files appear when the block ends without an exception.
+    """Sends by one form, within `opened`. Files appear when that ends without an exception.
 
     `together`: what is sent is one file, so that all of it is sent or nothing. `unsure` says what becomes of
     feedback of which it is not known whether it was sent: it is sent `again`, since that does no harm; the sender can
@@ -97,13 +95,10 @@ class Sender(ABC):
     def __init__(self, settings: SendSettings) -> None:
         self.settings = settings
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        del kind, error, trace
+    @contextmanager
+    def opened(self) -> Iterator[None]:
+        """Hold what is sent through: a file, or a connection."""
+        yield
 
     @abstractmethod
     def place(self, feedback: Feedback) -> str:

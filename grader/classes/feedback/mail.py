@@ -10,7 +10,8 @@ import re
 import smtplib
 import ssl
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from datetime import datetime, timezone
 from email.headerregistry import Address
 from email.message import EmailMessage
@@ -18,10 +19,7 @@ from email.policy import SMTP
 from email.utils import format_datetime
 from html import unescape
 from ipaddress import ip_address
-from types import TracebackType
 from urllib.parse import urlsplit
-
-from typing_extensions import Self
 
 from grader.classes.feedback.forms import PAGE, Feedback, Sender, SendSettings, Unsure
 from grader.classes.gradebook.platforms import kinds
@@ -65,15 +63,16 @@ class Mail(Sender):
         self.server = MailServer(settings.smtp, self.sender) if settings.smtp else None
         self.unsure = "ask" if self.server else "again"
 
-    def __enter__(self) -> Self:
-        if self.server:
-            self.server.connect()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self.server:
+    @contextmanager
+    def opened(self) -> Iterator[None]:
+        """Be connected to the server, if mails are sent."""
+        if self.server is None:
+            yield
+            return
+        self.server.connect()
+        try:
+            yield
+        finally:
             self.server.close()
 
     def place(self, feedback: Feedback) -> str:
@@ -148,19 +147,13 @@ class MailServer:
     """
 
     def __init__(self, address: str, sender: str) -> None:
-        parts = urlsplit(address if "://" in address else f"smtp://{address}")
         try:
+            parts = urlsplit(address if "://" in address else f"smtp://{address}")
             port = parts.port
-        except ValueError:
-            port = -1
+        except ValueError:  # as of `smtp://[::1`, or a port above 65535
+            parts, port = urlsplit(""), -1
         # a user's name is refused too: what comes with the command can be seen in the list of processes
-        if (
-            parts.scheme not in PORTS
-            or not parts.hostname
-            or port == -1
-            or parts.path.strip("/")
-            or parts.username
-        ):
+        if parts.scheme not in PORTS or not parts.hostname or parts.path.strip("/") or parts.username:
             hint = f"write it like smtp://mail.example.org:587 or smtps://mail.example.org; {USER} logs in"
             raise UsageError("--smtp: this is not the address of a mail server", hint=hint)
         self.host, self.port = parts.hostname, port or PORTS[parts.scheme]

@@ -18,7 +18,7 @@ from typing import Literal
 from pydantic import ValidationError
 
 from grader.classes.batch.folder import BatchFolder
-from grader.classes.batch.regrade import pairs, states_of
+from grader.classes.batch.regrade import compare_criteria, states_of
 from grader.classes.batch.renew_results import figures_in
 from grader.classes.batch.run import hold_folder
 from grader.classes.feedback.forms import PAGE, TEXT
@@ -56,8 +56,8 @@ class Published:
         return self.history.get(safe_name(entry.id), ())
 
     def folder(self, publication: Publication) -> Path:
-        """Return where the frozen result lies, with the student's reports."""
-        return frozen_folder(self.path, publication)
+        """Return where a frozen result lies, with the student's reports; what lies there never changes."""
+        return self.path / FOLDER / safe_name(publication.id) / publication.digest[:NAME_CHARS]
 
     def result(self, entry: Entry) -> GradingResult | None:
         """Return the result that is published. Raises EvidenceError if it cannot be read."""
@@ -82,11 +82,6 @@ class PublishStep:
     changes: tuple[str, ...] = ()
     why: str = ""
     failed: bool = False
-
-
-def frozen_folder(path: Path, publication: Publication) -> Path:
-    """Return where a publication's result and reports lie; what lies there never changes."""
-    return path / FOLDER / safe_name(publication.id) / publication.digest[:NAME_CHARS]
 
 
 def read_published(path: Path) -> Published:
@@ -175,7 +170,7 @@ def publish(folder: BatchFolder, rubric: LoadedRubric, how: Publishing) -> tuple
     Raises UsageError if the class was judged by another rubric, Busy if a batch works in the folder or feedback is
     being sent, OutputError, KeyboardInterrupt.
     """
-    refuse_other_rubric(folder, rubric)
+    refuse_other_rubric(folder, rubric, "publish it")
     make_folder(folder.path / FOLDER)
     # sending holds the second one alone, so that a class can be graded while it lasts
     with hold_folder(folder.path), hold_folder(folder.path / FOLDER, "feedback is being sent"):
@@ -199,12 +194,13 @@ def publish(folder: BatchFolder, rubric: LoadedRubric, how: Publishing) -> tuple
     return tuple(steps)
 
 
-def refuse_other_rubric(folder: BatchFolder, rubric: LoadedRubric) -> None:
-    """Raise UsageError unless the class was judged by this rubric, by which its reports are written."""
+def refuse_other_rubric(folder: BatchFolder, rubric: LoadedRubric, then: str) -> None:
+    """Raise UsageError unless the class was judged by this rubric, by which its reports are written; `then` is what to
+    do once it is."""
     if rubric.digest != folder.run.rubric.digest:
         raise UsageError(
             f"{folder.run.rubric_source}: the rubric has changed since the class was graded",
-            hint=f"grader regrade {folder.path} judges it by today's rubric; then publish it",
+            hint=f"grader regrade {folder.path} judges it by today's rubric; then {then}",
         )
 
 
@@ -229,7 +225,7 @@ def _job(folder: BatchFolder, published: Published, how: Publishing, step: Publi
         publication=publication,
         result=step.result,
         evidence=folder.folder_of(step.entry),
-        into=frozen_folder(folder.path, publication),
+        into=published.folder(publication),
         changes=history_words([*published.of(step.entry), publication]),
         hidden=how.hidden,
     )
@@ -344,7 +340,7 @@ def _total(result: GradingResult) -> str:
 def _criteria(before: GradingResult, after: GradingResult, hidden: Collection[str]) -> Iterator[str]:
     overrides = [{o.criterion: o for o in result.overrides} for result in (before, after)]
     unseen = 0
-    for change in pairs(states_of(before), after):
+    for change in compare_criteria(states_of(before), after):
         was, now = (found.get(change.criterion) for found in overrides)
         decided, same = _decision(was) != _decision(now), change.before == change.after
         if not decided and same:

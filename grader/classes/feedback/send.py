@@ -232,7 +232,7 @@ def _drafts(
     jobs: int,
 ) -> dict[str, tuple[Publication, Path]]:
     """Return the reports of results as they are now, written into `room`."""
-    refuse_other_rubric(folder, rubric)
+    refuse_other_rubric(folder, rubric, "publish it")
     wanted = {
         safe_name(step.entry.id): Freezing(
             publication=publication_of(step.entry, step.result),
@@ -290,7 +290,7 @@ def deliver(
     """
     together: list[Publication] = []
     place = ""
-    with sender:
+    with sender.opened():
         for feedback in selection.todo:
             publication = feedback.publication
             if (fault := _fault(sender, feedback)) is not None:  # what has no address is not begun

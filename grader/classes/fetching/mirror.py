@@ -263,7 +263,10 @@ class Mirror:
         """Fetch all heads and tags, and remove those that are no longer there."""
         refs = listing.refs
         sha256 = any(len(commit) == _WHOLE_HASHES[1] for commit in refs.values())
-        if sha256 != self._is_sha256() or not (self.path / "HEAD").is_file():
+        config = self.path / "config"
+        # a repository has one kind of hashes for ever, and its owner may have made it again with the other
+        was_sha256 = config.is_file() and "sha256" in config.read_text(encoding="utf-8", errors="replace")
+        if sha256 != was_sha256 or not (self.path / "HEAD").is_file():
             self._begin(self.path, sha256=sha256)
         for left in self.path.glob("objects/pack/tmp_*"):  # of one that was killed
             left.unlink()
@@ -318,10 +321,6 @@ class Mirror:
         self.git.run("init", "--quiet", "--bare", "--template=", *form, ".", cwd=folder)
         with (folder / "config").open("a", encoding="utf-8") as config:
             config.write(_SETTINGS)
-
-    def _is_sha256(self) -> bool:
-        config = self.path / "config"
-        return config.is_file() and "sha256" in config.read_text(encoding="utf-8", errors="replace")
 
     def _fetch(self, options: tuple[str, ...], *refspecs: str) -> None:
         try:

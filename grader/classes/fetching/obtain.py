@@ -40,13 +40,11 @@ from grader.model.result import HandedIn
 class Obtained:
     """`source` lies on this machine and can be opened as it is; its `given` and `name` are the roster's.
 
-    Of a repository it is a copy of the one commit that counts, below the `workdir`. `hints` are those that an opened
-    submission does not have by itself.
+    Of a repository it is a copy of the one commit that counts, below the `workdir`.
     """
 
     source: Source
     handed_in: HandedIn
-    hints: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -67,12 +67,9 @@ def letters_and_digits(text: str) -> str:
 
 def key(text: str) -> str:
     """Return the same for all that is written alike: invisible signs, case and blanks do not tell students apart."""
-    shown = "".join(
-        # Cf: signs that only format, and cannot be seen
-        sign
-        for sign in unicodedata.normalize("NFKC", text)
-        if unicodedata.category(sign) != "Cf"
-    )
+    signs = unicodedata.normalize("NFKC", text)
+    # Cf: signs that only format, and cannot be seen
+    shown = "".join(sign for sign in signs if unicodedata.category(sign) != "Cf")
     return " ".join(shown.casefold().split())
 
 
@@ -128,16 +125,11 @@ def _first_name_first(name: str) -> str:
     return " ".join(f"{first} {last}".split()) if comma else name
 
 
-@dataclass(frozen=True, kw_only=True)
-class Matched:
-    """`rows` gives the row of each submission, by their places; `doubtful` says why others have none."""
+def match(ours: Sequence[Identity], theirs: Sequence[Identity]) -> tuple[dict[int, int], dict[int, str]]:
+    """Return the row of each submission, by their places, and why others have none.
 
-    rows: dict[int, int]
-    doubtful: dict[int, str]
-
-
-def match(ours: Sequence[Identity], theirs: Sequence[Identity]) -> Matched:
-    """Return which belong together by what belongs to one person only; if one side has nothing of that, by name."""
+    They belong together by what belongs to one person only; if one side has nothing of that, by name.
+    """
     by_sure, by_name = defaultdict[tuple[str, str], set[int]](set), defaultdict[str, set[int]](set)
     for place, identity in enumerate(theirs):
         for sure in identity.sure:
@@ -154,10 +146,7 @@ def match(ours: Sequence[Identity], theirs: Sequence[Identity]) -> Matched:
         for row in rows:
             wanted[row].append(place)
     doubtful = {place: why for place, rows in found.items() if (why := _doubt(rows, wanted))}
-    return Matched(
-        rows={place: next(iter(rows)) for place, rows in found.items() if place not in doubtful},
-        doubtful=doubtful,
-    )
+    return {place: next(iter(rows)) for place, rows in found.items() if place not in doubtful}, doubtful
 
 
 def _contradict(ours: Identity, theirs: Identity) -> bool:

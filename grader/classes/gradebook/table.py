@@ -50,14 +50,8 @@ AFTER = ("comment", "error")
 def header(book: Book) -> tuple[str, ...]:
     """Return the columns' names: each is there once, whatever criteria and the roster's columns are called."""
     taken = {*BEFORE, *AFTER}
-    names = list(BEFORE)
-    for name, kind in [
-        *((c.id, "criterion") for c in book.criteria),
-        *((name, "roster") for name in book.columns),
-    ]:
-        names.append(_free(name, kind, taken))
-    criteria = len(BEFORE) + len(book.criteria)
-    return (*names[:criteria], *AFTER, *names[criteria:])
+    criteria = [_free(criterion.id, "criterion", taken) for criterion in book.criteria]
+    return (*BEFORE, *criteria, *AFTER, *(_free(name, "roster", taken) for name in book.columns))
 
 
 def cells(book: Book, row: GradebookRow) -> Iterator[Cell]:

@@ -63,14 +63,14 @@ def fill_template(
     _find_columns(work, named=named)
     work.remarks += _maxima(work, students)
     theirs = [row_identity(_fields(record, work), work.known) for record in students]
-    found = match([entry_identity(mark.entry, platform) for mark in marks], theirs)
+    rows, doubtful = match([entry_identity(mark.entry, platform) for mark in marks], theirs)
     for place, mark in enumerate(marks):
-        if place in found.rows:
-            _fill(work, students[found.rows[place]], mark)
+        if place in rows:
+            _fill(work, students[rows[place]], mark)
         else:
             who = f"{mark.entry.id} ({mark.entry.name})" if mark.entry.name else mark.entry.id
-            work.remarks.append(f"{who}: not in {template.name}: {found.doubtful[place]}")
-    work.remarks += _unmatched_remarks(work, students, theirs, set(found.rows.values()))
+            work.remarks.append(f"{who}: not in {template.name}: {doubtful[place]}")
+    work.remarks += _unmatched_remarks(work, students, theirs, set(rows.values()))
     return sheet.to_bytes(), work.remarks
 
 
@@ -305,7 +305,8 @@ def read_sheet(path: Path) -> Sheet:
     sheet = Sheet(
         path=path, mark=mark, encoding=encoding, delimiter=delimiter, records=list(_records(text, delimiter))
     )
-    if not any(name.strip() for name in sheet.header):
+    # a file with nothing but a byte order mark has no row at all
+    if not sheet.records or not any(name.strip() for name in sheet.header):
         raise UsageError(f"{path}:1: no columns are named", hint=_EXPORT)
     return sheet
 

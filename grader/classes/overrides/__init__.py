@@ -111,7 +111,8 @@ class _Reading:
         first: dict[str, str] = {}
         for key, value in data.items():
             if key == SCHEMA_KEY:
-                self._schema(value)
+                if value != SCHEMA:
+                    self.faults.append(((SCHEMA_KEY,), f'must be "{SCHEMA}", not {shown(value)}'))
                 continue
             name = self._ids.get(folder_key(key))
             if name is None:
@@ -121,10 +122,6 @@ class _Reading:
                 line = self._source.line((first[name],))
                 self.faults.append(((key,), f"is the submission on line {line} already, {first[name]}"))
             self._submission(key, value, name)
-
-    def _schema(self, value: object) -> None:
-        if value != SCHEMA:
-            self.faults.append(((SCHEMA_KEY,), f'must be "{SCHEMA}", not {shown(value)}'))
 
     def _submission(self, key: str, value: object, name: str | None) -> None:
         if value is not None and not isinstance(value, dict):

@@ -16,6 +16,7 @@ from flask import (
     current_app,
     get_template_attribute,
     jsonify,
+    make_response,
     redirect,
     render_template,
     request,
@@ -277,7 +278,7 @@ class _Views:
     def _item(self, key: str) -> ListedSubmission:
         item = self._session.item(key)
         if item is None:
-            raise NotFound("The class has no such submission.")
+            raise NotFound(NO_SUBMISSION)
         return item
 
     def _criterion(self, name: str) -> Criterion:
@@ -346,7 +347,9 @@ class _Views:
         self, item: ListedSubmission, drafts: Mapping[str, Draft]
     ) -> tuple[GradebookRow, Cards, list[str]]:
         """Return the submission as it counts now, its cards, and what is in the way of saving."""
-        row = self._session.submissions.row(item.key) or GradebookRow(entry=item.entry, result=None)
+        row = self._session.submissions.row(item.key)
+        if row is None:  # a batch has taken it out of the class since `item` was read
+            raise NotFound(NO_SUBMISSION)
         rubric = self._session.rubric.rubric
         try:
             found = self._session.decisions()
@@ -398,7 +401,7 @@ class _Views:
         if SCRIPT not in request.headers:
             return Response(self._page(item, {criterion: draft}), code)
         data = {"error": draft.error} | (self._parts(item, criterion, draft) if draft.conflict else {})
-        return with_code(jsonify(data), code)
+        return make_response(jsonify(data), code)
 
     def _saved_response(self, item: ListedSubmission, criterion: str, waits: str) -> AnyResponse:
         at = _now()
@@ -457,8 +460,8 @@ def _own(name: str) -> Markup:
     return Markup(files(__package__).joinpath("static", name).read_text(encoding="utf-8"))  # noqa: S704 - ours
 
 
-FAULTS_SHOWN = 10
 HIDDEN = "It is not shown while names are hidden."
+NO_SUBMISSION = "The class has no such submission."
 SCRIPT = "X-Asked-By"
 """The header with which our script asks: it is answered with what changed, as JSON."""
 
@@ -470,12 +473,6 @@ def send_opened(file: BinaryIO | None, mimetype: str, *, download: str = "") -> 
     return send_file(
         file, mimetype=mimetype, as_attachment=bool(download), download_name=download or None, max_age=0
     )
-
-
-def with_code(response: Response, code: int) -> Response:
-    """Return the same answer with another code."""
-    response.status_code = code
-    return response
 
 
 def show_grader_error(error: GraderError) -> AnyResponse:
@@ -500,5 +497,5 @@ def show_http_error(error: HTTPException) -> AnyResponse:
 
 def _message_page(code: int, title: str, text: str, *, again: bool) -> AnyResponse:
     if SCRIPT in request.headers:
-        return with_code(jsonify(error=text), code)
+        return make_response(jsonify(error=text), code)
     return Response(render_template("told.html", title=title, text=text, again=again), code)

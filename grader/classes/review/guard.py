@@ -91,11 +91,10 @@ def _check_form() -> None:
 
 
 def _with_headers(response: Response) -> Response:
-    # style and script of this review are the same to its end
-    kept = response.headers.get("Cache-Control", "") if response.cache_control.immutable else ""
     for name, value in HEADERS.items():
-        response.headers[name] = value
-    response.headers["Cache-Control"] = kept or HEADERS["Cache-Control"]
+        # style and script of this review are the same to its end, and say so themselves
+        if name != "Cache-Control" or not response.cache_control.immutable:
+            response.headers[name] = value
     response.headers.setdefault("Content-Security-Policy", PAGE)
     return response
 

@@ -47,7 +47,7 @@ def share_of(folder: Path, marker: str | None, of: str | None, group: str | None
         if of is not None:
             raise UsageError("--of needs --marker", hint="--marker ann --of 4")
         return MarkingShare(group=group)
-    if of.isdigit() and 0 < int(of) < 1000:
+    if of.isdecimal() and 0 < int(of) < 1000:
         with hold_review(folder):
             names, count = _claim_share(folder, marker, int(of)), int(of)
     else:

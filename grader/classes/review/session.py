@@ -9,7 +9,7 @@ import secrets
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,7 +19,7 @@ from pathlib import Path
 from grader.classes.batch.folder import BatchFolder, open_batch, write_run
 from grader.classes.batch.renew_results import Settler, rewrite, rewrite_all
 from grader.classes.batch.run import GRADEBOOK, hold_folder, ids_of, write_books
-from grader.classes.feedback.publish import read_published
+from grader.classes.feedback.publish import read_published, refuse_other_rubric
 from grader.classes.overrides import COMMENTS_FILE as BANK
 from grader.classes.overrides import (
     FILE,
@@ -66,13 +66,8 @@ def open_session(path: Path, pace: Pace | None = None) -> ReviewSession:
     changed, EvidenceError where a newer grader wrote results in it."""
     batch = open_batch(path)
     batch.refuse_newer()
-    run = batch.run
-    rubric = load_rubric(run.rubric_source)
-    if rubric.digest != run.rubric.digest:
-        raise UsageError(
-            f"{run.rubric_source}: the rubric has changed since the class was graded",
-            hint=f"grader regrade {path} judges it by today's rubric; then review it",
-        )
+    rubric = load_rubric(batch.run.rubric_source)
+    refuse_other_rubric(batch, rubric, "review it")
     return ReviewSession(path, rubric, pace or Pace())
 
 
@@ -300,11 +295,7 @@ class ReviewSession:
     def result(self, item: ListedSubmission, overrides: Overrides) -> GradingResult | None:
         """Return a submission's result as it counts with these overrides; None where it has none."""
         result = read_result(self.path / item.key) if item.gradable else None
-        if (
-            result is None
-            or result.rubric.digest != self.rubric.digest
-            or not self._behind(item, result, overrides)
-        ):
+        if result is None or not self._is_behind(item, result, overrides):
             return result
         return Settler(self.rubric.rubric, overrides).settle_again(result, item.entry.id, None)
 
@@ -420,32 +411,23 @@ class ReviewSession:
 
     def _catch_up(self) -> None:
         """Find what was decided, or settled, while no one reviewed or just before a review was killed."""
-        batch = self.submissions.batch()
-        behind = set(self._all_behind(self.overrides()))
+        batch, overrides, items = self.submissions.batch(), self.overrides(), self.submissions.items()
+        read = ((item, read_result(self.path / item.key)) for item in items if item.gradable)
+        behind = {item.key for item, found in read if found and self._is_behind(item, found, overrides)}
         written = stamp_of(self.path / GRADEBOOK)
-        newest = max(
-            ((stamp_of(self.path / item.key / RESULT) or (0,))[0] for item in self.submissions.items()),
-            default=0,
-        )
+        newest = max(((stamp_of(self.path / item.key / RESULT) or (0,))[0] for item in items), default=0)
         with self._guard:
             self._pending |= behind
             late = batch.run.state != "running" and (written is None or newest > written[0])
             self._books_behind |= bool(behind) or late
         self._caught_up = True
 
-    def _all_behind(self, overrides: Overrides) -> Iterator[str]:
-        for item in self.submissions.items():
-            result = read_result(self.path / item.key) if item.gradable else None
-            same = result is not None and result.rubric.digest == self.rubric.digest
-            if result is not None and same and self._behind(item, result, overrides):
-                yield item.key
-
-    @staticmethod
-    def _behind(item: ListedSubmission, result: GradingResult, overrides: Overrides) -> bool:
-        """Return whether a result says something else than `overrides.yaml`."""
+    def _is_behind(self, item: ListedSubmission, result: GradingResult, overrides: Overrides) -> bool:
+        """Return whether a result by this rubric says something else than `overrides.yaml`."""
         known = {criterion.id for criterion in result.criteria}
         given = {k: v for k, v in overrides.get(item.entry.id, {}).items() if k in known}
-        return given != {o.criterion: override_as_written(o) for o in result.overrides}
+        applied = {o.criterion: override_as_written(o) for o in result.overrides}
+        return given != applied and result.rubric.digest == self.rubric.digest
 
 
 LOCK = ".review.lock"

@@ -76,12 +76,6 @@ class RequestRow:
     criterion: str
     request: StudentRequest
 
-    def cells(self) -> tuple[str, ...]:
-        """Return the row in the order of `COLUMNS`, without control characters."""
-        asked = self.request
-        cells = (self.student, self.criterion, asked.text, asked.when, asked.source)
-        return tuple(visible(cell, lines=True) for cell in cells)
-
 
 def waiting(asked: Sequence[StudentRequest], decided: Override | None) -> list[StudentRequest]:
     """Return those of a criterion's questions that have no answer. One by hand, which names none, is to all."""
@@ -101,22 +95,25 @@ def write_requests(path: Path, rows: Sequence[RequestRow]) -> None:
     writer = csv.writer(out, lineterminator="\r\n")
     writer.writerow(COLUMNS)
     for row in rows:
-        writer.writerow([f"'{cell}" if _FORMULA.match(cell) else cell for cell in row.cells()])
+        asked = row.request
+        cells = (row.student, row.criterion, asked.text, asked.when, asked.source)
+        shown = [visible(cell, lines=True) for cell in cells]
+        writer.writerow([f"'{cell}" if _FORMULA.match(cell) else cell for cell in shown])
     atomic_write(path, out.getvalue().encode())
 
 
 def rows_of(path: Path, students: Collection[str]) -> list[RequestRow]:
     """Return what such a file, as `write_requests` writes it, has of these students."""
+    rows = csv.DictReader(io.StringIO(_text(path), newline=""))
+    read = ([_without_formula_sign(str(row.get(name) or "")) for name in COLUMNS] for row in rows)
     return [
         RequestRow(
-            student=str(row["student"]),
-            criterion=str(row.get("criterion") or ""),
-            request=StudentRequest(
-                **{name: _without_formula_sign(str(row.get(name) or "")) for name in COLUMNS[2:]}
-            ),
+            student=student,
+            criterion=criterion,
+            request=StudentRequest(text=text, when=when, source=source),
         )
-        for row in csv.DictReader(io.StringIO(_text(path), newline=""))
-        if row.get("student") in students
+        for student, criterion, text, when, source in read
+        if student in students
     ]
 
 
@@ -147,7 +144,7 @@ def read_requests(paths: Sequence[Path], entries: Sequence[Entry], criteria: Seq
             faults.append(f"{path.name}:1: there is no column {missing[0]}")
             continue
         for row in rows:
-            named = [str(row.get(name) or "").strip() for name in columns["student"]]
+            named = [_without_formula_sign(str(row.get(name) or "").strip()) for name in columns["student"]]
             asks, text, when, source = (
                 str(row.get(columns.get(name, ("",))[0]) or "").strip() for name in COLUMNS[1:]
             )

@@ -314,7 +314,7 @@ def entries_of(table: Table, path: Path, local: Local) -> Roster:
     """Return the entries of a table. Raises UsageError where a column is missing, or is there twice."""
     names = known_columns(table, path)
     header = Entry(id="", source="", where=f"{path.name}:{table.line}")
-    found = [FoundEntry(header, (meant,)) for _, meant in near_misses(table.columns)]
+    found = [FoundEntry(header, (meant,)) for meant in near_misses(table.columns)]
     found += [_read_row(row, names, table, path, local) for row in table.rows]
     further = tuple(column for column in table.columns if column and column not in names)
     return gather(path, found, columns=further)
@@ -433,7 +433,7 @@ def known_columns(table: Table, path: Path, required: Sequence[str] = REQUIRED) 
     where = f"{path}:{table.line}"
     if missing:
         there = ", ".join(brief(column) for column in table.columns if column) or "none"
-        meant = "; ".join(meant for _, meant in near_misses(table.columns))
+        meant = "; ".join(near_misses(table.columns))
         raise UsageError(
             f"{where}: no column {' and no column '.join(missing)}; there are: {there}",
             hint=meant or f"the first line names the columns: {','.join(required)}",
@@ -447,15 +447,15 @@ def known_columns(table: Table, path: Path, required: Sequence[str] = REQUIRED) 
     return {column: name for column, name in names.items() if name in KNOWN}
 
 
-def near_misses(columns: tuple[str, ...]) -> Iterator[tuple[str, str]]:
-    """Yield columns that are nearly one which means something and is not there, each with what was meant."""
+def near_misses(columns: tuple[str, ...]) -> Iterator[str]:
+    """Yield what was meant by each column that is nearly one which means something and is not there."""
     plain = {_plain(column) for column in columns}
     missing = [name for name in KNOWN if name not in plain]
     for column in columns:
         near = difflib.get_close_matches(_plain(column)[:40], missing, n=1, cutoff=NEARLY)
         # few mistype the first letter, and another one mostly makes another word
         if near and near[0][0] == _plain(column)[0] and _plain(column) not in KNOWN:
-            yield column, f"the column {brief(column)} is not known here: did you mean {near[0]}?"
+            yield f"the column {brief(column)} is not known here: did you mean {near[0]}?"
 
 
 def _plain(column: str) -> str:

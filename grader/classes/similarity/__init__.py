@@ -3,7 +3,3 @@
 The library `copydetect` compares fingerprints of every 25 characters of code, without its names and layout. Code of the
 starter, of the tutorials, or of most of the class is taken out first. Needs the extra `similarity`.
 """
-
-from grader.classes.similarity.comparison import compare, write_similarity
-
-__all__ = ["compare", "write_similarity"]

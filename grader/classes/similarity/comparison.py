@@ -20,25 +20,13 @@ from grader.files import atomic_write, open_untrusted, temporary_folder
 from grader.installable import require_extra
 from grader.intake.archive import unpack
 from grader.intake.limits import IntakeLimits
-from grader.model.batch import Lines, NotCompared, Pair, Similarity
+from grader.model.batch import Lines, NotCompared, Similarity
 from grader.report.text import csv_text, json_text
 
 THRESHOLD = 0.8
 HEAD = (
     "a", "name_a", "b", "name_b", "similarity_a_percent", "similarity_b_percent", "lines_a", "lines_b", "files"
 )  # fmt: skip
-
-
-@dataclass(frozen=True, kw_only=True)
-class ComparisonRequest:
-    """`folders` of results by id, starter code as folders and files, groups by id, a share from 0 to 1, and how many
-    are read side by side."""
-
-    folders: Mapping[str, Path]
-    starter: Sequence[Path]
-    groups: Mapping[str, str]
-    threshold: float
-    jobs: int
 
 
 def compare(
@@ -61,14 +49,9 @@ def compare(
     from grader.classes.similarity.matching import compare_class  # noqa: PLC0415 - of the extra `similarity`
 
     with temporary_folder("source") as place:
-        request = ComparisonRequest(
-            folders={name: folder.absolute() for name, folder in folders.items()},
-            starter=tuple(_unpack(path, place / str(number)) for number, path in enumerate(starter)),
-            groups=groups or {},
-            threshold=threshold,
-            jobs=max(1, jobs),
-        )
-        return compare_class(request)
+        given = [_unpack(path, place / str(number)) for number, path in enumerate(starter)]
+        whole = {name: folder.absolute() for name, folder in folders.items()}
+        return compare_class(whole, given, groups or {}, threshold=threshold, jobs=jobs)
 
 
 def _unpack(path: Path, into: Path) -> Path:
@@ -118,14 +101,11 @@ def _rows(similarity: Similarity, names: Mapping[str, str]) -> Iterator[tuple[st
     for pair in similarity.pairs:
         shares = (percent(pair.similarity_a), percent(pair.similarity_b))
         known = (pair.a, names.get(pair.a, ""), pair.b, names.get(pair.b, ""))
-        yield (*known, *shares, pair.lines_a, pair.lines_b, _files(pair))
-
-
-def _files(pair: Pair) -> str:
-    return "; ".join(
-        f"{match.file_a}:{stretches(match.lines_a)} ~ {match.file_b}:{stretches(match.lines_b)}"
-        for match in pair.files
-    )
+        files = (
+            f"{match.file_a}:{stretches(match.lines_a)} ~ {match.file_b}:{stretches(match.lines_b)}"
+            for match in pair.files
+        )
+        yield (*known, *shares, pair.lines_a, pair.lines_b, "; ".join(files))
 
 
 Language = Literal["python", "cpp"]
@@ -200,7 +180,8 @@ def _choose(name: str, files: list[tuple[str, bytes]]) -> Sources:
     chosen: list[ProgramText] = []
     left_out: list[NotCompared] = []
     room_bytes = SUBMISSION_BYTES_MAX
-    for path, data, language in sorted(_programs(files), key=lambda one: len(one[1])):
+    programs = [(path, data, found) for path, data in files if (found := language_of(path, data))]
+    for path, data, language in sorted(programs, key=lambda one: len(one[1])):
         reason = _why_not(data, room_bytes, len(chosen))
         if reason:
             left_out.append(NotCompared(id=name, file=path, reason=reason))
@@ -209,13 +190,6 @@ def _choose(name: str, files: list[tuple[str, bytes]]) -> Sources:
         chosen.append(ProgramText(path=path, code=data.decode(errors="replace"), language=language))
     chosen.sort(key=lambda one: one.path)
     return Sources(files=tuple(chosen), left_out=tuple(left_out[:FILES_MAX]))
-
-
-def _programs(files: list[tuple[str, bytes]]) -> Iterator[tuple[str, bytes, Language]]:
-    for path, data in files:
-        language = language_of(path, data)
-        if language is not None:
-            yield path, data, language
 
 
 def _why_not(data: bytes, room_bytes: int, count: int) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 import signal
 from base64 import b64decode, b64encode
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from importlib import metadata
@@ -28,7 +28,6 @@ from pygments.lexer import Lexer
 from pygments.lexers import get_lexer_by_name
 
 from grader.classes.similarity.comparison import (
-    ComparisonRequest,
     Language,
     ProgramText,
     read_starter,
@@ -120,17 +119,19 @@ def read_place(place: CodeSource) -> Fingerprints:
         reason = "takes too much memory to read"
     except Exception as error:  # noqa: BLE001 - whatever it is, the others are compared
         reason = f"could not be read: {type(error).__name__}"
-    return leave_out(place, reason)
+    return Fingerprints(place=place, left_out=(leave_out(place, reason),))
 
 
 def reading_ended(place: CodeSource, _: WorkerEnded) -> Fingerprints:
     """Return what there is of a place whose worker ended."""
-    return leave_out(place, "reading it took too long or too much memory")
+    return Fingerprints(
+        place=place, left_out=(leave_out(place, "reading it took too long or too much memory"),)
+    )
 
 
-def leave_out(place: CodeSource, reason: str) -> Fingerprints:
+def leave_out(place: CodeSource, reason: str) -> NotCompared:
     """Return that nothing of the place is compared."""
-    return Fingerprints(place=place, left_out=(NotCompared(id=place.name, reason=reason),))
+    return NotCompared(id=place.name, reason=reason)
 
 
 def read_files(
@@ -263,35 +264,42 @@ NEAR = 0.25
 _NONE = np.zeros(0, dtype=np.int64)
 
 
-def compare_class(request: ComparisonRequest) -> Similarity:
-    """Compare a class. Its submissions are read in workers."""
-    read = read_all(request)
-    starter = [text for one in read.starter for text in one.texts]
+def compare_class(
+    folders: Mapping[str, Path],
+    starter: Sequence[Path],
+    groups: Mapping[str, str],
+    *,
+    threshold: float,
+    jobs: int,
+) -> Similarity:
+    """Compare a class as `comparison.compare` says. Its submissions are read in workers."""
+    read = read_all(folders, starter, jobs)
+    given = [text for one in read.starter for text in one.texts]
     several = len(read.submissions) >= COMMON_FROM
     common = common_prints(list(read.submissions.values())) if several else _NONE
-    taken_out = distinct([*(text.prints for text in (*starter, *read.tutorials)), common])
+    taken_out = distinct([*(text.prints for text in (*given, *read.tutorials)), common])
     works = [own_work(name, files, taken_out) for name, files in read.submissions.items()]
     enough = [work for work in works if work.lines >= MIN_LINES]
-    pairs, same_group, cut = _pairs(enough, request)
+    pairs, same_group, cut = _pairs(enough, groups, threshold)
     found = clusters([(one.a, one.b) for one in pairs])
     cut = cut or len(pairs) > PAIRS_MAX
     return Similarity(
         library=LIBRARY,
         library_version=metadata.version(LIBRARY),
-        threshold=request.threshold,
+        threshold=threshold,
         min_lines=MIN_LINES,
         compared=len(works),
         pairs=tuple(pairs[:PAIRS_MAX]),
         clusters=found,
         taken_out=TakenOut(
-            starter=tuple(text.path for text in starter),
+            starter=tuple(text.path for text in given),
             tutorials=tuple(text.path for text in read.tutorials),
             common=len(common) if several else None,
         ),
         too_little=tuple(work.id for work in works if work.lines < MIN_LINES),
         not_compared=tuple(sorted(read.left_out, key=lambda one: (one.id, one.file))),
         same_group=same_group,
-        notes=(*_starter_notes(read.starter), *_notes(request, len(works), found, cut=cut)),
+        notes=(*_starter_notes(read.starter), *_notes(len(works), found, has_starter=bool(starter), cut=cut)),
     )
 
 
@@ -305,30 +313,26 @@ class _Class:
     left_out: list[NotCompared] = field(default_factory=list)
 
 
-def read_all(request: ComparisonRequest) -> _Class:
-    """Read submissions, starter code and tutorials, `request.jobs` at a time, each in a worker."""
+def read_all(folders: Mapping[str, Path], starter: Sequence[Path], jobs: int) -> _Class:
+    """Read submissions, starter code and tutorials, `jobs` at a time, each in a worker."""
     places = [
         CodeSource(),
-        *(CodeSource(folder=folder, is_starter=True) for folder in request.starter),
-        *(CodeSource(name=name, folder=folder) for name, folder in request.folders.items()),
+        *(CodeSource(folder=folder, is_starter=True) for folder in starter),
+        *(CodeSource(name=name, folder=folder) for name, folder in folders.items()),
     ]
     found, held = _Class(), 0
-    for one in run_each(
-        read_place, places, request.jobs, ended=reading_ended, limits=LIMITS, env=ENVIRONMENT
-    ):
+    for one in run_each(read_place, places, jobs, ended=reading_ended, limits=LIMITS, env=ENVIRONMENT):
         size = sum(len(text.prints) for text in one.texts)
         if one.place.folder is None:
             found.tutorials = one.texts
         elif one.place.is_starter:
             found.starter.append(one)
         elif held + size > PRINTS_MAX:
-            found.left_out += leave_out(
-                one.place, "the class has too much code to compare all of it"
-            ).left_out
+            found.left_out.append(leave_out(one.place, "the class has too much code to compare all of it"))
         else:
-            found.left_out += (
-                one.left_out if one.texts or one.left_out else leave_out(one.place, NO_PROGRAM).left_out
-            )
+            found.left_out += one.left_out
+            if not (one.texts or one.left_out):
+                found.left_out.append(leave_out(one.place, NO_PROGRAM))
             found.submissions |= {one.place.name: one.texts} if one.texts else {}
             held += size
     # workers end in any order; the report has the order of the command line
@@ -346,17 +350,19 @@ def _starter_notes(starter: Sequence[Fingerprints]) -> list[str]:
     return notes[:STARTER_NOTES]
 
 
-def _pairs(works: Sequence[Work], request: ComparisonRequest) -> tuple[list[Pair], int, bool]:
+def _pairs(
+    works: Sequence[Work], groups: Mapping[str, str], threshold: float
+) -> tuple[list[Pair], int, bool]:
     """Return the pairs that a person should see, how many were left out for their group, and whether some were cut."""
     near, cut = candidates(works)
     found, same_group = [], 0
     for first, second in near:
         one = pair(works[first], works[second])
         share = max(one.similarity_a, one.similarity_b)
-        if share < request.threshold or min(one.lines_a, one.lines_b) < MIN_LINES:
+        if share < threshold or min(one.lines_a, one.lines_b) < MIN_LINES:
             continue
-        group = request.groups.get(one.a, "")
-        if group and group == request.groups.get(one.b):
+        group = groups.get(one.a, "")
+        if group and group == groups.get(one.b):
             same_group += 1
         else:
             found.append(one)
@@ -366,9 +372,9 @@ def _pairs(works: Sequence[Work], request: ComparisonRequest) -> tuple[list[Pair
     return found, same_group, cut
 
 
-def _notes(request: ComparisonRequest, count: int, found: Sequence[Sequence[str]], *, cut: bool) -> list[str]:
+def _notes(count: int, found: Sequence[Sequence[str]], *, has_starter: bool, cut: bool) -> list[str]:
     notes = []
-    if count < COMMON_FROM and not request.starter:
+    if count < COMMON_FROM and not has_starter:
         notes.append(
             f"fewer than {COMMON_FROM} submissions and no starter code: what the task itself makes alike is not "
             "taken out; give the handout's package, or a reference solution, with --starter"
@@ -424,7 +430,9 @@ def common_prints(texts: Sequence[Sequence[Text]]) -> Numbers:
 
 def own_work(name: str, texts: Sequence[Text], taken_out: Numbers) -> Work:
     """Return the submission without the fingerprints in `taken_out`, which is sorted."""
-    return Work(name, tuple(_own(text, taken_out) for text in texts))
+    others = [np.isin(text.prints, taken_out) for text in texts]
+    files = [Own(text=t, prints=~o, signs=~mark_covered(t, o)) for t, o in zip(texts, others, strict=True)]
+    return Work(name, tuple(files))
 
 
 def candidates(works: Sequence[Work]) -> tuple[list[tuple[int, int]], bool]:
@@ -468,12 +476,6 @@ def clusters(pairs: Sequence[tuple[str, str]]) -> tuple[tuple[str, ...], ...]:
 def distinct(prints: Iterable[Numbers]) -> Numbers:
     """Return all of them, sorted, each once."""
     return np.unique(np.concatenate([_NONE, *prints]))
-
-
-def _own(text: Text, taken_out: Numbers) -> Own:
-    others = np.isin(text.prints, taken_out)
-    signs = ~mark_covered(text, others)
-    return Own(text=text, prints=~others, signs=signs)
 
 
 def _shared_counts(works: Sequence[Work]) -> np.ndarray:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from grader.classes.feedback.forms import FORGES, FORMS
+from grader.cli.commands.grading import DEFAULT_OUT
 from grader.cli.declare import (
     BATCH_FOLDER,
     CLASS_EXIT_CODES,
@@ -42,7 +43,6 @@ from grader.errors import ExitCode, UsageError
 from grader.installable import require_extra
 from grader.report.forms import FORMS as REPORT_FORMS
 
-DEFAULT_OUT = Path("grader-results")
 CLASS = Argument("DIR", BATCH_FOLDER)
 ROSTER = Argument(
     "ROSTER|FOLDER",
@@ -320,7 +320,7 @@ def similar(
     """Find nearly identical submissions, for a person to look at; marks do not change."""
     require_extra("similarity", "comparing submissions", "copydetect")
     with loading():
-        from grader.classes.similarity import compare, write_similarity
+        from grader.classes.similarity.comparison import compare, write_similarity
         from grader.cli.classes import print_similarity, starter_of, submissions_in
         from grader.cli.output import say_json
         from grader.portable import cores

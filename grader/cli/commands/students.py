@@ -59,7 +59,7 @@ def check(
     if fix and (staged or watch or as_json):
         raise UsageError("--fix goes with none of --staged, --watch and --json", hint="fix first")
     with loading():
-        from grader.cli.checking import check_packages
+        from grader.cli.checking import CheckSession, check_packages
         from grader.cli.select_rubric import choose_all
         from grader.pipeline import GradeOptions
         from grader.rubric.load import checkout_around
@@ -78,9 +78,10 @@ def check(
         wrong = fix_packages(chosen, dry_run=dry_run, yes=yes)
         if dry_run:
             return ExitCode.BELOW_PASS_MARK if wrong else ExitCode.PASSED
-    return check_packages(
-        path, chosen, options, watch=watch, out=out, as_json=as_json, staged=staged, full=full
+    session = CheckSession(
+        options=options, out=out, as_json=as_json, staged=staged, several=len(chosen) > 1, full=full
     )
+    return check_packages(path, chosen, session, watch=watch)
 
 
 @command("explain", group=STUDENTS)

@@ -121,18 +121,13 @@ def _page(run: BatchRun, found: Gathered, out: Path | None) -> str:
 
 def _list_diagnoses(run: BatchRun, found: Sequence[Diagnosis]) -> tuple[list[Listed], list[Listed]]:
     """Return the diagnoses that several share, and those that one has alone."""
-    worth: Mapping[str, Any] = {criterion.id: criterion for criterion in run.criteria}
+    known = {criterion.id: (criterion.title, criterion.max_points) for criterion in run.criteria}
     shared = [one for one in found if len(one.members) > 1][:SHARED_MAX]
     alone = [one for one in found if len(one.members) == 1][:ALONE_MAX]
-    listed = [
-        Listed(
-            place=place,
-            title=worth[one.criterion].title if one.criterion in worth else "",
-            worth=worth[one.criterion].max_points if one.criterion in worth else 0.0,
-            found=one,
-        )
-        for place, one in enumerate((*shared, *alone))
-    ]
+    listed = []
+    for place, one in enumerate((*shared, *alone)):
+        title, worth = known.get(one.criterion, ("", 0.0))  # what could not be graded has no criterion
+        listed.append(Listed(place=place, title=title, worth=worth, found=one))
     return listed[: len(shared)], listed[len(shared) :]
 
 
@@ -199,6 +194,7 @@ def page_data(
         "heat": [list(column) for column in heat.columns] if heat else [],
         "heatRows": list(heat.rows) if heat else [],
     }
+    # NaN and infinity are no JSON: a browser would show nothing at all
     return in_script(json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":")))
 
 
@@ -295,14 +291,6 @@ class _Kind:
     text: Callable[[SubmissionRow], str] = lambda _: ""
 
 
-def _problem(found: SubmissionRow) -> str:
-    return (
-        " ".join(part for part in (found.problem.message, found.problem.hint) if part)
-        if found.problem
-        else ""
-    )
-
-
 KINDS = (
     _Kind(
         anchor="missing",
@@ -325,7 +313,7 @@ KINDS = (
         title="Could not be graded",
         advice="If a submission is at fault, its student has to fix it. Then run only these again:",
         holds=lambda found: found.problem is not None and not found.problem.roster,
-        text=_problem,
+        text=lambda found: f"{found.problem.message} {found.problem.hint}".strip() if found.problem else "",
         command=lambda run, out: again(run, out, "failed"),
     ),
     _Kind(

@@ -10,7 +10,8 @@ from statistics import fmean, median
 from markupsafe import Markup
 
 from grader.model.batch import BatchRun, CriterionInfo
-from grader.report.class_page.submissions import LETTERS, LOST_LETTERS, SubmissionRow
+from grader.model.verdict import Status
+from grader.report.class_page.submissions import ABSENT, LETTERS, LOST_LETTERS, SubmissionRow
 from grader.report.html import svg
 from grader.wording import number
 
@@ -40,9 +41,13 @@ def costs(lines: Iterable[SubmissionRow], criteria: Sequence[CriterionInfo]) -> 
     """Return the costs of each criterion, in the rubric's order."""
     found = [MistakeCost(place=place, criterion=criterion) for place, criterion in enumerate(criteria)]
     for place, line in enumerate(lines):
-        if line.judged:
-            for cost in found:
-                _add(cost, place, line)
+        # what could not be judged has no letters that say anything; a criterion that is left out costs nothing
+        for cost in (c for c in found if line.judged and line.letters[c.place] != ABSENT):
+            cost.judged += 1
+            cost.touched += line.letters[cost.place] != LETTERS[Status.PASS]
+            if cost.place in line.caused:
+                cost.by.append(place)
+                cost.points += line.caused[cost.place]
     return found
 
 
@@ -51,17 +56,6 @@ def most_first(found: Iterable[MistakeCost]) -> list[MistakeCost]:
     return sorted(
         (cost for cost in found if cost.by), key=lambda cost: (-cost.points, -len(cost.by), cost.place)
     )
-
-
-def _add(cost: MistakeCost, place: int, line: SubmissionRow) -> None:
-    letter = line.letters[cost.place]
-    if letter == "n":
-        return
-    cost.judged += 1
-    cost.touched += letter != "p"
-    if cost.place in line.caused:
-        cost.by.append(place)
-        cost.points += line.caused[cost.place]
 
 
 BINS_MAX = 20
@@ -139,7 +133,7 @@ def histogram(found: Spread) -> Markup:
                 "rect",
                 svg.element("title", svg.escaped(one.words)),
                 class_="pile",
-                x=x + 1,
+                x=x + 1,  # with a gap between the bars
                 y=TOP + room - height,
                 width=max(1.0, step - 2),
                 height=height,

@@ -35,7 +35,7 @@ LETTERS: Mapping[Status, str] = {
 }
 """A status in one sign: what the page's data and its style sheet call it."""
 ABSENT = "n"
-LOST_LETTERS, OPEN = "afb", "iem"
+LOST_LETTERS = "afb"
 CLASS_MIN = 5
 """That fewer than so many submissions lose a criterion says nothing of the rubric."""
 SubmissionState = Literal["graded", "inconclusive", "manual", "error", "missing"]
@@ -206,11 +206,16 @@ class Gathered:
 
 def gather(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]]) -> Gathered:
     """Return them in the roster's order, by name."""
-    lines, diagnoses = [], Diagnoses()
+    lines, found = [], dict[tuple[str, str], Diagnosis]()
     for place, (entry, result) in enumerate(rows):
         lines.append(line_of(entry, result, run.criteria))
-        diagnoses.add(place, result)
-    return Gathered(lines=lines, diagnoses=diagnoses.largest_first())
+        for criterion, message, points in _mistakes(result):
+            text = line(message, MESSAGE_CHARS)
+            one = found.setdefault((criterion, reduced(text)), Diagnosis(criterion=criterion))
+            one.add(place, text, points)
+    # those of one size stay in the order in which they were found
+    diagnoses = sorted(found.values(), key=lambda one: (-len(one.members), -one.points))
+    return Gathered(lines=lines, diagnoses=diagnoses)
 
 
 def gather_anonymous(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]], salt: bytes) -> Gathered:
@@ -296,25 +301,6 @@ class Diagnosis:
             self.wordings[message] += 1
         else:
             self.more = True
-
-
-class Diagnoses:
-    """Groups what is added to it."""
-
-    def __init__(self) -> None:
-        self._found: dict[tuple[str, str], Diagnosis] = {}
-
-    def add(self, place: int, result: GradingResult) -> None:
-        """Add all mistakes of one submission. What only follows from another one is none of its own."""
-        for criterion, message, points in _mistakes(result):
-            text = line(message, MESSAGE_CHARS)
-            key = criterion, reduced(text)
-            found = self._found.setdefault(key, Diagnosis(criterion=criterion))
-            found.add(place, text, points)
-
-    def largest_first(self) -> list[Diagnosis]:
-        """Return all of them; those of one size in the order in which they were found."""
-        return sorted(self._found.values(), key=lambda found: (-len(found.members), -found.points))
 
 
 def _mistakes(result: GradingResult) -> Iterator[tuple[str, str, float]]:

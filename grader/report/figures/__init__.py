@@ -77,13 +77,12 @@ def _by_criterion(
 ) -> dict[str, tuple[Figure, ...]]:
     asked = {criterion.id: criterion for criterion in rubric.criteria}
     judged_by = {c.id: on_copy if c.repaired and not c.repaired.charged else first for c in criteria}
-    found = {c.id: _all_of(judged_by[c.id], asked[c.id], c) for c in criteria if c.id in asked}
+    found = {}
+    for result in (c for c in criteria if c.id in asked):
+        facts, criterion = judged_by[result.id], asked[result.id]
+        shown = _figures_of_check(facts, criterion, result) or _graph(facts, criterion, result)
+        found[result.id] = (*shown, *_cited_code(facts, result))
     return {name: figures for name, figures in found.items() if figures}
-
-
-def _all_of(facts: Facts, criterion: Criterion, result: CriterionResult) -> tuple[Figure, ...]:
-    shown = _figures_of_check(facts, criterion, result) or _graph(facts, criterion, result)
-    return (*shown, *_cited_code(facts, result))
 
 
 def _figures_of_check(facts: Facts, criterion: Criterion, result: CriterionResult) -> tuple[Figure, ...]:

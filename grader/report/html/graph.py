@@ -28,11 +28,11 @@ def graph_plot(figure: GraphFigure, name: str) -> Markup | None:
     if not vertices or len(vertices) > MOST or not (figure.edges or figure.wrong):
         return None
     known = set(vertices)
-    arrows = [
-        arrow
-        for arrow in map(_arrow, ((edge.node, edge.topic, edge.publishes) for edge in figure.edges))
-        if known.issuperset(arrow)
-    ]
+    # what a node publishes flows to the topic, and what it subscribes to comes from there
+    ends = (
+        (f"n{e.node}", f"t{e.topic}") if e.publishes else (f"t{e.topic}", f"n{e.node}") for e in figure.edges
+    )
+    arrows = [(begin, end) for begin, end in ends if known.issuperset((begin, end))]
     layers = layered(vertices, arrows)
     places, size = _places(layers, figure)
     children = [_heads(name)]
@@ -62,11 +62,6 @@ def graph_rows(figure: GraphFigure) -> Iterator[tuple[str, str, str, str]]:
         )
 
 
-def _arrow(edge: tuple[str, str, bool]) -> Arrow:
-    node, topic, publishes = f"n{edge[0]}", f"t{edge[1]}", edge[2]
-    return (node, topic) if publishes else (topic, node)
-
-
 def _clip_name(name: str) -> str:
     """Return the name, without the number that makes an anonymous node's unique: it only takes room."""
     return shorten(ANONYMOUS.sub("_…", name), NAME_CHARS)
@@ -78,7 +73,7 @@ def _width(vertex: str, figure: GraphFigure) -> float:
     name = LETTER * len(_clip_name(vertex[1:]))
     said = SMALL_LETTER * len(_clip_name(figure.wrong.get(vertex[1:], ""))) - 2 * EDGE
     if vertex[0] == "n":
-        return max(72.0, name * 1.15 + 34, said)
+        return max(72.0, name * 1.15 + 34, said)  # an ellipse narrows above and below its middle
     return max(72.0, name + 22, said, SMALL_LETTER * len(_clip_name(figure.types.get(vertex[1:], ""))) + 22)
 
 
@@ -93,6 +88,7 @@ def _places(layers: Layers, figure: GraphFigure) -> tuple[dict[str, Place], tupl
         for row, vertex in enumerate(column):
             places[vertex] = (left + wide / 2, above + row * ROW, _width(vertex, figure))
         left += wide + COLUMN_GAP
+    # 16: what is wrong with a vertex of the last row is written below it
     return places, (left - COLUMN_GAP + EDGE, (tallest - 1) * ROW + HEIGHT + 2 * EDGE + 16)
 
 

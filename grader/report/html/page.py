@@ -248,6 +248,7 @@ class Maker:
 
     def page(self, view: losses.ReportView) -> Page:
         whole = not not_graded(self._result)
+        # in this order: all share one room for cards, and what was lost is read first
         lost = [self._loss(loss) for loss in self._first(view.lost if whole else ())]
         still = [self._loss(loss) for loss in self._first(view.open if whole else ())]
         advice = [self._card(criterion) for criterion in self._first(view.advice)]

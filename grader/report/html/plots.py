@@ -336,6 +336,7 @@ def _over_time(figure: RateFigure, name: str) -> Markup:
     end = max(last, *(at for at, _ in died), last)
     top = (1.5 if log else 1.2) * max(highest, *rates)
     frame = svg.Frame(size=OVER_TIME, xs=(begin, end), ys=(0, top), log_y=log)
+    # SVG draws in this order: what passes, and when the machine was late, lies below axes and dots
     children = [_hatching(name), frame.box(frame.xs, (figure.low_hz, figure.high_hz), class_="band")]
     children += [
         frame.box(stretch, frame.ys, fill=f"url(#{name}-late)", class_="late")
@@ -406,7 +407,7 @@ def _hatching(name: str) -> Markup:
 def _histogram(figure: RateFigure, name: str) -> Markup:
     bound = figure.gap_high_s or 2 / figure.low_hz
     log = max(figure.gaps_s) > TOO_FAR * bound
-    longest_ms = 1.1e3 * max(1.2 * bound, *figure.gaps_s)
+    longest_ms = 1.1e3 * max(1.2 * bound, *figure.gaps_s)  # with a tenth of room behind it
     shares = [i / BINS for i in range(BINS + 1)]
     edges = [svg.from_log(s * svg.to_log(longest_ms)) if log else s * longest_ms for s in shares]
     counts = [0] * BINS

@@ -51,12 +51,8 @@ def environment() -> Environment:
         trim_blocks=True,
         undefined=StrictUndefined,
     )
-    made.filters["number"] = number
-    made.filters["of_points"] = of_points
-    made.filters["code"] = _code
-    made.filters["sentence"] = sentence
-    made.filters["joined"] = _join_signs
-    made.filters["to_write"] = _to_write
+    ours = {"code": _code, "joined": _join_signs, "to_write": _to_write}
+    made.filters.update(number=number, of_points=of_points, sentence=sentence, **ours)
     return made
 
 

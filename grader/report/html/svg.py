@@ -17,7 +17,10 @@ Point = tuple[float, float]
 
 def element(name: str, *children: Markup, **attributes: str | float) -> Markup:
     """Return `<name …>children</name>`. An attribute `class_` is `class`, `stroke_width` is `stroke-width`."""
-    given = "".join(f' {_name(key)}="{_value(value)}"' for key, value in attributes.items())
+    given = "".join(
+        f' {key.rstrip("_").replace("_", "-")}="{html(value) if isinstance(value, str) else short(value)}"'
+        for key, value in attributes.items()
+    )
     inside = "".join(children)
     return Markup(f"<{name}{given}>{inside}</{name}>" if inside else f"<{name}{given}/>")  # noqa: S704 - escaped
 
@@ -72,14 +75,6 @@ def drawing(
 def short(value: float) -> str:
     """Return a coordinate: tenths of a pixel."""
     return number(value, 1)
-
-
-def _name(key: str) -> str:
-    return key.rstrip("_").replace("_", "-")
-
-
-def _value(value: str | float) -> str:
-    return html(value) if isinstance(value, str) else short(value)
 
 
 LEFT, RIGHT, TOP, BOTTOM = 46.0, 14.0, 22.0, 40.0

@@ -15,8 +15,10 @@ from pathlib import Path
 
 import pytest
 
+from grader.classes.batch.run import _gradable
 from grader.classes.fetching.mirror import Patience
 from grader.classes.roster.entries import OUT
+from grader.model.batch import Entry, Roster
 from tests.classes.batch.a_class import (
     CORRECT,
     ROOT,
@@ -337,3 +339,12 @@ def test_passwords_of_the_roster_are_kept_nowhere(tmp_path, capsys, monkeypatch)
 def test_a_folder_that_cannot_be_written(tmp_path) -> None:
     (tmp_path / "out").mkdir(mode=0o500)
     assert batch(handed_in(tmp_path / "in", ["ada"]), tmp_path / "out") == 2
+
+
+@pytest.mark.parametrize("name", ["Run.json", "markers.json", "feedback"])
+def test_no_submission_lies_where_a_file_of_the_class_does(tmp_path, name) -> None:
+    found = _gradable(Roster(file="", entries=(Entry(id=name, source="https://x.example/y.git"),)), tmp_path)
+    assert found.entries == ()
+    assert [str(fault) for fault in found.faults] == [
+        f": id: {name} is the name of one of the batch's own files"
+    ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from grader.classes.cluster import ClusterExecutor
+from grader.classes.cluster.executor import ClusterExecutor
 from tests.classes.cluster.jobs import jobs_for
 
 

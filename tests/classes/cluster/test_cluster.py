@@ -8,8 +8,7 @@ import dask.config
 import pytest
 
 from grader.classes.batch.job import LocalExecutor
-from grader.classes.cluster import ClusterExecutor
-from grader.classes.cluster.executor import EXCHANGE
+from grader.classes.cluster.executor import EXCHANGE, ClusterExecutor
 from grader.errors import HostError
 from tests.classes.cluster.clusters import Cluster, cluster, kill
 from tests.classes.cluster.jobs import ids, ignore, jobs_for, verdicts

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.cluster import ClusterExecutor
-from grader.classes.cluster.executor import EXCHANGE
+from grader.classes.cluster.executor import EXCHANGE, ClusterExecutor
 from grader.errors import HostError
 from tests.classes.cluster.clusters import ROOT, Cluster, kill
 from tests.classes.cluster.jobs import ids, ignore, jobs_for, named_job, verdicts

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.cluster import ClusterExecutor, connect
-from grader.classes.cluster.connect import Answer, Needs, Recruits, check_address, why_not
+from grader.classes.cluster import connect
+from grader.classes.cluster.connect import Answer, GradingWorkers, Needs, check_address, why_not
+from grader.classes.cluster.executor import ClusterExecutor
 from grader.errors import HostError, UsageError
 from tests.classes.cluster.jobs import jobs_for
 from tests.support.processes import until
@@ -163,7 +164,7 @@ class _Cluster:
 
     def __init__(self, says: dict[str, Answer]) -> None:
         self.says, self.threads, self.lines = says, {}, []
-        self.recruits = Recruits(self, "/exchange", "0123", NEEDS, self.lines.append)
+        self.grading_workers = GradingWorkers(self, "/exchange", "0123", NEEDS, self.lines.append)
 
     def nthreads(self) -> dict[str, int]:
         return dict(self.threads)
@@ -175,10 +176,10 @@ class _Cluster:
     def look(self, threads: dict[str, int], answers: int) -> dict[str, int]:
         """The workers that can grade, once all have answered."""
         self.threads = threads
-        self.recruits.look()
-        until(lambda: self.recruits._answers.qsize() == answers)
-        self.recruits.settle()
-        return self.recruits.fit
+        self.grading_workers.look()
+        until(lambda: self.grading_workers._answers.qsize() == answers)
+        self.grading_workers.take_answers()
+        return self.grading_workers.fit
 
 
 @pytest.mark.parametrize(
@@ -186,7 +187,7 @@ class _Cluster:
 )
 def test_if_certificates_are_asked_for_a_worker_without_is_left_out(address: str, fits: bool) -> None:
     cluster = _Cluster({address: GOOD})
-    cluster.recruits._needs = Needs(versions=VERSIONS, ros=True, encrypted=True)
+    cluster.grading_workers._needs = Needs(versions=VERSIONS, ros=True, encrypted=True)
     assert (cluster.look({address: 4}, 1) == {address: 4}) is fits
     assert any("listens without certificates" in line for line in cluster.lines) is not fits
 
@@ -195,7 +196,7 @@ def test_workers_come_and_go() -> None:
     cluster = _Cluster({A: GOOD, B: GOOD})
     assert cluster.look({A: 4}, 1) == {A: 4}
     assert cluster.look({A: 4, B: 2}, 1) == {A: 4, B: 2}
-    assert cluster.recruits.threads == 6
+    assert cluster.grading_workers.threads == 6
     assert cluster.look({B: 2}, 0) == {B: 2}
     assert cluster.look({A: 4, B: 2}, 1) == {A: 4, B: 2}
 
@@ -208,7 +209,7 @@ def test_one_that_is_left_out_is_named_once_and_asked_again_when_it_comes_back()
     assert cluster.look({}, 0) == {}
     cluster.says[A] = GOOD
     assert cluster.look({A: 4}, 1) == {A: 4}
-    assert cluster.recruits.asked == 0
+    assert cluster.grading_workers.asked == 0
 
 
 @pytest.mark.parametrize("lost", [None, OSError("in <closed TCP>: Stream is closed")])
@@ -222,5 +223,5 @@ def test_one_that_was_lost_while_it_was_asked_is_asked_again(lost: Answer) -> No
 def test_an_answer_that_comes_after_its_worker_has_gone_counts_for_nothing() -> None:
     cluster = _Cluster({A: GOOD})
     cluster.threads = {A: 4}
-    cluster.recruits.look()
+    cluster.grading_workers.look()
     assert cluster.look({}, 1) == {}

@@ -11,8 +11,8 @@ import pytest
 from grader.arena.limits import RunLimits
 from grader.classes.batch.job import GradingJob, SubmissionOutcome
 from grader.classes.cluster import executor
-from grader.classes.cluster.executor import ParcelLost, store_results
-from grader.classes.cluster.worker import Exchange, Parcel, Report, pack
+from grader.classes.cluster.executor import PackedFolderLost, store_results
+from grader.classes.cluster.worker import Exchange, PackedFolder, Report, pack
 from grader.errors import Busy
 from grader.results import Results
 from tests.classes.cluster.jobs import jobs_for
@@ -33,7 +33,7 @@ def job(tmp_path: Path) -> GradingJob:
 
 def _sent(
     exchange: Exchange, folder: Path, *, status: str = "graded", words: str = "", evidence: str = ""
-) -> Parcel:
+) -> PackedFolder:
     (folder / "s000" / "evidence").mkdir(parents=True, exist_ok=True)
     (folder / "s000" / "result.json").write_text(json.dumps({"status": status, "words": words}))
     if evidence:
@@ -57,7 +57,7 @@ def test_of_two_attempts_the_one_that_was_reported_counts(
 ) -> None:
     believed_lost = _sent(exchange, tmp_path, words="first", evidence="first")
     reported = _sent(exchange, tmp_path, words="second", evidence="second")
-    assert store_results(job, Report(outcome=_outcome(), parcel=reported), exchange).status == "graded"
+    assert store_results(job, Report(outcome=_outcome(), packed=reported), exchange).status == "graded"
     assert _words(job) == "second"
     assert (job.out / "s000" / "evidence" / "package.mcap").read_text() == "second"
     assert sorted(path.name for path in (job.out / "s000").iterdir()) == ["evidence", "result.json"]
@@ -71,9 +71,9 @@ def test_only_an_error_of_the_submission_takes_the_place_of_a_complete_result(
     kind: str, stays: bool, exchange: Exchange, job: GradingJob, tmp_path: Path
 ) -> None:
     earlier = _sent(exchange, tmp_path / "a", words="earlier", evidence="earlier")
-    store_results(job, Report(outcome=_outcome(), parcel=earlier), exchange)
+    store_results(job, Report(outcome=_outcome(), packed=earlier), exchange)
     wrong = _sent(exchange, tmp_path / "b", status="error", words="wrong")
-    outcome = store_results(job, Report(outcome=_outcome("error", kind), parcel=wrong), exchange)
+    outcome = store_results(job, Report(outcome=_outcome("error", kind), packed=wrong), exchange)
     assert outcome.status == "error"
     assert _words(job) == ("earlier" if stays else "wrong")
     assert (job.out / "s000" / "evidence").exists() is stays
@@ -81,24 +81,24 @@ def test_only_an_error_of_the_submission_takes_the_place_of_a_complete_result(
     assert list(Path(exchange.url).iterdir()) == []
 
 
-def test_a_result_that_was_kept_needs_no_parcel(exchange: Exchange, job: GradingJob) -> None:
+def test_a_result_that_was_kept_needs_no_packed_folder(exchange: Exchange, job: GradingJob) -> None:
     kept = _outcome().model_copy(update={"kept": True})
     assert store_results(job, Report(outcome=kept), exchange) == kept
     assert not job.out.exists()
 
 
-def test_a_parcel_that_is_not_there_or_not_whole_changes_nothing(
+def test_a_packed_folder_that_is_not_there_or_not_whole_changes_nothing(
     exchange: Exchange, job: GradingJob, tmp_path: Path
 ) -> None:
     earlier = _sent(exchange, tmp_path, words="earlier", evidence="earlier")
-    store_results(job, Report(outcome=_outcome(), parcel=earlier), exchange)
-    with pytest.raises(ParcelLost):
-        store_results(job, Report(outcome=_outcome(), parcel=earlier), exchange)
+    store_results(job, Report(outcome=_outcome(), packed=earlier), exchange)
+    with pytest.raises(PackedFolderLost):
+        store_results(job, Report(outcome=_outcome(), packed=earlier), exchange)
     broken = _sent(exchange, tmp_path, words="broken")
     whole = Path(exchange.url, broken.name).read_bytes()
     Path(exchange.url, broken.name).write_bytes(whole[:-9])
-    with pytest.raises(ParcelLost):
-        store_results(job, Report(outcome=_outcome(), parcel=broken), exchange)
+    with pytest.raises(PackedFolderLost):
+        store_results(job, Report(outcome=_outcome(), packed=broken), exchange)
     assert _words(job) == "earlier"
     assert sorted(path.name for path in (job.out / "s000").iterdir()) == ["evidence", "result.json"]
 
@@ -106,9 +106,9 @@ def test_a_parcel_that_is_not_there_or_not_whole_changes_nothing(
 def test_a_submission_that_another_grader_works_on_is_left_to_it(
     exchange: Exchange, job: GradingJob, tmp_path: Path
 ) -> None:
-    parcel = _sent(exchange, tmp_path)
+    packed = _sent(exchange, tmp_path)
     with Results(job.out / "s000"), pytest.raises(Busy):
-        store_results(job, Report(outcome=_outcome(), parcel=parcel), exchange)
+        store_results(job, Report(outcome=_outcome(), packed=packed), exchange)
 
 
 def test_the_page_on_clusters_has_the_limits_of_memory_as_they_are() -> None:

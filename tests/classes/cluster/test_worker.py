@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from grader.classes.cluster import worker
-from grader.classes.cluster.worker import Exchange, GradeRequest, Parcel, pack, unpack
+from grader.classes.cluster.worker import Exchange, GradeRequest, PackedFolder, pack, unpack
 from grader.errors import HostError
 from tests.classes.cluster.jobs import named_job
 from tests.support.processes import children_of, lives, until
@@ -39,11 +39,13 @@ def _request(exchange: Exchange, tmp_path: Path, *, source: str = "", seen: bool
 
 
 @pytest.mark.full
-def test_it_leaves_one_parcel_and_nothing_in_the_batchs_folder(exchange: Exchange, tmp_path: Path) -> None:
+def test_it_leaves_one_packed_folder_and_nothing_in_the_batchs_folder(
+    exchange: Exchange, tmp_path: Path
+) -> None:
     report = worker.grade(_request(exchange, tmp_path), lambda: True)
     assert report.outcome.status == "inconclusive"
-    assert report.parcel is not None
-    assert [path.name for path in Path(exchange.url).iterdir()] == [report.parcel.name]
+    assert report.packed is not None
+    assert [path.name for path in Path(exchange.url).iterdir()] == [report.packed.name]
     assert not (tmp_path / "out").exists()
 
 
@@ -57,13 +59,13 @@ def test_a_path_that_only_the_client_sees_is_the_machines_fault(exchange: Exchan
 def test_a_path_that_nobody_sees_is_the_submissions(exchange: Exchange, tmp_path: Path) -> None:
     report = worker.grade(_request(exchange, tmp_path, source="/nowhere/ada", seen=False), lambda: True)
     assert (report.outcome.status, report.outcome.kind) == ("error", "submission")
-    assert report.parcel is not None
+    assert report.packed is not None
 
 
 @pytest.mark.full
 def test_what_nobody_wants_any_more_is_not_delivered(exchange: Exchange, tmp_path: Path) -> None:
     report = worker.grade(_request(exchange, tmp_path), lambda: False)
-    assert report.parcel is None
+    assert report.packed is None
     assert list(Path(exchange.url).iterdir()) == []
 
 
@@ -85,7 +87,7 @@ def test_dismissed_it_interrupts_what_runs_and_ends_its_processes(exchange: Exch
     until(lambda: set(children_of(os.getpid())) - before)
     asyncio.run(worker.dismiss(WORD))
     thread.join()
-    assert [report.parcel for report in found] == [None]
+    assert [report.packed for report in found] == [None]
     assert set(children_of(os.getpid())) <= before
 
 
@@ -111,8 +113,8 @@ def test_it_says_who_it_is(exchange: Exchange) -> None:
     assert "is a different place there" in asyncio.run(worker.describe(exchange.url, "another"))["kept_out"]
 
 
-def _parcel(content: bytes) -> Parcel:
-    return Parcel(name="ada.0.tar.gz", size=len(content), sha256=hashlib.sha256(content).hexdigest())
+def _packed(content: bytes) -> PackedFolder:
+    return PackedFolder(name="ada.0.tar.gz", size=len(content), sha256=hashlib.sha256(content).hexdigest())
 
 
 def _tar(*members: tarfile.TarInfo) -> bytes:
@@ -140,7 +142,7 @@ def test_a_folder_comes_back_as_it_was(tmp_path: Path) -> None:
     pack(folder, packed)
     content = packed.read_bytes()
     back.mkdir()
-    unpack(io.BytesIO(content), _parcel(content), back)
+    unpack(io.BytesIO(content), _packed(content), back)
     assert sorted(str(p.relative_to(back)) for p in back.rglob("*")) == [
         "evidence",
         "evidence/talker.mcap",
@@ -167,10 +169,10 @@ def test_nothing_leads_out_of_the_folder(member: tarfile.TarInfo, tmp_path: Path
     back = tmp_path / "in" / "back"
     back.mkdir(parents=True)
     if member.name.startswith("/"):
-        unpack(io.BytesIO(content), _parcel(content), back)
+        unpack(io.BytesIO(content), _packed(content), back)
     else:
         with pytest.raises(HostError, match="cannot be unpacked"):
-            unpack(io.BytesIO(content), _parcel(content), back)
+            unpack(io.BytesIO(content), _packed(content), back)
     found = [path for path in tmp_path.rglob("*") if not path.is_relative_to(back) and path.is_file()]
     assert found == []
     assert not Path("/tmp/outside").exists()
@@ -192,15 +194,15 @@ def test_nothing_leads_out_of_the_folder(member: tarfile.TarInfo, tmp_path: Path
 def test_what_was_not_sent_is_refused(harm: Callable[[bytes], bytes], tmp_path: Path) -> None:
     content = _tar(_member("result.json", size=4000))
     with pytest.raises(HostError, match=r"ada\.0\.tar\.gz cannot be unpacked"):
-        unpack(io.BytesIO(harm(content)), _parcel(content), tmp_path)
+        unpack(io.BytesIO(harm(content)), _packed(content), tmp_path)
 
 
 def test_more_than_results_ever_are_is_refused(tmp_path: Path, monkeypatch) -> None:
     content = _tar(*(_member(f"{number}", size=100) for number in range(20)))
     monkeypatch.setattr(worker, "ENTRIES", 19)
     with pytest.raises(HostError, match="more than results ever are"):
-        unpack(io.BytesIO(content), _parcel(content), tmp_path)
+        unpack(io.BytesIO(content), _packed(content), tmp_path)
     monkeypatch.setattr(worker, "ENTRIES", 20)
     monkeypatch.setattr(worker, "UNPACKED_BYTES", 1999)
     with pytest.raises(HostError, match="more than results ever are"):
-        unpack(io.BytesIO(content), _parcel(content), tmp_path)
+        unpack(io.BytesIO(content), _packed(content), tmp_path)

@@ -36,6 +36,7 @@ def _names(exchange: Exchange) -> list[str]:
         ("sftp://me:secret@host/results", "holds a password"),
         ("memory://results", "memory belongs to one process"),
         ("gopher://host/results", "gopher"),
+        ("s3://[bucket/results", "Invalid IPv6 URL"),
     ],
 )
 def test_what_no_worker_can_reach_is_refused(url: str, why: str) -> None:

@@ -186,6 +186,9 @@ def test_a_renamed_repository_is_followed_on_its_own_server_alone(
     assert both(published, system) == 3
     assert "it is on another server now" in capsys.readouterr().err
     assert len(bodies(server, "bob")) == 1
+    server.moved = {at: "https://[elsewhere"}
+    assert both(published, system) == 3
+    assert "it is on another server now" in capsys.readouterr().err
 
 
 def test_a_token_that_is_not_taken_ends_the_run(
@@ -236,6 +239,9 @@ def test_a_token_is_never_sent_in_the_clear(
     monkeypatch.setenv(name, "http://forge.example")
     assert both(published, system) == 2
     assert "a token is sent by https:// only" in capsys.readouterr().err
+    monkeypatch.setenv(name, "https://[forge.example")
+    assert both(published, system) == 2
+    assert "this is not the address of a server" in capsys.readouterr().err
 
 
 def test_a_dry_run_asks_no_server(published: Path, system: str, server: Forge, capsys) -> None:

@@ -200,7 +200,16 @@ def test_a_server_that_is_not_there_ends_the_run(published: Path, capsys) -> Non
 
 
 @pytest.mark.parametrize(
-    "address", ["imap://x", "smtp://", "smtp://x:y", "smtp://user:pass@x", "smtp://x/y", "smtp://x:99999"]
+    "address",
+    [
+        "imap://x",
+        "smtp://",
+        "smtp://x:y",
+        "smtp://user:pass@x",
+        "smtp://x/y",
+        "smtp://x:99999",
+        "smtp://[::1",
+    ],
 )
 def test_what_is_no_server(address: str, published: Path, capsys) -> None:
     assert send(published, address) == 2

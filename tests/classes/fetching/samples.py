@@ -9,7 +9,9 @@ from datetime import datetime
 from pathlib import Path
 from unittest.mock import patch
 
-from grader.classes.fetching import Obtained, Patience, Rule, obtain
+from grader.classes.fetching.history import Rule
+from grader.classes.fetching.mirror import Patience
+from grader.classes.fetching.obtain import Obtained, obtain
 from grader.intake.open import open_submission
 from grader.model.batch import Entry
 from grader.model.submission import Submission

@@ -7,7 +7,7 @@ import subprocess
 
 import pytest
 
-from grader.classes.fetching import Rule
+from grader.classes.fetching.history import Rule
 from grader.errors import SubmissionError, UsageError
 from grader.intake.credentials import Access, accesses, split_address, without_password
 from grader.intake.source import parse_source

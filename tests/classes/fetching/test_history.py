@@ -6,8 +6,7 @@ from datetime import datetime, timedelta, timezone
 
 import pytest
 
-from grader.classes.fetching import NothingInTime, Rule
-from grader.classes.fetching.history import later, local_time, read_commit
+from grader.classes.fetching.history import NothingInTime, Rule, later, local_time, read_commit
 from grader.errors import SubmissionError
 from tests.classes.fetching.samples import DEADLINE, HOST, commit_at
 from tests.intake.samples import commit, git, repository, write

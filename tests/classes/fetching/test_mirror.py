@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from grader.arena import base_workspace as arena_cache
-from grader.classes.fetching import Rule
+from grader.classes.fetching.history import Rule
 from grader.classes.fetching.mirror import cache_folder, locked, tidy
 from tests.classes.fetching.samples import DEADLINE, HOST, commit_at
 from tests.intake.samples import git, write
@@ -173,7 +173,8 @@ def test_two_processes_fetch_once(server, monkeypatch):
     server.new()
     log = fetches(server, monkeypatch)
     code = (
-        "import sys; from pathlib import Path; from grader.classes.fetching import Rule, obtain; "
+        "import sys; from pathlib import Path; "
+        "from grader.classes.fetching.history import Rule; from grader.classes.fetching.obtain import obtain; "
         "from grader.model.batch import Entry; print('ready', flush=True); sys.stdin.readline(); "
         f"print(obtain(Entry(id='a', source='{HOST}/student'), Rule(), workdir=Path(sys.argv[1]), "
         "fetched_since=float(sys.argv[2])).source.ref)"

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from grader.classes.fetching import Patience
-from grader.classes.fetching.mirror import GivenUp, patiently
+from grader.classes.fetching.mirror import GivenUp, Patience, patiently
 from grader.errors import SubmissionError, Unreachable
 from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch
 from grader.intake.repository import explained, may_pass

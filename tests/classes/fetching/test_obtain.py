@@ -7,7 +7,7 @@ import shutil
 
 import pytest
 
-from grader.classes.fetching import Rule
+from grader.classes.fetching.history import Rule
 from grader.errors import SubmissionError, UsageError
 from grader.intake.open import open_submission
 from grader.intake.source import identify

@@ -157,7 +157,8 @@ def test_line_ends_and_delimiters_stay(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "export", [b"", b"PK\x03\x04", b"Student,ID\xff\n", b"a,b\n1,2\n", b"\r\n\r\n", b"\xff\xfe\x00"]
+    "export",
+    [b"", b"\xef\xbb\xbf", b"PK\x03\x04", b"Student,ID\xff\n", b"a,b\n1,2\n", b"\r\n\r\n", b"\xff\xfe\x00"],
 )
 def test_what_is_no_export(tmp_path: Path, export: bytes) -> None:
     with pytest.raises(UsageError):

@@ -43,6 +43,14 @@ def test_finding(page) -> None:
     assert "Nothing like that here" in page.text("/?q=nobody")
 
 
+def test_a_submission_that_leaves_the_class_while_its_page_is_made_is_not_found(
+    page, review, monkeypatch
+) -> None:
+    monkeypatch.setattr(review.submissions, "row", lambda _key: None)
+    answer = page.client.get("/s/ada/")
+    assert (answer.status_code, "The class has no such submission." in answer.text) == (404, True)
+
+
 def test_what_changed_after_it_was_decided_is_found(page, out) -> None:
     page.save("ada", "chatter-rate", points="5", comment="lab machine")
     result = result_of(out, "ada")

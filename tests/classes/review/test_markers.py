@@ -34,6 +34,8 @@ def test_shares_are_the_whole_class_once(tmp_path) -> None:
     assert by_name == shares
     with pytest.raises(UsageError, match="ann, bob and cyd"):
         share_of(tmp_path, "dan", "3", None)
+    with pytest.raises(UsageError, match="the shares are those of ²"):
+        share_of(tmp_path, "ann", "²", None)
 
 
 def test_a_group_and_a_share_of_it(tmp_path) -> None:

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from grader.classes.review.student_requests import StudentRequest, read_requests, request_files
+from grader.classes.review.student_requests import (
+    RequestRow,
+    StudentRequest,
+    read_requests,
+    request_files,
+    rows_of,
+    write_requests,
+)
 from grader.judging.settle import settle
 from grader.model.batch import Entry
 from grader.model.verdict import Status
@@ -48,6 +55,19 @@ def test_a_file_without_a_column_says_so(tmp_path, text, column) -> None:
 def test_no_file_is_no_request(tmp_path) -> None:
     found = read(tmp_path)
     assert (found.found, found.faults) == ({}, ())
+
+
+def test_a_student_whose_id_could_be_a_formula_is_found_in_what_was_written(tmp_path) -> None:
+    path, asked = tmp_path / "requests-github.csv", StudentRequest(text="=Why?", when="2026", source="x")
+    row = RequestRow(student="-ada", criterion="style", request=asked)
+    write_requests(path, [row])
+    assert "'-ada" in path.read_text()
+    assert rows_of(path, {"-ada"}) == [row]
+    criteria = load_rubric("leeds-comp3631-lab1").rubric.criteria
+    found = read_requests(
+        [path], [Entry(id="-ada", source="")], [criteria[0].model_copy(update={"id": "style"})]
+    )
+    assert found.found == {"-ada": {"style": (asked,)}}
 
 
 def test_the_export_of_a_form_is_read_as_it_is(tmp_path) -> None:

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.similarity.comparison import ComparisonRequest
 from grader.classes.similarity.matching import compare_class
 from grader.model.batch import Similarity
 from tests.classes.similarity.classes import (
@@ -26,7 +25,7 @@ ALL = ("average", "generator", "laser", "machine", "monitor", "odometry", "servi
 
 def compared(folders: dict[str, Path], **also: object) -> Similarity:
     fields = {"starter": (), "groups": {}, "threshold": 0.8, "jobs": 2} | also
-    return compare_class(ComparisonRequest(folders=folders, **fields))
+    return compare_class(folders, **fields)
 
 
 def named(similarity: Similarity) -> set[tuple[str, str]]:

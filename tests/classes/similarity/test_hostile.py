@@ -7,8 +7,8 @@ import re
 
 import pytest
 
-from grader.classes.similarity import compare, matching
-from grader.classes.similarity.comparison import ComparisonRequest, ProgramText
+from grader.classes.similarity import matching
+from grader.classes.similarity.comparison import ProgramText, compare
 from grader.classes.similarity.matching import CodeSource, read_files, read_place, reading_ended
 from grader.workers import WorkerEnded
 from tests.classes.similarity.classes import class_of, hand_in, solution
@@ -126,9 +126,7 @@ def test_no_program_is_said(tmp_path) -> None:
 def test_a_class_with_too_much_code_is_compared_as_far_as_there_is_room(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(matching, "PRINTS_MAX", 700)
     folders = class_of(tmp_path, {name: {"a.py": GOOD} for name in ("ann", "ben", "cem")})
-    similarity = matching.compare_class(
-        ComparisonRequest(folders=folders, starter=(), groups={}, threshold=0.8, jobs=1)
-    )
+    similarity = matching.compare_class(folders, (), {}, threshold=0.8, jobs=1)
     assert [(pair.a, pair.b) for pair in similarity.pairs] == [("ann", "ben")]
     assert [(one.id, one.reason[:24]) for one in similarity.not_compared] == [
         ("cem", "the class has too much c")

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.similarity import compare
-from grader.classes.similarity.comparison import ComparisonRequest
+from grader.classes.similarity.comparison import compare
 from grader.classes.similarity.matching import compare_class
 from tests.classes.similarity.classes import class_of, renamed, solution
 
@@ -82,9 +81,7 @@ int main(int argc, char **argv)
 
 def compared(folders, **also):
     return compare_class(
-        ComparisonRequest(
-            folders=folders, **({"starter": (), "groups": {}, "threshold": 0.5, "jobs": 2} | also)
-        )
+        **{"folders": folders, "starter": (), "groups": {}, "threshold": 0.5, "jobs": 2} | also
     )
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import pytest
 
+from grader.model.batch import Entry
 from grader.model.result import GradingResult
 from grader.model.verdict import Status
-from grader.report.class_page.submissions import WORDINGS_MAX, Diagnoses, reduced
-from tests.report.class_page.made_up import made_up_rows
+from grader.report.class_page.submissions import WORDINGS_MAX, Diagnosis, gather, reduced
+from tests.report.class_page.made_up import made_up_rows, made_up_run
 
 
 @pytest.mark.parametrize(
@@ -47,21 +50,18 @@ def of(*messages: str) -> list[GradingResult]:
     return found
 
 
-def grouped(*messages: str) -> Diagnoses:
-    diagnoses = Diagnoses()
-    for place, result in enumerate(of(*messages)):
-        diagnoses.add(place, result)
-    return diagnoses
+def grouped(results: Sequence[GradingResult]) -> Sequence[Diagnosis]:
+    return gather(made_up_run(1), [(Entry(id="ada", source=""), result) for result in results]).diagnoses
 
 
 def test_the_largest_comes_first_in_the_words_of_most() -> None:
-    first, second = grouped("a is 1", "b is 2", "b is 2", "x", "b is 3", "a is 1").largest_first()[:2]
+    first, second = grouped(of("a is 1", "b is 2", "b is 2", "x", "b is 3", "a is 1"))[:2]
     assert (first.criterion, first.message, first.members) == ("manifest", "b is 2", [1, 2, 4])
     assert second.message == "a is 1"
 
 
 def test_a_diagnosis_of_very_many_wordings_stays_small() -> None:
-    (found,) = grouped(*(f"{number} Hz" for number in range(100))).largest_first()
+    (found,) = grouped(of(*(f"{number} Hz" for number in range(100))))
     assert len(found.members) == 100
     assert len(found.wordings) == WORDINGS_MAX
     assert found.more
@@ -69,8 +69,5 @@ def test_a_diagnosis_of_very_many_wordings_stays_small() -> None:
 
 def test_what_a_person_decided_keeps_the_words_of_the_check() -> None:
     decided = [result for _, result in made_up_rows(300) if result.overrides]
-    diagnoses = Diagnoses()
-    for place, result in enumerate(decided):
-        diagnoses.add(place, result)
     assert decided
-    assert not any("A. Miller" in found.message for found in diagnoses.largest_first())
+    assert not any("A. Miller" in found.message for found in grouped(decided))

@@ -52,7 +52,7 @@ def test_a_result_that_is_written_again_is_drawn_again(tmp_path, monkeypatch):
 def test_evidence_that_cannot_be_read_leaves_a_report_without_pictures(tmp_path):
     kept(tmp_path / "ada")
     before = (tmp_path / "ada" / "report.html").read_text()
-    rewrite(tmp_path / "ada", result(points=20), rubric())
+    rewrite(tmp_path / "ada", result(points=20), rubric(), {})
     after = (tmp_path / "ada" / "report.html").read_text()
     assert "<figure" not in after
     assert "20 of 100 points" in after
