@@ -1,5 +1,5 @@
-"""What compiles in a student's C++ and is not meant, as far as the text shows it: callbacks that wait, and angles in
-degrees of which a sine is taken. Nothing is compiled."""
+"""What compiles in a student's C++ and is not meant, as far as the text shows it: callbacks that wait, angles in
+degrees of which a sine is taken, and arguments that may not be there. Nothing is compiled."""
 
 from __future__ import annotations
 
@@ -39,6 +39,11 @@ _IN_DEGREES = re.compile(rf"\b(?P<name>[A-Za-z_]\w*)\s*=\s*[^;=]*{_DEGREES}")
 _OF_ANGLE = re.compile(
     r"\b(?:std::)?(?P<call>sin|cos|tan)f?\s*\(\s*(?P<given>[^();]*(?:\([^()]*\)[^();]*)?)\)"
 )
+_ARGUMENT = re.compile(r"\bargv\s*\[\s*(?P<n>[1-9])\s*\]")
+_COUNTED = re.compile(
+    r"\bargc\s*(?:<|!=|==|>(?!=|\s*0)|>=(?!\s*[01]\b))|[<>=]\s*argc\b|\bswitch\s*\(\s*argc\b"
+)
+"""A test whether there are arguments: there is always one, the program's name."""
 _TURNED = re.compile(r"180|rad|PI\b", re.IGNORECASE)
 """So an angle in degrees is made one in radians."""
 NEW_LINE = "\n"
@@ -72,6 +77,12 @@ def slips_of(path: str, text: str) -> Iterator[PythonSlip]:
     yield from _unspun(path, code)
     yield from _without_main(path, text, code)
     yield from _degrees(path, code)
+    read = next(_ARGUMENT.finditer(code), None)
+    if read is not None and _COUNTED.search(code) is None:
+        line, given = code.count("\n", 0, read.start()) + 1, f"argv[{read['n']}]"
+        message = f"it reads {given} on line {line} of {path}"
+        fix = f'write `argc > {read["n"]} ? {given} : "…"` there, with what it should be without an argument'
+        yield PythonSlip(file=path, line=line, kind="no-argument", message=message, fix=fix, name=read["n"])
 
 
 def _waiting(path: str, code: str) -> Iterator[PythonSlip]:

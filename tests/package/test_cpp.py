@@ -1,4 +1,4 @@
-"""Slips of C++ sources: callbacks that wait, and angles in degrees."""
+"""Slips of C++ sources: callbacks that wait, angles in degrees, and arguments that may not be there."""
 
 from __future__ import annotations
 
@@ -142,3 +142,25 @@ def test_a_loop_in_which_no_callback_is_called(loop: str, told: list[str]) -> No
 def test_a_main_in_a_comment(text: str, lines: list[int]) -> None:
     found = [one for one in slips_of("src/node.cpp", text) if one.kind == "commented-out"]
     assert [one.line for one in found] == lines
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (
+            'ros::init(argc, argv, "a");\nint hz = atoi(argv[1]);\n',
+            ["1: it reads argv[1] on line 3 of src/node.cpp"],
+        ),
+        ("if (argc > 0) hz = std::stoi(argv[ 2 ]);\n", ["2: it reads argv[2] on line 2 of src/node.cpp"]),
+        ("if (argc >= 1) name = argv[1];\n", ["1: it reads argv[1] on line 2 of src/node.cpp"]),
+        ("if (argc > 1) hz = atoi(argv[1]);\n", []),
+        ("if (argc != 3) return 1;\nhz = atoi(argv[1]);\n", []),
+        ("if (2 > argc) return 1;\nhz = atoi(argv[1]);\n", []),
+        ("for (int i = 1; i < argc; ++i) puts(argv[i]);\nputs(argv[1]);\n", []),
+        ("switch (argc) { case 2: puts(argv[1]); }\n", []),
+        ("puts(argv[0]);  // argv[1]\n", []),
+    ],
+)
+def test_an_argument_that_may_not_be_there(text: str, told: list[str]) -> None:
+    found = slips_of("src/node.cpp", f"int main(int argc, char **argv) {{\n{text}}}\n")
+    assert [f"{one.name}: {one.message}" for one in found] == told
