@@ -19,6 +19,7 @@ from grader.repaired_copy import REPAIRS_MAX, most_of
 from tests.package.repairing import (
     CMAKE,
     CMAKELISTS,
+    FILES,
     LAUNCHED,
     MANIFEST,
     SCRIPT,
@@ -317,6 +318,15 @@ def test_a_program_waits_for_no_headers_that_nothing_makes(tmp_path: Path, lines
     assert find_repairs(folder, facts_of(folder), WANTED) == ()
     older = (catkin + programs + lines).replace("3.0.2", "2.8.3")  # warns only
     (folder / CMAKELISTS).write_text(older)
+    assert find_repairs(folder, facts_of(folder), WANTED) == ()
+
+
+@pytest.mark.parametrize("given", ["$(arg from)", "$(env FROM)", "$(eval 'la' + 'b')"])
+def test_a_package_that_a_launch_file_works_out_is_no_slip(tmp_path: Path, given: str) -> None:
+    text = FILES[LAUNCHED].replace('pkg="lab"', f'pkg="{given}"')
+    folder = package(
+        tmp_path, {LAUNCHED: text.replace("<launch>", '<launch>\n  <arg name="from" default="lab"/>')}
+    )
     assert find_repairs(folder, facts_of(folder), WANTED) == ()
 
 

@@ -439,15 +439,15 @@ def _run_dependency(found: re.Match[str], package: PackageFacts, _lines: Sequenc
     name = found[1]
     tag = "run_depend" if package.manifest and package.manifest.format == 1 else "exec_depend"
     why = f"catkin_package(…) depends on {name}, and package.xml does not declare it as a run-time dependency"
-    return Explained(
-        why, f"add <{tag}>{name}</{tag}> to package.xml, or take {name} out of catkin_package(…)"
-    )
+    hint = f"add <{tag}>{name}</{tag}> to package.xml, or take {name} out of catkin_package(…)"
+    return Explained(why, hint)
 
 
 def _unused_argument(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     why = f"catkin_package(…) does not know what to do with {shown(found[1].replace(';', ' '))}"
-    hint = "write it after INCLUDE_DIRS, LIBRARIES, CATKIN_DEPENDS or DEPENDS, spelt like this"
-    return Explained(why, hint)
+    return Explained(
+        why, "write it after INCLUDE_DIRS, LIBRARIES, CATKIN_DEPENDS or DEPENDS, spelt like this"
+    )
 
 
 FIXES_MAX = 4
@@ -475,8 +475,10 @@ def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[st
             what, targets = f"the messages of {found[1]}", "${catkin_EXPORTED_TARGETS}"
             return _unwaited(package, text, what, targets, lines)
         if made & {f.path for f in package.files}:
-            why = f"{text}: the build makes {found[2]}.h in {package.name}/, the package's name"
-            return Explained(why, f'write `#include "{package.name}/{found[2]}.h"`')
+            lacks = "" if cmake_calls(package, "generate_messages") else "generate_messages"
+            once = lacks and f", once CMakeLists.txt calls {lacks}(…)"
+            why = f"{text}: the build makes {found[2]}.h in {package.name}/, the package's name{once}"
+            return Explained(why, f'write `#include "{package.name}/{found[2]}.h"`', uncalled=lacks)
         return Explained(f"{text}: there is no such header", "check the #include and find_package(…)")
     return _unwaited(package, text, "its message", OWN_TARGETS, lines)
 
