@@ -358,7 +358,8 @@ def _strays(found: Manifest, own: Collection[str | None]) -> Iterator[str]:
     for one in found.dependencies:
         meant = next((name for name in sorted(declared) if is_one_edit(one.name, name)), "")
         if meant and one.name not in {*known, *known_packages(), *own}:
-            yield f"delete line {one.line} of {found.file}: there is no package {one.name}, and {meant} is declared"
+            tag, line = f"<{one.kind}>{one.name}</{one.kind}>", f"line {one.line} of {found.file}"
+            yield f"delete {tag}, which is {line}: there is no package {one.name}, and {meant} is declared"
 
 
 def _declared_text(found: Manifest) -> str:
