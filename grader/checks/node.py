@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.checks.registry import NodeName, ProcessName, Refers, check
+from grader.checks.support.cpp_errors import slips_of_program
 from grader.checks.support.exit_causes import (
     explain_end,
     explain_traceback,
@@ -227,17 +228,22 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
     if stopped_by in {"TERM", "KILL"}:
         message = f"{_script(one)} did not end on Ctrl-C and had to be stopped with SIG{stopped_by}"
         # A line that is known to keep the node alive goes before any excuse.
-        if deaf := next((s for s in package.slips if s.kind == "deaf" and s.file == one.start.script), None):
+        in_cpp = slips_of_program(one.start.argv, package, "deaf")
+        own = [s for s in package.slips if s.kind == "deaf" and s.file == one.start.script] + in_cpp
+        if deaf := next((s for s in own if s.fix), None):
             return failed(f"{message}: {deaf.message}", hint=deaf.fix, citations=(deaf.place,))
+        if slow := max(in_cpp, key=lambda s: float(s.name), default=None):
+            slept = f"{slow.message}, also after Ctrl-C, so its end is not counted"
+            return passed(f"{_script(one)} is one node and stayed alive; {slept}")
         if excuse := _locked_up(one, run) or _asleep(one, package) or _asking(one, run, package):
             return excuse
         hint = IN_A_LOOP + both("; a bare `except:` in the loop swallows the Ctrl-C", "")
         return failed(message, hint=hint).if_repeated()  # no line of the script is known to be why
     found = process_tracebacks(run, one.name, after_ns=one.interrupt_ns)
-    own = [f for f in found if not is_rospys_own(f)]
-    if not own:
+    of_script = [f for f in found if not is_rospys_own(f)]
+    if not of_script:
         return None
-    end = explain_traceback(own[-1], package)
+    end = explain_traceback(of_script[-1], package)
     message = f"{_script(one)} ends on Ctrl-C with a traceback: {end.cause}"
     return failed(message, hint=end.hint or IN_A_LOOP, citations=end.citations)
 

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.registry import DependencyName, NoParams, PackageName, check
 from grader.checks.support.scripts import add_hint, find_script, is_product, move_hint
 from grader.checks.support.text import near_names, shown
+from grader.installable import known_packages, noetic_messages
 from grader.model.package import MANIFEST, Dependency, Manifest, PackageFacts, meant_manifest
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
-from grader.wording import is_word_of, join_words, on_lines, plural
+from grader.wording import is_one_edit, is_word_of, join_words, on_lines, plural
 
+CORE = ("rospy", "roscpp", "message_generation", "message_runtime")
 OTHERS = {
     "launch": ("launcher", "launchers", "launchfile", "launchfiles", "launch_files"),
     "src": ("scripts", "source", "sources", "nodes", "bin"),
@@ -208,15 +210,23 @@ def _judge_manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
     wrong = [v for v in (_judge_misnamed(package, found, params.name), _unbuilt(found)) if v is not None]
     if lacking := _lacking(found, params.dependencies):
         wrong.append(lacking)
+    strays = [*_strays(found, {one.name for one in package.also})]
     if wrong:
-        hints = [*(v.hint for v in wrong), *(package.general_hints() if found.name != params.name else ())]
+        hints = [
+            *(v.hint for v in wrong),
+            *strays,
+            *(package.general_hints() if found.name != params.name else ()),
+        ]
         others = [v.message.removeprefix(f"{found.file} ") for v in wrong[1:]]
         update = {"message": join_words([wrong[0].message, *others]), "hint": "; ".join(hints)}
         return wrong[0].model_copy(update=update)
     place = (FileCitation(file=found.file, line=found.name_line),)
     declares = f", declares {join_words(params.dependencies)}" if params.dependencies else ""
     message = f"{found.file} names {found.name}, built with catkin{declares}"
-    measured, hint = f"name {found.name}, format {found.format}", "; ".join(package.general_hints())
+    measured, hint = (
+        f"name {found.name}, format {found.format}",
+        "; ".join([*strays, *package.general_hints()]),
+    )
     return passed(message, measured=measured, hint=hint, citations=place)
 
 
@@ -339,6 +349,17 @@ def _rename(package: PackageFacts, found: Manifest, name: str) -> str:
     words, such = ("", f"{such} or {made}") if made else ("w", such)
     search = f"`grep -rn{words} {found.name} .` shows whether it stands anywhere else, as in {such}"
     return f"write {join_words(places[:PLACES_SHOWN])}; {search}"
+
+
+def _strays(found: Manifest, own: Collection[str | None]) -> Iterator[str]:
+    """Yield what to do with a dependency that no package has, beside that of which it is a slip."""
+    known = {*CORE, *noetic_messages()}
+    declared = {d.name for d in found.dependencies if d.kind in RUNTIME_KINDS} & known
+    for one in found.dependencies:
+        meant = next((name for name in sorted(declared) if is_one_edit(one.name, name)), "")
+        if meant and one.name not in {*known, *known_packages(), *own}:
+            tag, line = f"<{one.kind}>{one.name}</{one.kind}>", f"line {one.line} of {found.file}"
+            yield f"delete {tag}, which is {line}: there is no package {one.name}, and {meant} is declared"
 
 
 def _declared_text(found: Manifest) -> str:

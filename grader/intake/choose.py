@@ -510,6 +510,9 @@ def named_at(folder: Path, *, root: Path) -> tuple[str, int] | None:
 
 
 def _name(data: bytes) -> tuple[str, int] | None:
+    above, first, rest = data.partition(b"<")
+    if above.isascii() and re.search(rb"\w", above):  # a browser writes a line above what it shows
+        data = b"\n" * above.count(b"\n") + first + rest
     # a student's file may name entities that grow without end, or files and addresses to read
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, recover=True)
     try:

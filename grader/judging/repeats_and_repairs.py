@@ -418,14 +418,18 @@ def text_as_handed_in(text: str, repairs: Sequence[Repair], alone: str = "") -> 
     return LINES.sub(counted, text) if moving else text
 
 
-def repairs_as_handed_in(needed: Iterable[Repair], repairs: Iterable[Repair]) -> tuple[Repair, ...]:
-    """Return the repairs with their files' names in the package as it is: the copy may have renamed them first."""
+def repairs_as_handed_in(needed: Iterable[Repair], repairs: Sequence[Repair]) -> tuple[Repair, ...]:
+    """Return the repairs with files and lines as in the package as it is: the copy's repairs before each of them may
+    have renamed the one and moved the others."""
     names = {new: old for old, new in _renamed(repairs).items()}
-    old = ((one, names.get(one.file, one.file)) for one in needed)
-    return tuple(
-        one.model_copy(update={"file": file, "message": one.message.replace(one.file, file)})
-        for one, file in old
-    )
+    told = []
+    for one in needed:
+        file, earlier = names.get(one.file, one.file), repairs[: repairs.index(one)] if one in repairs else ()
+        line = one.line if one.line is None else _before(_moving(earlier), one.file, one.line)
+        message = text_as_handed_in(one.message, earlier, one.file).replace(one.file, file)
+        fix = text_as_handed_in(one.fix, earlier, one.file)
+        told.append(one.model_copy(update={"file": file, "line": line, "message": message, "fix": fix}))
+    return tuple(told)
 
 
 def with_names_as_handed_in(copy: Verdict, repairs: Iterable[Repair]) -> Verdict:

@@ -19,12 +19,13 @@ SlipKind = Literal[
     "hides-class", "float-index",
     "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed", "printed-in-part",
     "published-in-part", "never-published", "takes-number", "typed-text", "goes-on",
+    "no-argument",
 ]  # fmt: skip
 
 
 class PythonSlip(Placed, Record):
     """What is remarkable in a Python file. For a file that does not compile, only names, types and rates are known; for
-    one of C++, only `callback-waits` and `degrees`.
+    one of C++, only `callback-waits`, `degrees`, `no-argument` and `deaf` (`name`: for how long it sleeps at a time).
 
     `fix` says what to do where that is always the same. Slips, of which most show only when the node runs; `message`
     says what is wrong on that line, and `name` is the function or variable that both are about:
@@ -95,6 +96,7 @@ class PythonSlip(Placed, Record):
     - `sets-parameter`: where it sets a parameter.
     - `argument-text`: where an argument of the command line is kept as a text; `fix` is the line with a number in its
       place.
+    - `no-argument`: where a program of C++ reads an argument, the `name`-th, whether there is one or not.
     - `unused-import`, `lacking-import`: an import of the module `message` whose names nothing in the script uses, or
       that Python did not find where the files were read (`fix`: the name of a module in it, as `lab_msgs.msg`).
     """

@@ -1,5 +1,5 @@
-"""What compiles in a student's C++ and is not meant, as far as the text shows it: callbacks that wait, and angles in
-degrees of which a sine is taken. Nothing is compiled."""
+"""What compiles in a student's C++ and is not meant, as far as the text shows it: callbacks that wait, angles in
+degrees of which a sine is taken, and arguments that may not be there. Nothing is compiled."""
 
 from __future__ import annotations
 
@@ -39,6 +39,20 @@ _IN_DEGREES = re.compile(rf"\b(?P<name>[A-Za-z_]\w*)\s*=\s*[^;=]*{_DEGREES}")
 _OF_ANGLE = re.compile(
     r"\b(?:std::)?(?P<call>sin|cos|tan)f?\s*\(\s*(?P<given>[^();]*(?:\([^()]*\)[^();]*)?)\)"
 )
+_DEAF = re.compile(r"\bwhile\s*\(\s*(?:(?P<ok>(?:ros::|\w+(?:\.|->))ok)|true|1)\s*\)|\bfor\s*\(\s*;\s*;\s*\)")
+"""A loop that asks nothing; `ok` without brackets is a function, which is always true."""
+_ENDS = re.compile(r"\b(?:break|return|throw|goto|exit)\b|\bok\s*\(")
+_LONG = re.compile(
+    r"\bRate\s+\w+\s*[({]\s*(?P<hz>0?\.\d+)\s*[)}]|\bDuration\s*\(\s*(?P<s>\d+)(?:\.\d*)?\s*\)\s*\.\s*sleep\s*\("
+    r"|(?<![.\w>])sleep\s*\(\s*(?P<n>\d+)\s*\)"
+)
+LONG_S = 2.0
+"""A node that sleeps for longer at a time may be too late after Ctrl-C."""
+_ARGUMENT = re.compile(r"\bargv\s*\[\s*(?P<n>[1-9])\s*\]")
+_COUNTED = re.compile(
+    r"\bargc\s*(?:<|!=|==|>(?!=|\s*0)|>=(?!\s*[01]\b))|[<>=]\s*argc\b|\bswitch\s*\(\s*argc\b"
+)
+"""A test whether there are arguments: there is always one, the program's name."""
 _TURNED = re.compile(r"180|rad|PI\b", re.IGNORECASE)
 """So an angle in degrees is made one in radians."""
 NEW_LINE = "\n"
@@ -72,6 +86,13 @@ def slips_of(path: str, text: str) -> Iterator[PythonSlip]:
     yield from _unspun(path, code)
     yield from _without_main(path, text, code)
     yield from _degrees(path, code)
+    yield from _deaf(path, code)
+    read = next(_ARGUMENT.finditer(code), None)
+    if read is not None and _COUNTED.search(code) is None:
+        line, given = code.count("\n", 0, read.start()) + 1, f"argv[{read['n']}]"
+        message = f"it reads {given} on line {line} of {path}"
+        fix = f'write `argc > {read["n"]} ? {given} : "…"` there, with what it should be without an argument'
+        yield PythonSlip(file=path, line=line, kind="no-argument", message=message, fix=fix, name=read["n"])
 
 
 def _waiting(path: str, code: str) -> Iterator[PythonSlip]:
@@ -95,6 +116,32 @@ def _unspun(path: str, code: str) -> Iterator[PythonSlip]:
     message = f"the loop on line {line} never calls ros::spinOnce(), so that no callback is ever called"
     fix = f"write `ros::spinOnce();` in the loop on line {line}"
     yield PythonSlip(file=path, line=line, kind="callback-waits", message=message, fix=fix)
+
+
+def _deaf(path: str, code: str) -> Iterator[PythonSlip]:
+    """Yield what keeps a program from ending on Ctrl-C, of which roscpp only makes a note: an endless loop that does
+    not ask for it, and a long sleep, whose `name` is its length in seconds."""
+    for match in _DEAF.finditer(code) if _MAIN.search(code) else ():
+        brace = code.find("{", match.end())
+        end = (
+            _closing(code, brace + 1) if brace >= 0 and not code[match.end() : brace].strip() else match.end()
+        )
+        line = code.count("\n", 0, match.start()) + 1
+        if match["ok"] or not _ENDS.search(code, match.end(), end):
+            message = f"nothing in the loop on line {line} of {path} asks whether the node should end"
+            message = f"`{match['ok']}` has no brackets on line {line} of {path}" if match["ok"] else message
+            fix = f"write `while ({match['ok'] or 'ros::ok'}())` on line {line}"
+            yield PythonSlip(file=path, line=line, kind="deaf", message=message, fix=fix)
+    for match in _LONG.finditer(code) if _MAIN.search(code) else ():
+        pause = (
+            1 / float(match["hz"])
+            if match["hz"] and float(match["hz"])
+            else float(match["s"] or match["n"] or 0)
+        )
+        if pause > LONG_S:
+            line, name = code.count("\n", 0, match.start()) + 1, f"{pause:g}"
+            message = f"line {line} of {path} lets it sleep for {name} s at a time"
+            yield PythonSlip(file=path, line=line, kind="deaf", message=message, name=name)
 
 
 def _callbacks(code: str) -> Iterator[_Body]:

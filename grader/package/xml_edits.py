@@ -74,6 +74,8 @@ def _edits(text: str, fault: Fault, root: str) -> Iterator[str]:
         yield "\n".join([*lines[:first], opening_tag(text, root), *lines[first:], *end])
     elif "XML declaration allowed only" in message:
         yield text.lstrip()
+    elif "Start tag expected" in message and "<" in text:  # a browser writes a line above what it shows
+        yield text[text.index("<") :]
     last = at + 1 == len(lines) or lines[at + 1].lstrip().startswith("<")
     for line in (_quoted(lines[at]), *_ended(lines[at], last=last)):
         yield "\n".join([*lines[:at], line, *lines[at + 1 :]])

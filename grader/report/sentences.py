@@ -71,7 +71,7 @@ def repair_words(result: GradingResult) -> tuple[str, ...]:
 
 def _repair_words(repairs: list[Repair], criteria: list[CriterionResult]) -> str:
     charged = [c for c in criteria if c.repaired and c.repaired.charged]
-    others = [c for c in criteria if c not in charged and not c.blocked_by]
+    others = [c for c in criteria if c not in charged and _is_decided(c)]
     cost = sum(c.missing for c in charged)
     if not cost and not any(c.counts and c.points for c in others):
         return ""
@@ -87,6 +87,10 @@ def _repair_words(repairs: list[Repair], criteria: list[CriterionResult]) -> str
     return words if words.startswith(repairs[0].file) else f"{words[:1].upper()}{words[1:]}"
 
 
+def _is_decided(criterion: CriterionResult) -> bool:
+    return not criterion.blocked_by and not criterion.status.is_open
+
+
 def _faults(repairs: list[Repair]) -> list[str]:
     """Return what is wrong, once for all files with the same fault: `src/a.py and src/b.py are not executable`."""
     bits = [one.file for one in repairs if one.kind == "executable-bit"]
@@ -100,7 +104,7 @@ def _faults(repairs: list[Repair]) -> list[str]:
 def judged_repaired(result: GradingResult) -> dict[str, list[str]]:
     """Return by the criterion that a fault is charged to, which others were judged with this repaired."""
     found: dict[str, list[str]] = {}
-    with_copy = [(c.id, c.repaired) for c in result.criteria if c.repaired is not None and not c.blocked_by]
+    with_copy = [(c.id, c.repaired) for c in result.criteria if c.repaired is not None and _is_decided(c)]
     for name, charged in with_copy:
         if charged.charged:
             others = [

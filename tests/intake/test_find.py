@@ -222,6 +222,7 @@ def test_what_another_copy_has_and_the_graded_one_has_not_is_named(tmp_path):
         manifest("lab1"),
         "\ufeff" + manifest("lab1"),
         "\n\n  " + manifest("lab1"),
+        "This file has no style of its own.\n" + manifest("lab1"),
         '<package xmlns="http://x/y"><name>lab1</name></package>',
         '<p:package xmlns:p="http://x/y"><p:name>lab1</p:name></p:package>',
         "<package><name>\n  lab1 <!-- mine -->\n</name></package>",
@@ -243,6 +244,7 @@ def test_the_name_is_read_from_any_manifest(text, tmp_path):
         "<package><name>lab1</name></package>" + " " * (1 << 20),
         "<package><name/></package>",
         "<package/>",
+        "lab1 < lab1",
         b"\xff\xfe\x00",
     ],
 )

@@ -15,6 +15,7 @@ from grader.judging.repeats_and_repairs import (
     is_used_by,
     launched_in,
     never_run,
+    repairs_as_handed_in,
     with_lines_as_handed_in,
 )
 from grader.model.repair import Repair
@@ -225,3 +226,15 @@ def test_several_lines_and_those_of_other_files_in_one_text():
     hint = "write it on lines 8, 9 and 12 of a.py, and on line 9 of c.py; line 3"
     told = with_lines_as_handed_in(failed("", hint=hint, citations=cited), (IMPORT,))
     assert told.hint == "write it on lines 7, 8 and 11 of a.py, and on line 9 of c.py; line 3"
+
+
+def test_a_repair_names_its_lines_as_they_were_handed_in() -> None:
+    later = Repair(kind="missing-call", file="a.py", line=9, before="x", after="y", message="line 9 of a.py: x",
+                   fix="write y; delete lines 9, 11 and 12")  # fmt: skip
+    (told,) = repairs_as_handed_in([later], (IMPORT, later))
+    assert (told.line, told.message, told.fix) == (
+        8,
+        "line 8 of a.py: x",
+        "write y; delete lines 8, 10 and 11",
+    )
+    assert repairs_as_handed_in([IMPORT], (IMPORT, later)) == (IMPORT,)

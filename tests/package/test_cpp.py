@@ -1,4 +1,4 @@
-"""Slips of C++ sources: callbacks that wait, and angles in degrees."""
+"""Slips of C++ sources: callbacks that wait, angles in degrees, and arguments that may not be there."""
 
 from __future__ import annotations
 
@@ -22,8 +22,12 @@ int main(int argc, char** argv)
 """
 
 
+ASKS = "write `while (ros::ok())`"
+
+
 def _told(line: str, given: str = "hear") -> list[str]:
-    return [f"{one.line}: {one.message}; {one.fix}" for one in slips_of("src/node.cpp", NODE % (line, given))]
+    found = [one for one in slips_of("src/node.cpp", NODE % (line, given)) if one.kind != "deaf"]
+    return [f"{one.line}: {one.message}; {one.fix}" for one in found]
 
 
 @pytest.mark.parametrize(
@@ -142,3 +146,49 @@ def test_a_loop_in_which_no_callback_is_called(loop: str, told: list[str]) -> No
 def test_a_main_in_a_comment(text: str, lines: list[int]) -> None:
     found = [one for one in slips_of("src/node.cpp", text) if one.kind == "commented-out"]
     assert [one.line for one in found] == lines
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (
+            'ros::init(argc, argv, "a");\nint hz = atoi(argv[1]);\n',
+            ["1: it reads argv[1] on line 3 of src/node.cpp"],
+        ),
+        ("if (argc > 0) hz = std::stoi(argv[ 2 ]);\n", ["2: it reads argv[2] on line 2 of src/node.cpp"]),
+        ("if (argc >= 1) name = argv[1];\n", ["1: it reads argv[1] on line 2 of src/node.cpp"]),
+        ("if (argc > 1) hz = atoi(argv[1]);\n", []),
+        ("if (argc != 3) return 1;\nhz = atoi(argv[1]);\n", []),
+        ("if (2 > argc) return 1;\nhz = atoi(argv[1]);\n", []),
+        ("for (int i = 1; i < argc; ++i) puts(argv[i]);\nputs(argv[1]);\n", []),
+        ("switch (argc) { case 2: puts(argv[1]); }\n", []),
+        ("puts(argv[0]);  // argv[1]\n", []),
+    ],
+)
+def test_an_argument_that_may_not_be_there(text: str, told: list[str]) -> None:
+    found = slips_of("src/node.cpp", f"int main(int argc, char **argv) {{\n{text}}}\n")
+    assert [f"{one.name}: {one.message}" for one in found] == told
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("while (ros::ok) {\n  if (x) break;\n}\n",
+         ["`ros::ok` has no brackets on line 2 of a.cpp; write `while (ros::ok())` on line 2"]),
+        ("while (nh.ok) rate.sleep();\n",
+         ["`nh.ok` has no brackets on line 2 of a.cpp; write `while (nh.ok())` on line 2"]),
+        ("while(1) {\n  rate.sleep();\n}\n",
+         [f"nothing in the loop on line 2 of a.cpp asks whether the node should end; {ASKS} on line 2"]),
+        ("ros::Rate slow(0.1);\n", ["line 2 of a.cpp lets it sleep for 10 s at a time; "]),
+        ("ros::Duration(4.0).sleep();\nsleep(3);\n",
+         ["line 2 of a.cpp lets it sleep for 4 s at a time; ", "line 3 of a.cpp lets it sleep for 3 s at a time; "]),
+        ("while (true) { if (!ros::ok()) break; }\n", []),
+        ("for (;;) { if (done) return 0; }\n", []),
+        ("while (ros::ok()) { rate.sleep(); }\nros::Rate rate(0.5);\nsleep(1);\nros::Duration(0.1).sleep();\n", []),
+        ("ros::Rate rate(0.0);\n", []),
+    ],
+)  # fmt: skip
+def test_what_goes_on_after_ctrl_c(text: str, told: list[str]) -> None:
+    found = slips_of("a.cpp", f"int main() {{\n{text}}}\n")
+    assert [f"{one.message}; {one.fix}" for one in found if one.kind == "deaf"] == told
+    assert all(one.kind != "deaf" for one in slips_of("a.cpp", text)), "of a class, without main()"

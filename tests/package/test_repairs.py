@@ -19,6 +19,7 @@ from grader.repaired_copy import REPAIRS_MAX, most_of
 from tests.package.repairing import (
     CMAKE,
     CMAKELISTS,
+    FILES,
     LAUNCHED,
     MANIFEST,
     SCRIPT,
@@ -288,6 +289,45 @@ def test_a_program_waits_for_no_header_of_a_package_that_is_not_there(tmp_path: 
     node = "#include <lab_msgs/Num.h>\n"
     folder = package(tmp_path, {"src/a.cpp": node, CMAKELISTS: f"{CMAKE}add_executable(a src/a.cpp)\n"})
     assert not any("headers" in one.message for one in find_repairs(folder, facts_of(folder, "lab"), WANTED))
+
+
+EXPORTED = "${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS}"
+
+
+@pytest.mark.parametrize(
+    ("lines", "fix"),
+    [
+        ("add_dependencies(a lab_generate_messages_cpp)\n", f"write add_dependencies(a {EXPORTED})"),
+        ("add_dependencies(a ${PROJECT_NAME}_gencpp)\n", f"write add_dependencies(a {EXPORTED})"),
+        ("add_dependencies(a b first_pkg_generate_messages_cpp ${catkin_EXPORTED_TARGETS})\n",
+         f"write add_dependencies(a b {EXPORTED})"),
+        ("add_dependencies(a lab_gencpp)\nadd_dependencies(b lab_gencpp)\n",
+         f"write add_dependencies(a {EXPORTED}); write add_dependencies(b {EXPORTED})"),
+        ("add_dependencies(a std_msgs_generate_messages_cpp)\n", ""),
+        ("add_dependencies(a ${OTHER}_generate_messages_cpp)\n", ""),
+        ("add_dependencies(a b)\n", ""),
+        ("generate_messages()\nadd_dependencies(a lab_generate_messages_cpp)\n", ""),
+    ],
+)  # fmt: skip
+def test_a_program_waits_for_no_headers_that_nothing_makes(tmp_path: Path, lines: str, fix: str) -> None:
+    programs = "".join(f"add_executable({a} src/{a}.cpp)\ntarget_link_libraries({a} x)\n" for a in "ab")
+    catkin = CMAKE.replace("COMPONENTS ", "COMPONENTS message_generation ")
+    folder = package(tmp_path, {"src/a.cpp": "\n", "src/b.cpp": "\n", CMAKELISTS: catkin + programs + lines})
+    found = repair_all(folder)
+    assert [one.fix for one in found] == ([fix] if fix else [])
+    assert find_repairs(folder, facts_of(folder), WANTED) == ()
+    older = (catkin + programs + lines).replace("3.0.2", "2.8.3")  # warns only
+    (folder / CMAKELISTS).write_text(older)
+    assert find_repairs(folder, facts_of(folder), WANTED) == ()
+
+
+@pytest.mark.parametrize("given", ["$(arg from)", "$(env FROM)", "$(eval 'la' + 'b')"])
+def test_a_package_that_a_launch_file_works_out_is_no_slip(tmp_path: Path, given: str) -> None:
+    text = FILES[LAUNCHED].replace('pkg="lab"', f'pkg="{given}"')
+    folder = package(
+        tmp_path, {LAUNCHED: text.replace("<launch>", '<launch>\n  <arg name="from" default="lab"/>')}
+    )
+    assert find_repairs(folder, facts_of(folder), WANTED) == ()
 
 
 @pytest.mark.parametrize(

@@ -36,6 +36,7 @@ EDITED = {
     "two brackets": ('<node pkg="lab" type="t', '<<node pkg="lab" type="t'),
     "closes nothing": ("</launch>", "</node>\n</launch>"),
     "blank before the declaration": ("<launch>", "\n<?xml version='1.0'?>\n<launch>"),
+    "a browser's line above the root": ("<launch>", "This file has no style of its own.\n<launch>"),
     "dashes in a comment": ("<launch>", "<launch>\n  <!-- first -- second --->"),
     "ampersand": ('"screen"', '"screen" args="a & b"'),
     "a quote here, the root there": ('"talker.py"', '"talker.py'),

@@ -277,7 +277,8 @@ def test_two_faults_that_cost_the_same_criterion_are_told_in_one_sentence():
         criterion("rate", Status.PARTIAL, 5, 10, repaired=one),
     )
     blocked = criterion("step", Status.BLOCKED, 0, 10, repaired=one, blocked_by="rate")
-    (words,) = repair_words(result(criteria=(*criteria, blocked)))
+    undecided = criterion("node", Status.INCONCLUSIVE, 0, 5, repaired=one)  # the machine lacks a package
+    (words,) = repair_words(result(criteria=(*criteria, blocked, undecided)))
     assert words == (
         "src/a.py is not executable and line 7 of src/a.py: tabs: this costs you 5 points (executable); "
         "rate was judged with this repaired, for 50% of the points"

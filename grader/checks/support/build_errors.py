@@ -411,8 +411,7 @@ def _no_cmake_lists(_found: re.Match[str], package: PackageFacts, _lines: Sequen
         return Explained(why, "replace it with the CMakeLists.txt that catkin_create_pkg writes")
     if not name:
         return Explained("there is no CMakeLists.txt", "add the CMakeLists.txt that catkin_create_pkg writes")
-    why = f"the file is called {name}, and CMake looks for CMakeLists.txt"
-    return Explained(why, f"git mv {name} CMakeLists.txt")
+    return Explained(f"the file is called {name}, and CMake looks for {CMAKE}", f"git mv {name} {CMAKE}")
 
 
 def misspelt_cmake_lists(package: PackageFacts) -> str:
@@ -439,9 +438,8 @@ def _run_dependency(found: re.Match[str], package: PackageFacts, _lines: Sequenc
     name = found[1]
     tag = "run_depend" if package.manifest and package.manifest.format == 1 else "exec_depend"
     why = f"catkin_package(…) depends on {name}, and package.xml does not declare it as a run-time dependency"
-    return Explained(
-        why, f"add <{tag}>{name}</{tag}> to package.xml, or take {name} out of catkin_package(…)"
-    )
+    hint = f"add <{tag}>{name}</{tag}> to package.xml, or take {name} out of catkin_package(…)"
+    return Explained(why, hint)
 
 
 def _unused_argument(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -466,17 +464,19 @@ def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[st
         there = own if found[1] == package.name else noetic_messages().get(found[1], ())
         near = near_names(found[2], there) if found[2] not in there else ()
         if near:
-            right = f"#include <{found[1]}/{near[0]}.h>"
-            return Explained(f"there is no header {found[1]}/{found[2]}.h", f"write `{right}`")
+            why = f"there is no header {found[1]}/{found[2]}.h"
+            return Explained(why, f"write `#include <{found[1]}/{near[0]}.h>`")
         if found[1] in known_packages():
             return _missing_package(found, package, lines)
         if any(found[1] in call.args for call in cmake_calls(package, "find_package")):
             # found, and so built beside this package: its messages come too late
-            what, targets = f"the messages of {found[1]}", "${catkin_EXPORTED_TARGETS}"
-            return _unwaited(package, text, what, targets, lines)
+            what = f"the messages of {found[1]}"
+            return _unwaited(package, text, what, "${catkin_EXPORTED_TARGETS}", lines)
         if made & {f.path for f in package.files}:
+            lacks = "" if cmake_calls(package, "generate_messages") else "generate_messages"
             why = f"{text}: the build makes {found[2]}.h in {package.name}/, the package's name"
-            return Explained(why, f'write `#include "{package.name}/{found[2]}.h"`')
+            why += lacks and f", once CMakeLists.txt calls {lacks}(…)"
+            return Explained(why, f'write `#include "{package.name}/{found[2]}.h"`', uncalled=lacks)
         return Explained(f"{text}: there is no such header", "check the #include and find_package(…)")
     return _unwaited(package, text, "its message", OWN_TARGETS, lines)
 

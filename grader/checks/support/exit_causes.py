@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from grader.checks.registry import Check
 from grader.checks.support.console_output import Traceback, tracebacks, unpack_traceback
+from grader.checks.support.cpp_errors import argument_not_given
 from grader.checks.support.exceptions import (
     OF_ROSCPP,
     SLIPS,
@@ -185,7 +186,8 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
     # A signal of the grader's is no crash.
     if life.end is not None and life.end.signal is not None and life.end.stopped_by is None:
         said = (known for line in printed for text, known in OF_ROSCPP.items() if text in line)
-        return Ending(*next(said, (f"{signal_name(life.end.signal)} ended it", RUN_IT)))
+        ended = f"{signal_name(life.end.signal)} ended it"
+        return Ending(*(argument_not_given(ended, life.start.argv, package) or next(said, (ended, RUN_IT))))
     if code == 0:
         return _not_run(life, run, package) or _ran_to_the_end(printed, package)
     # roslaunch goes on printing after it has said why.

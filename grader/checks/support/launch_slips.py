@@ -98,7 +98,10 @@ def _unreadable(
         return None
     line = f", line {file.fault.line}" if file.fault.line else ""
     message = f"{file.path}{line} is not well-formed: {file.fault.explanation}"
-    hint = file.fault.advice or "close every element, and begin with <launch> and end with </launch>"
+    hint = (
+        file.fault.advice
+        or "close every element, begin the file with `<launch>`, and end it with `</launch>`"
+    )
     return failed(message, hint=hint, citations=(file.fault.place,))
 
 

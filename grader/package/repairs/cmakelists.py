@@ -31,6 +31,7 @@ from grader.package.repairs.editing import Files, keep_first_version, naming_fil
 from grader.package.repairs.interfaces import (
     GENERATE,
     define_as_asked,
+    depend_on_exported,
     make_interfaces,
     needs_interfaces,
     wait_for_headers,
@@ -114,6 +115,7 @@ def repair_cmake(
     if needs_interfaces(files, package, name, scripts):
         make_interfaces(files, package, name, scripts)
         define_as_asked(files, package, wanted)
+        depend_on_exported(files, package, name)
     name_programs(files, wanted)
     if not package.folder_beside:  # what it names is right once it lies there itself
         install_scripts(files, package, wanted)

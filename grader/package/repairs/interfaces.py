@@ -25,6 +25,7 @@ from grader.package.repairs.cmake_calls import (
     change_line,
     change_word,
     cmake_text,
+    has_call,
     values_behind,
     words_of,
 )
@@ -36,6 +37,7 @@ from grader.wording import is_one_edit, join_words, lines_text, numbers_text
 OF_GENERATION = re.compile(r"_generate_messages|_gen(cpp|py)$")
 """Targets that generate_messages(…) makes."""
 GENERATE, GENERATION = "generate_messages", "message_generation"
+EXPORTED = "${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS}"
 GENERATORS = {GENERATION, "genmsg", "actionlib_msgs"}
 """Packages of which each brings the calls that make messages; the last one finds genmsg."""
 
@@ -144,6 +146,32 @@ def wait_for_headers(files: Files, package: PackageFacts, name: str) -> None:
     targets = join_words(target for target, *_ in found)
     why = f"{targets} may be compiled before the headers of the messages"
     change_line(files, found[0][1], "\n".join(lines), why, "; ".join(fixes))
+
+
+def depend_on_exported(files: Files, package: PackageFacts, name: str) -> None:
+    """Make programs wait for all that is exported in place of headers that nothing makes, at which CMake stops from
+    version 3 on."""
+    versions = [t.value for c in calls_of(files, "cmake_minimum_required") for t in words_of(c)[1:]]
+    known = {*_components(files)[1], *noetic_messages(), *(one.name for one in package.also)}
+    own = {name, "${PROJECT_NAME}"}
+    known |= own if has_call(files, package, GENERATE) else set()
+    text, fixes, found = cmake_text(files), list[str](), list[tuple[Command, str]]()
+    for call in reversed(calls_of(files, "add_dependencies")):  # places above stay
+        target, *waited = [token.value for token in words_of(call)] or [""]
+        makers = {one: OF_GENERATION.split(one)[0] for one in waited if OF_GENERATION.search(one)}
+        lost = [
+            one for one, maker in makers.items() if maker not in known and (maker in own or "$" not in maker)
+        ]
+        if not lost:
+            continue
+        kept = [one for one in waited if one not in lost and "EXPORTED_TARGETS}" not in one]
+        new = f"add_dependencies({' '.join([target, *kept, EXPORTED])})"
+        text = text[: call.span.start] + new + text[call.span.stop :]
+        fixes.insert(0, f"write {new}")
+        found.insert(0, (call, lost[0]))
+    if found and re.match(r"[3-9]|\d\d", "".join(versions[:1])):
+        call, lost_target = found[0]
+        change_line(files, call, text, f"there is no target {lost_target} to wait for", "; ".join(fixes))
 
 
 def _components(files: Files) -> tuple[list[Command], list[str]]:

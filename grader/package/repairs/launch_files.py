@@ -46,7 +46,11 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
     for launch, node in nodes:
         pkg, kind = node.pkg or "", node.type or ""
         runs_own = bool({kind, f"{kind}.py"} & (scripts if pkg in ours else programs))
-        if pkg != own and (is_near(pkg, own) or ((pkg in ours or pkg not in others) and runs_own)):
+        if (
+            pkg != own
+            and "$(" not in pkg
+            and (is_near(pkg, own) or ((pkg in ours or pkg not in others) and runs_own))
+        ):
             _set_attribute(files, launch.path, node.line, ("pkg", pkg, own), kind="package-name")
     for launch in package.launch_files:
         _repair_find(files, launch.path, own)
