@@ -333,6 +333,8 @@ def corrections(line: str, message: str = "", column: int | None = None) -> Iter
     if "triple-quoted" in message:
         yield re.sub(r"""^(\s*)(["'])\2(?=\w)""", r"\1\2\2\2", line)
         yield re.sub(r"""(?<=[\w.])(["'])\1(\s*)$""", r"\1\1\1\2", line)
+    if message.startswith("f-string"):  # the other kind of quotes inside the braces
+        yield re.sub(r"(?<=[fF])(['\"]).*\1", _with_other_quotes, line)
     yield line.translate(PLAIN)
     code, comment, texts = _taken_apart(line.translate(PLAIN))
     code = re.sub("[\u2010-\u2015\u2212]", "-", code)
@@ -355,6 +357,11 @@ def corrections(line: str, message: str = "", column: int | None = None) -> Iter
     yield from (_together(one, comment, texts) for one in _with_separator(plain, texts))
     yield from _with_bracket(line, message, column)
     yield from _with_quote(line, message, column)
+
+
+def _with_other_quotes(text: re.Match[str]) -> str:
+    other = "'" if text[1] == '"' else '"'
+    return re.sub(r"\{[^{}]*\}", lambda braces: braces[0].replace(text[1], other), text[0])
 
 
 def without_doubled(line: str) -> Iterator[tuple[str, str]]:

@@ -253,6 +253,9 @@ def _not_set(
         return verdict.about(citations=named_at(package, run, "sets-parameter", params.name))
     if params.name not in after and params.name in params_given(run):
         cause = _taken_away(run, params.name)
+        if last is not None and _is_value(last.value, params.value) and DELETES in cause:
+            gone = cause.partition(DELETES)[2]
+            hint = f"remove `rospy.delete_param('{gone}')`: the parameters stay after the node has ended"
         return failed(f"{params.name} is no longer on the server{cause}", hint=hint)
     if end := explain_failure(package, run):
         return end.verdict(unjudged, f"{params.name} was never set: the node ended with {end.cause}")
@@ -290,6 +293,9 @@ def _judge_unchanged(run: Run, after: dict[str, Any], params: ParamsSetParams) -
     return None
 
 
+DELETES = ": the node deletes "
+
+
 def _taken_away(run: Run, name: str) -> str:
     """Return the change that took a name away: a map that lacks it, a value in the map's place, or a delete."""
     # The last change is the one that took it away.
@@ -297,7 +303,7 @@ def _taken_away(run: Run, name: str) -> str:
         above = absolute_name(event.name)
         if run.is_student_node(event.caller_id) and f"{name}/".startswith(f"{above.rstrip('/')}/"):
             if event.action == "delete":
-                return f": the node deletes {above}"
+                return f"{DELETES}{above}"
             return f": set_param('{above}', …) replaces all that was below {above}"
     return ""
 

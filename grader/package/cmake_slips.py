@@ -9,6 +9,7 @@ from cmake_parser import CMakeError, parse_raw
 
 from grader.model.package import CMAKE_COMMANDS
 from grader.package.line_slips import LineSlip, changed_line, doubled_and_turned
+from grader.wording import join_words, numbers_text
 
 _CHARS_MAX = 12_000
 _CALL_LINES_MAX = 12
@@ -41,8 +42,29 @@ def find_slip(text: str, number: int) -> LineSlip | None:
     first = next((n for n in reversed(begun) if re.match(r"\s*\w+\s*[({]?", lines[n - 1])), number)
     last = min(len(lines), number + _CALL_LINES_MAX)
     near = [number, *range(number + 1, last + 1), *range(first, number)]
-    slips = (*(one for n in near for one in _slips_in(lines, n)), *doubled_and_turned(lines, near))
+    slips = (
+        *_other_comments(lines),
+        *(one for n in near for one in _slips_in(lines, n)),
+        *doubled_and_turned(lines, near),
+    )
     return next((slip for slip in slips if is_good(slip.text)), None)
+
+
+_OTHER_COMMENT = re.compile(r"^([^#\"]*\)\s*(?=//)|\s*)(//|/\*|<!--|--|%|;)")
+
+
+def _other_comments(lines: list[str]) -> Iterator[LineSlip]:
+    """Yield the text with `#` for what begins comments in other languages, on all of its lines."""
+    found = {n: hit for n, line in enumerate(lines, 1) if (hit := _OTHER_COMMENT.match(line))}
+    if found:
+        changed = [_OTHER_COMMENT.sub(r"\1#", line) for line in lines]
+        signs = join_words((f"`{one}`" for one in dict.fromkeys(hit[2] for hit in found.values())), "or")
+        first, *more = found
+        same = (
+            f", and the same on {'lines' if len(more) > 1 else 'line'} {numbers_text(more)}" if more else ""
+        )
+        why = f"a comment begins with `#`, and not with {signs}"
+        yield LineSlip(why, first, f"write `#` instead of {signs}{same}", "\n".join(changed), is_within=True)
 
 
 def _slips_in(lines: list[str], number: int) -> Iterator[LineSlip]:

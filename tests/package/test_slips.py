@@ -512,6 +512,8 @@ def test_a_condition_is_joined_with_another_where_that_changes_nothing_in_it(
             {"subscribed-again"},
         ),
         ("while not rospy.is_shutdown():\n    rospy.Subscriber('a', Int8, hear)\n    rospy.spin()\n", set()),
+        ("while x:\n    print(rospy.wait_for_message('a', Int8))\n", {"subscribed-again"}),
+        ("m = rospy.wait_for_message('a', Int8)\nwhile x:\n    print(m)\n", set()),
         (
             "def hear(msg):\n    pass\ndef hear(msg):\n    pass\nrospy.Subscriber('a', Int8, hear)\n",
             {"defined-twice"},

@@ -53,19 +53,21 @@ def loop_rates(tree):
             continue
         value = given(node.args[0])
         whole = nanoseconds_apart(value) if is_call(value, "Duration") else None
+        pause = dotted(node.func) if timed == "sleep" else ""
         if is_call(value, "Duration") and value.args and not whole:
-            value = given(value.args[0])
-        yield from loop_rate(node, timed, value, whole or constant(value, given))
+            pause, value = dotted(value.func) if timed == "Timer" else pause, given(value.args[0])
+        yield from loop_rate(node, timed, value, whole or constant(value, given), pause)
 
 
-def loop_rate(call, timed, value, number):
-    """Yield the rate that a `Rate(…)`, `sleep(…)` or `Timer(…)` asks for: of the last two, `number` is in seconds."""
+def loop_rate(call, timed, value, number, pause):
+    """Yield the rate that a `Rate(…)`, `sleep(…)` or `Timer(…)` asks for: of the last two, `number` is in seconds, and
+    `pause` is what takes it."""
     name = read_parameter(value) if timed == "Rate" else None
     if name:
         yield slip(value.lineno, "rate-parameter", name)
     elif number:
         hz = "%.12g" % (number if timed == "Rate" else 1.0 / number)
-        pause, fix = dotted(call.func) if timed == "sleep" else "", ""
+        fix = ""
         if is_call(value, "Duration"):
             pause, fix = dotted(value.func), "its second number counts nanoseconds, so it is %.9g s" % number
         yield slip(call.lineno, "rate-number", hz, fix, pause)

@@ -308,22 +308,31 @@ def _own_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | No
     paths = [PurePosixPath(file.path) for file in package.files if not is_product(file.path)]
     if asked[1] == package.name and PurePosixPath(f"src/{asked[1]}/__init__.py") in paths:
         return _own_python_package(asked[1], package)
-    folder = PurePosixPath(script).parent
+    folder, line = PurePosixPath(script).parent, found.innermost.source.strip()
+    # `from basic_comms.tools import say`, of a file that lies in no Python package of that name
+    inner = re.match(r"from (\w+)(?:\.(\w+) (import .*)| (import (\w+)))$", line)
+    inner = inner if inner and inner[1] == asked[1] == package.name else None
+    name = (inner[2] or inner[5]) if inner else asked[1]
     files = sorted(
-        (path for path in paths if path.name == f"{asked[1]}.py"), key=lambda path: path.parent != folder
+        (path for path in paths if path.name == f"{name}.py"), key=lambda path: path.parent != folder
     )
     if not files:
         return None
-    file, place = files[0], "os.path.dirname(__file__)"
+    file, place, instead = files[0], "os.path.dirname(__file__)", ""
+    if inner:
+        cause = f"{file} is there, and no Python package {asked[1]} that it is a part of"
+        instead = f"write `{inner[4] or f'from {name} {inner[3]}'}` instead of the import, and "
     if file.parent != folder:
-        cause = f"{file} is in another folder, and Python looks beside {script}"
+        cause = cause if instead else f"{file} is in another folder, and Python looks beside {script}"
         place = f"os.path.join({place}, '{posixpath.relpath(str(file.parent), str(folder))}')"
+    elif instead:
+        pass
     elif any("/devel/lib/" in frame.file for frame in found.frames):
         program = f"the program that catkin_install_python makes from {script}"
         cause = f"{file} is there, and {program} does not look beside it"
     else:
         return None
-    return cause, f"write `import os, sys; sys.path.insert(0, {place})` above the import"
+    return cause, f"{instead}write `import os, sys; sys.path.insert(0, {place})` above the import"
 
 
 def _own_python_package(name: str, package: PackageFacts) -> tuple[str, str] | None:
