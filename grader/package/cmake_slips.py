@@ -43,28 +43,48 @@ def find_slip(text: str, number: int) -> LineSlip | None:
     last = min(len(lines), number + _CALL_LINES_MAX)
     near = [number, *range(number + 1, last + 1), *range(first, number)]
     slips = (
-        *_other_comments(lines),
+        *_habits_of_c(lines),
         *(one for n in near for one in _slips_in(lines, n)),
         *doubled_and_turned(lines, near),
     )
     return next((slip for slip in slips if is_good(slip.text)), None)
 
 
-_OTHER_COMMENT = re.compile(r"^([^#\"]*\)\s*(?=//)|\s*)(//|/\*|<!--|--|%|;)")
+_OTHER_COMMENT = re.compile(r"^([^#\"]*\)\s*(?=//)|\s*)(//|/\*|<!--|--|%)")
+_END_OF_C = re.compile(r"(?<=\))\s*;(?=\s*(?:#|$))")
 
 
-def _other_comments(lines: list[str]) -> Iterator[LineSlip]:
-    """Yield the text with `#` for what begins comments in other languages, on all of its lines."""
-    found = {n: hit for n, line in enumerate(lines, 1) if (hit := _OTHER_COMMENT.match(line))}
-    if found:
-        changed = [_OTHER_COMMENT.sub(r"\1#", line) for line in lines]
-        signs = join_words((f"`{one}`" for one in dict.fromkeys(hit[2] for hit in found.values())), "or")
-        first, *more = found
+def _habits_of_c(lines: list[str]) -> Iterator[LineSlip]:
+    """Yield the text with `#` for what begins comments in other languages, and the one without `;` behind commands, on
+    all of its lines."""
+    changed, signs, inside = dict[int, str](), dict[str, None](), False
+    for number, line in enumerate(lines, 1):
+        hit = _OTHER_COMMENT.match(line)
+        if hit or inside:
+            changed[number] = (
+                f"# {line.strip()}" if inside or hit is None else _OTHER_COMMENT.sub(r"\1#", line)
+            )
+            signs |= {f"`{hit[2]}`": None} if hit and not inside else {}
+        inside = "*/" not in line and (inside or (hit is not None and hit[2] == "/*"))
+    begun = join_words(signs, "or")
+    yield from _changed_lines(
+        lines,
+        changed,
+        f"a comment begins with `#`, and not with {begun}",
+        "write `#` where the comment begins",
+    )
+    ended = {n: one for n, line in enumerate(lines, 1) if (one := _END_OF_C.sub("", line, count=1)) != line}
+    yield from _changed_lines(lines, ended, "no `;` comes behind a command", "delete the `;`")
+
+
+def _changed_lines(lines: list[str], changed: dict[int, str], why: str, fix: str) -> Iterator[LineSlip]:
+    if changed:
+        first, *more = changed
         same = (
             f", and the same on {'lines' if len(more) > 1 else 'line'} {numbers_text(more)}" if more else ""
         )
-        why = f"a comment begins with `#`, and not with {signs}"
-        yield LineSlip(why, first, f"write `#` instead of {signs}{same}", "\n".join(changed), is_within=True)
+        text = "\n".join(changed.get(number, line) for number, line in enumerate(lines, 1))
+        yield LineSlip(why, first, f"{fix}{same}", text, is_within=True)
 
 
 def _slips_in(lines: list[str], number: int) -> Iterator[LineSlip]:

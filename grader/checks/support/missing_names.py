@@ -74,6 +74,19 @@ ATTRIBUTES = {
 """What a lab's scripts use of rospy (http://docs.ros.org/en/noetic/api/rospy/html/)."""
 
 
+_ARG = r"\s*([^,()]+)"
+CALLS_OF_ROS_2 = {
+    "create_publisher": (rf"{_ARG},{_ARG},{_ARG}\)", r"rospy.Publisher(\2, \1, queue_size=\3)"),
+    "create_subscription": (rf"{_ARG},{_ARG},{_ARG},{_ARG}\)", r"rospy.Subscriber(\2, \1, \3)"),
+    "create_timer": (rf"{_ARG},{_ARG}\)", r"rospy.Timer(rospy.Duration(\1), \2)"),
+    "create_service": (rf"{_ARG},{_ARG},{_ARG}\)", r"rospy.Service(\2, \1, \3)"),
+    "create_client": (rf"{_ARG},{_ARG}\)", r"rospy.ServiceProxy(\2, \1)"),
+    "create_rate": (rf"{_ARG}\)", r"rospy.Rate(\1)"),
+    "get_logger": (r"\)\.info\(([^()]+)\)", r"rospy.loginfo(\1)"),
+}
+"""Methods of a node of ROS 2: their arguments, and the call of rospy's with them."""
+
+
 def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """A message type, a module, an attribute or an argument that there is none of, and what is meant."""
     if meant := own_message(found, package):
@@ -82,7 +95,8 @@ def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
         return _other_types(wrong[1], wrong[2])
     if wrong := _NO_ATTRIBUTE.search(found.message):
         source = found.innermost.source
-        return _field_of_number(found, wrong[1]) or _other_attributes(package, wrong[1], wrong[2], source)
+        meant = _call_of_ros_2(wrong[2], source) or _field_of_number(found, wrong[1])
+        return meant or _other_attributes(package, wrong[1], wrong[2], source)
     if wrong := re.match(r"(\w+) is not an attribute of (\w+)$", found.message):
         known = fields_of(package, wrong[2])
         source = found.innermost.source
@@ -96,6 +110,15 @@ def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
         return (f"it is called {near[0]}", f"write {near[0]}= instead of {wrong[1]}=") if near else None
     is_import = found.kind in IMPORT_ERRORS
     return (_own_module(found, package) or _other_module(found, package)) if is_import else None
+
+
+def _call_of_ros_2(name: str, source: str) -> tuple[str, str] | None:
+    if name not in CALLS_OF_ROS_2:
+        return None
+    arguments, new = CALLS_OF_ROS_2[name]
+    call = re.search(rf"[\w.]+\.{name}\({arguments}", source)
+    written = call.expand(new) if call else re.sub(r"\\\d", "…", new)
+    return f"`{name}` is from ROS 2", f"write `{written}` in place of that call"
 
 
 def hiding_file(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
