@@ -319,9 +319,8 @@ def corrected(line: str, message: str = "", column: int | None = None) -> str:
 
     `message` is what Python says of the line, and `column` the place, from 1.
     """
-    good = (one for one in corrections(line, message, column) if one != line and _parses(one))
     shorter = _without_unmatched(line, message, column) if _ends_earlier_lines(line) else ""
-    return next(good, shorter)
+    return next((one for one in corrections(line, message, column) if one != line and _parses(one)), shorter)
 
 
 def corrections(line: str, message: str = "", column: int | None = None) -> Iterator[str]:
@@ -333,7 +332,7 @@ def corrections(line: str, message: str = "", column: int | None = None) -> Iter
     if "triple-quoted" in message:
         yield re.sub(r"""^(\s*)(["'])\2(?=\w)""", r"\1\2\2\2", line)
         yield re.sub(r"""(?<=[\w.])(["'])\1(\s*)$""", r"\1\1\1\2", line)
-    yield line.translate(PLAIN)
+    yield from (other_quotes(line) or line, line.translate(PLAIN))
     code, comment, texts = _taken_apart(line.translate(PLAIN))
     code = re.sub("[\u2010-\u2015\u2212]", "-", code)
     yield _together(code, comment, texts)
@@ -355,6 +354,14 @@ def corrections(line: str, message: str = "", column: int | None = None) -> Iter
     yield from (_together(one, comment, texts) for one in _with_separator(plain, texts))
     yield from _with_bracket(line, message, column)
     yield from _with_quote(line, message, column)
+
+
+def other_quotes(line: str) -> str:
+    """Return the line with the other quotes inside the braces of an f-string; "" where that is no good line."""
+    found = re.search(r"(?<=[fF])(['\"]).*\1", line)
+    inside, quote = (found[0], found[1]) if found else ("", "'")
+    swapped = re.sub(r"\{[^{}]*\}", lambda one: one[0].replace(quote, "'\""[quote == "'"]), inside)
+    return changed if swapped != inside and _parses(changed := line.replace(inside, swapped)) else ""
 
 
 def without_doubled(line: str) -> Iterator[tuple[str, str]]:

@@ -327,7 +327,9 @@ def _why_misplaced(package: PackageFacts, one: Installed) -> Lack:
     where = f"line {one.call.line}"
     if one.kind != "PROGRAMS":
         why = f"{where}: catkin_install_python(…) does not begin with the word PROGRAMS"
-        return Lack(why, f"write catkin_install_python(PROGRAMS … DESTINATION {BIN})", _line(one))
+        instead = f"write PROGRAMS instead of {one.kind} in it"
+        fix = instead if one.kind else f"write catkin_install_python(PROGRAMS … DESTINATION {BIN})"
+        return Lack(why, fix, _line(one))
     empty = "DESTINATION" in one.call.args and not one.destination
     if empty and not cmake_calls(package, "catkin_package"):
         why = f"{where}: {BIN} has no value, because catkin_package() is not called before it"

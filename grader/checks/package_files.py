@@ -129,11 +129,15 @@ def _lost_folder(package: PackageFacts, folder: str, params: LayoutParams) -> Sl
 
 
 def _instead(package: PackageFacts, folder: str) -> str:
-    """A folder that stands in for this one: its name in other letters, or another customary name."""
+    """A folder that stands in for this one: its name in other letters, another customary name, or it lies further
+    down."""
     there = dict.fromkeys(PurePosixPath(f.path).parts[0] for f in package.files if "/" in f.path)
     slips = [n for n in there if n.casefold() == folder.casefold()] or list(near_names(folder, there))
     customary = [n for n in there if n.casefold() in OTHERS.get(folder, ())]
-    return next(iter([*slips, *customary]), "")
+    paths = (f.path for f in package.files if not is_product(f.path))
+    parents = dict.fromkeys(parent.as_posix() for path in paths for parent in PurePosixPath(path).parents)
+    deeper = sorted(one for one in parents if one.endswith(f"/{folder}"))
+    return next(iter([*slips, *customary, *deeper[:1]]), "")
 
 
 def _lost_file(package: PackageFacts, name: str) -> Slip:

@@ -25,7 +25,7 @@ from grader.checks.support.parameters import (
 )
 from grader.checks.support.processes import GlobalName, first_interrupt_ns, lives, named_at, not_started
 from grader.checks.support.text import get_param, log_param, near_names, set_param, shown
-from grader.checks.support.topics import cite, no_node
+from grader.checks.support.topics import cite, no_node, run_slip
 from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
@@ -253,6 +253,9 @@ def _not_set(
         return verdict.about(citations=named_at(package, run, "sets-parameter", params.name))
     if params.name not in after and params.name in params_given(run):
         cause = _taken_away(run, params.name)
+        if last is not None and _is_value(last.value, params.value) and DELETES in cause:
+            gone = cause.partition(DELETES)[2]
+            hint = f"remove `rospy.delete_param('{gone}')`: the parameters stay after the node has ended"
         return failed(f"{params.name} is no longer on the server{cause}", hint=hint)
     if end := explain_failure(package, run):
         return end.verdict(unjudged, f"{params.name} was never set: the node ended with {end.cause}")
@@ -260,9 +263,23 @@ def _not_set(
     if _is_value(params_on_server(run).get(params.name), params.value):
         message = f"{params.name} is set to {params.value} only after Ctrl-C: the node waits too long"
         return failed(message, hint="set it as soon as the values are read, without a long sleep before it")
+    return _never_set(package, run, mine, params)
+
+
+def _never_set(
+    package: PackageFacts, run: Run, mine: Sequence[ParamEvent], params: ParamsSetParams
+) -> Verdict:
+    """The node sets other names, or nothing calls the function that would set it."""
     others = dict.fromkeys(absolute_name(e.name) for e in mine)
+    spare = run_slip(package, run, "never-called") if not mine else None
+    if spare is not None and (setting := named_at(package, run, "sets-parameter", params.name)):
+        hint = spare.fix or f"call `{spare.name}()` where {spare.file} should set it"
+        return failed(
+            f"{params.name} is never set: {spare.message}", hint=hint, citations=(spare.place, *setting)
+        )
     instead = f"; the node sets {join_words(others)}" if others else ""
     cited = named_at(package, run, "sets-parameter", next(iter(others))) if len(others) == 1 else ()
+    hint = f"write {set_param(params.name, params.value)}"
     return failed(f"{params.name} is never set to {params.value}{instead}", hint=hint, citations=cited)
 
 
@@ -290,6 +307,9 @@ def _judge_unchanged(run: Run, after: dict[str, Any], params: ParamsSetParams) -
     return None
 
 
+DELETES = ": the node deletes "
+
+
 def _taken_away(run: Run, name: str) -> str:
     """Return the change that took a name away: a map that lacks it, a value in the map's place, or a delete."""
     # The last change is the one that took it away.
@@ -297,7 +317,7 @@ def _taken_away(run: Run, name: str) -> str:
         above = absolute_name(event.name)
         if run.is_student_node(event.caller_id) and f"{name}/".startswith(f"{above.rstrip('/')}/"):
             if event.action == "delete":
-                return f": the node deletes {above}"
+                return f"{DELETES}{above}"
             return f": set_param('{above}', …) replaces all that was below {above}"
     return ""
 

@@ -525,10 +525,13 @@ class Later:
         yield from self._fields(name, slip)
 
     def _lacks_words(self, words: str) -> bool:
-        """Return whether the words stand in no line of the sources, which are known."""
+        """Return whether the words stand in no line of the sources, which are known, or of modules that they import."""
+        imports = [one for path in self._paths for one in self._lines(path)[:LINES_READ] if "import" in one]
+        named = set(re.findall(r"\w+", " ".join(line[:LINE_CHARS] for line in imports)))
+        own = [f.path for f in self._package.files if f.path.endswith(".py")]
         lines = [
             line.partition("#" if path.endswith(".py") else "//")[0]
-            for path in self._paths
+            for path in {*self._paths, *(one for one in own if PurePosixPath(one).stem in named)}
             for line in self._lines(path)
         ]
         return bool(lines) and not any(

@@ -304,12 +304,13 @@ class LateRemap(LaunchLine):
 
 class LaunchArg(Placed, Record):
     """An `<arg>` that has no value where `$(arg …)` asks for it. `declared`: there is an `<arg>`, without a default,
-    and `line` is its own; else the line that asks."""
+    and `line` is its own; else the line that asks, where `meant` is the one with nearly that name."""
 
     name: str
     declared: bool
     file: str
     line: int
+    meant: str = Field(default="", exclude_if=lambda value: not value)
 
 
 class LaunchNode(Placed, Record):

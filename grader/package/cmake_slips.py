@@ -9,6 +9,7 @@ from cmake_parser import CMakeError, parse_raw
 
 from grader.model.package import CMAKE_COMMANDS
 from grader.package.line_slips import LineSlip, changed_line, doubled_and_turned
+from grader.wording import join_words, numbers_text
 
 _CHARS_MAX = 12_000
 _CALL_LINES_MAX = 12
@@ -41,8 +42,49 @@ def find_slip(text: str, number: int) -> LineSlip | None:
     first = next((n for n in reversed(begun) if re.match(r"\s*\w+\s*[({]?", lines[n - 1])), number)
     last = min(len(lines), number + _CALL_LINES_MAX)
     near = [number, *range(number + 1, last + 1), *range(first, number)]
-    slips = (*(one for n in near for one in _slips_in(lines, n)), *doubled_and_turned(lines, near))
+    slips = (
+        *_habits_of_c(lines),
+        *(one for n in near for one in _slips_in(lines, n)),
+        *doubled_and_turned(lines, near),
+    )
     return next((slip for slip in slips if is_good(slip.text)), None)
+
+
+_OTHER_COMMENT = re.compile(r"^([^#\"]*\)\s*(?=//)|\s*)(//|/\*|<!--|--|%)")
+_END_OF_C = re.compile(r"(?<=\))\s*;(?=\s*(?:#|$))")
+
+
+def _habits_of_c(lines: list[str]) -> Iterator[LineSlip]:
+    """Yield the text with `#` for what begins comments in other languages, and the one without `;` behind commands, on
+    all of its lines."""
+    changed, signs, inside = dict[int, str](), dict[str, None](), False
+    for number, line in enumerate(lines, 1):
+        hit = _OTHER_COMMENT.match(line)
+        if hit or inside:
+            changed[number] = (
+                f"# {line.strip()}" if inside or hit is None else _OTHER_COMMENT.sub(r"\1#", line)
+            )
+            signs |= {f"`{hit[2]}`": None} if hit and not inside else {}
+        inside = "*/" not in line and (inside or (hit is not None and hit[2] == "/*"))
+    begun = join_words(signs, "or")
+    yield from _changed_lines(
+        lines,
+        changed,
+        f"a comment begins with `#`, and not with {begun}",
+        "write `#` where the comment begins",
+    )
+    ended = {n: one for n, line in enumerate(lines, 1) if (one := _END_OF_C.sub("", line, count=1)) != line}
+    yield from _changed_lines(lines, ended, "no `;` comes behind a command", "delete the `;`")
+
+
+def _changed_lines(lines: list[str], changed: dict[int, str], why: str, fix: str) -> Iterator[LineSlip]:
+    if changed:
+        first, *more = changed
+        same = (
+            f", and the same on {'lines' if len(more) > 1 else 'line'} {numbers_text(more)}" if more else ""
+        )
+        text = "\n".join(changed.get(number, line) for number, line in enumerate(lines, 1))
+        yield LineSlip(why, first, f"{fix}{same}", text, is_within=True)
 
 
 def _slips_in(lines: list[str], number: int) -> Iterator[LineSlip]:

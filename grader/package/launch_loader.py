@@ -20,6 +20,7 @@ from grader.model.package import Fault, LateRemap, LaunchArg, LaunchLine, Launch
 from grader.model.record import Record
 from grader.package.xml import line_of
 from grader.package.xml_slips import ATTRIBUTES
+from grader.wording import PAIR, is_one_edit
 
 INCLUDES_MAX = 50
 DEPTH_MAX = 10
@@ -183,7 +184,9 @@ class _Loader:
             found[file, name] = LaunchArg(name=name, declared=True, file=file, line=line)
         for asked in (name for value in element.attrib.values() for name in _ARGUMENT.findall(str(value))):
             if asked not in scope.args and len(found) < _UNSET_MAX:
-                found.setdefault((file, asked), LaunchArg(name=asked, declared=False, file=file, line=line))
+                meant = next((one for one in islice(scope.args, _UNSET_MAX) if _is_slip(asked, one)), "")
+                arg = LaunchArg(name=asked, declared=False, file=file, line=line, meant=meant)
+                found.setdefault((file, asked), arg)
 
     def _param(self, element: etree._Element, scope: Scope) -> Scope:
         param = _param(element, scope)
@@ -246,6 +249,13 @@ def _included(element: etree._Element, scope: Scope, path: str) -> Scope:
     args = {**scope.args, **given.args} if passed else given.args
     inside = scope.below(scope.get(element, "ns"), element)
     return inside.model_copy(update={"file": path, "args": args})
+
+
+def _is_slip(asked: str, name: str) -> bool:
+    """Return whether one letter, or capitals, tell the names of two arguments apart: not a digit, nor all they have."""
+    one, other = asked.lower(), name.lower()
+    numbered = re.sub(r"\d", "", one) == re.sub(r"\d", "", other) and one != other
+    return len(one) > PAIR and not numbered and (one == other or is_one_edit(one, other))
 
 
 def _with_arg(element: etree._Element, scope: Scope) -> Scope:

@@ -26,6 +26,7 @@ from grader.syntax_fixes import (
     MERGE_MARKER,
     OUT_OF_BLOCK,
     Reason,
+    other_quotes,
     reason_of_doubled,
     reason_of_line,
     without_texts,
@@ -303,7 +304,7 @@ def _reason_of_block(message: str, text: str, *, mixed: bool) -> Reason | None:
     if "unindent does not match" in message and (lone := _EXCEPT.match(text)):
         why = f"there is no `try:` for this `{lone[1]}`"
         return Reason(why, "write `try:` above the lines that it is for")
-    if message.startswith("f-string") and _SAME_QUOTES.search(text):
+    if other_quotes(text) or (message.startswith("f-string") and _SAME_QUOTES.search(text)):
         why = "the quote inside the braces of this f-string ends it"
         return Reason(why, "write the other kind of quotes inside the braces")
     empty = _EMPTY_BLOCK.match(message)

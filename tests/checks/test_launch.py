@@ -57,6 +57,18 @@ def node(name: str, namespace: str = "/") -> LaunchNode:
             ["RLException: Unable to launch [ns-10]. ", "If it is a script, you may be missing a '#!'"],
             "of ns",
         ),
+        (
+            [
+                "RLException: error loading <rosparam> tag: ",
+                "\t'param' attribute must be set for non-dictionary values",
+                "XML is <rosparam>",
+                "      red:34",
+                "      green:139",
+                "    </rosparam>",
+            ],
+            "red:34 has no space in it",
+        ),
+        (["RLException: ERROR: unknown machine [raspi]"], "no <machine> of the name raspi"),
         (["RLException: multiple files named [a.launch] in package [p]:"], "two launch files"),
         (["RLException: Unknown substitution command [findpkg p]. Valid commands are"], "findpkg p"),
         (["RLException: Invalid roslaunch XML syntax: mismatched tag: line 3, column 2"], "not well-formed"),

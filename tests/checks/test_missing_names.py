@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from grader.checks.support.exit_causes import explain_traceback
@@ -142,6 +144,29 @@ def test_a_module_of_the_students_own_is_told_from_one_that_is_not_there(tmp_pat
     error = "ModuleNotFoundError: No module named 'texts'"
     end = explained(tmp_path, dict.fromkeys(files, SCRIPT), *frames, error=error)
     assert cause in end.cause
+    assert hint in end.hint
+
+
+@pytest.mark.parametrize(
+    ("line", "owner", "hint"),
+    [
+        ("self.t = rospy.create_timer(0.1, self.tell)", "module 'rospy'",
+         "write `rospy.Timer(rospy.Duration(0.1), self.tell)` in place of that call"),
+        ("self.p = self.create_publisher(String, 'chatter', 10)", "'Talker' object",
+         "write `rospy.Publisher('chatter', String, queue_size=10)` in place of that call"),
+        ("self.get_logger().info('hello')", "'Talker' object", "write `rospy.loginfo('hello')` in place"),
+        ("n.create_subscription(", "'Talker' object", "write `rospy.Subscriber(…, …, …)` in place"),
+    ],
+)  # fmt: skip
+def test_a_method_of_ros_2_is_told_with_rospys_call(tmp_path, line, owner, hint):
+    name = re.search(r"create_\w+|get_logger", line)[0]
+    end = explained(
+        tmp_path,
+        {"src/a.py": SCRIPT},
+        ("src/a.py", 4, line),
+        error=f"AttributeError: {owner} has no attribute '{name}'",
+    )
+    assert "is from ROS 2" in end.cause
     assert hint in end.hint
 
 

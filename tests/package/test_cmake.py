@@ -19,6 +19,7 @@ from grader.package.cmake import (
     written_calls,
 )
 from grader.package.cmake_parse import parse_tree_of
+from grader.package.cmake_slips import find_slip
 
 
 def facts_of(tmp_path, text, *, trace=None, root=None):
@@ -276,6 +277,33 @@ def test_a_name_that_only_cmake_knows_may_be_any(tmp_path):
     (found,) = facts_of(tmp_path, text).executables
     assert found.is_called("my_talker_node")
     assert not found.is_called("talker")
+
+
+@pytest.mark.parametrize(
+    ("text", "fix", "after"),
+    [
+        (
+            "// a\nproject(x) // b\n",
+            "where the comment begins, and the same on line 2",
+            "# a\nproject(x) # b\n",
+        ),
+        (
+            "/* a\n b */\nproject(x)\n",
+            "where the comment begins, and the same on line 2",
+            "# a\n# b */\nproject(x)\n",
+        ),
+        ("<!-- a -->\nproject(x)\n", "where the comment begins", "# a -->\nproject(x)\n"),
+        (
+            "project(x);\nfoo()  ;  # a\n",
+            "delete the `;`, and the same on line 2",
+            "project(x)\nfoo()  # a\n",
+        ),
+        ('set(x "http://a;b")\nproject(x)\n', "", ""),
+    ],
+)
+def test_what_other_languages_write_is_put_right_on_all_lines(text, fix, after):
+    slip = find_slip(text, 1)
+    assert (slip.fix.endswith(fix), slip.text) == (True, after) if fix else slip is None
 
 
 @pytest.mark.parametrize(

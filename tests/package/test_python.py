@@ -300,6 +300,8 @@ HABITS = {
     "class = 3": "",
     "$ chmod +x talker.py": "",
     "using namespace std;": "",
+    "x = f'{d['a']}'": "x = f'{d[\"a\"]}'",
+    "x = f'at {'%.1f' % t}'": "x = f'at {\"%.1f\" % t}'",
 }
 
 

@@ -139,6 +139,9 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (node(LOOP + "        rate.sleep()\n    p.publish(1)\n") + CALLED,
          [("never-reached", 4, "the publish(…) on line 6")]),
         (node("    rospy.spin()\n    p.publish(1)\n") + CALLED, [("never-reached", 4, "the spin() on line 4")]),
+        ("class A:\n    def __init__(s):\n        r.spin()\n    def go(s):\n        r.Service(a, B)\na = A()\na.go()",
+         [("never-reached", 6, "the spin() on line 3 never ends, so the go(…) on line 7")]),
+        ("def go():\n    rospy.spin()\np = rospy.Publisher('a', B)\np.publish(1)\ngo()\n", []),
         (node("    while True:\n        pass\n    p = rospy.Publisher('a', A)\n    p.publish(1)\n") + CALLED,
          [("never-reached", 4, "the Publisher(…) on line 6")]),
         ("class Node:\n    def __init__(self):\n        rospy.Subscriber('a', A, f)\nrospy.spin()\nNode()\n",
@@ -512,6 +515,8 @@ def test_a_condition_is_joined_with_another_where_that_changes_nothing_in_it(
             {"subscribed-again"},
         ),
         ("while not rospy.is_shutdown():\n    rospy.Subscriber('a', Int8, hear)\n    rospy.spin()\n", set()),
+        ("while x:\n    print(rospy.wait_for_message('a', Int8))\n", {"subscribed-again"}),
+        ("m = rospy.wait_for_message('a', Int8)\nwhile x:\n    print(m)\n", set()),
         (
             "def hear(msg):\n    pass\ndef hear(msg):\n    pass\nrospy.Subscriber('a', Int8, hear)\n",
             {"defined-twice"},

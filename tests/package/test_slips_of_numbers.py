@@ -53,6 +53,8 @@ def test_a_rate_that_is_a_number_is_known(tmp_path, code, found):
     (tmp_path / "a.py").write_text(f"HZ = 7.5; a = b; b = a\n{code}\n")
     slips = check_syntax(tmp_path, ["a.py"]).slips
     assert [(s.message, s.line) for s in slips if s.kind == "rate-number"] == found
+    of_timer = {s.name for s in slips if s.kind == "rate-number" and "Timer" in code}
+    assert of_timer <= {"rospy.Duration"}
 
 
 @pytest.mark.parametrize(

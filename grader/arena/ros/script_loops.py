@@ -53,19 +53,21 @@ def loop_rates(tree):
             continue
         value = given(node.args[0])
         whole = nanoseconds_apart(value) if is_call(value, "Duration") else None
+        pause = dotted(node.func) if timed == "sleep" else ""
         if is_call(value, "Duration") and value.args and not whole:
-            value = given(value.args[0])
-        yield from loop_rate(node, timed, value, whole or constant(value, given))
+            pause, value = dotted(value.func) if timed == "Timer" else pause, given(value.args[0])
+        yield from loop_rate(node, timed, value, whole or constant(value, given), pause)
 
 
-def loop_rate(call, timed, value, number):
-    """Yield the rate that a `Rate(…)`, `sleep(…)` or `Timer(…)` asks for: of the last two, `number` is in seconds."""
+def loop_rate(call, timed, value, number, pause):
+    """Yield the rate that a `Rate(…)`, `sleep(…)` or `Timer(…)` asks for: of the last two, `number` is in seconds, and
+    `pause` is what takes it."""
     name = read_parameter(value) if timed == "Rate" else None
     if name:
         yield slip(value.lineno, "rate-parameter", name)
     elif number:
         hz = "%.12g" % (number if timed == "Rate" else 1.0 / number)
-        pause, fix = dotted(call.func) if timed == "sleep" else "", ""
+        fix = ""
         if is_call(value, "Duration"):
             pause, fix = dotted(value.func), "its second number counts nanoseconds, so it is %.9g s" % number
         yield slip(call.lineno, "rate-number", hz, fix, pause)
@@ -84,9 +86,18 @@ MAKES = ("Publisher", "Subscriber", "Service")
 
 def never_reached(tree):
     """Loops without an end before the first `publish(…)`, `Publisher(…)` and the like that comes behind them in the
-    same block, in a function or class of this file too.
+    same block, in a function or class of this file too. So is a `spin()` in what a statement of the block calls.
     """
     parts = all_of(tree, ast.FunctionDef, ast.ClassDef)
+    bodies = {n.name: n.body for n in parts if isinstance(n, ast.FunctionDef)}
+    makers = {n.name: f.body for n in parts for f in n.body if getattr(f, "name", "") == "__init__"}
+    bodies.update(makers)
+    spinning = {
+        name: one.lineno
+        for name, body in bodies.items()
+        for one in body
+        if is_call(getattr(one, "value", None), "spin") and sum(n.name == name for n in parts) == 1
+    }
     own = {n.name for n in parts if calls_in(n, *MAKES)}
 
     def word(node):
@@ -96,17 +107,21 @@ def never_reached(tree):
     for node in walk(tree):
         for block in (getattr(node, "body", None), getattr(node, "orelse", None)):
             for index, loop in enumerate(block if isinstance(block, list) else ()):
-                spins = isinstance(loop, ast.Expr) and is_call(loop.value, "spin")
-                if not spins and not (isinstance(loop, ast.While) and is_endless(loop)):
+                calls = isinstance(loop, (ast.Expr, ast.Assign))
+                spins = calls and is_call(loop.value, "spin")
+                inner = spinning.get(called_name(loop.value)) if calls and not spins else None
+                if not spins and not inner and not (isinstance(loop, ast.While) and is_endless(loop)):
                     continue
                 within = set(map(word, ast.walk(loop)))
                 behind = (n for later in block[index + 1 :] for n in ast.walk(later))
                 behind = [n for n in behind if word(n) and word(n) not in within]
                 if behind and "publish" not in within:
-                    what = "spin()" if spins else "loop"
+                    what = "spin()" if spins or inner else "loop"
                     message = "the %s on line %d never ends, so the %s(…) on line %d is never reached"
-                    message %= (what, loop.lineno, word(behind[0]), behind[0].lineno)
+                    message %= (what, inner or loop.lineno, word(behind[0]), behind[0].lineno)
                     fix = "move line %d above line %d" % (behind[0].lineno, loop.lineno)
+                    if inner:
+                        fix = "move the spin() of line %d below line %d" % (inner, behind[0].lineno)
                     fix = "" if word(behind[0]) == "publish" else fix
                     yield slip(loop.lineno, "never-reached", message, fix)
                 break  # nothing behind it in the block runs

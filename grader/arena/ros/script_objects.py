@@ -284,8 +284,14 @@ def text_behind(node, tree):
 
 
 def subscribed_again(tree):
-    """Yield each `Subscriber(…)` in a loop that runs until the node ends: each turn makes another one."""
+    """Yield each `Subscriber(…)` in a loop that runs until the node ends: each turn makes another one. So does
+    `wait_for_message(…)`, for one message, where the script has no other."""
     for loop in all_of(tree, ast.While):
+        waits = next(iter(calls_in(loop, "wait_for_message")), None)
+        if waits is not None and not calls_in(tree, "Subscriber"):
+            message = "wait_for_message(…) on line %d listens for one message in each turn of its loop, and not between"
+            fix = "write a callback that prints, and rospy.Subscriber(…) with it and rospy.spin() in place of the loop"
+            yield slip(waits.lineno, "subscribed-again", message % waits.lineno, fix)
         if calls_in(loop.test, "is_shutdown") and not calls_in(loop, "spin"):
             made = next((n for n in ast.walk(loop) if called_name(n) == "Subscriber"), None)
             if made is not None:

@@ -99,7 +99,7 @@ def is_call_alone(node):
     return isinstance(node, ast.Expr) and isinstance(node.value, ast.Call)
 
 
-WORKS = ("init_node", "publish", "spin", "sendTransform", "send_goal")
+WORKS = ("init_node", "publish", "spin", "sendTransform", "send_goal", "set_param")
 """What a function is there for: one that calls none of these may be a spare one."""
 
 
@@ -137,7 +137,7 @@ def handed_over(function, tree, owner):
     """Return who has to be told of a callback, which takes one value, or how one that takes several is called; "" of
     another function."""
     taken = [one.arg for one in function.args.args if one.arg != "self"]
-    if len(taken) > 1 and not function.args.defaults:
+    if (len(taken) > 1 or (taken and calls_in(function, "set_param"))) and not function.args.defaults:
         return "call `%s%s(…)` with values for %s" % (owner, function.name, ", ".join(taken))
     # A callback is given one message, and a function that makes the node is the program's own beginning
     if len(taken) != 1 or function.args.defaults or calls_in(function, "init_node"):

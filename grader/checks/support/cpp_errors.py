@@ -11,9 +11,10 @@ from grader.checks.support.build_output import FIRST_ERROR_HINT, Explain, Explai
 from grader.checks.support.scripts import cmake_calls
 from grader.checks.support.text import near_names
 from grader.installable import ON_THE_MACHINE
-from grader.model.package import PackageFacts
+from grader.model.package import CMAKE, PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.verdict import FileCitation
+from grader.wording import on_lines
 
 CPP_SUFFIXES = (".c", ".cc", ".cpp", ".cxx")
 STANDARD = {
@@ -170,7 +171,28 @@ def _missing_target(found: re.Match[str], package: PackageFacts, _lines: Sequenc
     return Explained(why, f"take that line out, or make {name} above it")
 
 
+def _no_language(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    """Of targets that are built from scripts, or from nothing that CMake can compile."""
+    made = [
+        call for call in cmake_calls(package, "add_executable", "add_library")
+        if len(call.args) > 1 and all(word.endswith(".py") for word in call.args[1:])
+    ]  # fmt: skip
+    if not made:
+        return Explained(
+            f"CMake knows none of the sources of {found[1]} as C or C++", "name its .cpp file there"
+        )
+    targets = {call.args[0] for call in made}
+    linked = cmake_calls(package, "target_link_libraries", "add_dependencies", "set_target_properties")
+    lines = sorted({call.line for call in (*made, *linked) if call.args and call.args[0] in targets})
+    why = f"{made[0].name}({made[0].args[0]} …) is for C++, and {made[0].args[1]} is a script of Python"
+    place = FileCitation(file=CMAKE, line=made[0].line)
+    return Explained(
+        why, f"delete the calls on {on_lines(lines)} of {CMAKE}: Python is not compiled", place=place
+    )
+
+
 CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
+    (r"Cannot determine link language for target \"([^\"]+)\"", _no_language),
     (r"expected (',' or )?';' before '([^']+)'", _no_semicolon),
     (r"expected initializer before '([^']+)'", _no_semicolon_above),
     (

@@ -232,10 +232,10 @@ def _place_in_list(message: str, source: str) -> Meaning | None:
     return cause, rewritten(source, (found.slice, f"int({ast.unparse(found.slice)})"))
 
 
-def _type(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+def _type(message: str, source: str, marked: tuple[int, int] | None) -> Meaning | None:
     if (
         meaning := explain_ros_call(message, source)
-        or _call(message, source)
+        or _call(message, source, marked)
         or _nested_index(message, source)
         or _place_in_list(message, source)
     ):
@@ -290,10 +290,8 @@ def _no_number(message: str, source: str) -> Meaning | None:
     """Of a whole message, or a text, where a number is wanted."""
     if (whole := _WHOLE.search(message)) and (kind := whole[whole.lastindex or 0]) != "NoneType":
         data = kind in noetic_messages()["std_msgs"]
-        return (
-            f"this is the whole message ({kind})",
-            "take its field, as in `msg.data`" if data else "take one of its fields",
-        )
+        hint = "take its field, as in `msg.data`" if data else "take one of its fields"
+        return f"this is the whole message ({kind})", hint
     if re.match(
         r"expected \[\w+\] but got \[std_msgs/\w+\]", message
     ):  # rospy's own words, of a service's request
@@ -311,22 +309,22 @@ def _no_number(message: str, source: str) -> Meaning | None:
     return None
 
 
-def _call(message: str, source: str) -> Meaning | None:
+def _called_value(kind: str, source: str) -> Meaning:
+    value = f"is a value ({kind}), and no function"
+    if field := re.search(r"\b(?!self\.\w+\()[\w.]+\.(?:data|\w+(?=\(\)$))(?=\(\))", source):
+        return f"`{field[0]}` {value}", f"write `{field[0]}` without the brackets behind it"
+    if hidden := next((name for name in HIDDEN if calls_in_line(source, name)), ""):
+        cause = f"`{hidden}` is a variable here, and hides Python's `{hidden}`"
+        return cause, f"give the variable `{hidden}` another name"
+    return f"what is called {value}", "give the variable and the function different names"
+
+
+def _call(message: str, source: str, marked: tuple[int, int] | None) -> Meaning | None:
     """Of a call: a module, a value, or a method without `self`."""
     if message == "'module' object is not callable":
-        return (
-            "a module is called",
-            "call what is in the module (`time.time()`), or import it: `from … import …`",
-        )
+        return "a module is called", "call what is in it (`time.time()`), or import that: `from … import …`"
     if called := _CALLED.search(message):
-        hidden = next((name for name in HIDDEN if calls_in_line(source, name)), "")
-        if hidden:
-            cause = f"`{hidden}` is a variable here, and hides Python's `{hidden}`"
-            return cause, f"give the variable `{hidden}` another name"
-        return (
-            f"what is called is a value ({called[1]}), not a function",
-            "give the variable and the function different names",
-        )
+        return _called_value(called[1], source[slice(*marked)] if marked else source)
     given = _ONE_TOO_MANY.search(message)
     if given and int(given[3]) == int(given[2]) + 1 and f".{given[1]}(" in source:
         method = given[1]

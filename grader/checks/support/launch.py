@@ -64,6 +64,8 @@ _REFUSALS = (
      "$(find …) and pkg need the package's exact name"),
     (_UNSET.pattern, 'its <arg name="{0}"> has no default',
      'write <arg name="{0}" default="…"/>'),
+    (r"unknown machine \[([^\[\]\n]+)\]", "there is no <machine> of the name {0}",
+     'remove machine="{0}" from the <node>: it runs on this computer then'),
     (r"output must be one of", 'output is "screen" or "log", in lower case', 'write output="screen"'),
     (r"multiple files named", "the package has two launch files of that name",
      "delete one of them, even one in a folder of old files: find . -name '*.launch' lists them"),
@@ -71,6 +73,11 @@ _REFUSALS = (
      "its first line has to be #!/usr/bin/env python3, or #!/bin/bash for a shell script"),
     (r"Unknown substitution command \[([^\[\]\n]+)\]", "roslaunch does not know $({0})",
      "write $(find <package>)/…"),
+    (r"'param' attribute must be set for .*\n+XML is <rosparam[^<>\n]*>\s*([\w/~]{1,64}):([^\s:<>]{1,64})\n",
+     "the text in <rosparam> is one long word and no parameters: {0}:{1} has no space in it",
+     "write a space behind each colon in <rosparam>: {0}: {1}"),
+    (r"'param' attribute must be set for non-dictionary values", "the text in <rosparam> names no parameters",
+     "write each of them as name: value, on a line of its own, with a space behind the colon"),
     (BAD_FILE, "<rosparam> cannot load its file",
      "rosparam load <file> shows what is wrong with the file"),
     (r"Invalid roslaunch XML syntax: \[Errno 2\] No such file or directory: '([^'\n]+)'",
@@ -258,6 +265,10 @@ def _unset_args(text: str, package: PackageFacts) -> Absence | None:
     verb = "uses" if len(lines) == 1 else "use"
     why = f"{NOTHING_STARTS}: {where} {verb} {names}, which no <arg> declares"
     hint = f"below <launch>, add {declares}, with {'its value' if len(args) == 1 else 'their values'} in place of …"
+    if all(arg.meant for arg in args):
+        hint = join_words(
+            f"on line {arg.line}, write $(arg {arg.meant}), not $(arg {arg.name})" for arg in args
+        )
     return Absence(why, hint, citations=tuple(dict.fromkeys(tuple(arg.place for arg in args))))
 
 
@@ -267,7 +278,8 @@ def unset_arg_fixes(file: LaunchFile, told: str, given: Iterable[str] = ()) -> I
     names = {word.partition(":=")[0] for word in given}
     for arg in file.unset_args:
         written = f'<arg name="{arg.name}" default="…"/>'
-        if written not in told and arg.name not in names:
+        # a name that is nearly that of an argument is told as that: `$(arg right), not $(arg slip)`
+        if written not in told and f"not $(arg {arg.name})" not in told and arg.name not in names:
             yield (
                 f"on line {arg.line} of {arg.file} write {written}"
                 if arg.declared

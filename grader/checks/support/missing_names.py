@@ -74,6 +74,19 @@ ATTRIBUTES = {
 """What a lab's scripts use of rospy (http://docs.ros.org/en/noetic/api/rospy/html/)."""
 
 
+_ARG = r"\s*([^,()]+)"
+CALLS_OF_ROS_2 = {
+    "create_publisher": (rf"{_ARG},{_ARG},{_ARG}\)", r"rospy.Publisher(\2, \1, queue_size=\3)"),
+    "create_subscription": (rf"{_ARG},{_ARG},{_ARG},{_ARG}\)", r"rospy.Subscriber(\2, \1, \3)"),
+    "create_timer": (rf"{_ARG},{_ARG}\)", r"rospy.Timer(rospy.Duration(\1), \2)"),
+    "create_service": (rf"{_ARG},{_ARG},{_ARG}\)", r"rospy.Service(\2, \1, \3)"),
+    "create_client": (rf"{_ARG},{_ARG}\)", r"rospy.ServiceProxy(\2, \1)"),
+    "create_rate": (rf"{_ARG}\)", r"rospy.Rate(\1)"),
+    "get_logger": (r"\)\.info\(([^()]+)\)", r"rospy.loginfo(\1)"),
+}
+"""Methods of a node of ROS 2: their arguments, and the call of rospy's with them."""
+
+
 def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """A message type, a module, an attribute or an argument that there is none of, and what is meant."""
     if meant := own_message(found, package):
@@ -82,7 +95,8 @@ def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
         return _other_types(wrong[1], wrong[2])
     if wrong := _NO_ATTRIBUTE.search(found.message):
         source = found.innermost.source
-        return _field_of_number(found, wrong[1]) or _other_attributes(package, wrong[1], wrong[2], source)
+        meant = _call_of_ros_2(wrong[2], source) or _field_of_number(found, wrong[1])
+        return meant or _other_attributes(package, wrong[1], wrong[2], source)
     if wrong := re.match(r"(\w+) is not an attribute of (\w+)$", found.message):
         known = fields_of(package, wrong[2])
         source = found.innermost.source
@@ -96,6 +110,15 @@ def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
         return (f"it is called {near[0]}", f"write {near[0]}= instead of {wrong[1]}=") if near else None
     is_import = found.kind in IMPORT_ERRORS
     return (_own_module(found, package) or _other_module(found, package)) if is_import else None
+
+
+def _call_of_ros_2(name: str, source: str) -> tuple[str, str] | None:
+    if name not in CALLS_OF_ROS_2:
+        return None
+    arguments, new = CALLS_OF_ROS_2[name]
+    call = re.search(rf"[\w.]+\.{name}\({arguments}", source)
+    written = call.expand(new) if call else re.sub(r"\\\d", "…", new)
+    return f"`{name}` is from ROS 2", f"write `{written}` in place of that call"
 
 
 def hiding_file(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
@@ -308,22 +331,31 @@ def _own_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | No
     paths = [PurePosixPath(file.path) for file in package.files if not is_product(file.path)]
     if asked[1] == package.name and PurePosixPath(f"src/{asked[1]}/__init__.py") in paths:
         return _own_python_package(asked[1], package)
-    folder = PurePosixPath(script).parent
+    folder, line = PurePosixPath(script).parent, found.innermost.source.strip()
+    # `from basic_comms.tools import say`, of a file that lies in no Python package of that name
+    inner = re.match(r"from (\w+)(?:\.(\w+) (import .*)| (import (\w+)))$", line)
+    inner = inner if inner and inner[1] == asked[1] == package.name else None
+    name = (inner[2] or inner[5]) if inner else asked[1]
     files = sorted(
-        (path for path in paths if path.name == f"{asked[1]}.py"), key=lambda path: path.parent != folder
+        (path for path in paths if path.name == f"{name}.py"), key=lambda path: path.parent != folder
     )
     if not files:
         return None
-    file, place = files[0], "os.path.dirname(__file__)"
+    file, place, instead = files[0], "os.path.dirname(__file__)", ""
+    if inner:
+        cause = f"{file} is there, and no Python package {asked[1]} that it is a part of"
+        instead = f"write `{inner[4] or f'from {name} {inner[3]}'}` instead of the import, and "
     if file.parent != folder:
-        cause = f"{file} is in another folder, and Python looks beside {script}"
+        cause = cause if instead else f"{file} is in another folder, and Python looks beside {script}"
         place = f"os.path.join({place}, '{posixpath.relpath(str(file.parent), str(folder))}')"
+    elif instead:
+        pass
     elif any("/devel/lib/" in frame.file for frame in found.frames):
         program = f"the program that catkin_install_python makes from {script}"
         cause = f"{file} is there, and {program} does not look beside it"
     else:
         return None
-    return cause, f"write `import os, sys; sys.path.insert(0, {place})` above the import"
+    return cause, f"{instead}write `import os, sys; sys.path.insert(0, {place})` above the import"
 
 
 def _own_python_package(name: str, package: PackageFacts) -> tuple[str, str] | None:

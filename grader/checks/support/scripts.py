@@ -15,7 +15,7 @@ PYTHON = "catkin_install_python"
 BUILD_FIRST_HINT = "first get the build to pass: catkin_make"
 RIGHT_SHEBANG = "#!/usr/bin/env python3"
 NODE_FOLDERS = ("scripts", "src", "nodes", "bin")
-_KINDS = ("PROGRAMS", "FILES", "TARGETS", "DIRECTORY", "SCRIPT", "CODE")
+_KINDS = ("PROGRAMS", "FILES", "TARGETS", "DIRECTORY", "SCRIPT", "SCRIPTS", "CODE")
 _OPTIONS = (
     *("DESTINATION", "TYPE", "OPTIONAL", "PERMISSIONS", "CONFIGURATIONS", "COMPONENT", "RENAME"),
     *("EXCLUDE_FROM_ALL", "ARCHIVE", "LIBRARY", "RUNTIME"),

@@ -207,9 +207,10 @@ def _put_first(files: Files, name: str, words: Sequence[Token]) -> None:
     text = cmake_text(files)
     behind = words[values.index(right)] if right in values else None
     text = replace_token(text, behind, "") if behind is not None else text
-    changed = replace_token(text, words[0], f"{right} {values[0]}")
-    why, fix = f"{name}(…) does not begin with {right}", f"write {right} before {values[0]}"
-    change_line(files, words[0], changed, why, fix)
+    other = values[0] in {"FILES", "TARGETS", "SCRIPTS", "DIRECTORY"}  # install(…) has them
+    changed = replace_token(text, words[0], right if other else f"{right} {values[0]}")
+    fix = f"write {right} {'instead of' if other else 'before'} {values[0]}"
+    change_line(files, words[0], changed, f"{name}(…) does not begin with {right}", fix)
 
 
 def _correct_version(files: Files) -> None:

@@ -12,7 +12,7 @@ from grader.package.repairs.editing import UTF16, Files, as_text, keep_first_ver
 from grader.package.repairs.files import to_utf8
 from grader.package.repairs.names import Wanted, is_near
 from grader.package.xml import parse_xml
-from grader.wording import is_one_edit, is_word_of
+from grader.wording import is_one_edit, is_word_of, numbers_text
 
 FORMAT_1 = r"<package(\s+format\s*=\s*[\"']1[\"'])?\s*>"
 VALUES = (
@@ -50,6 +50,7 @@ def repair_manifest(files: Files, package: PackageFacts, wanted: Wanted) -> str:
     keep_first_version(files, MANIFEST, "manifest-line")
     repair_xml(files, MANIFEST, "package", "manifest-line")
     _correct_values(files)
+    _rename_dependencies(files)
     _add_required(files, package.name)
     _add_buildtool(files)
     for name in wanted.dependencies:
@@ -73,6 +74,22 @@ def _correct_values(files: Files) -> None:
             line = text.count("\n", 0, found.end() - len(found[0].lstrip())) + 1
             fix = "" if new else f"delete line {line}"
             files.change("manifest-line", MANIFEST, changed, f"line {line} of {MANIFEST}: {message}", fix)
+
+
+def _rename_dependencies(files: Files) -> None:
+    """Write `exec_depend` for `run_depend`, which only format 1 has."""
+    text = files.text(MANIFEST) or ""
+    found = list(re.finditer(r"(?<=<)(/?)run_depend(?=[\s>])", _blank_comments(text)))
+    if not found or not _parses(text) or re.search(FORMAT_1, text):
+        return
+    changed = text
+    for one in reversed(found):
+        changed = f"{changed[: one.start()]}{one[1]}exec_depend{changed[one.end() :]}"
+    first, *more = sorted({text.count("\n", 0, one.start()) + 1 for one in found})
+    message = f"line {first} of {MANIFEST}: only format 1 has <run_depend>"
+    same = f", and the same on {'lines' if len(more) > 1 else 'line'} {numbers_text(more)}" if more else ""
+    fix = f"write exec_depend instead of run_depend{same}"
+    files.change("manifest-line", MANIFEST, changed, message, fix)
 
 
 def _blank_comments(text: str) -> str:
