@@ -52,20 +52,25 @@ def loop_rates(tree):
         if not node.args or (timed == "sleep" and id(node) not in looped):
             continue
         value = given(node.args[0])
-        whole = nanoseconds_apart(value) if is_call(value, "Duration") else None
-        if is_call(value, "Duration") and value.args and not whole:
+        lasting = value if is_call(value, "Duration") else None
+        whole = nanoseconds_apart(value) if lasting else None
+        if lasting and value.args and not whole:
             value = given(value.args[0])
-        yield from loop_rate(node, timed, value, whole or constant(value, given))
+        yield from loop_rate(node, lasting, value, whole or constant(value, given))
 
 
-def loop_rate(call, timed, value, number):
-    """Yield the rate that a `Rate(…)`, `sleep(…)` or `Timer(…)` asks for: of the last two, `number` is in seconds."""
+def loop_rate(call, lasting, value, number):
+    """Yield the rate that a `Rate(…)`, `sleep(…)` or `Timer(…)` asks for: of the last two, `number` is in seconds, and
+    `lasting` is the Duration."""
+    timed = call.func.attr
     name = read_parameter(value) if timed == "Rate" else None
     if name:
         yield slip(value.lineno, "rate-parameter", name)
     elif number:
         hz = "%.12g" % (number if timed == "Rate" else 1.0 / number)
         pause, fix = dotted(call.func) if timed == "sleep" else "", ""
+        if lasting and timed == "Timer":
+            pause = dotted(lasting.func)
         if is_call(value, "Duration"):
             pause, fix = dotted(value.func), "its second number counts nanoseconds, so it is %.9g s" % number
         yield slip(call.lineno, "rate-number", hz, fix, pause)

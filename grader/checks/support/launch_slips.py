@@ -375,9 +375,11 @@ def _slip(node: LaunchNode, why: str, fix: str) -> Slip:
 
 
 def own_script(package: PackageFacts, node: LaunchNode) -> SourceFile | None:
-    """Return the file of the package that the node runs; one of another of the lab's packages by its path from here."""
+    """Return the file of the package that the node runs; one of another of the lab's packages by its path from here.
+    A source of C++ is none: its program is run."""
     owner = owner_of(package, node)
-    script = find_script(owner, str(node.type)) if owner is not None else None
+    is_source = str(node.type).endswith(CPP_SUFFIXES)
+    script = find_script(owner, str(node.type)) if owner is not None and not is_source else None
     if script is None or owner is None or owner is package:
         return script
     path = posixpath.normpath(f"{package.way_to(owner)}/{script.path}")

@@ -413,7 +413,7 @@ def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | 
     return next(iter(run_slips(package, run, *kinds)), None)
 
 
-SEEN_AS = {"nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": ""}
+SEEN_AS = {"nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": "", "added": ""}
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so."""
 
 
@@ -426,7 +426,7 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
         kinds.append("goes-on")  # actionlib was told to end a goal that is over
     found = [s for s in package.slips if s.kind in kinds and s.file in files]
     sure = [s for s in found if s.kind == "goes-on" or (verdict.wrong and SEEN_AS[s.name] == verdict.wrong)]
-    for slip in sure[:1] or [s for s in found if s.name == "bounds" and not verdict.wrong][:4]:
+    for slip in sure[:1] or [s for s in found if not SEEN_AS.get(s.name) and not verdict.wrong][:4]:
         why, hint = f"line {slip.line} of {slip.file}: {slip.message}", f"{verdict.hint}; {slip.fix}"
         cause = slip.message if sure else ""
         verdict = verdict.explained(why, slip.fix if sure else hint, (slip.place,), cause=cause)
