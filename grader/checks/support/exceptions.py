@@ -471,8 +471,7 @@ def _below_home(path: str) -> str:
 
 
 def _command(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
-    found = _COMMAND.match(message)
-    if found is None:
+    if not (found := _COMMAND.match(message)):
         return None
     hint = (
         "leave it out, or catch the error: a node that is started here has neither your folder nor a network"
