@@ -12,6 +12,7 @@ from grader.checks.support.exit_causes import explain_traceback, process_traceba
 from grader.checks.support.launch_slips import (
     PROGRAMS_OF,
     at_its_lines,
+    namespace_meant,
     node_slip,
     own_script,
     owner_of,
@@ -177,6 +178,8 @@ def refusal(run: Run, package: PackageFacts) -> Absence | None:
             fix = hint.format(*words).replace("<package>", package.name)
             if pattern == NO_FILE and (meant := _file_meant(package, words[0])):
                 fix = f"write $(find {package.name})/{meant}"
+            if "multiple nodes" in pattern:
+                fix = namespace_meant(*(node for file in package.launch_files for node in file.brings)) or fix
             said = f"{NOTHING_STARTS}: {why.format(*words)}"
             if pattern == BAD_FILE and (unread := _unread_yaml(text, package)):
                 return unread

@@ -267,6 +267,12 @@ def illegal_name(node: LaunchNode) -> Slip | None:
     return _slip(node, why, "begin it with a letter, and use letters, digits and _ only")
 
 
+def namespace_meant(*nodes: LaunchNode) -> str:
+    """Return what to write where a `<node>`, or a `<group>` around it, has a `namespace`, which roslaunch ignores."""
+    found = any("namespace" in node.unknown for node in nodes)
+    return 'write ns="…" instead of namespace="…", which roslaunch does not know' if found else ""
+
+
 def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
     """Yield what makes roslaunch start nothing at all."""
     for fault in file.include_faults:
@@ -281,7 +287,11 @@ def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
             yield _slip(node, f'name="{node.name}" has a slash in it, which roslaunch refuses', fix)
         elif node.full_name in seen and not node.uncertain:
             why = f"a second node is named {node.full_name}, like that on line {seen[node.full_name].line}"
-            yield _slip(node, why, "give each <node> its own name: roslaunch refuses the file")
+            yield _slip(
+                node,
+                why,
+                namespace_meant(node) or "give each <node> its own name: roslaunch refuses the file",
+            )
         # Nodes behind an `if` that only roslaunch works out may exclude each other.
         if not node.uncertain:
             seen.setdefault(node.full_name, node)
