@@ -149,6 +149,7 @@ def handed_over(function, tree, owner):
 
 
 OF_ANGLES = ("sin", "cos", "tan")
+TO_RADIANS = ("radians", "deg2rad")
 IN_DEGREES = ("degrees", "rad2deg")
 
 
@@ -169,6 +170,10 @@ def wrong_values(tree):
                 message = "`%s` takes radians, and gets degrees" % called_name(node)
                 fix = "leave out `degrees(…)`: the angle is already in radians"
                 yield slip(line, "wrong-value", message, fix, "degrees")
+        elif called_name(node) in TO_RADIANS and node.args and getattr(node.args[0], "attr", "") == "theta":
+            angle = dotted(node.args[0])
+            fix = "on line %d, write `%s` alone, without `%s(…)`" % (line, angle, called_name(node))
+            yield slip(line, "wrong-value", "`%s` is already in radians" % angle, fix, "added")
         elif isinstance(node, ast.Subscript) and is_quotient(key_of(node)):
             message = "`/` makes a float, also of whole numbers, and an index is a whole number"
             fix = "on line %d, write `//` instead of `/` in the index" % line

@@ -351,6 +351,8 @@ def _nothing_like_it(package: PackageFacts, node: LaunchNode, why: str) -> Slip:
     )
     if source:
         fix = f"write `add_executable({plain} {source})` in CMakeLists.txt, which nothing there does"
+    if made := next((one for one in programs(package) if source and source in one.call.args[1:]), None):
+        fix = f"in CMakeLists.txt, write `{plain}` for `{shown(made.target)}`, on line {made.call.line} and below it"
     return _slip(node, why, f"write the script {plain}, or the name of one that is there" if suffix else fix)
 
 
