@@ -341,8 +341,7 @@ def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
     }
     # Subscribed and never connected: their types may differ.
     heard = [topic for topic in topics if topic not in missed and topic not in connected]
-    refusals = (refused_type(run, topic) for topic in heard)
-    if refused := next(filter(None, refusals), None) or _of_other_type(run, connected):
+    if refused := next(filter(None, (refused_type(run, topic) for topic in heard)), None):
         return refused
     near = next(((topic, found) for topic in missed if (found := near_names(topic, others))), None)
     # A node need not hear every topic: one that is missed counts if all are, or if a name is nearly the same.
@@ -361,20 +360,6 @@ def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
     if topic in offered:
         add = f"subscribe to {topic} in place of {join_words(found, 'or')}, on which nothing is published"
     return failed(message, hint=remapped or add)
-
-
-def _of_other_type(run: Run, connected: set[str]) -> Verdict | None:
-    """Return the verdict where a student's node subscribes to a program's topic, and is connected to others alone."""
-    others = {*connected, *SYSTEM_TOPICS}
-    for one in run.channels if connected else ():
-        node = next(iter(nodes_on(run, one.topic, "subscribers")), "")
-        is_own = run.is_student_node(one.callerid) or one.by_grader or one.topic in others
-        if node and one.messages and not is_own and (kind := plain_type(one.type)).count("/") == 1:
-            message = f"{node} subscribes to {one.topic} with another type than {kind}, so nothing arrives"
-            of_types, _, name = kind.partition("/")
-            line = imports(of_types, name, "msg")
-            return failed(message, hint=f"use {kind} in {subscriber(one.topic)}, with `{line}` at the top")
-    return None
 
 
 def unheard_programs(run: Run) -> dict[str, tuple[str, ...]]:
