@@ -84,7 +84,7 @@ class PrintsParams(Record):
     tolerance: Annotated[float, Field(ge=0)] = 0.0
     """How much each number may differ, in the text's own unit."""
     at_most: Annotated[int, Field(ge=1)] | None = None
-    """How many lines may have the text with these numbers; null: any number."""
+    """How many lines of one stream may have the text with these numbers; null: any number. What is logged is printed too."""
     exit_code: int | None = None
     """The process has to end by itself with this code; null: it may run on."""
 
@@ -141,7 +141,7 @@ def prints(package: PackageFacts, run: Run, params: PrintsParams) -> Verdict:
         verdict = _not_printed(one, lines, package, run, params)
     else:
         verdict = (
-            _too_often(sum(_fits(line, params) for line in lines), params)
+            _too_often(run, one.name, params)
             or _other_end(one, params)
             or passed(f"it prints {shown(right.text)!r}")
         )
@@ -166,12 +166,13 @@ def _read(run: Run, process: str) -> tuple[list[Line], list[Line]]:
     return lines, errors
 
 
-def _too_often(count: int, params: PrintsParams) -> Verdict | None:
+def _too_often(run: Run, process: str, params: PrintsParams) -> Verdict | None:
+    # What is logged is also printed: each stream counts by itself.
+    counts = (sum(_fits(line, params) for line in stream) for stream in stream_lines(run, process))
+    count = max(counts, default=0)
     if params.at_most is None or count <= params.at_most:
         return None
-    message = (
-        f"it prints {params.words} {count} times, and {plural(params.at_most, 'time')} at most is asked for"
-    )
+    message = f"it prints {params.words} again and again, {count} times"
     return failed(message, hint="remember in a variable that it was printed, and do not print it again")
 
 
