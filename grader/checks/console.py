@@ -84,7 +84,7 @@ class PrintsParams(Record):
     tolerance: Annotated[float, Field(ge=0)] = 0.0
     """How much each number may differ, in the text's own unit."""
     at_most: Annotated[int, Field(ge=1)] | None = None
-    """How many lines of one stream may have the text with these numbers; null: any number. What is logged is printed too."""
+    """How many lines of one stream may have the text with these numbers, the log being one; null: any number."""
     exit_code: int | None = None
     """The process has to end by itself with this code; null: it may run on."""
 
