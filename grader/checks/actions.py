@@ -12,7 +12,7 @@ from grader.checks.support.clocks import NEVER_LATE_S, excused, run_seconds, why
 from grader.checks.support.exit_causes import explain_early_end, explain_error
 from grader.checks.support.fields import differences, fields_text
 from grader.checks.support.processes import GlobalName, plain_type
-from grader.checks.support.text import near_names, shown
+from grader.checks.support.text import both, near_names, shown
 from grader.checks.support.topics import cite, no_node, nodes_on, published_topics, run_slip, topics_with
 from grader.evidence.events import ActorEvent
 from grader.evidence.run import Run
@@ -21,14 +21,23 @@ from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
 from grader.wording import join_words, plural, significant, there_is
 
+LISTED = 10
+"""So many values of the feedback are listed."""
 GOES_ON_NS = 1_000_000_000
 """Feedback so long after a goal was cancelled says that the server goes on with it."""
 CANCELLED_MORE_S = 5.0
 """So much longer than `within_s`, at least, the result of a goal that is cancelled is waited for."""
+ENDS = {
+    "SUCCEEDED": both("set_succeeded(result)", "setSucceeded(result)"),
+    "ABORTED": both("set_aborted(result)", "setAborted(result)"),
+    "PREEMPTED": both("set_preempted(result)", "setPreempted(result)"),
+}
+"""The methods of an action server that end a goal."""
+ASKED_TO_STOP = both("is_preempt_requested()", "isPreemptRequested()")
 HINTS = {
-    "SUCCEEDED": "end the callback with server.set_succeeded(result)",
-    "ABORTED": "end the callback with server.set_aborted(result)",
-    "PREEMPTED": "in the loop: if server.is_preempt_requested(): server.set_preempted(result), then return",
+    "SUCCEEDED": f"at the end of the callback, call the action server's {ENDS['SUCCEEDED']}",
+    "ABORTED": f"for such a goal, call the action server's {ENDS['ABORTED']}, and then return",
+    "PREEMPTED": f"in the loop, where the action server's {ASKED_TO_STOP} is true: {ENDS['PREEMPTED']}, then return",
 }
 
 
@@ -47,13 +56,18 @@ class ActionResultParams(Record):
     """How far numbers of the result may be off."""
     feedback: Annotated[int, Field(ge=0)] = 0
     """The least number of feedback messages."""
+    reports: dict[str, list[Any]] = Field(default_factory=dict)
+    """Fields of the feedback, and the values that have to come in this order; others may come between them."""
+    as_reported: dict[str, str] = Field(default_factory=dict)
+    """Fields of the result that must have the value that a field of the last feedback has: `{total: count}`."""
     within_s: Annotated[float, Field(gt=0)] | None = None
     """How long after the goal, or after it was cancelled, the result may come; null: as long as the step waits."""
 
     @property
     def of_feedback_alone(self) -> bool:
         """Whether nothing is asked of the goal's end."""
-        return self.feedback > 0 and not self.model_fields_set & {"status", "result", "within_s"}
+        of_end = {"status", "result", "within_s", "as_reported"}
+        return bool(self.feedback or self.reports) and not self.model_fields_set & of_end
 
     @property
     def after_cancel_s(self) -> float | None:
@@ -64,9 +78,14 @@ class ActionResultParams(Record):
 
     @property
     def words(self) -> str:
+        reports = [f"{name} {join_words(map(str, values))}" for name, values in self.reports.items()]
+        told = join_words(reports) and f"feedback with {join_words(reports)}"
         if self.of_feedback_alone:
-            return f"{plural(self.feedback, 'feedback message')} on goal {self.goal} of {self.action}"
+            wanted = told or plural(self.feedback, "feedback message")
+            return f"{wanted} on goal {self.goal} of {self.action}"
         with_result = f" with {fields_text(self.result)}" if self.result else ""
+        for name, field in self.as_reported.items():
+            with_result += f" with the {name} that the last feedback has as {field}"
         limit = f" within {significant(self.within_s)} s" if self.within_s else ""
         feedback = f", {plural(self.feedback, 'feedback message')} before" if self.feedback else ""
         return f"goal {self.goal} of {self.action} {self.status}{with_result}{limit}{feedback}"
@@ -141,15 +160,45 @@ def _fault(package: PackageFacts, run: Run, goal: Goal, params: ActionResultPara
     if goal.end.value is None:
         return _no_result(package, run, goal, params)
     status, hint = goal.end.detail, HINTS[params.status]
-    if params.of_feedback_alone and _feedback(run, goal, params) >= params.feedback:
-        return None  # how it ends is another criterion's
+    if params.of_feedback_alone and len(_feedback(run, goal, params)) >= params.feedback:
+        return _other_reports(run, goal, params)  # how it ends is another criterion's
     if status != params.status:
         return _other_end(package, run, goal, params)
     found = list(differences(goal.end.value, params.result, params.tolerance))
     if found:
         message = f"{goal.name} of {params.action} ends {status} with {join_words(map(str, found))}"
         return failed(message, hint=_how_to_fill(goal.end.value, params.result, hint))
-    return _too_late(run, goal, params) or _no_feedback(run, goal, params)
+    return (
+        _unlike_last_report(run, goal, params)
+        or _too_late(run, goal, params)
+        or _no_feedback(run, goal, params)
+        or _other_reports(run, goal, params)
+    )
+
+
+def _unlike_last_report(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | None:
+    last, end = next(iter(_feedback(run, goal, params)[-1:]), {}), goal.end.value if goal.end else None
+    for name, field in params.as_reported.items():
+        wanted = {name: last[field]} if field in last else {}
+        if end is not None and any(differences(end, wanted, params.tolerance)):
+            ends = f"{goal.name} of {params.action} ends {params.status} with {name}: {end.get(name)}"
+            hint = f"set {name} of the result before you call {ENDS[params.status]}"
+            return failed(f"{ends}, but the last feedback has {field}: {last[field]}", hint=hint)
+    return None
+
+
+def _other_reports(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | None:
+    for name, wanted in params.reports.items():
+        came = [one.get(name) for one in _feedback(run, goal, params)]
+        left = iter(came)
+        if all(any(value == one for value in left) for one in wanted):
+            continue
+        shown_values = f"{join_words(map(str, came[:LISTED]))}{' …' * (len(came) > LISTED)}"
+        message = f"the feedback on {goal.name} of {params.action} has {name} {shown_values or 'nowhere'}"
+        message += f", not {join_words(map(str, wanted))}"
+        verdict = failed(message, hint=f"look at where {name} of the feedback gets its value")
+        return verdict if len(came) >= len(wanted) else _excused(verdict.if_repeated(), run, goal)
+    return None
 
 
 def _how_to_fill(got: Mapping[str, Any], wanted: Mapping[str, Any], hint: str) -> str:
@@ -172,7 +221,7 @@ def _is_empty(value: object) -> bool:
 
 def _passed(run: Run, goal: Goal, params: ActionResultParams) -> Verdict:
     if params.of_feedback_alone:
-        count = plural(_feedback(run, goal, params), "feedback message")
+        count = plural(len(_feedback(run, goal, params)), "feedback message")
         return passed(f"{count} came on {goal.name} of {params.action}")
     return passed(f"{goal.name} of {params.action} ends {params.status}")
 
@@ -231,7 +280,7 @@ def _too_late(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | Non
     since = "it was cancelled" if goal.cancelled_ns else "it was sent"
     message = f"the result of {goal.name} of {params.action} comes {took_s:.2f} s after {since}"
     hint = (
-        "check is_preempt_requested() each time around the loop"
+        f"check {ASKED_TO_STOP} each time around the loop"
         if goal.cancelled_ns
         else "do not sleep longer than the handout asks"
     )
@@ -243,12 +292,13 @@ def _too_late(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | Non
 
 
 def _no_feedback(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | None:
-    came = _feedback(run, goal, params)
+    came = len(_feedback(run, goal, params))
     if came >= params.feedback:
         return None
     count = plural(came, "feedback message")
     message = f"{count} came on {goal.name} of {params.action}, but {params.feedback} are expected"
-    verdict = failed(message, hint="call server.publish_feedback(feedback) each time around the loop")
+    publish = both("publish_feedback(feedback)", "publishFeedback(feedback)")
+    verdict = failed(message, hint=f"call the action server's {publish} each time around the loop")
     # That none came at all is no matter of time.
     return verdict if came == 0 else _excused(verdict.if_repeated(), run, goal)
 
@@ -258,18 +308,18 @@ def _excused(verdict: Verdict, run: Run, goal: Goal) -> Verdict:
     return excused(verdict, run, goal.at_ns, goal.ended_ns or run.end_ns, why_late)
 
 
-def _feedback(run: Run, goal: Goal, params: ActionResultParams) -> int:
-    """Return how much feedback came on the goal: by its id, and where that was not recorded, by its time."""
+def _feedback(run: Run, goal: Goal, params: ActionResultParams) -> list[dict[str, Any]]:
+    """Return the feedback on the goal: by its id, and where that was not recorded, by its time."""
     sent = [v for c in run.channels if c.topic == f"{params.action}/goal" and c.by_grader for v in c.values]
     ids = [(value or {}).get("goal_id", {}).get("id") for value in sent]
-    channels = run.student_channels(f"{params.action}/feedback")
+    channels, until_ns = run.student_channels(f"{params.action}/feedback"), goal.ended_ns or run.end_ns
+    came = [(t, v or {}) for c in channels for t, v in zip(c.times_ns, c.values, strict=True)]
     if len(ids) >= params.goal:
-        values = [value for channel in channels for value in channel.values if value]
-        return sum(
-            value.get("status", {}).get("goal_id", {}).get("id") == ids[params.goal - 1] for value in values
-        )
-    until_ns = goal.ended_ns or run.end_ns
-    return sum(goal.at_ns <= t <= until_ns for channel in channels for t in channel.times_ns)
+        own = ids[params.goal - 1]
+        came = [(t, v) for t, v in came if v.get("status", {}).get("goal_id", {}).get("id") == own]
+    else:
+        came = [(t, v) for t, v in came if goal.at_ns <= t <= until_ns]
+    return [value.get("feedback", {}) for _, value in came]
 
 
 def _not_sent(package: PackageFacts, run: Run, goals: Sequence[Goal], params: ActionResultParams) -> Verdict:
@@ -292,7 +342,7 @@ def _not_sent(package: PackageFacts, run: Run, goals: Sequence[Goal], params: Ac
 def _no_server(package: PackageFacts, run: Run, params: ActionResultParams) -> Verdict:
     what, bare = f"there is no action server {params.action}", params.action.lstrip("/")
     # An action server subscribes to `<name>/goal`.
-    servers = [t.removesuffix("/goal") for t in topics_with(run, "subscribers") if t.endswith("/goal")]
+    servers = [t.removesuffix("/goal") or "/" for t in topics_with(run, "subscribers") if t.endswith("/goal")]
     if near := near_names(params.action, servers):
         hint = f"give SimpleActionServer(…) the name '{bare}'"
         return unjudged(f"{what}; {there_is(near)}", hint=hint, measured=join_words(servers))
@@ -309,7 +359,7 @@ def _no_server(package: PackageFacts, run: Run, params: ActionResultParams) -> V
 
 
 def _measured_text(run: Run, goal: Goal, params: ActionResultParams) -> str:
-    came = plural(_feedback(run, goal, params), "feedback message")
+    came = plural(len(_feedback(run, goal, params)), "feedback message")
     if goal.end is None or goal.end.value is None:
         return f"{came}, no result"
     return f"{came}, {shown(goal.end.detail)} with {fields_text(goal.end.value)}"

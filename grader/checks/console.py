@@ -83,6 +83,8 @@ class PrintsParams(Record):
     """The numbers that have to be in place of `{number}`, in this order."""
     tolerance: Annotated[float, Field(ge=0)] = 0.0
     """How much each number may differ, in the text's own unit."""
+    at_most: Annotated[int, Field(ge=1)] | None = None
+    """How many lines of one stream may have the text with these numbers, the log being one; null: any number."""
     exit_code: int | None = None
     """The process has to end by itself with this code; null: it may run on."""
 
@@ -138,7 +140,11 @@ def prints(package: PackageFacts, run: Run, params: PrintsParams) -> Verdict:
     if right is None:
         verdict = _not_printed(one, lines, package, run, params)
     else:
-        verdict = _other_end(one, params) or passed(f"it prints {shown(right.text)!r}")
+        verdict = (
+            _too_often(run, one.name, params)
+            or _other_end(one, params)
+            or passed(f"it prints {shown(right.text)!r}")
+        )
     span = (right.at_ns, right.at_ns) if right else (one.start_ns, one.end_ns)
     measured = verdict.measured or plural(len(lines), "line")
     cited = verdict.citations or (cite(run, "/grader/console", *span),)
@@ -158,6 +164,16 @@ def _read(run: Run, process: str) -> tuple[list[Line], list[Line]]:
         lines += [line for index, line in enumerate(read) if index not in hidden and line.text.strip()]
         errors += [read[one.last] for one in found]
     return lines, errors
+
+
+def _too_often(run: Run, process: str, params: PrintsParams) -> Verdict | None:
+    # What is logged is also printed: each stream counts by itself.
+    counts = (sum(_fits(line, params) for line in stream) for stream in stream_lines(run, process))
+    count = max(counts, default=0)
+    if params.at_most is None or count <= params.at_most:
+        return None
+    message = f"it prints {params.words} again and again, {count} times"
+    return failed(message, hint="remember in a variable that it was printed, and do not print it again")
 
 
 def _fits(line: Line, params: PrintsParams) -> bool:

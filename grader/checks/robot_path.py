@@ -39,6 +39,7 @@ from grader.checks.support.geometry import (
     top_speeds,
     track,
     turned_rad,
+    winds,
 )
 from grader.checks.support.processes import GlobalName
 from grader.checks.support.topics import Sender, cite, nothing_sent, topics_with
@@ -288,7 +289,8 @@ def _in_degrees(run: Run) -> Words | None:
     # All topics: poses may be judged, and the velocities that led to them are on another one.
     turns = ((c, one.turn) for c in run.student_channels() for _, one in commands_of(c))
     channel, fastest = max(turns, key=lambda one: abs(one[1]), default=(None, 0.0))
-    if channel is None or abs(fastest) < DEGREES_FROM:
+    seconds = run_seconds(run)
+    if channel is None or (abs(fastest) < DEGREES_FROM and (seconds is None or not winds(channel, seconds))):
         return None
     message = f"it turns with an angular.z of {significant(fastest)} on {channel.topic}, which is in radians a second"
     return Words(message, "a turn of 90 degrees is math.pi / 2, in radians: math.radians(90)")

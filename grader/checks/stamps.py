@@ -252,7 +252,10 @@ def _other_frame(found: Sequence[Stamp], params: StampsParams) -> Verdict | None
     count = f"in {len(wrong)} of {plural(len(found), 'message')}"
     message = f"{params.field}.frame_id of {params.topic} is '{shown(seen)}', not {asked}, {count}"
     slash = "; tf2 does not accept frames that start with a slash" if seen == f"/{params.frame_id}" else ""
-    verdict = failed(message, hint=f"set msg.{params.field}.frame_id = {asked}{slash}")
+    right = (
+        f"write {asked} in place of '{shown(seen)}'" if seen else f"set msg.{params.field}.frame_id = {asked}"
+    )
+    verdict = failed(message, hint=f"{right}{slash}")
     return verdict.seeking("quoted", *filter(None, [seen]))
 
 

@@ -358,6 +358,10 @@ def _wrong_pose(
         f"it is {_text(value)} while {params.pose_of} says {_text(pose)}",
     )
     if not old:
+        if all(
+            math.isclose(a, b, abs_tol=params.tolerance_m) for a, b in zip(value.at, pose.at, strict=True)
+        ):
+            hint = "copy the whole orientation of the message, x, y, z and w: none of them is an angle"
         hint = _axes(value, pose, params)[1] or hint
         return failed(f"{what}{_why(value, pose, params)}; {says}", hint=hint)
     verdict = failed(f"{what}: it is that of an older pose; {says}", hint=hint).late()

@@ -57,7 +57,7 @@ class PythonSlip(Placed, Record):
     - `deaf`: why the node goes on after Ctrl-C.
     - `callback-called`, `callback-values`, `callback-missing`: a callback that is called where it should only be named,
       that takes another number of values than ROS passes, or that does not exist.
-    - `callback-waits`: a topic's or service's callback that sleeps, or never ends.
+    - `callback-waits`: a topic's or service's callback that sleeps, or never ends, or makes its publisher itself.
     - `not-printed`: why a topic's callback prints nothing of any message; `name` is the topic as it is written there.
     - `printed-in-part`: why it prints some messages only, or something else than their values; `name` as above.
     - `subscribed-again`: a `Subscriber(…)` that a loop makes in each turn.
@@ -76,8 +76,8 @@ class PythonSlip(Placed, Record):
       number: a slip only if that message has to be a text.
     - `goes-on`: an `if` that ends an action's goal by the call `name`, and no `return` behind it.
     - `wrong-value`: a value that is none: a comparison with NaN, the sine of an angle in degrees, a service's answer
-      that is made and not returned, or of which no field is set, or a condition that all numbers fulfil, or none
-      (`name`: `nan`, `degrees`, `return`, `empty`, `bounds`).
+      that is made and not returned, or of which no field is set, a condition that all numbers fulfil, or none, or what
+      each turn of a loop adds or sets again (`name`: `nan`, `degrees`, `return`, `empty`, `bounds`, `added`).
 
     No slips, but what a line says, for checks that compare it with what the lab asks; `message` is a name, a number or
     a text:
@@ -110,5 +110,6 @@ class PythonSlip(Placed, Record):
 
     @property
     def is_endless(self) -> bool:
-        """Whether it is a callback that never ends, or that is never called, and not one that only sleeps."""
-        return self.kind == "callback-waits" and bool(re.search(r"never (?:ends|calls)", self.message))
+        """Whether a callback never ends, or is never called, or what it needs is made again and again: not a sleep."""
+        told = re.search(r"never (?:ends|calls)|subscribes again|makes another publisher", self.message)
+        return self.kind == "callback-waits" and bool(told)

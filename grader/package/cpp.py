@@ -18,6 +18,10 @@ SHORT_S = 0.1
 """A callback may wait for less than this."""
 _TEXT = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.DOTALL)
 _LISTENS = re.compile(r"\b(?:subscribe|advertiseService)\s*(?:<[^;()]*>)?\s*\(")
+_MADE = re.compile(r"\b(?P<call>subscribe|advertise)\s*(?:<[^;()<>]*(?:<[^;()<>]*>)?[^;()<>]*>)?\s*\(")
+_ONCE = re.compile(r"\b(?:static|if|else)\b[^;{}]*$|\?[^;{}]*$")
+BEFORE_CHARS = 200
+"""So many characters before a call may say that it is made once."""
 _NAMED = re.compile(r"\s*&?\s*(?P<name>[A-Za-z_][\w:]*)\s*")
 _BOUND = re.compile(r"\bbind\s*(?:<[^;()]*>)?\s*\(\s*&?\s*(?P<name>[A-Za-z_][\w:]*)\s*,")
 _LAMBDA = re.compile(r"\[[^\[\];]*\]\s*\([^;{}]*?\)[^;{}()]*{")
@@ -30,6 +34,7 @@ _SPINS = re.compile(r"spin|Spinner|call(?:Available|One)\b")
 _MAIN = re.compile(r"\bmain\s*\(")
 _DEFINES_MAIN = re.compile(r"\b(?:int|void)\s+main\s*\([^;{}()]*\)\s*{")
 _LOOP = re.compile(r"\bwhile\s*\([^;{}]*\bok\s*\(\s*\)")
+_OPENS = re.compile(r"\s*\)?\s*\{")
 _SLEEP = re.compile(
     r"\b(?:ros::)?(?:Wall)?Duration\s*\(\s*(?P<s>[\d.]+)\s*\)\s*\.\s*sleep\s*\(|\bus?leep\s*\(\s*(?P<us>\d+)"
     r"|\bsleep_for\s*\(\s*(?:std::)?(?:chrono::)?milliseconds\s*\(\s*(?P<ms>\d+)|\bsleep(?:_for)?\s*\("
@@ -84,6 +89,7 @@ def slips_of(path: str, text: str) -> Iterator[PythonSlip]:
     code = _TEXT.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), text)
     yield from _waiting(path, code)
     yield from _unspun(path, code)
+    yield from _made_again(path, code)
     yield from _without_main(path, text, code)
     yield from _degrees(path, code)
     yield from _deaf(path, code)
@@ -142,6 +148,44 @@ def _deaf(path: str, code: str) -> Iterator[PythonSlip]:
             line, name = code.count("\n", 0, match.start()) + 1, f"{pause:g}"
             message = f"line {line} of {path} lets it sleep for {name} s at a time"
             yield PythonSlip(file=path, line=line, kind="deaf", message=message, name=name)
+
+
+def _made_again(path: str, code: str) -> Iterator[PythonSlip]:
+    """Yield the publisher that a callback makes each time it is called, and what a loop makes in each of its turns."""
+    places = [(body, f"callback `{body.name}`" if body.name else "callback") for body in _callbacks(code)]
+    for loop in _LOOP.finditer(code):
+        if begin := _OPENS.match(code, loop.end()):
+            line = code.count("\n", 0, loop.start()) + 1
+            places.append((_Body("", begin.end(), _closing(code, begin.end())), f"loop on line {line}"))
+    for body, what in dict.fromkeys(places):
+        calls = _MADE.finditer(code, body.start, body.end)
+        made = next(
+            (
+                m
+                for m in calls
+                if not _ONCE.search(code, max(body.start, m.start() - BEFORE_CHARS), m.start())
+            ),
+            None,
+        )
+        before = code[body.start : made.start()] if made else ""
+        if made is None or before.count("{") != before.count("}"):
+            continue
+        line = code.count("\n", 0, made.start("call")) + 1
+        if made["call"] == "advertise":
+            message = f"the {what} makes another publisher each time (line {line}), and nothing is connected to it yet"
+        elif what.startswith("loop"):
+            message = (
+                f"the {what} subscribes again in each turn, on line {line}, and misses what comes in between"
+            )
+        else:
+            continue
+        kept = "publisher" if made["call"] == "advertise" else "subscriber"
+        where = "above the loop" if what.startswith("loop") else "in `main` or in the constructor"
+        fix = (
+            f"make the {kept} once, {where}, and keep it in a variable that stays: a global one, or a member"
+        )
+        fix = f"move line {line} above the loop" if where == "above the loop" else fix
+        yield PythonSlip(file=path, line=line, kind="callback-waits", message=message, fix=fix)
 
 
 def _callbacks(code: str) -> Iterator[_Body]:

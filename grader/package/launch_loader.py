@@ -25,6 +25,8 @@ from grader.wording import PAIR, is_one_edit
 INCLUDES_MAX = 50
 DEPTH_MAX = 10
 WORK_MAX = 10_000
+OF_GROUP = ("ns", "clear_params", "if", "unless")
+"""The attributes of a `<group>`."""
 STARTING = ("node", "group", "include")
 KEPT_AS_WRITTEN = ("pkg", "type", "name", "ns", "output", "launch_prefix", "args")
 """Attributes of a `<node>`, also of one that no scope resolves."""
@@ -96,7 +98,7 @@ def node_of(element: etree._Element, scope: Scope, remapping: Sequence[etree._El
         namespace=below.namespace,
         renaming=renaming,
         uncertain=scope.uncertain,
-        unknown=unknown_attributes(element),
+        unknown=(*unknown_attributes(element), *scope.unknown),
     )
 
 
@@ -118,7 +120,9 @@ class _Loader:
                 return
             self._note_unset(child, scope)
             if child.tag == "group":
-                self.walk(child, scope.of(child).below(scope.get(child, "ns"), child), depth)
+                inner = scope.of(child).below(scope.get(child, "ns"), child)
+                others = tuple(str(name)[:100] for name in child.attrib if name not in OF_GROUP)
+                self.walk(child, inner.model_copy(update={"unknown": (*scope.unknown, *others)[:10]}), depth)
             elif child.tag == "include":
                 self._include(child, scope.of(child), depth)
             elif child.tag in {"arg", "remap", "param"}:
@@ -308,6 +312,7 @@ class Scope(Record):
     renaming: tuple[LaunchLine, ...] = ()
     private: tuple[LaunchParam, ...] = ()
     uncertain: bool = False
+    unknown: tuple[str, ...] = ()
 
     def text(self, written: str) -> str:
         """Resolve `$(arg …)`, `$(dirname)` and `$(optenv NAME DEFAULT)`; what only roslaunch knows stays as it is."""

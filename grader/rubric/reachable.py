@@ -462,7 +462,7 @@ def _other_ends(criteria: Sequence[WrittenCriterion]) -> Iterator[Fault]:
     before: dict[tuple[str, ...], tuple[str, dict[str, Any]]] = {}
     for criterion in criteria:
         given = criterion.given
-        is_of_end = not given.keys() <= {"action", "goal", "feedback", "tolerance"}
+        is_of_end = not given.keys() <= {"action", "goal", "feedback", "reports", "tolerance"}
         if criterion.check != "action-result" or not is_of_end:
             continue
         key = tuple(map(str, (criterion.run, given.get("action"), given.get("goal", 1))))

@@ -192,3 +192,34 @@ def test_what_goes_on_after_ctrl_c(text: str, told: list[str]) -> None:
     found = slips_of("a.cpp", f"int main() {{\n{text}}}\n")
     assert [f"{one.message}; {one.fix}" for one in found if one.kind == "deaf"] == told
     assert all(one.kind != "deaf" for one in slips_of("a.cpp", text)), "of a class, without main()"
+
+
+MAKES = 'ros::Publisher p = n.advertise<std_msgs::Int8>("/a", 1);'
+HEARS = 'auto s = n.subscribe("/b", 1, hear);'
+
+
+@pytest.mark.parametrize(
+    ("callback", "loop", "told"),
+    [
+        (MAKES, "ros::spin();", "1: the callback `hear` makes another publisher each time (line 1)"),
+        (MAKES.replace("ros::Publisher p =", "static auto p ="), "ros::spin();", ""),
+        ("if (!p) p = n.advertise<std_msgs::Int8>(t, 1);", "ros::spin();", ""),
+        ("if (!p) {\n p = n.advertise<std_msgs::Int8>(t, 1);\n}", "ros::spin();", ""),
+        (
+            "",
+            "while (ros::ok()) {\n" + HEARS + "\nros::spinOnce();\n}",
+            "3: the loop on line 2 subscribes again",
+        ),
+        (
+            "",
+            "while (ros::ok())\n{\n" + MAKES + " ros::spinOnce();\n}",
+            "4: the loop on line 2 makes another publisher",
+        ),
+        ("", "while (ros::ok()) { if (late) {" + MAKES + "} ros::spinOnce(); }", ""),
+        ("", MAKES + " while (ros::ok()) { ros::spinOnce(); }", ""),
+    ],
+)
+def test_what_is_made_again_and_again(callback: str, loop: str, told: str) -> None:
+    code = f"void hear(M m) {{ {callback} }}\nint main() {{ {HEARS} {loop} }}"
+    found = [f"{one.line}: {one.message}" for one in slips_of("src/node.cpp", code)]
+    assert [told in one for one in found] == [True] * bool(told)

@@ -58,6 +58,21 @@ def test_a_rate_that_is_a_number_is_known(tmp_path, code, found):
 
 
 @pytest.mark.parametrize(
+    ("code", "name"),
+    [
+        ("rospy.Timer(rospy.Duration(20), tell)", "rospy.Duration"),
+        ("pause = rospy.Duration(20)\nrospy.Timer(pause, tell)", "rospy.Duration"),
+        ("while True:\n    rospy.sleep(rospy.Duration(20))", "rospy.sleep"),
+        ("rospy.Rate(20)", ""),
+    ],
+)
+def test_what_asks_for_a_rate_is_known(tmp_path, code, name):
+    (tmp_path / "a.py").write_text(f"{code}\n")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.name for s in slips if s.kind == "rate-number"] == [name]
+
+
+@pytest.mark.parametrize(
     ("code", "found"),
     [
         ("n = (n + 1) % 128", [("128", "reset-limit", 1)]),

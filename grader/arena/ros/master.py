@@ -172,7 +172,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
 
     def hasParam(self, caller_id, key):
         answer = super().hasParam(caller_id, key)
-        self._note_lookup("read", caller_id, key, is_there=answer[2] is True)
+        self._note_lookup("read", caller_id, key, is_there=answer[2] is True, by=" (has_param)")
         return answer
 
     def subscribeParam(self, caller_id, caller_api, key):
@@ -182,7 +182,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         self._note_lookup("read", caller_id, key, is_there=answer[2] != {})
         return answer
 
-    def _note_lookup(self, action, caller_id, name, is_there):
+    def _note_lookup(self, action, caller_id, name, is_there, by=""):
         """Tell the first time that a node asks for a name, and the second for a service that is not there."""
         asked, key = self._told[action], (caller_id, str(name))
         times, most = asked.get(key, 0), 2 if action == "lookup" and not is_there else 1
@@ -191,7 +191,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         if times or len(asked) < TOLD_MAX:
             asked[key] = times + 1
             record = {"action": action, "actor": caller_id, "topic": cut(name, ARGUMENT_CHARS)}
-            self._wire.event("/grader/actor", dict(record, detail="" if is_there else "not there"))
+            self._wire.event("/grader/actor", dict(record, detail="" if is_there else "not there" + by))
 
     def unregisterService(self, caller_id, service, service_api):
         self._graph.before_leaving()

@@ -46,7 +46,7 @@ def slips(tree):
         loops.publishes_twice, callbacks.callbacks, loops.waiting_callbacks, objects.queue_sizes, objects.graph_names,
         objects.object_slips, said_texts, loops.deaf_loops, counters.clock_values, counters.counter_slips,
         counters.counter_starts, without_effect, names.assigned_late, objects.hidden_names, objects.subscribed_again,
-        imports, objects.taken_off, objects.unstarted_servers, wrong_values, decided_conditions,
+        imports, objects.taken_off, objects.unstarted_servers, wrong_values, decided_conditions, last_one_counts,
         callbacks.unprinted_messages, counters.values_left_out, counters.published_unchanged,
         objects.unused_publishers, loops.loops_of_numbers, finished_goals, counters.sends_no_time, without_node,
     )  # fmt: skip
@@ -149,6 +149,7 @@ def handed_over(function, tree, owner):
 
 
 OF_ANGLES = ("sin", "cos", "tan")
+TO_RADIANS = ("radians", "deg2rad")
 IN_DEGREES = ("degrees", "rad2deg")
 
 
@@ -169,6 +170,10 @@ def wrong_values(tree):
                 message = "`%s` takes radians, and gets degrees" % called_name(node)
                 fix = "leave out `degrees(…)`: the angle is already in radians"
                 yield slip(line, "wrong-value", message, fix, "degrees")
+        elif called_name(node) in TO_RADIANS and node.args and getattr(node.args[0], "attr", "") == "theta":
+            angle = dotted(node.args[0])
+            fix = "on line %d, write `%s` alone, without `%s(…)`" % (line, angle, called_name(node))
+            yield slip(line, "wrong-value", "`%s` is already in radians" % angle, fix, "added")
         elif isinstance(node, ast.Subscript) and is_quotient(key_of(node)):
             message = "`/` makes a float, also of whole numbers, and an index is a whole number"
             fix = "on line %d, write `//` instead of `/` in the index" % line
@@ -302,6 +307,79 @@ def decided_by_values(condition, kind):
             fix = "on line %d, write `%s` in place of `%s`" % (condition.lineno, other, word)
             message = "`%s` is true for %s value" % (pair, holds)
             yield slip(condition.lineno, "wrong-value", message, fix, "bounds")
+
+
+CLOCKS = ("now", "get_time", "time", "get_rostime", "to_sec", "toSec")
+
+
+def last_one_counts(tree):
+    """`way += speed * (t1 - t0)` in a loop that leaves t0 as it is; and an `if` with an `else` in a loop, both of which
+    give one name a fixed value, so that what the loop saw before its last turn is forgotten.
+    """
+    for loop in all_of(tree, ast.While, ast.For):
+        given = [n for n in ast.walk(loop) if isinstance(n, ast.Assign)]
+        stored = {dotted(target): n.value for n in given for target in n.targets}
+        for node in loop.body:
+            is_sum = isinstance(node, ast.AugAssign) and isinstance(node.op, ast.Add)
+            spans = [n for n in ast.walk(node.value) if isinstance(n, ast.BinOp)] if is_sum else ()
+            for span in spans:
+                start, end = dotted(getattr(span, "right", None)), stored.get(dotted(span.left), span.left)
+                is_clock = isinstance(span.op, ast.Sub) and bool(calls_in(end, *CLOCKS))
+                if is_clock and start not in stored and "..." not in start:
+                    name = dotted(node.target)
+                    message = "`%s +=` adds the whole time since `%s` again in each turn" % (name, start)
+                    fix = "on line %d, write `%s =` instead of `%s +=`" % (node.lineno, name, name)
+                    yield slip(node.lineno, "wrong-value", message, fix, "added")
+        only = loop.body[0] if isinstance(loop, ast.For) and len(loop.body) == 1 else None
+        if isinstance(only, ast.If) and isinstance(only.test, ast.Compare) and not acts(only):
+            yield from overwritten(loop, only)
+
+
+HARMLESS = (
+    "print",
+    "loginfo",
+    "logwarn",
+    "str",
+    "format",
+    "round",
+    "abs",
+    "float",
+    "isnan",
+    "isinf",
+    "append",
+)
+
+
+def acts(node):
+    """Whether something leaves a loop, or happens in its turns beyond what is computed and printed."""
+    calls = {called_name(n) or "" for n in ast.walk(node) if isinstance(n, ast.Call)}
+    leaving = (ast.Break, ast.Return, ast.Raise, ast.Yield)
+    return not calls <= set(HARMLESS) or any(isinstance(n, leaving) for n in ast.walk(node))
+
+
+def overwritten(loop, choice):
+    """Yield the `if` of a loop's body that gives a name one fixed value, and its `else` another one."""
+    one, other = (
+        {
+            dotted(n.targets[0]): n.value
+            for n in block
+            if isinstance(n, ast.Assign) and isinstance(getattr(n.value, "operand", n.value), ast.Constant)
+        }
+        for block in (choice.body, choice.orelse)
+    )
+    names = [name for name in one if name in other and ast.dump(one[name]) != ast.dump(other[name])]
+    if names and type(choice.test.ops[0]) in SIGNS:
+        near = type(choice.test.ops[0]) in BELOW
+        usual = getattr((other if near else one)[names[0]], "value", "…")
+        message = "each turn of this loop sets `%s`, so that only the last one counts" % names[0]
+        part = "`else`" if near else "`if`"
+        fix = "set `%s` to %s above the loop on line %d, and not in the %s" % (
+            names[0],
+            usual,
+            loop.lineno,
+            part,
+        )
+        yield slip(choice.lineno, "wrong-value", message, fix, "added")
 
 
 def bound_of(node):

@@ -279,11 +279,10 @@ def _nested_index(message: str, source: str) -> Meaning | None:
     if len(nested) != 1 or not isinstance(inner := nested[0].value, ast.Subscript):
         return None
     flat, row, column = (ast.unparse(part) for part in (inner.value, inner.slice, nested[0].slice))
-    cause = f"`{shown(flat)}` is one list of numbers, row after row"
-    return (
-        cause,
-        f"write `{shown(f'{flat}[{row} * width + {column}]')}`, where `width` is how many there are in a row",
+    fix = (
+        f"write `{shown(f'{flat}[{row} * width + {column}]')}`, where `width` is how many there are in a row"
     )
+    return f"`{shown(flat)}` is one list of numbers, row after row", fix
 
 
 def _no_number(message: str, source: str) -> Meaning | None:
@@ -470,14 +469,12 @@ def _below_home(path: str) -> str:
 
 
 def _command(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
-    found = _COMMAND.match(message)
-    if found is None:
+    if not (found := _COMMAND.match(message)):
         return None
-    cause = f"the command `{shown(found[1])}` fails (exit code {found[2]})"
-    return (
-        cause,
-        "leave it out, or catch the error: a node that is started here has neither your folder nor a network",
+    hint = (
+        "leave it out, or catch the error: a node that is started here has neither your folder nor a network"
     )
+    return f"the command `{shown(found[1])}` fails (exit code {found[2]})", hint
 
 
 def _service(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
@@ -487,6 +484,9 @@ def _service(message: str, _source: str, _marked: tuple[int, int] | None) -> Mea
     if "md5sum" in message:
         hint = "give both the same .srv, with the names and types of the handout, and build again"
         return "the service's type differs from the type that is called", hint
+    if "responded with an error" in message and not re.search(r"error processing|handler returned", message):
+        hint = "put the call below `try:`, and write `except rospy.ServiceException as error:` for it"
+        return "the server refuses, and no `except` of the script is for that", hint
     return None
 
 

@@ -39,6 +39,7 @@ from grader.checks.support.rospy_calls import (
     other_items,
     part_of_action,
     unfit_value,
+    whole_message,
     without_message,
     wrong_class,
 )
@@ -504,7 +505,7 @@ def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
         or other_name(found, package)
     )
     frame = found.innermost
-    meant = meant or explain_formatting(found.message, source)
+    meant = meant or whole_message(found, package) or explain_formatting(found.message, source)
     return meant or explain_exception(found.kind, found.message, frame.source, frame.marked)
 
 

@@ -252,8 +252,18 @@ def _moved(got: Sequence[object], wanted: Sequence[object]) -> str:
             for values in (got, wanted)
         )
         if here != there:
-            return f"in another order: {value_text(number)} is at {here}, not at {there}"
+            by_columns = [n for n in range(2, len(wanted)) if _is_by_columns(got, wanted, n)]
+            how = f"in another order: {value_text(number)} is at {here}, not at {there}"
+            if len(by_columns) == 1:
+                how += f", column by column: a cell's index is `row * {by_columns[0]} + column`"
+            return how
     return ""
+
+
+def _is_by_columns(got: Sequence[object], wanted: Sequence[object], width: int) -> bool:
+    """Whether the columns of `wanted`, in rows of `width`, follow each other in `got`."""
+    columns = chain.from_iterable(wanted[start::width] for start in range(width))
+    return len(wanted) % width == 0 and list(columns) == list(got)
 
 
 def _equal(got: object, wanted: object, tolerance: float) -> bool:

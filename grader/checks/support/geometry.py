@@ -6,7 +6,7 @@ A path is read from a run's poses or added up from its velocities; what counts i
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Annotated, Any, NamedTuple
 
@@ -363,6 +363,21 @@ def commands_of(channel: Channel) -> list[tuple[int, Command]]:
     pairs = zip(channel.times_ns, channel.values, strict=True) if "Twist" in channel.type else ()
     commands = ((time_ns, _command(0.0, message)) for time_ns, message in pairs)
     return [(t, one) for t, one in commands if one is not None and _finite(one.forward, one.left, one.turn)]
+
+
+WOUND_RAD = 40.0
+"""More than six times around: no robot turns by that at a corner, and its degrees come to that."""
+
+
+def winds(channel: Channel, seconds: Callable[[int], float]) -> bool:
+    """Whether velocities turn a robot on the spot many times around, twice or more, and drive it in between."""
+    corners, turned = 0, 0.0
+    for (here_ns, one), (next_ns, _) in pairwise(commands_of(channel)):
+        if one.speed:
+            corners, turned = corners + (turned > WOUND_RAD), 0.0
+        else:
+            turned += abs(one.turn) * (seconds(next_ns) - seconds(here_ns))
+    return corners + (turned > WOUND_RAD) > 1
 
 
 def other_axis(channel: Channel) -> str:

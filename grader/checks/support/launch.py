@@ -12,6 +12,7 @@ from grader.checks.support.exit_causes import explain_traceback, process_traceba
 from grader.checks.support.launch_slips import (
     PROGRAMS_OF,
     at_its_lines,
+    namespace_meant,
     node_slip,
     own_script,
     owner_of,
@@ -184,6 +185,8 @@ def refusal(run: Run, package: PackageFacts) -> Absence | None:
             fix = hint.format(*words).replace("<package>", package.name)
             if pattern == NO_FILE and (meant := _file_meant(package, words[0])):
                 fix = f"write $(find {package.name})/{meant}"
+            if "multiple nodes" in pattern:
+                fix = namespace_meant(*(node for file in package.launch_files for node in file.brings)) or fix
             said = f"{NOTHING_STARTS}: {why.format(*words)}"
             if pattern == BAD_FILE and (unread := _unread_yaml(text, package)):
                 return unread
@@ -389,11 +392,19 @@ def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | N
     if "Cannot locate" not in line:
         return Absence(f"there is no package {node.pkg}", "check how pkg is spelt, and that it is installed")
     why = f"roslaunch finds no program {node.type} in the package {node.pkg}"
-    if near := near_names(str(node.type), PROGRAMS_OF.get(str(node.pkg), ())):
-        return Absence(f"{why}; it has {near[0]}", f'write type="{near[0]}"')
     hint = "type is the file's name, with .py for a script, and the file needs chmod +x"
-    if owner is None:
+    sources = {
+        one.name: [PurePosixPath(s).name for s in one.call.args[1:]] for one in programs(owner or package)
+    }
+    if near := near_names(str(node.type), PROGRAMS_OF.get(str(node.pkg), ())):
+        why, hint = f"{why}; it has {near[0]}", f'write type="{near[0]}"'
+    elif owner is None:
         hint = programs_hint(str(node.pkg))
+    elif made := next((name for name, named in sources.items() if node.type in named), ""):
+        why, hint = (
+            f"{why}: {node.type} is its source",
+            f'write type="{made}", as in `add_executable({made} …)`',
+        )
     return Absence(why, hint)
 
 

@@ -270,6 +270,12 @@ def illegal_name(node: LaunchNode) -> Slip | None:
     return _slip(node, why, "begin it with a letter, and use letters, digits and _ only")
 
 
+def namespace_meant(*nodes: LaunchNode) -> str:
+    """Return what to write where a `<node>`, or a `<group>` around it, has a `namespace`, which roslaunch ignores."""
+    found = any("namespace" in node.unknown for node in nodes)
+    return 'write ns="…" instead of namespace="…", which roslaunch does not know' if found else ""
+
+
 def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
     """Yield what makes roslaunch start nothing at all."""
     for fault in file.include_faults:
@@ -284,7 +290,11 @@ def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
             yield _slip(node, f'name="{node.name}" has a slash in it, which roslaunch refuses', fix)
         elif node.full_name in seen and not node.uncertain:
             why = f"a second node is named {node.full_name}, like that on line {seen[node.full_name].line}"
-            yield _slip(node, why, "give each <node> its own name: roslaunch refuses the file")
+            yield _slip(
+                node,
+                why,
+                namespace_meant(node) or "give each <node> its own name: roslaunch refuses the file",
+            )
         # Nodes behind an `if` that only roslaunch works out may exclude each other.
         if not node.uncertain:
             seen.setdefault(node.full_name, node)
@@ -344,6 +354,8 @@ def _nothing_like_it(package: PackageFacts, node: LaunchNode, why: str) -> Slip:
     )
     if source:
         fix = f"write `add_executable({plain} {source})` in CMakeLists.txt, which nothing there does"
+    if made := next((one for one in programs(package) if source and source in one.call.args[1:]), None):
+        fix = f"in CMakeLists.txt, write `{plain}` for `{shown(made.target)}`, on line {made.call.line} and below it"
     return _slip(node, why, f"write the script {plain}, or the name of one that is there" if suffix else fix)
 
 
@@ -378,9 +390,11 @@ def _slip(node: LaunchNode, why: str, fix: str) -> Slip:
 
 
 def own_script(package: PackageFacts, node: LaunchNode) -> SourceFile | None:
-    """Return the file of the package that the node runs; one of another of the lab's packages by its path from here."""
+    """Return the file of the package that the node runs; one of another of the lab's packages by its path from here.
+    A source of C++ is none: its program is run."""
     owner = owner_of(package, node)
-    script = find_script(owner, str(node.type)) if owner is not None else None
+    is_source = str(node.type).endswith(CPP_SUFFIXES)
+    script = find_script(owner, str(node.type)) if owner is not None and not is_source else None
     if script is None or owner is None or owner is package:
         return script
     path = posixpath.normpath(f"{package.way_to(owner)}/{script.path}")

@@ -17,7 +17,7 @@ from grader.checks.support.console_output import Line
 from grader.checks.support.exit_causes import Ending, explain_end, explain_error
 from grader.checks.support.fields import value_text
 from grader.checks.support.processes import base_name, early_end
-from grader.checks.support.text import both, get_param, init, near_names
+from grader.checks.support.text import both, get_param, init, near_names, shown
 from grader.checks.support.topics import cite, nodes_on, published_topics
 from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
@@ -43,6 +43,7 @@ _BETWEEN_PARTS = re.compile(r"[,;]?\s*\n\s*|[,;]\s+")
 _YAML_KEY = re.compile(r"^( *)[\"']?([A-Za-z]\w{0,99})[\"']?\s*:(?:\s|$)")
 _PLACE = re.compile(r"line (\d+), column (\d+)")
 _IN_LINE = "line {line} has a tab after a name or a value, which YAML does not accept"
+_NO_COLON = re.compile(r"(?<!\S)_\w{1,99}=(?!=)\S+")
 INDENT = "indent with spaces only, two per level"
 # what is printed, what it means ({line}: where), and what to do
 _CAUSES = (
@@ -240,6 +241,7 @@ def explain_by_unread_parameter(check: Check, _package: PackageFacts, run: Run, 
     own = [(node, n) for node, n in asked if last in n.split("/") or near_names(last, n.split("/"))]
     seen = f"; {own[0][0]} asks for {own[0][1]}" if own else ""
     hint = f"read it with {get_param(f'~{last}' if above in run.student_nodes() else name)}"
+    hint += _asked_before(run, own[0][1] if own else "", f"~{last}" if above in run.student_nodes() else name)
     if _is_too_early(run):
         hint = "move `rospy.init_node(…)` above the line that reads it: before, the node has no name"
     if own and own[0][1] == f"{own[0][0]}/{last}" and above not in run.student_nodes():
@@ -248,6 +250,13 @@ def explain_by_unread_parameter(check: Check, _package: PackageFacts, run: Run, 
     them = "it" if len(unread) == 1 else "them"
     why = f"the run sets {sets}, and no node reads {them}{seen}"
     return verdict.explained(why, hint, cause=name).about(citations=(cite(run, "/grader/actor"),))
+
+
+def _asked_before(run: Run, asked: str, right: str) -> str:
+    """Return what else to write where a node asked whether the parameter is there, and so never read it."""
+    events = (e for _, e in run.actors if e.action == "read" and absolute_name(e.topic or "") == asked)
+    has = both(f"`rospy.has_param('{shown(right)}')`", f'`nh.hasParam("{shown(right)}")`')
+    return f", and ask {has}, too" if any("has_param" in e.detail for e in events) else ""
 
 
 def _named(node: str, wanted: str) -> str:
@@ -271,20 +280,32 @@ def explain_by_misplaced_parameter(
         why = "a parameter is read before `rospy.init_node(…)`, when the node has no name yet"
         return verdict.explained(why, "move `rospy.init_node(…)` above the line that reads it", cause=why)
     if found is None:
-        return verdict
+        return _without_colon(package, run, verdict)
     asked, param, node = found
     sets = f"line {param.line} of {param.file} sets {param.name}, and {node.full_name} reads {asked}"
     last, within = asked.rpartition("/")[2], f"{node.full_name}/"
     hint = f"on line {param.line} of {param.file}, write "
     if param.name.startswith(within) and not asked.startswith(within):
         own = param.name.removeprefix(within)
-        hint = f"in the script, read it with {get_param(f'~{own}')}: it is the node's own"
+        too = _asked_before(run, asked, f"~{own}")
+        hint = f"in the script, read it with {get_param(f'~{own}')}{too}: it is the node's own"
     elif asked.startswith(within) and not param.name.startswith(within):
         place = f"the <node> on line {node.line}"
         hint = f'move line {param.line} of {param.file} into {place}, as <param name="{last}" …/>'
     else:
         hint += f'name="{last if asked.startswith(within) else asked}"'
     return verdict.explained(sets, hint, (param.place,), cause=asked)
+
+
+def _without_colon(package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
+    """Return a lost mark with an argument `_color=red` of a node, which roslaunch takes for no parameter."""
+    nodes = _publishing(verdict, run)
+    for node in (one for file in package.launch_files for one in file.brings if one.full_name in nodes):
+        if given := _NO_COLON.search(node.args or ""):
+            why = f"`{shown(given[0])}` in args on line {node.line} of {node.file} sets no parameter"
+            hint = f"write `{shown(given[0].replace('=', ':=', 1))}`"
+            return verdict.explained(why, hint, (node.place,), cause=why)
+    return verdict
 
 
 def explain_by_overwritten_parameter(

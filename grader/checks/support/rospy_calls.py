@@ -22,6 +22,7 @@ _BAD_TOPIC = re.compile(
 )
 _VALUE_ALONE = re.compile(r"\s*(\w+)\((?:-?[\d.]+|'[^']*'|\"[^\"]*\")\)\s*(?:#.*)?$")
 
+_OF_TWO = re.compile(r"between instances|unsupported operand")
 _TEXT_AND_NUMBER = re.compile(
     r"'str' and '(?:int|float)'|'(?:int|float)' and 'str'|must be real number, not str"
 )
@@ -375,6 +376,23 @@ def fields_of(package: PackageFacts, name: str) -> tuple[str, ...]:
             if name.startswith(stem) and fields:
                 return fields
     return next((fields for types in noetic_messages().values() if (fields := types.get(name, ()))), ())
+
+
+def whole_message(found: Traceback, package: PackageFacts) -> Meaning | None:
+    """Return which name stands for a whole message, goal or request of one field, where Python wants a value."""
+    kinds = re.findall(r"'([A-Z]\w*)'", found.message) if found.kind == "TypeError" else []
+    fields = [fields_of(package, kind) for kind in kinds]
+    if len(kinds) != 1 or len(fields[0]) != 1 or (fields[0] == ("data",) and _OF_TWO.search(found.message)):
+        return None
+    frame = found.innermost
+    tree = line_tree(frame.source[slice(*frame.marked)] if frame.marked else frame.source)
+    inner = [n.func for n in ast.walk(tree) if isinstance(n, ast.Call)]
+    inner += [n.value for n in ast.walk(tree) if isinstance(n, ast.Attribute)]
+    names = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and n not in inner}
+    if len(names) != 1:
+        return None
+    name = shown(names.pop())
+    return f"`{name}` is the whole message ({kinds[0]})", f"write `{name}.{fields[0][0]}` instead of `{name}`"
 
 
 def of_typed_text(found: Traceback, file: str, package: PackageFacts) -> tuple[str, str] | None:

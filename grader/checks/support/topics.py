@@ -351,11 +351,11 @@ def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
     if refused := refused_type(run, topic):
         return refused
     if topic in TF_TOPICS:
-        message = f"the run publishes on {topic}, and no node listens to tf"
-        return failed(message, hint="`listener = tf2_ros.TransformListener(buffer)` fills the buffer")
+        fills = "`listener = tf2_ros.TransformListener(buffer)` fills the buffer"
+        return failed(f"the run publishes on {topic}, and no node listens to tf", hint=fills)
     seen = f"; {nodes_on(run, found[0], 'subscribers')[0]} subscribes to {join_words(found)}" if found else ""
     message = f"the run publishes on {topic}, and no node subscribes to it{seen}"
-    remapped = _remap_to(package, run, topic, found[0]) if package is not None and found else ""
+    remapped = _remap_to(package, run, topic, found[0]) if package and found else ""
     add = f"add {subscriber(topic, f'{TYPE_SLOT}, callback')}"
     if topic in offered:
         add = f"subscribe to {topic} in place of {join_words(found, 'or')}, on which nothing is published"
@@ -413,7 +413,7 @@ def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | 
     return next(iter(run_slips(package, run, *kinds)), None)
 
 
-SEEN_AS = {"nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": ""}
+SEEN_AS = {"nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": "", "added": ""}
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so."""
 
 
@@ -426,7 +426,7 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
         kinds.append("goes-on")  # actionlib was told to end a goal that is over
     found = [s for s in package.slips if s.kind in kinds and s.file in files]
     sure = [s for s in found if s.kind == "goes-on" or (verdict.wrong and SEEN_AS[s.name] == verdict.wrong)]
-    for slip in sure[:1] or [s for s in found if s.name == "bounds" and not verdict.wrong][:4]:
+    for slip in sure[:1] or [s for s in found if not SEEN_AS.get(s.name) and not verdict.wrong][:4]:
         why, hint = f"line {slip.line} of {slip.file}: {slip.message}", f"{verdict.hint}; {slip.fix}"
         cause = slip.message if sure else ""
         verdict = verdict.explained(why, slip.fix if sure else hint, (slip.place,), cause=cause)
