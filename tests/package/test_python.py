@@ -24,6 +24,8 @@ CASES = {
     "raise": ('raise E, "x"\n', 1, "Python 2"),
     "exec": ('exec "x"\n', 1, "`exec` has no brackets, as in Python 2"),
     "backticks": ("x = `1`\n", 1, "backticks"),
+    "markdown": ("```python\nx = 1\n```\n", 1, "this is Markdown"),
+    "markdown_end": ("x = 1\n```\n", 2, "this is Markdown"),
     "unequal": ("if 1 <> 2:\n  pass\n", 1, "`!=`"),
     "long": ("x = 10L\n", 1, "`L`"),
     "unit": ("rate = rospy.Rate(10Hz)\n", 1, "leave `Hz` out"),
@@ -299,6 +301,7 @@ HABITS = {
     "x := 3": "x = 3",
     "class = 3": "",
     "$ chmod +x talker.py": "",
+    "``` python": "",
     "using namespace std;": "",
 }
 

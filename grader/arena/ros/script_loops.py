@@ -53,19 +53,23 @@ def loop_rates(tree):
             continue
         value = given(node.args[0])
         whole = nanoseconds_apart(value) if is_call(value, "Duration") else None
+        pause = dotted(value.func) if timed == "Timer" and is_call(value, "Duration") else ""
+        pause = dotted(node.func) if timed == "sleep" else pause
         if is_call(value, "Duration") and value.args and not whole:
             value = given(value.args[0])
-        yield from loop_rate(node, timed, value, whole or constant(value, given))
+        yield from loop_rate(node, pause, value, whole or constant(value, given))
 
 
-def loop_rate(call, timed, value, number):
-    """Yield the rate that a `Rate(…)`, `sleep(…)` or `Timer(…)` asks for: of the last two, `number` is in seconds."""
+def loop_rate(call, pause, value, number):
+    """Yield the rate that a `Rate(…)`, `sleep(…)` or `Timer(…)` asks for: of the last two, `number` is in seconds.
+    `pause` is what takes these seconds."""
+    timed = call.func.attr
     name = read_parameter(value) if timed == "Rate" else None
     if name:
         yield slip(value.lineno, "rate-parameter", name)
     elif number:
         hz = "%.12g" % (number if timed == "Rate" else 1.0 / number)
-        pause, fix = dotted(call.func) if timed == "sleep" else "", ""
+        fix = ""
         if is_call(value, "Duration"):
             pause, fix = dotted(value.func), "its second number counts nanoseconds, so it is %.9g s" % number
         yield slip(call.lineno, "rate-number", hz, fix, pause)
@@ -88,6 +92,7 @@ def never_reached(tree):
     """
     parts = all_of(tree, ast.FunctionDef, ast.ClassDef)
     own = {n.name for n in parts if calls_in(n, *MAKES)}
+    functions = functions_in(tree)
 
     def word(node):
         name = called_name(node)
@@ -95,21 +100,45 @@ def never_reached(tree):
 
     for node in walk(tree):
         for block in (getattr(node, "body", None), getattr(node, "orelse", None)):
-            for index, loop in enumerate(block if isinstance(block, list) else ()):
-                spins = isinstance(loop, ast.Expr) and is_call(loop.value, "spin")
-                if not spins and not (isinstance(loop, ast.While) and is_endless(loop)):
+            for index, one in enumerate(block if isinstance(block, list) else ()):
+                called = called_own(getattr(one, "value", None), functions)
+                loop = holding([one] if called is None else called.body)
+                if loop is None:
                     continue
-                within = set(map(word, ast.walk(loop)))
+                within = set(map(word, ast.walk(called or loop)))
                 behind = (n for later in block[index + 1 :] for n in ast.walk(later))
                 behind = [n for n in behind if word(n) and word(n) not in within]
-                if behind and "publish" not in within:
-                    what = "spin()" if spins else "loop"
+                if behind and ("publish" not in within or word(behind[0]) in own):
                     message = "the %s on line %d never ends, so the %s(…) on line %d is never reached"
+                    what = "loop" if isinstance(loop, ast.While) else "spin()"
                     message %= (what, loop.lineno, word(behind[0]), behind[0].lineno)
-                    fix = "move line %d above line %d" % (behind[0].lineno, loop.lineno)
-                    fix = "" if word(behind[0]) == "publish" else fix
+                    later = holding(getattr(called_own(behind[0], functions), "body", []))
+                    fix = unreached_fix(one, loop, behind[0], later)
                     yield slip(loop.lineno, "never-reached", message, fix)
                 break  # nothing behind it in the block runs
+
+
+def holding(block):
+    """Return the statement of a block that never ends: a loop, or `spin()`."""
+    for one in block:
+        inner = holding(one.body) if isinstance(one, ast.Try) else None
+        spins = isinstance(one, ast.Expr) and is_call(one.value, "spin")
+        if inner is not None or spins or (isinstance(one, ast.While) and is_endless(one)):
+            return inner or one
+    return None
+
+
+def unreached_fix(one, loop, behind, later):
+    """Return how to get to the call `behind` a statement that stays in its `loop`; `later` holds that call itself."""
+    above = "move line %d above line %d" % (behind.lineno, one.lineno)
+    if isinstance(later, ast.While) and isinstance(loop, ast.While):
+        made = "one loop has to do both: do what the loop on line %d does in the one on line %d, too"
+        return made % (later.lineno, loop.lineno)
+    if later is not None:
+        spins = later if isinstance(loop, ast.While) else loop
+        kept = "delete the spin() on line %d" % spins.lineno
+        return "%s, and %s" % (above, kept) if spins is later else kept + ": one at the end is enough"
+    return above if called_name(behind) != "publish" else ""
 
 
 def loop_ends(test):
