@@ -257,7 +257,7 @@ CASES = {
     "variable-of-a-callback": Case(
         swapped(TALKER, ("\ndef main():", "\nfront = None\n\ndef heard(msg):\n    front = msg.data\n\ndef main():"),
                         ("        rate.s", "        print(front)\n        rate.s")),
-        ["missing-call"], "the function gives a value to a front of its own",
+        ["missing-call"], "the function around it gives a value to a front of its own",
         after={TALKER: "def heard(msg):\n    global front\n    front = msg.data\n"},
     ),
     "variables-of-their-own": Case(

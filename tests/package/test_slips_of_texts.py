@@ -25,6 +25,7 @@ def said(text: str, tmp_path: Path, callback: str = "cb") -> list[tuple[str, str
         ("    global n\n    n += 1\n    print('heard', n)", "line 4 prints `n`", "on line 4, print `m.data`"),
         ("    print(rospy.get_caller_id() + ' I heard')", "line 2 prints has nothing of the message", "`m.data`"),
         ("    rospy.logdebug('%d', m.data)", "`logdebug` on line 2 shows nothing", "write `rospy.loginfo`"),
+        ("    global n\n    n = m.data\n    rospy.logdebug(n)", "`logdebug` on line 4 shows nothing", "on line 4"),
     ],
 )  # fmt: skip
 def test_a_callback_that_shows_nothing(body: str, message: str, fix: str, tmp_path: Path) -> None:
@@ -72,6 +73,7 @@ def test_a_callback_that_shows_some_or_something_else(body: str, message: str, t
         "    try:\n        print(m.data)\n    except Exception:\n        pass",
         # what may be printed elsewhere is not told
         "    global v\n    v = m.data",
+        "    global v\n    v = m.data\n    rospy.logdebug('heard')",
         "    seen.append(m.data)",
         "    logging.info('heard %s', m.data)",
         "    cb2(m)",
