@@ -172,7 +172,7 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
         yield from (one for one in moved if syntax_error(one[1]) is None)
     is_future = "future" in error["message"] and FUTURE.fullmatch(lines[at])
     if is_future or reason_of_line(lines[at]).fix == DELETE_LINE:
-        yield "token", "\n".join([*lines[:at], *lines[at + 1 :]])
+        yield "token", with_line(lines, at, "")  # what follows is told by the lines that it has
 
 
 def _in_their_blocks(lines: list[str], at: int, message: str) -> Iterator[tuple[str, str]]:

@@ -113,6 +113,8 @@ CASES = {
         swapped(TALKER, ("#!/usr/bin/env python3\n", ""), ("rospy.Publisher", "rospy.Publishr")),
         ["shebang", "missing-call"], "src/talker.py line 6: write `publisher = ", after={TALKER: SCRIPT},
     ),
+    "markdown": Case({TALKER: SCRIPT.replace("import rospy\n", "```\nimport rospy\n", 1) + "```\n"},
+                     ["python-syntax"] * 2, f"line {SCRIPT.count(chr(10)) + 2} of src/talker.py: this is Markdown"),
     "no-shebang": Case(swapped(TALKER, ("#!/usr/bin/env python3\n", "")), ["shebang"], "cannot be started"),
     "shebang-blank": Case({TALKER: "\n" + SCRIPT}, ["shebang"], "`#!` comes on line 2"),
     "tabs-of-8": Case(swapped(TALKER, ("        publisher.pub", "\tpublisher.pub")), ["python-syntax"],
