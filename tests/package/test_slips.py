@@ -120,10 +120,6 @@ LOOP = "    while not rospy.is_shutdown():\n"
 SERVER = "    s = SimpleActionServer('a', A, f, auto_start=False)\n"
 OF_A = "try:\n    from a.msg import A\nfinally:\n    pass\n"
 CALLED = "if __name__ == '__main__':\n    main()\n"
-OTHER_LOOP = (
-    "def b():\n    q = rospy.Publisher('b', B)\n    while not rospy.is_shutdown():\n        q.publish(1)\n"
-)
-TWO_PARTS = "def a():\n    p = rospy.Publisher('a', A)\n    while not rospy.is_shutdown():\n"
 
 
 @pytest.mark.parametrize(
@@ -148,15 +144,6 @@ TWO_PARTS = "def a():\n    p = rospy.Publisher('a', A)\n    while not rospy.is_s
         ("class Node:\n    def __init__(self):\n        rospy.Subscriber('a', A, f)\nrospy.spin()\nNode()\n",
          [("never-reached", 4, "the spin() on line 4 never ends, so the Node(…) on line 5")]),
         ("def stop():\n    print(1)\nrospy.spin()\nstop()\n", []),
-        (f"{TWO_PARTS}        p.publish(1)\n{OTHER_LOOP}try:\n    a()\n    b()\nexcept E:\n    pass\n",
-         [("never-reached", 3, "one loop has to do both: do what the loop on line 7 does in the one on line 3, too")]),
-        (f"{TWO_PARTS}        p.publish(1)\ndef b():\n    rospy.Subscriber('b', B, f)\n    rospy.spin()\na()\nb()\n",
-         [("never-reached", 3, "move line 9 above line 8, and delete the spin() on line 7")]),
-        (f"def a():\n    rospy.Subscriber('a', A, f)\n    rospy.spin()\n{OTHER_LOOP}a()\nb()\n",
-         [("never-reached", 3, "delete the spin() on line 3: one at the end is enough")]),
-        (f"{TWO_PARTS}        p.publish(1)\n        break\n{OTHER_LOOP}a()\nb()\n",
-         [("loop-left", 5, "at the break on line 5")]),
-        (TWO_PARTS + "        p.publish(1)\ndef b():\n    print(1)\na()\nb()\n", []),
         (node("    while True:\n        break\n    p.publish(1)\n") + CALLED, []),
         (node("    while not done:\n        pass\n    p.publish(1)\n") + CALLED, []),
         (node(LOOP + "        p.publish(1)\n        rospy.spin()\n") + CALLED,

@@ -248,3 +248,58 @@ def test_a_callback_that_gives_its_argument_another_value_is_named(tmp_path: Pat
     assert [(kind, fix) for kind, _, fix in found] == [("not-printed", "delete line 2")]
     assert said("def cb(m):\n    print(m.data)\n    m = A()\n", tmp_path) == []
     assert said("def cb(m):\n    m = m.data\n    print(m)\n", tmp_path) == []
+
+
+OTHER_LOOP = (
+    "def b():\n    q = rospy.Publisher('b', B)\n    while not rospy.is_shutdown():\n        q.publish(1)\n"
+)
+OF_CLASS = (
+    "class {}:\n    def __init__(self):\n        self.p = rospy.Publisher('a', A)\n"
+    "    def run(self):\n        while not rospy.is_shutdown():\n            self.p.publish(1)\n"
+)
+TWO_PARTS = "def a():\n    p = rospy.Publisher('a', A)\n    while not rospy.is_shutdown():\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        (
+            f"{TWO_PARTS}        p.publish(1)\n{OTHER_LOOP}try:\n    a()\n    b()\nexcept E:\n    pass\n",
+            [
+                (
+                    "never-reached",
+                    3,
+                    "one loop has to do both: do what the loop on line 7 does in the one on line 3, too",
+                )
+            ],
+        ),
+        (
+            f"{TWO_PARTS}        p.publish(1)\ndef b():\n    rospy.Subscriber('b', B, f)\n    rospy.spin()\na()\nb()\n",
+            [("never-reached", 3, "move line 9 above line 8, and delete the spin() on line 7")],
+        ),
+        (
+            f"def a():\n    rospy.Subscriber('a', A, f)\n    rospy.spin()\n{OTHER_LOOP}a()\nb()\n",
+            [("never-reached", 3, "delete the spin() on line 3: one at the end is enough")],
+        ),
+        *(
+            (
+                f"{OF_CLASS.format('A')}{OF_CLASS.format('B')}a = A()\n{first}.run()\nB().run()\n",
+                [
+                    (
+                        "never-reached",
+                        5,
+                        "one loop has to do both: do what the loop on line 11 does in the one on line 5",
+                    )
+                ],
+            )
+            for first in ("a", "A()")
+        ),
+        (f"{TWO_PARTS}        p.publish(1)\n        break\n{OTHER_LOOP}a()\nb()\n", []),
+        (TWO_PARTS + "        p.publish(1)\ndef b():\n    print(1)\na()\nb()\n", []),
+    ],
+)
+def test_what_comes_behind_a_function_that_never_ends_is_never_reached(text, found, tmp_path):
+    (tmp_path / "a.py").write_text(text)
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "never-reached"]
+    assert [(s.kind, s.line) for s in slips] == [one[:2] for one in found]
+    assert all(one[2] in slip.fix for slip, one in zip(slips, found, strict=True))

@@ -92,27 +92,44 @@ def never_reached(tree):
     """
     parts = all_of(tree, ast.FunctionDef, ast.ClassDef)
     own = {n.name for n in parts if calls_in(n, *MAKES)}
-    functions = functions_in(tree)
+    functions, classes = functions_in(tree), {n.name: n for n in all_of(tree, ast.ClassDef)}
+    made = {dotted(n.targets[0]): n.value for n in all_of(tree, ast.Assign)} if classes else {}
+
+    def run_by(node):  # `A().f()`, `a.f()` and `f()`
+        owner = getattr(getattr(node, "func", None), "value", None)
+        kind = classes.get(called_name(made.get(dotted(owner), owner)))
+        own = [n for n in kind.body if getattr(n, "name", "") == node.func.attr] if kind else []
+        return own[0] if own else called_own(node, functions)
 
     def word(node):
         name = called_name(node)
         return name if name and (name in own or is_call(node, "publish", *MAKES)) else None
 
+    known = {None: (None, ())}  # a function that is called again is looked at once
+
+    def held(function):
+        if function not in known:
+            known[function] = holding(function.body), set(map(word, ast.walk(function)))
+        return known[function]
+
     for node in walk(tree):
         for block in (getattr(node, "body", None), getattr(node, "orelse", None)):
             for index, one in enumerate(block if isinstance(block, list) else ()):
-                called = called_own(getattr(one, "value", None), functions)
-                loop = holding([one] if called is None else called.body)
+                called = run_by(getattr(one, "value", None))
+                loop, within = held(called) if called else (holding([one]), None)
                 if loop is None:
                     continue
-                within = set(map(word, ast.walk(called or loop)))
+                within = set(map(word, ast.walk(loop))) if within is None else within
                 behind = (n for later in block[index + 1 :] for n in ast.walk(later))
                 behind = [n for n in behind if word(n) and word(n) not in within]
                 if behind and ("publish" not in within or word(behind[0]) in own):
                     message = "the %s on line %d never ends, so the %s(…) on line %d is never reached"
                     what = "loop" if isinstance(loop, ast.While) else "spin()"
                     message %= (what, loop.lineno, word(behind[0]), behind[0].lineno)
-                    later = holding(getattr(called_own(behind[0], functions), "body", []))
+                    calls = (
+                        n for later in block[index + 1 :] for n in ast.walk(later) if isinstance(n, ast.Call)
+                    )
+                    later = next(filter(None, (held(run_by(n))[0] for n in calls)), None)
                     fix = unreached_fix(one, loop, behind[0], later)
                     yield slip(loop.lineno, "never-reached", message, fix)
                 break  # nothing behind it in the block runs
