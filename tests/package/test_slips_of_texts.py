@@ -269,7 +269,7 @@ TWO_PARTS = "def a():\n    p = rospy.Publisher('a', A)\n    while not rospy.is_s
                 (
                     "never-reached",
                     3,
-                    "one loop has to do both: do what the loop on line 7 does in the one on line 3, too",
+                    "one loop has to do both: make above line 3 what the loop on line 7 uses, and do",
                 )
             ],
         ),
@@ -288,7 +288,7 @@ TWO_PARTS = "def a():\n    p = rospy.Publisher('a', A)\n    while not rospy.is_s
                     (
                         "never-reached",
                         5,
-                        "one loop has to do both: do what the loop on line 11 does in the one on line 5",
+                        "one loop has to do both: make above line 5 what the loop on line 11 uses, and do",
                     )
                 ],
             )

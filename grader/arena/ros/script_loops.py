@@ -149,8 +149,8 @@ def unreached_fix(one, loop, behind, later):
     """Return how to get to the call `behind` a statement that stays in its `loop`; `later` holds that call itself."""
     above = "move line %d above line %d" % (behind.lineno, one.lineno)
     if isinstance(later, ast.While) and isinstance(loop, ast.While):
-        made = "one loop has to do both: do what the loop on line %d does in the one on line %d, too"
-        return made % (later.lineno, loop.lineno)
+        both = "one loop has to do both: make above line %d what the loop on line %d uses, and do its work in there, too"
+        return both % (loop.lineno, later.lineno)
     if later is not None:
         spins = later if isinstance(loop, ast.While) else loop
         kept = "delete the spin() on line %d" % spins.lineno
