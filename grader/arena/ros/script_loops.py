@@ -120,16 +120,14 @@ def never_reached(tree):
                 if loop is None:
                     continue
                 within = set(map(word, ast.walk(loop))) if within is None else within
-                behind = (n for later in block[index + 1 :] for n in ast.walk(later))
-                behind = [n for n in behind if word(n) and word(n) not in within]
+                rest = [n for later in block[index + 1 :] for n in ast.walk(later)]
+                behind = [n for n in rest if word(n) and word(n) not in within]
                 if behind and ("publish" not in within or word(behind[0]) in own):
                     message = "the %s on line %d never ends, so the %s(…) on line %d is never reached"
                     what = "loop" if isinstance(loop, ast.While) else "spin()"
                     message %= (what, loop.lineno, word(behind[0]), behind[0].lineno)
-                    calls = (
-                        n for later in block[index + 1 :] for n in ast.walk(later) if isinstance(n, ast.Call)
-                    )
-                    later = next(filter(None, (held(run_by(n))[0] for n in calls)), None)
+                    runs = (held(run_by(n))[0] for n in rest if isinstance(n, ast.Call))
+                    later = next(filter(None, runs), None)
                     fix = unreached_fix(one, loop, behind[0], later)
                     yield slip(loop.lineno, "never-reached", message, fix)
                 break  # nothing behind it in the block runs
@@ -149,7 +147,9 @@ def unreached_fix(one, loop, behind, later):
     """Return how to get to the call `behind` a statement that stays in its `loop`; `later` holds that call itself."""
     above = "move line %d above line %d" % (behind.lineno, one.lineno)
     if isinstance(later, ast.While) and isinstance(loop, ast.While):
-        both = "one loop has to do both: make above line %d what the loop on line %d uses, and do its work in there, too"
+        both = (
+            "one loop has to do both: make above line %d what the loop on line %d uses, and do its work, too"
+        )
         return both % (loop.lineno, later.lineno)
     if later is not None:
         spins = later if isinstance(loop, ast.While) else loop
