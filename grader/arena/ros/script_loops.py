@@ -147,9 +147,7 @@ def unreached_fix(one, loop, behind, later):
     """Return how to get to the call `behind` a statement that stays in its `loop`; `later` holds that call itself."""
     above = "move line %d above line %d" % (behind.lineno, one.lineno)
     if isinstance(later, ast.While) and isinstance(loop, ast.While):
-        both = (
-            "one loop has to do both: make above line %d what the loop on line %d uses, and do its work, too"
-        )
+        both = "one loop has to do both: make above line %d what the loop on line %d uses, and do its work"
         return both % (loop.lineno, later.lineno)
     if later is not None:
         spins = later if isinstance(loop, ast.While) else loop
