@@ -113,6 +113,8 @@ CASES = {
         swapped(TALKER, ("#!/usr/bin/env python3\n", ""), ("rospy.Publisher", "rospy.Publishr")),
         ["shebang", "missing-call"], "src/talker.py line 6: write `publisher = ", after={TALKER: SCRIPT},
     ),
+    "markdown-above-the-shebang": Case({TALKER: "```python\n" + SCRIPT + "```\n"}, ["shebang", "python-syntax", "python-syntax"],
+                                       f"line {SCRIPT.count(chr(10)) + 2} of src/talker.py: this is Markdown"),
     "markdown": Case({TALKER: SCRIPT.replace("import rospy\n", "```\nimport rospy\n", 1) + "```\n"},
                      ["python-syntax"] * 2, f"line {SCRIPT.count(chr(10)) + 2} of src/talker.py: this is Markdown"),
     "no-shebang": Case(swapped(TALKER, ("#!/usr/bin/env python3\n", "")), ["shebang"], "cannot be started"),
