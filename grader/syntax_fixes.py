@@ -163,6 +163,7 @@ _HABITS = (
            ((r"^(\s*)print\s+([^>(\s](?:.*[^,;\s])?)\s*;*$", r"\1print(\2)"),)),
     _Habit(r"^\s*exec\s+[^(=\s]", "`exec` has no brackets, as in Python 2", "write `exec(...)`",
            ((r"^(\s*)exec\s+(.+)$", r"\1exec(\2)"),)),
+    _Habit(r"^\s*```", "this is Markdown, from a chat or a web page, not Python", DELETE_LINE),
     _Habit(r"`", "backticks are Python 2", "write `repr(x)` or `str(x)`", ((r"`([^`]+)`", r"repr(\1)"),)),
     _Habit(r"<>", "`<>` is Python 2", "write `!=`", ((r"\s*<>\s*", " != "),)),
     _Habit(r"\bur['\"]", '`ur"..."` is Python 2', 'write `r"..."`', ((r"\bur(?=['\"])", "r"),)),

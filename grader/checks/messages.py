@@ -135,6 +135,8 @@ def _misfit(
         message = f"a message reads {in_one_line(text)!r}: its placeholder was never filled in"
     elif more := _behind(part):
         message = f"a message has {more!r} after the time: {in_one_line(text)!r}, not '{wanted}'"
+    elif part.startswith(("<function ", "<bound method ", "<built-in ")):
+        message = f"a message says {part!r} where the time belongs: a function without its brackets `()` is no number"
     elif part:
         message = f"a message says {part!r} where the time in seconds belongs: {in_one_line(text)!r}, not '{wanted}'"
     else:

@@ -471,7 +471,7 @@ class Later:
             yield from self._unprinted() if unheard and len(heard) <= 1 else ()
             return
         right = [one for one in said if says(one.message, template)]
-        if right and len(heard) == 1 and self._has_no_field(right[0]):
+        if right and len(heard) == 1 and self._has_no_field(right[0]) and ".data`" not in self._verdict.hint:
             yield Fix(f"print the `data` of the message on {_line(right[0])}")
         if right and other_type and of_text and (place := PLACES.search(self._text_of(right[0]))):
             yield Fix(f"write %s instead of {place[0]} on {_line(right[0])}")

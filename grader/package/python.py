@@ -99,7 +99,7 @@ _MESSAGES: tuple[tuple[str, ...], ...] = (
      "a value without a name comes after one with a name", "move what has `=` to the end of the call"),
     (r"UTF-16", "the file is saved as UTF-16", "save it as UTF-8"),
     (r"Non-UTF-8 code|codec can't decode byte|invalid or missing encoding",
-     "the file is not saved as UTF-8 (accents of an old encoding)", "save it as UTF-8"),
+     "the file is not saved as UTF-8 (letters of an old encoding)", "save it as UTF-8"),
     (r"unicodeescape", r"a backslash in a string is read as `\U...`", r"write the string as r\"...\""),
     (r"name '(\w+)' is .* global declaration", "`global {0}` comes after a line that uses {0}"),
     (r"encoding", "line 1 or 2 names an encoding that Python does not know", "write `# -*- coding: utf-8 -*-`"),
@@ -355,5 +355,5 @@ def _character_words(char: str) -> Reason:
         return Reason(f"an invisible character ({code}) was {_COPIED}", "delete this line and type it again")
     plain = unicodedata.normalize("NFKC", char)
     if plain != char and plain.isascii():
-        return Reason(f"`{char}` ({code}) is not the plain `{plain}`", "type it again")
+        return Reason(f"`{char}` ({code}) is not the plain `{plain}`", f"write a plain `{plain}`")
     return Reason(f"`{char}` ({code}) cannot appear in Python code outside a string or a comment")

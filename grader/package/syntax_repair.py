@@ -172,7 +172,9 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
         yield from (one for one in moved if syntax_error(one[1]) is None)
     is_future = "future" in error["message"] and FUTURE.fullmatch(lines[at])
     if is_future or reason_of_line(lines[at]).fix == DELETE_LINE:
-        yield "token", "\n".join([*lines[:at], *lines[at + 1 :]])
+        first = lines[1] if not at and lines[1:] and lines[1].startswith("#!") else ""
+        emptied = with_line(lines, at, first)  # what follows is told by the lines that it has
+        yield "token", emptied if not first else with_line(emptied.split("\n"), 1, "")
 
 
 def _in_their_blocks(lines: list[str], at: int, message: str) -> Iterator[tuple[str, str]]:

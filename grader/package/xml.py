@@ -160,7 +160,7 @@ def _fault(error: etree.XMLSyntaxError, parser: etree.XMLParser, data: bytes, fi
     known = 0 < column <= len(text) + 1
     # the error's own log holds what went wrong with other files before, too
     log = [str(entry.message)[:_MESSAGE_CHARS_MAX] for entry in islice(parser.error_log, _MESSAGES)]
-    reason, opened = _explain(message, log, text, root=root)
+    reason, opened = _closed_early(message, data, root) or _explain(message, log, text, root=root)
     if opened and opened != line:
         line, text = opened, _line(data, opened)
         column = text.find("<") + 1
@@ -186,6 +186,22 @@ def _never_opened(message: str, data: bytes, root: str) -> Reason | None:
     if "Extra content at the end" not in message or first is None:
         return None
     return Reason(f"`<{root}>` is missing", f"above line {first + 1}, write `{opening_tag(text, root)}`")
+
+
+def _closed_early(message: str, data: bytes, root: str) -> tuple[Reason, int] | None:
+    """Return what is to be said, with the line, where the root's end comes above other tags of its own; None where
+    what follows begins another root."""
+    plain = COMMENT.sub(lambda found: "\n" * found[0].count("\n"), data.decode("utf-8", "replace"))
+    before, end, behind = plain.partition(f"</{root}>")
+    if "Extra content at the end" not in message or not end or not re.match(r"\s*<\w", behind):
+        return None
+    if re.match(rf"\s*<{re.escape(root)}[\s>/]", behind):
+        return None
+    number = before.count("\n") + 1
+    why = f"`{end}` on line {number} ends the file, and more tags come below it"
+    if end in behind:
+        return Reason(why, f"delete that one, since there is another `{end}` further down"), number
+    return Reason(why, f"move that `{end}` to the end of the file"), number
 
 
 def opening_tag(text: str, root: str) -> str:

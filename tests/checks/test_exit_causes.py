@@ -82,6 +82,8 @@ from tests.checks.tracebacks import SCRIPT, explained, package_of
          "give one value for each `%` in the string, or remove one"),
         (6, "rospy.loginfo('Sending: ', text)", "TypeError: not all arguments converted during string formatting",
          "write `rospy.loginfo('Sending: %s', text)`"),
+        (6, "rospy.loginfo('I send ' + text)", 'TypeError: can only concatenate str (not "tuple") to str',
+         "where text gets its value, write `%` instead of the comma behind the text"),
         (6, "rospy.loginfo('I heard ' + msg)", 'TypeError: can only concatenate str (not "String") to str',
          "write `msg.data` instead of `msg`"),
         (6, "text = 'I heard ' + number", 'TypeError: can only concatenate str (not "Int8") to str',

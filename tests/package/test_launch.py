@@ -80,6 +80,17 @@ def test_attributes_that_are_not_there_are_none():
         ('<launch>\n<node a="1" a="2"/></launch>', 2, "`a` is given twice"),
         ("<launch></launch>\n<launch></launch>", 2, "this line repeats the one above: delete line 2"),
         ("<launch></launch>\nbye", 2, "only one `<launch>`"),
+        (
+            "<launch>\n<node/>\n</launch>\n<node/>\n</launch>",
+            3,
+            "delete that one, since there is another",
+        ),
+        (
+            "<launch>\n<!-- </launch> -->\n</launch>\n<node/>\n<node/>",
+            3,
+            "move that `</launch>` to the end",
+        ),
+        ("<launch>\n</launch>\n<launch>\n<node/>\n</launch>", 3, "only one `<launch>`"),
         ("<Launch></Launch>", 1, "`<Launch>`; roslaunch wants `<launch>` in lower case"),
         ("<robot/>", 1, "`<robot>`; roslaunch wants `<launch>`"),
         ("<launch>\n<launch/></launch>", 2, "a second `<launch>`"),

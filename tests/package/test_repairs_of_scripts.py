@@ -107,10 +107,17 @@ CASES = {
                 ("publisher.publish(", "publisher.publish('100%', ")), []),
     "latin-1": Case({TALKER: SCRIPT.replace("import rospy\n", "import rospy  # caf\u00e9\n").encode("latin-1")},
                 ["encoding"], "not saved as UTF-8"),
+    "gbk": Case({TALKER: (SCRIPT + "\u8ba1\u6570 = 0\n").encode("gbk")}, ["encoding"], "not saved as UTF-8",
+                after={TALKER: SCRIPT + "\u8ba1\u6570 = 0\n"}),
     "no-shebang-and-a-slip": Case(
         swapped(TALKER, ("#!/usr/bin/env python3\n", ""), ("rospy.Publisher", "rospy.Publishr")),
         ["shebang", "missing-call"], "src/talker.py line 6: write `publisher = ", after={TALKER: SCRIPT},
     ),
+    "markdown-above-the-shebang": Case({TALKER: "```python\n" + SCRIPT + "```\n"},
+        ["shebang", "python-syntax", "python-syntax"],
+        f"line {SCRIPT.count(chr(10)) + 2} of src/talker.py: this is Markdown"),
+    "markdown": Case({TALKER: SCRIPT.replace("import rospy\n", "```\nimport rospy\n", 1) + "```\n"},
+                     ["python-syntax"] * 2, f"line {SCRIPT.count(chr(10)) + 2} of src/talker.py: this is Markdown"),
     "no-shebang": Case(swapped(TALKER, ("#!/usr/bin/env python3\n", "")), ["shebang"], "cannot be started"),
     "shebang-blank": Case({TALKER: "\n" + SCRIPT}, ["shebang"], "`#!` comes on line 2"),
     "tabs-of-8": Case(swapped(TALKER, ("        publisher.pub", "\tpublisher.pub")), ["python-syntax"],
@@ -255,7 +262,7 @@ CASES = {
     "variable-of-a-callback": Case(
         swapped(TALKER, ("\ndef main():", "\nfront = None\n\ndef heard(msg):\n    front = msg.data\n\ndef main():"),
                         ("        rate.s", "        print(front)\n        rate.s")),
-        ["missing-call"], "the function gives a value to a front of its own",
+        ["missing-call"], "the function around it gives a value to a front of its own",
         after={TALKER: "def heard(msg):\n    global front\n    front = msg.data\n"},
     ),
     "variables-of-their-own": Case(

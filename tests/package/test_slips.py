@@ -140,7 +140,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("never-reached", 4, "the publish(…) on line 6")]),
         (node("    rospy.spin()\n    p.publish(1)\n") + CALLED, [("never-reached", 4, "the spin() on line 4")]),
         ("class A:\n    def __init__(s):\n        r.spin()\n    def go(s):\n        r.Service(a, B)\na = A()\na.go()",
-         [("never-reached", 6, "the spin() on line 3 never ends, so the go(…) on line 7")]),
+         [("never-reached", 3, "the spin() on line 3 never ends, so the go(…) on line 7")]),
         ("def go():\n    rospy.spin()\np = rospy.Publisher('a', B)\np.publish(1)\ngo()\n", []),
         (node("    while True:\n        pass\n    p = rospy.Publisher('a', A)\n    p.publish(1)\n") + CALLED,
          [("never-reached", 4, "the Publisher(…) on line 6")]),

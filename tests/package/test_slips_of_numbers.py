@@ -76,6 +76,8 @@ def test_what_asks_for_a_rate_is_known(tmp_path, code, name):
     ("code", "found"),
     [
         ("n = (n + 1) % 128", [("128", "reset-limit", 1)]),
+        ("for i in range(9999):\n    p.publish(i % 129)", [("129", "reset-limit", 2)]),
+        ("for i in range(129):\n    p.publish('%d' % i)", [("129", "reset-limit", 1)]),
         (
             "if n > 127:\n    n = 1",
             [("127", "reset-limit", 1), ("1", "reset-value", 2)],

@@ -25,6 +25,7 @@ def said(text: str, tmp_path: Path, callback: str = "cb") -> list[tuple[str, str
         ("    global n\n    n += 1\n    print('heard', n)", "line 4 prints `n`", "on line 4, print `m.data`"),
         ("    print(rospy.get_caller_id() + ' I heard')", "line 2 prints has nothing of the message", "`m.data`"),
         ("    rospy.logdebug('%d', m.data)", "`logdebug` on line 2 shows nothing", "write `rospy.loginfo`"),
+        ("    global n\n    n = m.data\n    rospy.logdebug(n)", "`logdebug` on line 4 shows nothing", "on line 4"),
     ],
 )  # fmt: skip
 def test_a_callback_that_shows_nothing(body: str, message: str, fix: str, tmp_path: Path) -> None:
@@ -72,6 +73,7 @@ def test_a_callback_that_shows_some_or_something_else(body: str, message: str, t
         "    try:\n        print(m.data)\n    except Exception:\n        pass",
         # what may be printed elsewhere is not told
         "    global v\n    v = m.data",
+        "    global v\n    v = m.data\n    rospy.logdebug('heard')",
         "    seen.append(m.data)",
         "    logging.info('heard %s', m.data)",
         "    cb2(m)",
@@ -246,3 +248,58 @@ def test_a_callback_that_gives_its_argument_another_value_is_named(tmp_path: Pat
     assert [(kind, fix) for kind, _, fix in found] == [("not-printed", "delete line 2")]
     assert said("def cb(m):\n    print(m.data)\n    m = A()\n", tmp_path) == []
     assert said("def cb(m):\n    m = m.data\n    print(m)\n", tmp_path) == []
+
+
+OTHER_LOOP = (
+    "def b():\n    q = rospy.Publisher('b', B)\n    while not rospy.is_shutdown():\n        q.publish(1)\n"
+)
+OF_CLASS = (
+    "class {}:\n    def __init__(self):\n        self.p = rospy.Publisher('a', A)\n"
+    "    def run(self):\n        while not rospy.is_shutdown():\n            self.p.publish(1)\n"
+)
+TWO_PARTS = "def a():\n    p = rospy.Publisher('a', A)\n    while not rospy.is_shutdown():\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        (
+            f"{TWO_PARTS}        p.publish(1)\n{OTHER_LOOP}try:\n    a()\n    b()\nexcept E:\n    pass\n",
+            [
+                (
+                    "never-reached",
+                    3,
+                    "one loop has to do both: make above line 3 what the loop on line 7 uses, and do",
+                )
+            ],
+        ),
+        (
+            f"{TWO_PARTS}        p.publish(1)\ndef b():\n    rospy.Subscriber('b', B, f)\n    rospy.spin()\na()\nb()\n",
+            [("never-reached", 3, "move line 9 above line 8, and delete the spin() on line 7")],
+        ),
+        (
+            f"def a():\n    rospy.Subscriber('a', A, f)\n    rospy.spin()\n{OTHER_LOOP}a()\nb()\n",
+            [("never-reached", 3, "delete the spin() on line 3: one at the end is enough")],
+        ),
+        *(
+            (
+                f"{OF_CLASS.format('A')}{OF_CLASS.format('B')}a = A()\n{first}.run()\nB().run()\n",
+                [
+                    (
+                        "never-reached",
+                        5,
+                        "one loop has to do both: make above line 5 what the loop on line 11 uses, and do",
+                    )
+                ],
+            )
+            for first in ("a", "A()")
+        ),
+        (f"{TWO_PARTS}        p.publish(1)\n        break\n{OTHER_LOOP}a()\nb()\n", []),
+        (TWO_PARTS + "        p.publish(1)\ndef b():\n    print(1)\na()\nb()\n", []),
+    ],
+)
+def test_what_comes_behind_a_function_that_never_ends_is_never_reached(text, found, tmp_path):
+    (tmp_path / "a.py").write_text(text)
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "never-reached"]
+    assert [(s.kind, s.line) for s in slips] == [one[:2] for one in found]
+    assert all(one[2] in slip.fix for slip, one in zip(slips, found, strict=True))

@@ -274,7 +274,9 @@ class Printing:
         if told:
             return self.in_part(told)
         if not self.prints:
-            return self.kept(tree) if self.shared else self.silent(level)
+            debug = any(called_name(n).startswith("logdebug") and self.of_message(n) for n in self.nodes)
+            kept = self.kept(tree) if self.shared else None
+            return kept or (self.silent(level) if debug or not self.shared else None)
         return self.another()
 
     def of_message(self, call):

@@ -82,7 +82,9 @@ def limits_of_ranges(tree):
     for node in all_of(tree, ast.For):
         ranged = called_name(node.iter) == "range" and calls_in(node, "publish")
         limit = whole((node.iter.args[:2] or [None])[-1]) if ranged else None
-        if limit is not None:
+        counted = dotted(node.target)
+        remainders = (n for n in ast.walk(node) if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Mod))
+        if limit is not None and not any(counted in map(dotted, ast.walk(n.left)) for n in remainders):
             yield slip(node.lineno, "reset-limit", "%d" % limit, name="range")
 
 

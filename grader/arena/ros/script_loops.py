@@ -86,45 +86,84 @@ MAKES = ("Publisher", "Subscriber", "Service")
 
 def never_reached(tree):
     """Loops without an end before the first `publish(…)`, `Publisher(…)` and the like that comes behind them in the
-    same block, in a function or class of this file too. So is a `spin()` in what a statement of the block calls.
+    same block, in a function or class of this file too; so is a `spin()`, in what a statement of the block calls as well.
     """
     parts = all_of(tree, ast.FunctionDef, ast.ClassDef)
-    bodies = {n.name: n.body for n in parts if isinstance(n, ast.FunctionDef)}
-    makers = {n.name: f.body for n in parts for f in n.body if getattr(f, "name", "") == "__init__"}
-    bodies.update(makers)
-    spinning = {
-        name: one.lineno
-        for name, body in bodies.items()
-        for one in body
-        if is_call(getattr(one, "value", None), "spin") and sum(n.name == name for n in parts) == 1
-    }
     own = {n.name for n in parts if calls_in(n, *MAKES)}
+    functions, classes = functions_in(tree), {n.name: n for n in all_of(tree, ast.ClassDef)}
+    made = {dotted(n.targets[0]): n.value for n in all_of(tree, ast.Assign)} if classes else {}
+
+    def run_by(node):  # `A()`, `A().f()`, `a.f()` and `f()`
+        func = getattr(node, "func", None)
+        owner = getattr(func, "value", None)
+        kind = classes.get(
+            func.id if isinstance(func, ast.Name) else called_name(made.get(dotted(owner), owner))
+        )
+        own = (
+            [n for n in kind.body if getattr(n, "name", "") == getattr(func, "attr", "__init__")]
+            if kind
+            else []
+        )
+        return own[0] if own else called_own(node, functions)
 
     def word(node):
         name = called_name(node)
         return name if name and (name in own or is_call(node, "publish", *MAKES)) else None
 
+    known = {None: (None, ())}  # a function that is called again is looked at once
+
+    def held(function):
+        if function not in known:
+            known[function] = holding(function.body), set(map(word, ast.walk(function)))
+        return known[function]
+
     for node in walk(tree):
         for block in (getattr(node, "body", None), getattr(node, "orelse", None)):
-            for index, loop in enumerate(block if isinstance(block, list) else ()):
-                calls = isinstance(loop, (ast.Expr, ast.Assign))
-                spins = calls and is_call(loop.value, "spin")
-                inner = spinning.get(called_name(loop.value)) if calls and not spins else None
-                if not spins and not inner and not (isinstance(loop, ast.While) and is_endless(loop)):
+            for index, one in enumerate(block if isinstance(block, list) else ()):
+                called = run_by(getattr(one, "value", None))
+                loop, within = held(called) if called else (holding([one]), None)
+                if loop is None:
                     continue
-                within = set(map(word, ast.walk(loop)))
-                behind = (n for later in block[index + 1 :] for n in ast.walk(later))
-                behind = [n for n in behind if word(n) and word(n) not in within]
-                if behind and "publish" not in within:
-                    what = "spin()" if spins or inner else "loop"
+                within = set(map(word, ast.walk(loop))) if within is None else within
+                rest = [n for later in block[index + 1 :] for n in ast.walk(later)]
+                behind = [n for n in rest if word(n) and word(n) not in within]
+                if behind and ("publish" not in within or word(behind[0]) in own):
                     message = "the %s on line %d never ends, so the %s(…) on line %d is never reached"
-                    message %= (what, inner or loop.lineno, word(behind[0]), behind[0].lineno)
-                    fix = "move line %d above line %d" % (behind[0].lineno, loop.lineno)
-                    if inner:
-                        fix = "move the spin() of line %d below line %d" % (inner, behind[0].lineno)
-                    fix = "" if word(behind[0]) == "publish" else fix
+                    what = "loop" if isinstance(loop, ast.While) else "spin()"
+                    message %= (what, loop.lineno, word(behind[0]), behind[0].lineno)
+                    runs = (held(run_by(n))[0] for n in rest if isinstance(n, ast.Call))
+                    later = next(filter(None, runs), None)
+                    fix = unreached_fix(one, loop, behind[0], later, called)
                     yield slip(loop.lineno, "never-reached", message, fix)
                 break  # nothing behind it in the block runs
+
+
+def holding(block):
+    """Return the statement of a block that never ends: a loop, or `spin()`."""
+    for one in block:
+        inner = holding(one.body) if isinstance(one, ast.Try) else None
+        spins = isinstance(one, ast.Expr) and is_call(one.value, "spin")
+        if inner is not None or spins or (isinstance(one, ast.While) and is_endless(one)):
+            return inner or one
+    return None
+
+
+def unreached_fix(one, loop, behind, later, called):
+    """Return how to get to the call `behind` a statement that stays in its `loop`; `later` holds that call itself,
+    `called` is the function that the statement calls."""
+    if (
+        isinstance(loop, ast.Expr) and getattr(called, "name", "") == "__init__"
+    ):  # what is behind needs the object
+        return "move the spin() of line %d below line %d" % (loop.lineno, behind.lineno)
+    above = "move line %d above line %d" % (behind.lineno, one.lineno)
+    if isinstance(later, ast.While) and isinstance(loop, ast.While):
+        both = "one loop has to do both: make above line %d what the loop on line %d uses, and do its work"
+        return both % (loop.lineno, later.lineno)
+    if later is not None:
+        spins = later if isinstance(loop, ast.While) else loop
+        kept = "delete the spin() on line %d" % spins.lineno
+        return "%s, and %s" % (above, kept) if spins is later else kept + ": one at the end is enough"
+    return above if called_name(behind) != "publish" else ""
 
 
 def loop_ends(test):

@@ -411,7 +411,7 @@ def _judge_death(count: Count, run: Run, package: PackageFacts, params: WrapPara
             return failed(why, hint=fix, citations=(first.place, *end.citations))
         if high is not None and last == params.maximum:
             hint = _limit_hint(high, params)
-            return failed(f"{message}; line {high.line} compares the counter with {high.message}", hint=hint)
+            return failed(f"{message}; line {high.line} sets its limit by {high.message}", hint=hint)
         return failed(message, hint=params.reset_hint, citations=end.citations)
     came = f"after {plural(len(count.values), 'message')}, at {significant(last)}"
     message = f"the node ended {came}, before the counter could reset twice: {end.cause}"

@@ -570,18 +570,17 @@ def explain_operand(found: Traceback, package: PackageFacts) -> tuple[str, str] 
     if fields := fields_of(package, kind):
         value = f"{other or 'msg'}.{fields[0]}"
         value = value if kind == "String" or not of_text else f"str({value})"
-        return (
-            f"{other or 'one side'} is the whole message ({kind})",
-            f"write `{value}` instead of `{other or 'msg'}`",
-        )
+        whole = f"{other or 'one side'} is the whole message ({kind})"
+        return whole, f"write `{value}` instead of `{other or 'msg'}`"
     if not of_text:
         return None
+    if other and kind == "tuple":
+        fix = f"where {other} gets its value, write `%` instead of the comma behind the text"
+        return f"{other} is no text: a comma makes several values of it", fix
     if other:
         return f"{other} is not a string", f"write `str({other})` instead of `{other}`"
-    return (
-        f"{'an' if kind[0] in 'aeiou' else 'a'} {kind} is not a string",
-        "wrap it in `str(…)` before you add it to a string",
-    )
+    article = "an" if kind[0] in "aeiou" else "a"
+    return f"{article} {kind} is not a string", "wrap it in `str(…)` before you add it to a string"
 
 
 def _other_side(frame: Frame, *, is_right: bool) -> str:

@@ -55,7 +55,7 @@ KEYWORDS = (
     "anonymous", "log_level", "disable_signals", "argv", "queue_size", "latch", "tcp_nodelay", "headers", "callback",
     "callback_args", "buff_size", "subscriber_listener", "data_class", "oneshot", "timeout", "default",
 )  # fmt: skip
-"""Arguments of rospy's functions that are given by their names."""
+"""Arguments of rospy's functions that are given by their names, those of `init_node` first."""
 ATTRIBUTES = {
     "rospy": (
         *("init_node", "Publisher", "Subscriber", "Service", "ServiceProxy", "Rate", "Timer", "Time", "Duration"),
@@ -106,8 +106,7 @@ def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
         said = f"{wrong[2]} has {join_words(known[:ATTRIBUTES_SHOWN])}" if known else ""
         return said, hint or f"leave out `{wrong[1]}=`, or write the field that you mean"
     if wrong := _KEYWORD.search(found.message):
-        near = near_names(wrong[1], KEYWORDS)
-        return (f"it is called {near[0]}", f"write {near[0]}= instead of {wrong[1]}=") if near else None
+        return _other_argument(wrong[1], of_node="init_node" in found.message)
     is_import = found.kind in IMPORT_ERRORS
     return (_own_module(found, package) or _other_module(found, package)) if is_import else None
 
@@ -119,6 +118,14 @@ def _call_of_ros_2(name: str, source: str) -> tuple[str, str] | None:
     call = re.search(rf"[\w.]+\.{name}\({arguments}", source)
     written = call.expand(new) if call else re.sub(r"\\\d", "…", new)
     return f"`{name}` is from ROS 2", f"write `{written}` in place of that call"
+
+
+def _other_argument(name: str, *, of_node: bool) -> tuple[str, str]:
+    if near := near_names(name, KEYWORDS):
+        return f"it is called {near[0]}", f"write {near[0]}= instead of {name}="
+    moved = f"move `{name}=` from there into the brackets of `rospy.init_node(…)`"
+    is_misplaced = name in KEYWORDS[:4] and not of_node
+    return "it takes no such argument", moved if is_misplaced else f"leave out `{name}=`"
 
 
 def hiding_file(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:

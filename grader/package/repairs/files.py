@@ -105,19 +105,27 @@ def _repair_encoding(files: Files, script: SourceFile, data: bytes) -> bytes:
 
 
 def to_utf8(data: bytes) -> bytes:
-    """Return the bytes as UTF-8: from UTF-16, or from the encoding of Windows in western Europe."""
+    """Return the bytes as UTF-8: from UTF-16, or from the encoding of Windows in China or in western Europe."""
     if data.startswith(UTF16):
         text = data.decode("utf-16", "replace")
     else:
-        try:
-            text = data.decode("cp1252")
-        except UnicodeDecodeError:
-            text = data.decode("latin-1")
+        text = next(filter(None, (_decoded(data, one) for one in OLD_ENCODINGS)), "")
     lines = text.split("\n", 2)
     for number, line in enumerate(lines[:2]):
         if COOKIE.match(line):
             lines[number] = "# -*- coding: utf-8 -*-"
     return "\n".join(lines).encode()
+
+
+OLD_ENCODINGS = ("gb2312", "cp1252", "latin-1")
+"""In this order: accents mostly stand alone, and are no GB 2312 then, in which a character takes two of these bytes."""
+
+
+def _decoded(data: bytes, encoding: str) -> str:
+    try:
+        return data.decode(encoding)
+    except UnicodeDecodeError:
+        return ""
 
 
 def _repair_shebang(files: Files, script: SourceFile, text: str) -> None:
