@@ -409,9 +409,9 @@ def _at_rest_since(live: RunState, now_s: float) -> float | None:
 
 
 def computes(live: RunState, process: str) -> bool:
-    """Return whether a process works on and on, and changes nothing."""
+    """Return whether a process works on and on, and changes nothing, or sleeps in a loop before it is a node."""
     rest = live.at_rest.get(process)
-    return rest is not None and rest.kind in {"computes", "stuck"}
+    return rest is not None and rest.kind in {"computes", "stuck", "naps"}
 
 
 def is_unnamed(live: RunState, process: str) -> bool:
@@ -453,8 +453,7 @@ def _patience_s(live: RunState) -> float:
     talking = {live.owners.get(node) for node in live.talking} | _unused(live)
     patience = {
         "spins": LOOPING_S if live.naps else SPINNING_S,
-        "computes": COMPUTING_S,
-        "stuck": COMPUTING_S,
+        **dict.fromkeys(("computes", "stuck", "naps"), COMPUTING_S),
     }
     found = []
     for process in live.running:

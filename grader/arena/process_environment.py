@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice
@@ -231,13 +231,14 @@ class ProcessEnvironment:
 
     def has_line(
         self,
-        pattern: re.Pattern[bytes],
+        pattern: re.Pattern[bytes] | Callable[[bytes], object],
         script: str | None = None,
         *,
         programs: re.Pattern[bytes] | None = None,
     ) -> bool:
         """Return whether a script or a source file of the lab's packages has it, or this script of theirs; with
         `programs`, this one or a file that has nothing like that and may be imported."""
+        search = pattern.search if isinstance(pattern, re.Pattern) else pattern
         packages = (self.workspace, *self.workspace.others.values())
         folders = [one.repaired / one.folder for one in packages]
         own = [folder / script for folder in folders] if script is not None else []
@@ -245,7 +246,7 @@ class ProcessEnvironment:
         files = own if script is not None and programs is None else [*own, *islice(found, SOURCES_MAX)]
         texts = ((path, read_untrusted(path, SOURCE_BYTES_MAX) or b"") for path in files if path.is_file())
         return any(
-            pattern.search(text)
+            search(text)
             for path, text in texts
             if programs is None or path in own or not programs.search(text)
         )

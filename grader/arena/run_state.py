@@ -57,6 +57,8 @@ class RunState:
     """The package's programs sleep for times of their own or have timers, which may look like `spin()` from outside."""
     endless: frozenset[str] = frozenset()
     """The processes whose script has a loop that does nothing and never ends."""
+    sleeping: frozenset[str] = frozenset()
+    """Those whose script has one that sleeps and no more."""
     mute: frozenset[str] = frozenset()
     """Those whose script has a publisher, and nothing in it, or in what it may import, publishes."""
     serves: frozenset[str] = frozenset()
@@ -213,9 +215,10 @@ class RunState:
 
     def note_rest(self, process: str, rest: str | None, programs: int, now_s: float) -> None:
         """Take note that a process with so many programs has come to rest, of one kind or another, or moves again
-        (None). One that computes is at rest where it can have nothing else to do."""
+        (None). One that computes or sleeps is at rest where it can have nothing else to do."""
         known = self.at_rest.pop(process, None)
         if rest is not None and (rest != "computes" or process in self.endless):
+            rest = "loops" if rest == "naps" and process not in self.sleeping else rest
             # A rest goes on when its kind changes, and begins again with another program.
             same = known is not None and known.programs == programs
             since_s, lost_s = (known.since_s, known.lost_before_s) if known and same else (now_s, self.lost_s)

@@ -42,6 +42,20 @@ IDLE = re.compile(
     rb"^[ \t]*while\s*\(?\s*" + ENDLESS + rb"\s*\)?\s*:\s*(?:#[^\n]*\n\s*)*(?:pass|continue)\b", re.MULTILINE
 )
 """A loop that does nothing and never ends: `while True: pass`."""
+SLEEPS = rb"(?:print|rospy\.log\w+|[\w.]*sleep)\b[^\n;]*(?:\n|\Z)|[ \t]*(?:#[^\n]*)?\n"
+SLEEPING = re.compile(
+    rb"^([ \t]*)while\s*\(?\s*" + ENDLESS + rb"\s*\)?\s*:[ \t]*"
+    rb"(?:[\w.]*sleep\([^\n;]*(?:\n|\Z)|(?:#[^\n]*)?\n(?:\1[ \t]+" + SLEEPS + rb")+(?!\1[ \t]|[ \t]*[#\n]))",
+    re.MULTILINE,
+)
+"""One that sleeps, and no more."""
+
+
+def sleeps_elsewhere(text: bytes) -> bool:
+    """Return whether a source sleeps outside of such loops, too: then it may go on after its sleep."""
+    return NAPS.search(SLEEPING.sub(b"", text)) is not None
+
+
 # Of the run's time. A node's timer or sleep is late by one step at most.
 CLOCK_STEP_S = 0.05
 UNFOLLOWED_S = 2.0
@@ -157,6 +171,11 @@ def _tell_what_is_known(
     session.live.naps = place.has_line(NAPS)
     scripts = {spec["name"]: spec["script"] for _, spec in starts if spec["script"] is not None}
     session.live.endless = frozenset(s["name"] for _, s in starts if place.has_line(IDLE, s["script"]))
+    session.live.sleeping = frozenset(
+        s["name"]
+        for _, s in starts
+        if place.has_line(SLEEPING, s["script"]) and not place.has_line(sleeps_elsewhere, s["script"])
+    )
     session.live.mute = frozenset(
         name
         for name, path in scripts.items()

@@ -357,10 +357,15 @@ SERVICES: Mapping[str, list[tuple[str, str, str]]] = {
     "std_srvs/Trigger": [("response", "bool", "success"), ("response", "string", "message")],
 }
 MADE_UP, SENT = ", with messages made up for this run", ", with messages of the grader's"
-SAMPLES: Mapping[str, tuple[bool | float, ...]] = {
+SCAN: RubricEntry = {"header": {"stamp": "now", "frame_id": "laser"}, "range_max": 10.0}
+SAMPLES: Mapping[str, tuple[object, ...]] = {
     "std_msgs/Float32": (1.5, -2.25, 3.0),
     "std_msgs/Float64": (1.5, -2.25, 3.0),
     "std_msgs/Bool": (True, False, True),
+    "sensor_msgs/LaserScan": tuple(
+        SCAN | {"ranges": {"repeat": far_m, "count": 360}} for far_m in (5.0, 0.3, 5.0)
+    ),
+    "sensor_msgs/BatteryState": ({"percentage": 0.9}, {"percentage": 0.1}, {"percentage": 0.9}),
 }
 """What is sent to a node that does not print what it hears, and how soon it is to answer."""
 

@@ -525,7 +525,8 @@ def _other_value(
     other = next((v for v in first.values if any(differences(v, params.value, params.tolerance))), None)
     why = next(map(str, differences(other, params.value, params.tolerance)), "")
     seen = f"it is {shown(why)}" if first.values else f"it is not there ({first.fault})"
-    hint = f"{params.field} has to be {params.words} when you publish"
+    where = f"in the {params.when} message that" if params.when in {"first", "last"} else "when"
+    hint = f"{params.field} has to be {params.words} {where} you publish"
     own = sent_by(run, params.topic, params.of)
     beside = "" if other else set_beside(own, first.time_ns, params.field, params.value, params.tolerance)
     if beside:

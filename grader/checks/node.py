@@ -34,7 +34,7 @@ from grader.checks.support.processes import (
     wrong_name,
 )
 from grader.checks.support.text import ANONYMOUS, INIT, LOOP, both
-from grader.checks.support.topics import cite
+from grader.checks.support.topics import cite, run_slip
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
@@ -148,6 +148,9 @@ def _nameless(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdic
     message, hint = "no node was registered, so there is no name", f"call {INIT}"
     one = life(run, params.process)
     if one is None or not one.ended_early:
+        slip = run_slip(package, run, "never-reached")
+        if slip is not None and "init_node" in slip.message:
+            message, hint = f"no node was registered: {slip.message}", slip.fix
         return unjudged(message, measured="no node", hint=hint)
     end = explain_end(one, run, package)
     message = f"{_script(one)} ended by itself after {one.lasted}, before it was a node: {end.cause}"

@@ -47,7 +47,7 @@ class PythonSlip(Placed, Record):
     - `no-init`: a script with topics, or that does more than define names, never calls `init_node`.
     - `never-called`: a function that makes a node, publishes or waits, and that nothing calls.
     - `main-guard`: `__name__` is compared with another word than `__main__`.
-    - `never-reached`: an endless loop before the first `publish(…)`.
+    - `never-reached`: an endless loop before the first `init_node(…)` or `publish(…)`.
     - `spin-in-loop`: a loop that publishes and waits in `spin()`.
     - `loop-left`: a loop that ends in its first turn, or after a number of them, or a callback that ends the node, or
       the only `publish(…)`, above a loop that waits; `name` is the function that it asks, where a `not` is missing.

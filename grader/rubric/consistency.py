@@ -18,7 +18,7 @@ from grader.rubric.fault_words import model_faults
 from grader.rubric.model import ManualParams
 from grader.rubric.references import reference_faults
 from grader.rubric.scenario import ROSTEST_ENDING
-from grader.rubric.step_faults import empty_in, of_type, private, served_faults, slash, step_faults
+from grader.rubric.step_faults import call_faults, empty_in, private, served_faults, slash, step_faults
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
@@ -307,9 +307,10 @@ def scenario_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
     yield from _starts(path, scenario)
     yield from _params(path, scenario)
     yield from _probes(path, scenario)
+    types: dict[str, str] = {}
     for index, call in as_maps(scenario.get("calls")):
         yield from slash((*path, "calls", index, "service"), call.get("service"), "a service")
-        yield from of_type((*path, "calls", index), call)
+        yield from call_faults((*path, "calls", index), call, types)
     yield from served_faults(path, scenario)
     yield from step_faults(path, scenario)
     yield from _until((*path, "until"), as_map(scenario.get("until")), scenario)

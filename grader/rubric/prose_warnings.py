@@ -10,6 +10,7 @@ from typing import Any
 from grader.checks.support.fields import is_number
 from grader.model.message_definitions import BUILT_IN
 from grader.rubric.message_fields import said_types
+from grader.rubric.simulators import topics_of_programs
 from grader.rubric.spelling import is_slip, topics_in
 from grader.rubric.yaml_lines import (
     Fault,
@@ -159,6 +160,8 @@ def _unsaid_topic(rubric: WrittenRubric) -> Iterator[Fault]:
     named = {text for key, part in rubric.data.items() if key != "handout" for _, text in texts_in((), part)}
     used = {word for text in named for word in re.findall(r"(?<![\w.])/[\w/]*\w", text)}
     used |= {f"/{text}" for text in named}  # a node's
+    # A simulator has topics that students use and no criterion reads, and others that only criteria read.
+    used |= {topic for scenario in rubric.scenarios.values() for topic in topics_of_programs(scenario)}
     others = [
         name for name in dict.fromkeys(re.findall(r"`(/[\w/]*\w)`", rubric.handout)) if name not in used
     ]

@@ -210,6 +210,9 @@ def _near_topic(topic: str, scenario: dict[str, Any]) -> str:
     """Return the topic of one of the scenario's programs for which this one stands; "" where it is none of theirs."""
     topics = topics_of_programs(scenario)
     if topic not in topics:
+        _, node, last = f"{topic}//".split("/", 2)  # its topics do not begin with the program's name
+        if node in {program.node for program in PROGRAMS.values()} and f"/{last.rstrip('/')}" in topics:
+            return f"/{last.rstrip('/')}"
         others = [one for one in topics if re.sub(r"\d+", "1", topic) != one]  # /turtle2/pose is another's
         return closest(topic, others, cutoff=SURE)
     values = {str(one.get("name")).strip("/"): one.get("value") for _, one in set_in(scenario)}

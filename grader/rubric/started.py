@@ -14,8 +14,17 @@ from grader.rubric.definitions import slip_of
 from grader.rubric.scenario import ROSTEST_ENDING
 from grader.rubric.simulators import PROGRAMS, asked_topics
 from grader.rubric.spelling import PROSE, is_slip
-from grader.rubric.yaml_lines import Fault, KeyPath, WrittenRubric, as_maps, as_texts, starts_of, texts_in
-from grader.wording import did_you_mean, join_words
+from grader.rubric.yaml_lines import (
+    Fault,
+    KeyPath,
+    WrittenRubric,
+    as_map,
+    as_maps,
+    as_texts,
+    starts_of,
+    texts_in,
+)
+from grader.wording import did_you_mean, join_words, plural
 
 KINDS_OF_FILES = ("script", "launch", "load")
 OPEN_ENDINGS = (".launch", ".xml", ROSTEST_ENDING)
@@ -117,6 +126,7 @@ def _is_own(topic: str, program: str) -> bool:
 
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")
 OPTION = re.compile(r"(--?([A-Za-z]\w*))(?:(:?=)(.*))?")
+_PLAIN = re.compile(r"(([A-Za-z]\w*))(=)(.*)")
 SPECIAL = ("__name", "__ns", "__log", "__ip", "__hostname", "__master")
 
 
@@ -147,6 +157,7 @@ def argument_faults(scenario: dict[str, Any], rubric: WrittenRubric) -> Iterator
 def argument_warnings(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield private parameters that nothing else in the rubric names, decimal numbers with a comma, and options where
     parameters may be meant."""
+    yield from _plain_arguments(rubric)
     known = _known(rubric)
     # A handout that writes private parameters with ~ has them all so.
     named = known.params if re.search(r"~\w", rubric.handout) else known.params | known.words
@@ -156,15 +167,41 @@ def argument_warnings(rubric: WrittenRubric) -> Iterator[Fault]:
             at = (*place, "args", number)
             if re.fullmatch(r"-?\d+,\d+", value):
                 yield at, f"ROS reads {value} as text: a decimal number has a point, no comma"
-            elif start.get("script") and (option := OPTION.fullmatch(text)):
-                is_said = any(option[1] in one for path, one in rubric.texts if "args" not in path)
+            elif start.get("script") and (option := OPTION.fullmatch(text) or _PLAIN.fullmatch(text)):
+                words = option[1] if text.startswith("-") else f"{option[1]}="
+                is_said = any(words in one for path, one in rubric.texts if "args" not in path)
                 if not is_said and (option[3] or option[2] in known.params):
                     fault = f"sets no parameter of a node, as _{option[2]}:={option[4] or '…'} does"
-                    yield at, f"{fault}: if the script reads {option[1]} itself, say so in the handout"
+                    yield at, f"{fault}: if the script reads {words} itself, say so in the handout"
             elif start.get("script") and re.match(r"_(?!_)\w+:=", text) and name[1:] not in named:
                 said = join_words([f"~{one}" for one in sorted(known.params)])
                 fault = f"nothing else in the rubric names ~{name[1:]}"
                 yield at, f"{fault}: it has {said}" if said else fault
+
+
+def _plain_arguments(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield a start with fewer or more plain arguments than all others of its script have, and requests whose fields
+    are in another order than the arguments that they come from."""
+    given: dict[KeyPath, tuple[str, list[str]]] = {}
+    for place, start in rubric.starts():
+        plain = [
+            text for _, text in as_texts(start.get("args")) if ":=" not in text and not OPTION.fullmatch(text)
+        ]
+        given[place] = str(start.get("script")), plain
+    for place, (script, plain) in given.items():
+        others = [len(one) for at, (other, one) in given.items() if other == script != "None" and at != place]
+        if len(others) > 1 and len({*others}) == 1 and len(plain) != others[0] and plain:
+            fault = f"has {plural(len(plain), 'argument')}, and the other starts of {script} have {others[0]}"
+            yield (*place, "args"), fault
+    for criterion in rubric.criteria:
+        asked = as_map(criterion.given.get("expect")) if criterion.check == "calls" else {}
+        made_up = {key: as_map(value).get("made_up") for key, value in asked.items()}
+        wanted = [f"{{made_up: {name}}}" if (name := made_up[key]) else str(asked[key]) for key in asked]
+        for place, (_, plain) in given.items():
+            is_here = place[1] == criterion.run and len({*wanted}) == len(wanted) > 1
+            if is_here and {*wanted} <= {*plain} and [one for one in plain if one in wanted] != wanted:
+                fault = f"has {', '.join(asked)} in another order than the arguments of {place[1]}"
+                yield (*criterion.at, "expect"), f"{fault}, {' '.join(plain)}: is that meant?"
 
 
 def _blanks(text: str) -> str:

@@ -125,7 +125,7 @@ def _faults_of(at: KeyPath, kind: str, given: dict[str, Any], types: dict[str, s
     if kind == "publish":
         yield from _publish(at, given, types)
     elif kind == "call":
-        yield from of_type(at, given)
+        yield from call_faults(at, given, types)
     elif kind == "action":
         yield from _action(at, given, types)
     elif kind == "wait":
@@ -137,6 +137,14 @@ def _faults_of(at: KeyPath, kind: str, given: dict[str, Any], types: dict[str, s
     elif kind == "play":
         for number, topic in as_texts(given.get("topics")):
             yield from slash((*at, "topics", number), topic, "a topic")
+
+
+def call_faults(at: KeyPath, given: dict[str, Any], types: dict[str, str]) -> Iterator[Fault]:
+    """Yield the faults of a call. `types` are those of the services that earlier ones call."""
+    name, asked = str(given.get("service")), given.get("type")
+    if asked is not None and types.setdefault(name, asked) != asked:
+        yield (*at, "type"), f"an earlier call of {name} has {types[name]}: a service has one type"
+    yield from of_type(at, given)
 
 
 def _action_name(at: KeyPath, given: dict[str, Any]) -> Iterator[Fault]:

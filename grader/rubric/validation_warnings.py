@@ -6,6 +6,7 @@ Names that one line alone has are in `spelling.py`.
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import PurePosixPath
@@ -13,7 +14,7 @@ from typing import Any
 
 from grader.checks.support.fields import is_number
 from grader.rubric.prose_warnings import prose_warnings
-from grader.rubric.simulators import topics_of_programs
+from grader.rubric.simulators import robot_of, topics_of_programs
 from grader.rubric.started import argument_warnings
 from grader.rubric.step_faults import count_causes
 from grader.rubric.yaml_lines import (
@@ -76,6 +77,7 @@ def warnings(rubric: WrittenRubric) -> Iterator[Fault]:
     for criterion in rubric.criteria:
         yield from _hard(criterion)
         yield from _easy(criterion)
+        yield from _there_already(criterion)
         if criterion.check == "connected":
             yield from _process_for_node(criterion, rubric)
     yield from prose_warnings(rubric)
@@ -136,18 +138,26 @@ def _of_the_build(rubric: WrittenRubric) -> Iterator[Fault]:
                 yield path, "is asked for at run time, and only the build needs it: write message_runtime"
 
 
-PATTERN = re.compile(r"\.[*+]|\\[dws]|^/.*/$|^\^.*\$$")
+PATTERN = re.compile(r"\.[*+]|\\[dws]|^/.*/$|^\^.*\$$|\[(?:0-9|a-z|A-Z)\]")
+
+
+LETTERS = {"field-equals": ("value", "values"), "logs": ("text",), "prints": ("text",)}
+"""By check, the keys of texts that are compared letter by letter."""
 
 
 def _patterns(rubric: WrittenRubric) -> Iterator[Fault]:
-    """Yield values of fields that look like a pattern: they are compared letter by letter."""
+    """Yield texts that look like a pattern: they are compared letter by letter."""
     for criterion in rubric.criteria:
-        for key in ("value", "values"):
+        for key in LETTERS.get(criterion.check, ()):
             for at, text in texts_in((key,), criterion.given.get(key)):
-                is_one = criterion.check == "field-equals" and PATTERN.search(text)
                 # A topic or a path is no pattern, though it begins and ends with a slash.
-                if is_one and not re.fullmatch(r"(/\w+)+/?", text):
+                if PATTERN.search(text) and not re.fullmatch(r"(/\w+)+/?", text):
                     yield (*criterion.at, *at), "is compared letter by letter: it is no pattern"
+                elif criterion.check == "logs" and re.search(r"\{\w*\}", text):
+                    yield (
+                        (*criterion.at, *at),
+                        "is compared letter by letter: prints has {number}, logs has not",
+                    )
 
 
 def _words(name: str) -> set[str]:
@@ -377,6 +387,20 @@ def _easy(criterion: WrittenCriterion) -> Iterator[Fault]:
         if is_number(lasting_s) and within_s >= lasting_s:
             fault = f"the run's window is {lasting_s:g} s: the time of the first message passes for all"
             yield (*at, "within_s"), fault
+
+
+def _there_already(criterion: WrittenCriterion) -> Iterator[Fault]:
+    """Yield a goal so near to the start that a robot of the robot world that never moves has reached it."""
+    given, start = criterion.given, robot_of(criterion.scenario).get("start")
+    goal, off_m = given.get("goal"), given.get("tolerance_m")
+    if criterion.check != "ends-at" or not isinstance(start, list) or not isinstance(goal, list):
+        return
+    numbers = [*start[:2], *goal[:2]]
+    if len(numbers) == 4 and all(map(is_number, [*numbers, off_m])) and not given.get("relative"):
+        away_m = math.dist(numbers[:2], numbers[2:])
+        if off_m is not None and 0 < away_m <= off_m:
+            fault = f"the robot starts {away_m:.3g} m from the goal: one that never moves passes"
+            yield (*criterion.at, "tolerance_m"), fault
 
 
 def _silent_anyway(rubric: WrittenRubric) -> Iterator[Fault]:

@@ -106,6 +106,7 @@ def test_only_programs_that_start_no_other_count_as_last() -> None:
             {None},
         ),  # it may be loading something
         ("import time\nwhile True: time.sleep(0.1)", {"loops"}),
+        ("import time\nwhile True: time.sleep(0.9)", {"naps"}),
     ],
 )
 def test_who_works_in_the_same_memory_computes(program: str, kinds: set[str | None]) -> None:
@@ -134,6 +135,7 @@ WAITING = {
         f"threading.Thread(target=lambda: [threading.Event().wait(0.5) for _ in range(99)]).start()\n{TWICE}",
         "loops",
     ),
+    "in one long sleep": ("time.sleep(100)", None),
     "with a limit": ("threading.Event().wait(100)", None),
     "for itself, a thread with a limit": (f"{IN_TIME}\n{TWICE}", None),
     "for itself, a thread that works": (f"{WAITS}\n{TWICE}", None),

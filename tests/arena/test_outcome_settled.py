@@ -188,6 +188,18 @@ def test_who_computes_before_it_is_a_node_is_no_longer_starting() -> None:
     assert find_outcome(live, until, 3.0) == ("silent", "the graph has settled, without /a")
 
 
+def test_who_sleeps_in_a_loop_before_it_is_a_node_is_not_waited_for() -> None:
+    """Where its script has no loop that only sleeps, it may yet become a node."""
+    live, until = RunState(), Until(messages={"/a": 10})
+    live.note_start("node", 0.0, helper=False)
+    live.note_rest("node", "naps", 1, 2.0)
+    assert find_outcome(live, until, 19.0) is None
+    live.sleeping = frozenset({"node"})
+    live.note_rest("node", "naps", 1, 2.0)
+    assert find_outcome(live, until, 2.4) is None
+    assert find_outcome(live, until, 2.6) == ("silent", "the graph has settled, without /a")
+
+
 @pytest.mark.parametrize(
     ("rest", "messages", "until", "silent_s"),
     [
@@ -335,7 +347,7 @@ def test_a_client_that_is_no_node_is_not_waited_for_where_nobody_offers_its_serv
 def test_who_asked_for_a_service_before_init_node_may_become_a_node() -> None:
     live, until = _resting(server=("spins", 1)), Until(nodes=2)
     live.note_start("client", 4.0, helper=False)
-    live.note_rest("client", "naps", 1, 5.0)
+    live.note_rest("client", "loops", 1, 5.0)
     live.services, live.sought["/unnamed"] = {"/clamp"}, {"/clamp"}
     assert starting(live, until, 9.0) == {"client"}
     live.services = set()

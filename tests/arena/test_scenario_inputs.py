@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from grader.arena.process_environment import TEXT_BYTES_MAX, ProcessEnvironment
-from grader.arena.scenario import set_params
+from grader.arena.scenario import SLEEPING, set_params, sleeps_elsewhere
 from grader.arena.scenario_inputs import FILE_BYTES_MAX, made_up, make_shots
 from grader.arena.static_recorder import (
     ATTACHED_BYTES_MAX,
@@ -151,3 +151,31 @@ def test_what_is_read_is_a_regular_file_and_no_longer_than_the_limit(tmp_path: P
         stream.truncate(1 << 40)
     assert read_untrusted(file, 100) == bytes(100)
     assert read_untrusted(tmp_path, 100) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "only_sleeps"),
+    [
+        ("while True:\n    time.sleep(1)\nrospy.init_node('a')\n", True),
+        (
+            "def f():\n    while not rospy.is_shutdown():\n        print('x')\n\n        rospy.sleep(1)\n    g()\n",
+            True,
+        ),
+        ("while 1: sleep(1)", True),
+        ("while True:\n    # not yet\n    time.sleep(1)\n# now\n\nrospy.spin()\n", True),
+        ("while True:\n    time.sleep(1)\n\n\n    work()\n", False),
+        ("while True:\n    time.sleep(1)\n# and\n    work()\n", False),
+        ("while True: time.sleep(1); work()\n", False),
+        ("while not ready:\n    time.sleep(1)\n", False),
+        ("while True:\n    pub.publish(1)\n    rate.sleep()\n", False),
+    ],
+)
+def test_a_loop_that_only_sleeps_is_known_by_its_lines(text: str, only_sleeps: bool) -> None:
+    assert bool(SLEEPING.search(text.encode())) == only_sleeps
+
+
+def test_who_sleeps_elsewhere_too_may_go_on() -> None:
+    """A node that waits for five seconds at its start, and sleeps at its end in place of `rospy.spin()`."""
+    end = "while not rospy.is_shutdown():\n    rospy.sleep(1)\n"
+    assert not sleeps_elsewhere(f"while True: time.sleep(1)\nrate.sleep()\n{end}".encode())
+    assert sleeps_elsewhere(f"for i in range(5):\n    time.sleep(1)\nrospy.init_node('a')\n{end}".encode())

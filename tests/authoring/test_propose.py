@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from grader.authoring.mutation.faulty_packages import mutants_text
 from grader.authoring.propose import Proposal, assign_points
 from grader.authoring.rubric_draft import (
+    SAMPLES,
     Parts,
     answers_to,
     find_parts,
@@ -20,6 +21,7 @@ from grader.authoring.rubric_draft import (
     observe,
     rubric_text,
     second_look,
+    step_for,
     wraps_of,
 )
 from grader.evidence.reader import package_facts
@@ -27,6 +29,7 @@ from grader.evidence.run import Run
 from grader.model.mutants import LostCriterion, Mutant, MutantResult
 from grader.model.package import Interface, InterfaceField
 from grader.rubric.load import load_rubric
+from grader.rubric.step_faults import step_faults
 from tests.report.nasty import STEERING, TEXTS, TO_A_CI
 from tests.support.timeline import build_runs
 
@@ -121,6 +124,22 @@ def test_a_node_that_failed_is_named_in_a_note(tmp_path):
     path.write_text(text)
     assert "# NOTE: src/node.py was not observed" in text
     assert load_rubric(str(path)).rubric.max_points == 100
+
+
+def test_a_script_with_its_packages_name_is_noted() -> None:
+    """Python finds the script in place of the package with the messages."""
+    line = "ModuleNotFoundError: No module named 'node.msg'; 'node' is not a package"
+    runs = build_runs({"runs": {"node": {"processes": [{**LIVES, "exit_s": 1, "exit_code": 1, "stopped_by": None}],
+                                         "console": [{"process": "node", "stream": "stderr", "line": line}],
+                                         "graph": []}}, "package": {}})  # fmt: skip
+    parts = Parts(nodes={"node": "src/node.py"}, launches={})
+    proposal = Proposal(package_facts(runs["package"]), parts, {"node": observe(runs["node"])}, runs)
+    assert "the script has the package's name, and Python finds it first" in proposal.notes[0]
+
+
+@pytest.mark.parametrize("kind", SAMPLES)
+def test_what_is_sent_to_a_node_fits_its_type(kind: str) -> None:
+    assert list(step_faults((), {"steps": [step_for("/heard", kind)]})) == []
 
 
 def test_a_build_that_failed_is_noted_first() -> None:
@@ -236,7 +255,15 @@ def test_a_service_of_the_packages_own_is_called_and_its_client_answered() -> No
     assert (served.service, served.answer, served.definition) == ("/convert", {"result": 1.5}, text)
 
     asked = {"unit": "inch", "value": 2}
-    answers = [{"action": "answer", "topic": "/convert", "value": {"result": v}} for v in (8.89, 16.51)]
+    answers = [
+        {"at_s": at_s, "action": action, "topic": "/convert", "value": {"result": value}}
+        for at_s, action, value in (
+            (1, "call", 0),
+            (1.1, "answer", 8.89),
+            (2, "call", 0),
+            (2.1, "answer", 16.51),
+        )
+    ]
     served_it = [{"action": "serve", "actor": "/client", "topic": "/convert",
                   "value": {"request": asked, "response": {"result": 1.5}}}]  # fmt: skip
     said = [{"process": "node", "stream": "stdout", "line": "2 inch is 1.50 cm"}]
@@ -246,6 +273,10 @@ def test_a_service_of_the_packages_own_is_called_and_its_client_answered() -> No
     proposal = Proposal(facts, parts, seen, runs)
     judged = {one["check"]: one.get("with", {}) for one in proposal.criteria}
     assert judged["service-answers"]["expect"] == [{"result": 8.89}, {"result": 16.51}]
+    assert [call["limit_s"] for call in proposal.scenarios["node-asked"]["calls"]] == [2, 2]
+    later = [{**one, "at_s": 9} if one["at_s"] == 2.1 else one for one in answers]
+    slow = Proposal(facts, parts, seen, runs | {"node-asked": run_of(actors=later)})
+    assert not any("limit_s" in call for call in slow.scenarios["node-asked"]["calls"])
     assert judged["calls"]["expect"] == [asked]
     assert judged["prints"]["text"] == "{number} inch is {number} cm"
     assert judged["prints"]["numbers"] == [2, 1.5]

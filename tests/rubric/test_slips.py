@@ -93,6 +93,27 @@ def test_what_may_be_a_slip_is_a_warning(examples: Path, slip: dict[str, str]) -
     assert warnings_of(load_rubric(str(path)), path.name) == [f"spoiled.yaml:{slip['warning']}"]
 
 
+@pytest.mark.parametrize(
+    ("name", "text", "new", "why"),
+    [
+        ("battery", "battery low,", '"battery low.*",', "it is no pattern"),
+        ("service-own-type", '"refused:"', '"^refused:$"', "it is no pattern"),
+        ("battery", "battery low,", '"battery low: {number}",', "prints has {number}, logs has not"),
+    ],
+)
+def test_a_text_is_no_pattern(examples: Path, name: str, text: str, new: str, why: str) -> None:
+    path = _spoiled(examples, name, f"text: {text}", f"text: {new}")
+    found = warnings_of(load_rubric(str(path)), path.name)
+    assert any(f"with.text: is compared letter by letter: {why}" in one for one in found)
+
+
+def test_calls_of_one_service_have_one_type(examples: Path) -> None:
+    old = "type: own_service/Clamp, request: {value: -3"
+    path = _spoiled(examples, "service-own-type", old, old.replace("Clamp", "Clip"))
+    fault = "scenarios.server.calls[1].type: an earlier call of /clamp has own_service/Clamp: a service has one type"
+    assert f"spoiled.yaml:21: {fault}" in faults(path)
+
+
 @pytest.mark.parametrize("path", sorted(rubrics_folder().rglob("*.yaml")), ids=lambda path: path.stem)
 def test_a_rubric_of_the_graders_own_loads_without_a_word(path: Path) -> None:
     assert warnings_of(load_rubric(str(path)), path.name) == []
@@ -127,6 +148,11 @@ def test_an_example_has_sixty_lines_at_most(path: Path) -> None:
         # the field has another unit than the handout's range, or the handout has its range, too
         ("own-message", "10 to 30", "1 to 3 % of the temperature"),
         ("own-message", "10 to 30", "1 to 3 by the temperature; it is 10 to 30"),
+        # a simulator has topics that only students use
+        ("follow-wall", "looks at /scan", "looks at `/scan`"),
+        # points and dashes are in many texts, and a parameter is no plain argument
+        ("go-to-goal", "goal reached:", "goal... [reached] - "),
+        ("service-client", '["1", "2"]', '["1", "2", "_wait:=true"]'),
     ],
 )
 def test_what_looks_like_a_slip_and_is_none_is_accepted(

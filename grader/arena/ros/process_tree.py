@@ -178,6 +178,8 @@ ASLEEP_S = 0.8
 WORKING = 0.4
 # Twice a second, with room for what a callback or a log message wakes.
 SPIN_HZ = 3.2
+TURNS, TURNS_S = 3, 3.0
+"""A program of one thread, so no node, that sleeps again and again: so many times, for so long."""
 COMPUTES_S, STUCK_S = 0.6, 5.0
 """CPU seconds in one stretch, without new memory: so many, and a program computes; so many, and it does only that."""
 GROWS = 25
@@ -205,6 +207,7 @@ class Rest:
         self._used_s, self._pages = 0.0, 0
         self._naps = {}
         self._awake = {}
+        self._turns, self._turning_s = 0, now_s
 
     def look(self, now_s, used_s, pages):
         """`used_s` are the CPU seconds that the program has used so far, `pages` those of its memory that it
@@ -232,13 +235,20 @@ class Rest:
             rarely = wakes - self._wakes_before <= SPIN_HZ * (now_s - self.since_s) + 1
             self.spins = not (self._napping or sleeps) and (rarely or self._only_callbacks)
         grows = pages - self._pages > GROWS
+        if working or grows or len(threads) > 1 or not _naps(self._pid, self._pid):
+            self._turns, self._turning_s = 0, now_s
+        else:
+            self._turns += wakes != self._wakes
         self.computed_s = self.computed_s + used_s - self._used_s if working and not grows else 0.0
         self._used_s, self._pages, self._late_s = used_s, pages, late_s
         self._wakes, self._looked_s = wakes, now_s
 
     @property
     def kind(self):
-        """Return `spins`, `loops`, `computes`, `stuck` (it has computed for long), or None where it is not at rest."""
+        """Return `spins`, `loops`, `naps` (it loops, and is no node), `computes`, `stuck` (it has computed for
+        long), or None where it is not at rest."""
+        if self._turns >= TURNS and self._looked_s - self._turning_s >= TURNS_S:
+            return "naps"
         if self.since_s is not None:
             return "spins" if self.spins else "loops"
         return (
@@ -275,7 +285,7 @@ class Rest:
         return bool(naps), any(now_s - since_s > ASLEEP_S for _, since_s in naps.values())
 
 
-KINDS = (None, "computes", "stuck", "loops", "spins")
+KINDS = (None, "computes", "stuck", "naps", "loops", "spins")
 """The kinds of rest: a tree's is the first of these that one of its programs has."""
 
 

@@ -81,12 +81,12 @@ def nanoseconds_apart(call):
     return parts[0] + parts[1] * 1e-9
 
 
-MAKES = ("Publisher", "Subscriber", "Service")
+MAKES = ("init_node", "Publisher", "Subscriber", "Service")
 
 
 def never_reached(tree):
-    """Loops without an end before the first `publish(…)`, `Publisher(…)` and the like that comes behind them in the
-    same block, in a function or class of this file too; so is a `spin()`, in what a statement of the block calls as well.
+    """Loops without an end before the first `init_node(…)`, `publish(…)` and the like that comes behind them in the
+    same block, in a function or class of this file too; so is a `spin()`, in what a statement calls as well.
     """
     parts = all_of(tree, ast.FunctionDef, ast.ClassDef)
     own = {n.name for n in parts if calls_in(n, *MAKES)}
