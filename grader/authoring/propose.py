@@ -10,11 +10,9 @@ from grader.authoring.rubric_draft import (
     ANSWERED,
     ANSWERS_S,
     ASKED,
-    INTEGER_PROBES,
     MADE_UP,
     SENT,
-    STRING,
-    TEXT_PROBES,
+    WAIT,
     Observed,
     Parts,
     RubricEntry,
@@ -33,6 +31,7 @@ from grader.authoring.rubric_draft import (
     rubric_text,
     second_look,
     serves_of,
+    start_alone,
     step_for,
     wraps_of,
 )
@@ -132,9 +131,8 @@ class Proposal:
     def _node(self, name: str, script: str, seen: Observed) -> None:
         file = PurePosixPath(script).name
         requires: list[str] = []
-        if (
-            script.endswith(".py") and script not in self._installed_scripts()
-        ):  # which needs no executable bit
+        # One that is installed needs no executable bit.
+        if script.endswith(".py") and script not in self._installed_scripts():
             requires = [
                 self._add(
                     f"{name}-executable", f"{file} can be run", "executable", {"path": script},
@@ -146,8 +144,7 @@ class Proposal:
             needs = "" if "No module named" in why else ": does it need parameters or another node?"
             self.notes.append(f"{script} was not observed ({why}){needs}")
             return
-        served = self._runs.get(f"{name}-served")
-        if served:
+        if served := self._runs.get(f"{name}-served"):
             self._client(name, file, served, requires)
             return
         self._scenario(name, seen)
@@ -167,15 +164,14 @@ class Proposal:
         """What a service was seen to answer."""
         scenario = f"{name}-asked"
         run = self._runs.get(scenario)
-        answers = (
-            [e.value for _, e in run.actors if (e.action, e.topic) == ("answer", service)] if run else []
-        )
+        actors = run.actors if run else ()
+        answers = [e.value for _, e in actors if (e.action, e.topic) == ("answer", service)]
         if not answers or None in answers:
             call = f"- call: {{service: {service}, type: {kind}, request: {self._request(kind)}}}"
             self.notes.append(f"what {service} answers is not covered: a step can call it, {call}")
             return
         calls = calls_of(self._seen[name], self._facts.interfaces)
-        self.scenarios[scenario] = self._alone(name, ASKED, calls=calls, until={"nodes": 1})
+        self.scenarios[scenario] = start_alone(self._parts, name, ASKED, calls=calls, until={"nodes": 1})
         parameters = {"service": service, "expect": list(map(plain_fields, answers))}
         if len(answers) > 1 and all(answer == answers[0] for answer in answers):
             self.notes.append(
@@ -188,7 +184,9 @@ class Proposal:
     def _client(self, name: str, file: str, run: Run, requires: list[str]) -> None:
         """What a program asks of a service of the package's, and prints of its answer."""
         scenario, serves = f"{name}-served", serves_of(name, self._seen, self._facts.interfaces)
-        self.scenarios[scenario] = self._alone(name, ANSWERED, serves=serves, until={"quiet_s": 2})
+        self.scenarios[scenario] = start_alone(
+            self._parts, name, ANSWERED, serves=serves, until={"quiet_s": 2}
+        )
         for served in serves:
             service, answer = served["service"], served["answer"]
             asked = [e.value["request"] for _, e in run.actors if (e.action, e.topic) == ("serve", service)]
@@ -207,10 +205,8 @@ class Proposal:
     def _request(self, kind: str) -> str:
         """Return a request of a service of the package's own, as it can be written in a step."""
         path = f"srv/{kind.rpartition('/')[2]}.srv"
-        fields = [
-            f.name for i in self._facts.interfaces if i.path == path for f in i.fields if f.part == "request"
-        ]
-        return f"{{{', '.join(f'{name}: …' for name in fields)}}}"
+        own = (field for one in self._facts.interfaces if one.path == path for field in one.fields)
+        return f"{{{', '.join(f'{field.name}: …' for field in own if field.part == 'request')}}}"
 
     def _words(self, name: str, file: str, seen: Observed, node: str) -> None:
         """What it logs and which parameters it shows."""
@@ -221,16 +217,6 @@ class Proposal:
             names = {"names": list(seen.read)}
             self._add(f"{name}-reads", f"{file} shows the parameters", "params-read", names, **needs)
 
-    def _alone(self, name: str, words: str, *, clock: str = "", **how: object) -> RubricEntry:
-        """Return a scenario that starts one node, with the package's own parameters set before; `words` follow its
-        file's name in the title."""
-        script = self._parts.nodes[name]
-        scenario: RubricEntry = {"title": f"{PurePosixPath(script).name}{words}"}
-        if self._parts.configs:
-            scenario["params"] = [{"file": path} for path in self._parts.configs]
-        scenario |= {"clock": clock} if clock else {}
-        return {**scenario, "start": [{"name": name, "script": script}], **how}
-
     def _scenario(self, name: str, seen: Observed) -> None:
         periodic = [t.name for t in seen.topics if t.rate_hz]
         until: RubricEntry = (
@@ -238,7 +224,7 @@ class Proposal:
         )
         if seen.ended:
             until = {"quiet_s": 2}
-        self.scenarios[name] = self._alone(name, " in real time", until=until)
+        self.scenarios[name] = start_alone(self._parts, name, " in real time", until=until)
 
     def _life(self, name: str, script: str, seen: Observed, requires: list[str]) -> str:
         anonymous = "required" if seen.anonymous else "allowed"
@@ -303,7 +289,9 @@ class Proposal:
             last, first = wrap
             words = f" with a fast clock, {WRAPS} times around"
             until = {"messages": {topic.name: WRAPS * (last - first + 1) + 2}}
-            self.scenarios[f"{name}-fast"] = self._alone(name, words, clock="warped", until=until)
+            self.scenarios[f"{name}-fast"] = start_alone(
+                self._parts, name, words, clock="warped", until=until
+            )
             needs["scenario"] = f"{name}-fast"
         title, start = f"The counter begins with {topic.counts_from}", {**about, "start": topic.counts_from}
         self._add(f"{label}-start", title, "counter-start", start, **needs)
@@ -322,8 +310,10 @@ class Proposal:
         if not heard:
             return
         scenario = f"{name}-hears"
-        probes = [_probe(topic, found[topic]) for topic in heard]
-        self.scenarios[scenario] = self._alone(name, MADE_UP, probes=probes, until={"heard": True})
+        probes = [probe_for(topic, found[topic]) for topic in heard]
+        self.scenarios[scenario] = start_alone(
+            self._parts, name, MADE_UP, probes=probes, until={"heard": True}
+        )
         for topic, template in heard.items():
             parameters = {"topic": topic} | ({"template": template} if template != "{value}" else {})
             id_ = f"{name}-hears-{label_of(topic)}"
@@ -353,8 +343,7 @@ class Proposal:
                 title = f"{PurePosixPath(script).name} publishes on {answer} after each message on {topic}"
                 self._add(id_, title, "reacts", parameters, scenario=scenario, requires=requires)
         if steps:
-            wait = {"wait": {"seconds": ANSWERS_S}}
-            self.scenarios[scenario] = self._alone(name, SENT, steps=[*steps, wait])
+            self.scenarios[scenario] = start_alone(self._parts, name, SENT, steps=[*steps, WAIT])
 
     def _launch(self, name: str, launch: str, seen: Observed) -> None:
         file = next(f for f in self._facts.launch_files if PurePosixPath(f.path).name == launch)
@@ -380,20 +369,14 @@ class Proposal:
         nodes = {str(n.name): str(n.pkg) for n in others}
         ours = [str(n.name) for n in file.nodes if n.pkg == self._facts.name]
         if len(ours) > len(own):  # one script is several nodes
-            nodes |= {
-                f"/{one}": self._facts.name for one in sorted(seen.nodes) if one.rpartition("/")[2] in ours
-            }
+            named_so = [one for one in sorted(seen.nodes) if one.rpartition("/")[2] in ours]
+            nodes |= {f"/{one}": self._facts.name for one in named_so}
         named = {"nodes": nodes} if nodes else {}
         parameters = wanted | ({"topic": seen.connected[0]} if seen.connected else {}) | named
         self._add(
             f"{name}-runs", f"roslaunch brings up the nodes of {launch}", "launch-runs", parameters,
             scenario=name, requires=[xml], reproduce=f"roslaunch {self._facts.name} {launch}",
         )  # fmt: skip
-
-
-def _probe(topic: str, kind: str) -> RubricEntry:
-    made_up = {"text": TEXT_PROBES} if kind == STRING else {"integers": INTEGER_PROBES, "among": [0]}
-    return {"topic": topic, "type": kind, **made_up}
 
 
 def drop_empty(**lists: list[str]) -> RubricEntry:

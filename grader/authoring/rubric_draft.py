@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 from math import isfinite
 from pathlib import Path, PurePosixPath
@@ -24,14 +25,13 @@ from grader.checks.support.processes import lives
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.evidence.inspect import periodic_share, rate_stats
 from grader.evidence.run import Channel, Run
+from grader.model.message_definitions import integer_limits
 from grader.model.package import Interface, PackageFacts
 from grader.model.record import Record
 from grader.rubric.load import LoadedRubric
-from grader.rubric.scenario import Call, Param, Probe, Scenario, Served, Start, Step, Until
 from grader.untrusted_text import line, visible, without_ci_commands
 
 SYSTEM_SERVICES = ("/get_loggers", "/set_logger_level")
-INTEGER_TYPES = frozenset(f"std_msgs/{u}Int{bits}" for u in ("", "U") for bits in (8, 16, 32, 64))
 ANONYMOUS = re.compile(r"_\d+_\d{9,}$")
 MESSAGES_MIN = 5
 INFO = 2
@@ -159,14 +159,14 @@ def printed_answer(run: Run, answer: Mapping[str, object]) -> RubricEntry:
 
 
 def _topic(channel: Channel) -> Topic:
-    values = channel.data
+    values, kind = channel.data, channel.type.replace("/msg/", "/")
     return Topic(
         name=channel.topic,
-        type=channel.type.replace("/msg/", "/"),
+        type=kind,
         rate_hz=nice_rate(channel.times_ns),
         latched=channel.latching,
         silent=not channel.times_ns,
-        counts_from=_counts_from(values) if channel.type.replace("/msg/", "/") in INTEGER_TYPES else None,
+        counts_from=_counts_from(values) if integer_limits(kind) else None,
         template=_template(values, channel.times_ns),
     )
 
@@ -347,6 +347,7 @@ TEXT_PROBES = 8
 INTEGER_PROBES = 9
 STRING = "std_msgs/String"
 ANSWERS_S, MESSAGES = 0.5, 3
+WAIT = {"wait": {"seconds": ANSWERS_S}}
 ASKED, ANSWERED = ", with calls of the grader's", ", with a service of the grader's"
 SERVICES: Mapping[str, list[tuple[str, str, str]]] = {
     "std_srvs/SetBool": [
@@ -373,11 +374,6 @@ class Parts(Record):
     launches: dict[str, str]
     configs: tuple[str, ...] = ()
 
-    @property
-    def params(self) -> tuple[Param, ...]:
-        """Every parameter of the package's own files, with made-up values."""
-        return tuple(Param(file=path) for path in self.configs)
-
 
 def find_parts(folder: Path, facts: PackageFacts) -> Parts:
     """Python files that call `init_node`, programs of `add_executable`, launch files that can be read."""
@@ -395,11 +391,11 @@ def find_parts(folder: Path, facts: PackageFacts) -> Parts:
 
 def first_look(package: str, parts: Parts) -> LoadedRubric:
     """Each node alone, in real time, and each launch file."""
-    until = Until(alive_s=WATCH_S, messages={})
-    scenarios = {name: _alone(parts, name, " in real time", until=until) for name in parts.nodes}
+    until = {"alive_s": WATCH_S}
+    scenarios = {name: start_alone(parts, name, " in real time", until=until) for name in parts.nodes}
     for name, launch in parts.launches.items():
-        until = Until(alive_s=QUIET_LAUNCH_S, quiet_s=0.0, messages={})
-        scenarios[name] = Scenario(title=launch, start=(Start(name=name, launch=launch),), until=until)
+        until = {"alive_s": QUIET_LAUNCH_S, "quiet_s": 0.0}
+        scenarios[name] = {"title": launch, "start": [{"name": name, "launch": launch}], "until": until}
     return LoadedRubric.to_record(package, scenarios)
 
 
@@ -408,26 +404,20 @@ def second_look(
 ) -> LoadedRubric | None:
     """Messages for the nodes that listen, calls for those that offer a service and answers for those that look for one,
     and a fast clock for those that count; None where there is nothing to see."""
-    scenarios: dict[str, Scenario] = {}
+    scenarios: dict[str, RubricEntry] = {}
     for name in parts.nodes:
-        if asked := tuple(map(Call.model_validate, calls_of(seen[name], interfaces))):
-            until = Until(nodes=1, messages={})
-            scenarios[f"{name}-asked"] = _alone(parts, name, ASKED, calls=asked, until=until)
-        if answers := tuple(map(Served.model_validate, serves_of(name, seen, interfaces))):
-            until = Until(quiet_s=2, messages={})
-            scenarios[f"{name}-served"] = _alone(parts, name, ANSWERED, serves=answers, until=until)
-        listens = seen[name].listens.items()
-        if probes := tuple(p for topic, kind in listens if (p := probe_for(topic, kind))):
-            until = Until(heard=True, messages={})
-            scenarios[f"{name}-hears"] = _alone(parts, name, MADE_UP, probes=probes, until=until)
+        alone, listens = partial(start_alone, parts, name), seen[name].listens.items()
+        if calls := calls_of(seen[name], interfaces):
+            scenarios[f"{name}-asked"] = alone(ASKED, calls=calls, until={"nodes": 1})
+        if serves := serves_of(name, seen, interfaces):
+            scenarios[f"{name}-served"] = alone(ANSWERED, serves=serves, until={"quiet_s": 2})
+        if probes := [probe for topic, kind in listens if (probe := probe_for(topic, kind))]:
+            scenarios[f"{name}-hears"] = alone(MADE_UP, probes=probes, until={"heard": True})
         if sent := [step_for(topic, kind) for topic, kind in listens if not probe_for(topic, kind)]:
-            steps = tuple(Step.model_validate(step) for step in (*sent, {"wait": {"seconds": ANSWERS_S}}))
-            scenarios[f"{name}-answers"] = _alone(parts, name, SENT, steps=steps, until=Until(messages={}))
-        counters = [topic.name for topic in seen[name].topics if topic.counts_from is not None]
-        if counters:
-            until = Until(messages=dict.fromkeys(counters, WARPED_MESSAGES))
-            fast = _alone(parts, name, " with a fast clock", clock="warped", until=until)
-            scenarios[f"{name}-fast"] = fast
+            scenarios[f"{name}-answers"] = alone(SENT, steps=[*sent, WAIT])
+        if counters := [topic.name for topic in seen[name].topics if topic.counts_from is not None]:
+            until = {"messages": dict.fromkeys(counters, WARPED_MESSAGES)}
+            scenarios[f"{name}-fast"] = alone(" with a fast clock", clock="warped", until=until)
     return LoadedRubric.to_record(package, scenarios) if scenarios else None
 
 
@@ -482,20 +472,23 @@ def _filled(fields: Iterable[tuple[str, str, str]], part: str, turn: int) -> Rub
     return found
 
 
-def _alone(parts: Parts, name: str, words: str, **how: Any) -> Scenario:  # noqa: ANN401 - fields of the scenario
-    """Return a scenario that starts one node; `words` follow its file's name in the title."""
+def start_alone(parts: Parts, name: str, words: str, *, clock: str = "", **how: object) -> RubricEntry:
+    """Return a scenario that starts one node, with the package's own parameters set before; `words` follow its
+    file's name in the title."""
     script = parts.nodes[name]
-    title, start = f"{PurePosixPath(script).name}{words}", (Start(name=name, script=script),)
-    return Scenario(title=title, params=parts.params, start=start, **how)
+    scenario: RubricEntry = {"title": f"{PurePosixPath(script).name}{words}"}
+    scenario |= {"params": [{"file": path} for path in parts.configs]} if parts.configs else {}
+    scenario |= {"clock": clock} if clock else {}
+    return {**scenario, "start": [{"name": name, "script": script}], **how}
 
 
-def probe_for(topic: str, kind: str) -> Probe | None:
-    """Made-up messages of that type, None for a type of which none can be made up."""
+def probe_for(topic: str, kind: str) -> RubricEntry:
+    """Return made-up messages of that type; nothing for a type of which none can be made up."""
     if kind == STRING:
-        return Probe(topic=topic, type=kind, text=TEXT_PROBES)
-    if kind in INTEGER_TYPES:
-        return Probe(topic=topic, type=kind, integers=INTEGER_PROBES, among=(0,))
-    return None
+        return {"topic": topic, "type": kind, "text": TEXT_PROBES}
+    if integer_limits(kind):
+        return {"topic": topic, "type": kind, "integers": INTEGER_PROBES, "among": [0]}
+    return {}
 
 
 def step_for(topic: str, kind: str) -> RubricEntry:

@@ -23,7 +23,6 @@ from grader.rubric.find import BUILT_IN, known_labs, locate, rubric_ids, rubrics
 from grader.rubric.made_up import draw_values, faults_of_sample, made_up_faults, sample_data, with_values
 from grader.rubric.model import Criterion, Rubric
 from grader.rubric.own_checks import Beside, known_checks, read_instructor, run_checks_file
-from grader.rubric.scenario import Scenario
 from grader.rubric.spelling import misspelt_names, names_seen_once
 from grader.rubric.validation_warnings import warnings
 from grader.rubric.yaml_lines import Fault, KeyPath, Source, Value, WrittenRubric, as_map, read_source
@@ -57,7 +56,7 @@ class LoadedRubric(Record):
         return known_checks(folder, run_checks_file(folder.resolve() / self.rubric.checks, self.own).checks)
 
     @classmethod
-    def to_record(cls, package: str, scenarios: Mapping[str, Scenario]) -> LoadedRubric:
+    def to_record(cls, package: str, scenarios: Mapping[str, object]) -> LoadedRubric:
         """Return a rubric that only says what to run; its criterion is never judged."""
         first = next(iter(scenarios), None)
         criterion = Criterion.model_validate(

@@ -218,9 +218,6 @@ class Script:
         """Return the innermost statement that the node belongs to."""
         return next(n for n in (node, *self.above(node)) if isinstance(n, ast.stmt))
 
-    def function(self, node: ast.AST) -> Function | None:
-        return next((n for n in self.above(node) if isinstance(n, Function)), None)
-
     def block(self, statement: ast.stmt) -> list[ast.stmt]:
         """Return the list of statements that it stands in."""
         parent = self.parents[statement]
