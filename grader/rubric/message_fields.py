@@ -163,7 +163,7 @@ def _no_place(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fa
     given = criterion.given
     types = {str(kind) for kind in types_of(str(given.get("topic")), rubric, criterion.scenario)}
     are_known = types and all(kind.partition("/")[0] in noetic_messages() for kind in types)
-    if are_known and "fields" not in given and types.isdisjoint({*POSES, *VELOCITIES, *rubric.own_packages}):
+    if are_known and "fields" not in given and types.isdisjoint({*POSES, *VELOCITIES}):
         fault = f"{given['topic']} carries {min(types)}, which has neither a pose nor a velocity"
         yield (*criterion.at, "topic"), fault
 

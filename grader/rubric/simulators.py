@@ -9,6 +9,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple, TypeGuard
 
 from grader.checks.support.fields import is_number
+from grader.checks.support.geometry import off_m
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
@@ -227,7 +228,7 @@ def start_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
     lines, place, radius_m = _lines(robot), _start(robot), robot.get("radius")
     if not lines or place is None or not is_number(radius_m):
         return
-    away_m = min(_distance(place, *ends) for line in lines for ends in pairwise(line))
+    away_m = min(off_m(place, *ends) for line in lines for ends in pairwise(line))
     boxes = [line for line in _boxes(robot) if _is_inside(place, line)]
     given = (at for at, one in set_in(scenario) if str(one.get("name")).endswith("/start"))
     where = (*path, *next(given, ("start",)))
@@ -250,7 +251,7 @@ def room_faults(about: WrittenCriterion, most_s: float | None) -> Iterator[Fault
     lines, place, radius_m = _lines(robot), _start(robot), robot.get("radius")
     if not lines or place is None or not is_number(radius_m) or any(start_faults((), scenario)):
         return
-    away_m = min(_distance(place, *ends) for line in lines for ends in pairwise(line))
+    away_m = min(off_m(place, *ends) for line in lines for ends in pairwise(line))
     if about.check == "stays-within" and given.get("topic") == TRUE_POSE:
         is_always = not given.get("walls") and not given.get("from_s") and given.get("share", 1) == 1
         for key, sign in (("min_m", 1), ("max_m", -1)):
@@ -269,7 +270,7 @@ def room_faults(about: WrittenCriterion, most_s: float | None) -> Iterator[Fault
         spot = (goal[0], goal[1])
         for line in lines if math.dist(place, spot) - 2 * tolerance_m <= way_m else ():  # said elsewhere
             is_apart = line[0] == line[-1] and _is_inside(place, line) != _is_inside(spot, line)
-            if is_apart and min(_distance(spot, *ends) for ends in pairwise(line)) > tolerance_m:
+            if is_apart and min(off_m(spot, *ends) for ends in pairwise(line)) > tolerance_m:
                 fault = f"walls are between the start, {pair(place)}, and {pair(spot)}"
                 yield (*about.at, "goal"), fault
                 return
@@ -293,15 +294,6 @@ def _lines(robot: dict[str, Any]) -> list[list[Spot]]:
 
 def _boxes(robot: dict[str, Any]) -> list[list[Spot]]:
     return [[(a, b), (c, b), (c, d), (a, d), (a, b)] for a, b, c, d in robot.get("boxes", [])]
-
-
-def _distance(spot: Spot, one: Spot, other: Spot) -> float:
-    """Return how far a spot is from the line between two others."""
-    dx, dy = other[0] - one[0], other[1] - one[1]
-    squared = dx * dx + dy * dy
-    along = ((spot[0] - one[0]) * dx + (spot[1] - one[1]) * dy) / squared if squared else 0.0
-    along = min(max(along, 0.0), 1.0)
-    return math.dist(spot, (one[0] + along * dx, one[1] + along * dy))
 
 
 def _is_inside(spot: Spot, line: Sequence[Spot]) -> bool:
