@@ -256,10 +256,8 @@ def _other_type(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[
     there = {one for one in there if not ros_packages().type_fault(one, "msg", own)}
     others = sorted(there - {kind})
     if isinstance(topic, str) and kind in there and others:
-        yield (
-            (*criterion.at, "type"),
-            f"elsewhere in the rubric {topic} carries {join_words(others)}, not {kind}",
-        )
+        fault = f"elsewhere in the rubric {topic} carries {join_words(others)}, not {kind}"
+        yield (*criterion.at, "type"), fault
 
 
 def _no_such(shape: Shape, path: object, given: dict[str, Any]) -> str:

@@ -187,11 +187,8 @@ def asked_faults(
     for key, is_publisher in (("publisher", True), ("subscriber", False)):
         node = nodes.get(str(given.get(key)))
         if node and topic in node.topics and bool(node.published.fullmatch(topic)) != is_publisher:
-            does = "hears what comes" if is_publisher else "publishes"
-            yield (
-                (key,),
-                f"{node.node} {does} on {topic}, and {'sends' if is_publisher else 'hears'} nothing there",
-            )
+            does, never = ("hears what comes", "sends") if is_publisher else ("publishes", "hears")
+            yield (key,), f"{node.node} {does} on {topic}, and {never} nothing there"
     for name in as_map(given.get("params")):
         for _, program in as_texts(given.get("programs")):
             known = PROGRAMS[program].params if program in PROGRAMS else ()

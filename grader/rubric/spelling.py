@@ -70,10 +70,8 @@ def names_seen_once(rubric: WrittenRubric, folder: Path) -> Iterator[Fault]:
         if not near:
             yield path, f"nothing else in the rubric names {text}: is it spelt as in the handout?"
     for path, word, near in _misspelt_words(rubric, code=False):
-        yield (
-            path,
-            f'nothing else in the rubric has the word {word}: did you mean "{near}", as in the handout?',
-        )
+        fault = f'nothing else in the rubric has the word {word}: did you mean "{near}", as in the handout?'
+        yield path, fault
 
 
 def misspelt_names(rubric: WrittenRubric, folder: Path) -> Iterator[Fault]:
