@@ -117,8 +117,8 @@ class Recorder:
         self._stack.close()
 
     def record_all(self, beside_build: Callable[[], None]) -> None:
-        """The package with its build, then every scenario, side by side. `beside_build` is called beside the build, in
-        another thread."""
+        """Record the package with its build, then every scenario, side by side. `beside_build` is called beside the
+        build, in another thread."""
         self._run(self._record_all(beside_build))
 
     def record_again(self, scenarios: Iterable[str]) -> None:

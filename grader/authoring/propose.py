@@ -114,7 +114,7 @@ class Proposal:
         self._add("build", "The package builds", "build", {}, requires=before, reproduce="catkin_make")
 
     def _definition(self, one: Interface) -> None:
-        """A message, service or action of the package's own, with all of its fields and constants."""
+        """Ask for a message, service or action of the package's own, with all of its fields and constants."""
         fields = {field.path: field.type for field in one.fields if field.value is None}
         constants = {field.path: field.value for field in one.fields if field.value is not None}
         about = {"fields": fields, "constants": constants, "ordered": len(fields) > 1}
@@ -161,7 +161,7 @@ class Proposal:
         self._hearing(name, script, seen, requires)
 
     def _called(self, name: str, service: str, kind: str, requires: str) -> None:
-        """What a service was seen to answer."""
+        """Ask for what a service was seen to answer."""
         scenario = f"{name}-asked"
         run = self._runs.get(scenario)
         actors = run.actors if run else ()
@@ -182,7 +182,7 @@ class Proposal:
         self._add(id_, title, "service-answers", parameters, scenario=scenario, requires=[requires])
 
     def _client(self, name: str, file: str, run: Run, requires: list[str]) -> None:
-        """What a program asks of a service of the package's, and prints of its answer."""
+        """Ask for what a program asks of a service of the package's, and prints of its answer."""
         scenario, serves = f"{name}-served", serves_of(name, self._seen, self._facts.interfaces)
         self.scenarios[scenario] = start_alone(
             self._parts, name, ANSWERED, serves=serves, until={"quiet_s": 2}
@@ -209,7 +209,7 @@ class Proposal:
         return f"{{{', '.join(f'{field.name}: …' for field in own if field.part == 'request')}}}"
 
     def _words(self, name: str, file: str, seen: Observed, node: str) -> None:
-        """What it logs and which parameters it shows."""
+        """Ask for what it logs and which parameters it shows."""
         needs: RubricEntry = {"scenario": name, "requires": [node]}
         for text in seen.logged[:1] if not seen.topics else ():
             self._add(f"{name}-logs", f"{file} logs {text!r}", "logs", {"text": text}, **needs)
@@ -276,7 +276,7 @@ class Proposal:
             self._counter(name, topic, [kind, node], fast)
 
     def _label(self, name: str, topic: Topic) -> str:
-        """By the topic, and by the node too where several publish on it."""
+        """Return a label by the topic, and by the node too where several publish on it."""
         publishers = [n for n in self._parts.nodes if topic.name in {t.name for t in self._seen[n].topics}]
         return label_of(topic.name) if len(publishers) == 1 else f"{name}-{label_of(topic.name)}"
 
@@ -327,7 +327,7 @@ class Proposal:
         return set(answers_to(run, topic, ANSWERS_S)) - periodic if run else set()
 
     def _answering(self, name: str, script: str, listens: Mapping[str, str], requires: list[str]) -> None:
-        """What it publishes upon what it hears and does not print."""
+        """Ask for what it publishes upon what it hears and does not print."""
         scenario, steps = f"{name}-answers", []
         for topic, kind in listens.items():
             found = self._answers(name, topic)

@@ -88,7 +88,7 @@ class Observed(Record):
 
 
 def observe(run: Run) -> Observed:
-    """What the run shows of the student's nodes."""
+    """Return what the run shows of the student's nodes."""
     names = [n.lstrip("/") for n in run.student_nodes()]
     early = [one for one in lives(run) if one.ended_early]
     bad = next((one for one in early if one.end and one.end.exit_code != 0), None)
@@ -108,14 +108,14 @@ def observe(run: Run) -> Observed:
 
 
 def wraps_of(run: Run, topic: str) -> tuple[int, int] | None:
-    """The (last, first) values around a counter's wrap; None where it never wrapped, or differently each time."""
+    """Return the (last, first) values around a counter's wrap; None where it never did, or differently each time."""
     values = [v for c in run.student_channels(topic) for v in c.data if isinstance(v, int)]
     found = {(a, b) for a, b in pairwise(values) if b != a + 1}
     return next(iter(found)) if len(found) == 1 and next(iter(found))[1] < next(iter(found))[0] else None
 
 
 def heard_template(run: Run, topic: str) -> str | None:
-    """What the lines say around the messages (`I heard {value}`); None where they are not all printed."""
+    """Return what the lines say around the messages (`I heard {value}`); None where they are not all printed."""
     lines = printed_lines(run)
     prefixes = set()
     for probe in probes_on(run, topic):
@@ -193,7 +193,7 @@ def _counts_from(values: Sequence[object]) -> int | None:
 
 
 def _template(values: Sequence[object], times_ns: Sequence[int]) -> str:
-    """`hello world {seconds}` for texts that end in a time which grows as the clock does."""
+    """Return `hello world {seconds}` for texts that end in a time which grows as the clock does."""
     found = [_TIME.fullmatch(v) if isinstance(v, str) else None for v in values]
     matches = [m for m in found if m is not None]
     if len(matches) < MESSAGES_MIN or len(matches) < len(found) or len({m["words"] for m in matches}) > 1:
@@ -281,8 +281,8 @@ class _Dumper(yaml.SafeDumper):
 
 
 def _quote_text(dumper: _Dumper, text: str) -> yaml.ScalarNode:
-    """What a CI's log could take for a command stands in double quotes, where `without_ci_commands` writes escapes; and
-    so do lines, which are then on one."""
+    """Write text: what a CI's log could take for a command stands in double quotes, where `without_ci_commands` writes
+    escapes; and so do lines, which are then on one."""
     style = '"' if "##" in text or "::" in text or "\n" in text else None
     return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
 
@@ -390,7 +390,7 @@ def find_parts(folder: Path, facts: PackageFacts) -> Parts:
 
 
 def first_look(package: str, parts: Parts) -> LoadedRubric:
-    """Each node alone, in real time, and each launch file."""
+    """Return a rubric that runs each node alone, in real time, and each launch file."""
     until = {"alive_s": WATCH_S}
     scenarios = {name: start_alone(parts, name, " in real time", until=until) for name in parts.nodes}
     for name, launch in parts.launches.items():
@@ -511,12 +511,12 @@ def _is_node(path: Path) -> bool:
 
 
 def _holds_parameters(path: str) -> bool:
-    """By its folder: other YAML files are someone else's, a CI's for instance."""
+    """Return whether it does, by its folder: other YAML files are someone else's, a CI's for instance."""
     return {"config", "cfg", "param", "params", "yaml"} & set(PurePosixPath(path).parts[:-1]) != set()
 
 
 def _name(path: str, taken: set[str]) -> str:
-    """A start's name that no other has: `scripts/numeric_talker.py` becomes `numeric-talker`."""
+    """Return a start's name that no other has: `scripts/numeric_talker.py` becomes `numeric-talker`."""
     stem = re.sub(r"[^a-z0-9]+", "-", PurePosixPath(path).stem.lower()).strip("-")
     stem = stem if stem[:1].isalpha() else f"p-{stem}".rstrip("-")
     stem += "-launch" if path.endswith(".launch") else ""

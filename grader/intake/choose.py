@@ -278,7 +278,7 @@ def _windows(folder: Path, names: list[str]) -> str:
 
 
 def _where_it_went(root: Path, wanted: str, git_links: tuple[str, ...]) -> str:
-    """What students do to a package so that it is there and cannot be seen."""
+    """Return what students do to a package so that it is there and cannot be seen."""
     links = [path for path in git_links if path.rpartition("/")[2].casefold() == wanted.casefold()]
     # nothing else was handed in, so the package is behind one of the links, whatever its name
     if not links and not any(folder.others for folder in walk(root, tolerant=True)):

@@ -377,7 +377,7 @@ def _staged_paths(view: View, package: Path) -> list[str]:
 
 
 def _batches(paths: Sequence[str]) -> Iterator[list[str]]:
-    """As many paths at once as a command line takes."""
+    """Yield as many paths at once as a command line takes."""
     batch: list[str] = []
     for path in paths:
         if batch and (len(batch) == PATHS_AT_ONCE or sum(map(len, batch)) + len(path) > COMMAND_CHARS):

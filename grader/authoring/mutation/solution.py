@@ -42,7 +42,7 @@ Tree = dict[str, TreeFile]
 
 
 def read_tree(folder: Path, *, modes: bool = True) -> Tree:
-    """Every file below `folder`, by its posix path.
+    """Return every file below `folder`, by its posix path.
 
     Without `modes`, the folder cannot be trusted to have kept executable bits (an installed wheel's data): then
     what begins with a shebang is executable. Raises UsageError for a folder that no reference solution would be.
