@@ -14,7 +14,8 @@ from pathlib import Path
 
 from benchmarks.figures import NotMeasured
 from benchmarks.machine import Cost, timed
-from grader.ros_env import SYSTEM_PATH, RosInstallation, find_ros
+from grader.host_programs import HOST_PATH
+from grader.ros_env import RosInstallation, find_ros
 
 MASTER_S, LOOK_S = 10.0, 0.02
 HZTEST = """<launch>
@@ -40,7 +41,7 @@ def require_ros() -> RosInstallation:
 def ros_env(home: Path, **more: str) -> dict[str, str]:
     """What ROS's programs need, with logs and results below `home`."""
     ros = require_ros()
-    path = os.pathsep.join([ros.env["PATH"], SYSTEM_PATH])
+    path = os.pathsep.join([ros.env["PATH"], HOST_PATH])
     plain = {"HOME": str(home), "ROS_HOSTNAME": "localhost", "LANG": "C.UTF-8", "PYTHONUNBUFFERED": "1"}
     return {**ros.env, **plain, "PATH": path, **more}
 

@@ -179,7 +179,7 @@ def _run_beside_loop(work: Callable[[], T], stop: Callable[[], None]) -> T:
 
 def _loop_runs_here() -> bool:
     if "asyncio" not in sys.modules:  # slow to import, and there is no loop without it
-        return False  # without the module there can be no loop in this thread
+        return False
     import asyncio  # noqa: PLC0415
 
     try:

@@ -167,7 +167,9 @@ def _write_error_result(fault: GraderError, context: GradingContext) -> str:
 
     An earlier complete result stays, unless the submission itself is at fault now.
     """
-    submission = context.submission or _identify(context)
+    submission = context.submission
+    if submission is None and (known := identify(context.source, context.submission_id)):
+        submission = SubmissionInfo(id=known[0], source=known[1], commit=None, digest="", package="")
     if submission is None:
         return ""
     folder = context.out / submission.id
@@ -186,10 +188,3 @@ def _write_error_result(fault: GraderError, context: GradingContext) -> str:
     except Exception as second:  # noqa: BLE001 - the first error is the one to report
         return f"no result could be written: {getattr(second, 'message', '') or type(second).__name__}"
     return ""
-
-
-def _identify(context: GradingContext) -> SubmissionInfo | None:
-    known = identify(context.source, context.submission_id)
-    if known is None:
-        return None
-    return SubmissionInfo(id=known[0], source=known[1], commit=None, digest="", package="")

@@ -74,7 +74,9 @@ def whole_file(target: Path, *, public: bool = False) -> Iterator[Path]:
                 return
             with beside.open("r+b") as written:  # Windows flushes no file that is open to be read
                 os.fsync(written.fileno())
-            _replace(beside, file, target)
+            if not HAS_LOCKS:  # on Windows, what is open cannot be renamed
+                file.close()
+            beside.replace(target)
     except OSError as error:
         raise unwritable(target, error) from error
 
@@ -100,12 +102,6 @@ def _new_beside(target: Path, folder: Path, *, public: bool = False) -> Iterator
     finally:
         with suppress(OSError):
             beside.unlink()
-
-
-def _replace(beside: Path, file: BinaryIO, target: Path) -> None:
-    if not HAS_LOCKS:  # on Windows, what is open cannot be renamed
-        file.close()
-    beside.replace(target)
 
 
 def _sweep_beside(folder: Path, prefix: str) -> None:

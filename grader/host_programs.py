@@ -107,7 +107,7 @@ def find_host_program(name: str) -> str | None:
 
 
 def git_user() -> str:
-    """What git calls the person; empty where it does not."""
+    """Return what git calls the person; empty where it does not."""
     return git_setting("user.name", with_absolute_paths(os.environ), Path("/"))
 
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from grader.arena.static_recorder import StaticRecorder
     from grader.model import SandboxMode
 
-LATER = ("grader.evidence.reader",)
+LATER = "grader.evidence.reader"
 """Slow to import, and needed by no verdict that the files alone decide: imported while the build runs. The arena is
 imported when it begins, and what judges or reports recordings when it is called."""
 
@@ -133,9 +133,8 @@ def record_all(job: RecordingJob, recorder: Recorder | StaticRecorder) -> None:
 
 
 def import_later() -> None:
-    """Import modules before they are needed."""
-    for name in LATER:
-        import_module(name)
+    """Import it before it is needed."""
+    import_module(LATER)
 
 
 def judge_folder(evidence: Path, rubric: LoadedRubric) -> Judged:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import posixpath
 import shutil
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -163,8 +163,13 @@ def _of(submission: Submission, package: SourcePackage, repairs: Sequence[Repair
 def _repair_copy(package: SourcePackage, folder: Path, repairs: Sequence[Repair]) -> SourcePackage:
     """Return a copy of the package in `folder` with the repairs. Raises NotRepairable, OSError."""
     copy = folder / package.folder.name
+
+    def left_out(above: str, names: list[str]) -> set[str]:
+        below = Path(above).relative_to(package.folder)
+        return {name for name in names if (below / name).as_posix() in package.left_out}
+
     # a link stays one: what a student's link points to is not theirs to copy
-    shutil.copytree(package.folder, copy, symlinks=True, ignore=_left_out(package.folder, package.left_out))
+    shutil.copytree(package.folder, copy, symlinks=True, ignore=left_out)
     # the bits on the disk may be lost; the runs set them from this list
     executable = dict(package.executable)
     for repair in repairs:
@@ -192,11 +197,3 @@ class CopyProgress(Silence):
     def step(self, name: str, state: StepState, detail: str = "", expected_s: float | None = None) -> None:
         """Show the step under a name of its own."""
         self._progress.step(f"{name} (repaired copy)", state, detail, expected_s)
-
-
-def _left_out(root: Path, paths: frozenset[str]) -> Callable[[str, list[str]], set[str]]:
-    def ignore(folder: str, names: list[str]) -> set[str]:
-        below = Path(folder).relative_to(root)
-        return {name for name in names if (below / name).as_posix() in paths}
-
-    return ignore

@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 from grader.errors import RosMissing
-from grader.host_programs import find_host_program, run_host_program
+from grader.host_programs import HOST_PATH, find_host_program, run_host_program
 from grader.installable import install_command, known_packages, noetic_messages
+from grader.model.package import MANIFEST
 from grader.model.record import Record
 from grader.portable import system
 from grader.wording import closest, did_you_mean
@@ -29,7 +30,6 @@ DEBIAN_PACKAGES = (
 )
 NO_ROS = "no ROS 1 on this machine"
 INSTALL_HINT = f"on Debian 12: apt-get install {DEBIAN_PACKAGES} (or: make setup)"
-SYSTEM_PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 ROS_VARIABLES = frozenset(
     (
         "CMAKE_PREFIX_PATH", "LD_LIBRARY_PATH", "PATH", "PKG_CONFIG_PATH", "PYTHONPATH", "ROSCONSOLE_FORMAT",
@@ -100,7 +100,7 @@ def _find(setup: str, conda: str) -> RosInstallation | None:
 def _from_setup(setup: Path) -> RosInstallation:
     script = 'source "$1" >/dev/null && env -0'
     # without a home, so that no file of the user's has a say in it
-    base = {"PATH": SYSTEM_PATH, "HOME": "/nonexistent"}
+    base = {"PATH": HOST_PATH, "HOME": "/nonexistent"}
     done = subprocess.run(
         ["/bin/bash", "-c", script, "bash", str(setup)],
         env=base,
@@ -113,7 +113,7 @@ def _from_setup(setup: Path) -> RosInstallation:
     if done.returncode != 0:
         raise RosMissing(f"{setup} does not load: {done.stderr.decode(errors='replace').strip()[-200:]}")
     env = keep_ros_variables(parse_env(done.stdout))
-    python = shutil.which("python3", path=env.get("PATH", SYSTEM_PATH)) or "/usr/bin/python3"
+    python = shutil.which("python3", path=env.get("PATH", HOST_PATH)) or "/usr/bin/python3"
     distro = env.get("ROS_DISTRO", setup.parent.name)
     return RosInstallation(
         kind="setup", where=str(setup), distro=distro, python=python, prefixes=_prefixes(setup, env), env=env
@@ -144,7 +144,7 @@ def _debian() -> RosInstallation | None:
         distro=f"ros_comm {version}",
         python="/usr/bin/python3",
         prefixes=(),
-        env={"PATH": SYSTEM_PATH, "ROS_PACKAGE_PATH": "/usr/share"},
+        env={"PATH": HOST_PATH, "ROS_PACKAGE_PATH": "/usr/share"},
     )
 
 
@@ -157,7 +157,7 @@ def _debian_version() -> str:
 def _conda(prefix: str) -> RosInstallation | None:
     if not prefix or not (Path(prefix) / "bin" / "rosmaster").exists():
         return None
-    env = keep_ros_variables({**os.environ, "PATH": f"{prefix}/bin:{SYSTEM_PATH}"})
+    env = keep_ros_variables({**os.environ, "PATH": f"{prefix}/bin:{HOST_PATH}"})
     return RosInstallation(
         kind="conda",
         where=prefix,
@@ -194,7 +194,6 @@ def keep_ros_variables(env: Mapping[str, str]) -> dict[str, str]:
     return {name: value for name, value in env.items() if name in ROS_VARIABLES}
 
 
-MANIFEST = "package.xml"
 STANDINS = Path(__file__).resolve().parent / "arena" / "standins"
 DEPTH_MAX = 5
 LOOK_S = 20

@@ -20,14 +20,10 @@ from grader.files import lock, open_lock
 
 NAME = "ros-lab-grader"
 MEMINFO = Path("/proc/meminfo")
+CGROUP = Path("/sys/fs/cgroup")
 CONTAINER = (
-    (Path("/sys/fs/cgroup"), "memory.max", "memory.current", "inactive_file"),
-    (
-        Path("/sys/fs/cgroup/memory"),
-        "memory.limit_in_bytes",
-        "memory.usage_in_bytes",
-        "total_inactive_file",
-    ),
+    (CGROUP, "memory.max", "memory.current", "inactive_file"),
+    (CGROUP / "memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
 )
 """Where a container's limit stands, in control groups of version 2 and of version 1."""
 UNLIMITED_BYTES = 1 << 62

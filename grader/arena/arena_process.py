@@ -5,7 +5,6 @@ from __future__ import annotations
 import array
 import asyncio
 import atexit
-import contextlib
 import json
 import os
 import signal
@@ -56,7 +55,7 @@ class ArenaProcess:
     def send(self, command: dict[str, Any]) -> None:
         """Send a command as a line of JSON. The end of the arena's output tells that the arena has ended."""
         data = memoryview(json.dumps(command).encode() + b"\n")
-        with contextlib.suppress(BrokenPipeError):
+        with suppress(BrokenPipeError):
             while data:
                 data = data[os.write(self._commands, data) :]
 
@@ -72,19 +71,15 @@ class ArenaProcess:
             await self._ended.wait()
             timer.cancel()
         finally:
-            self._kill()
+            # With its group: a bubblewrap that is killed while it starts leaves a second process that waits for ever.
+            with suppress(ProcessLookupError):  # all of it has ended
+                os.killpg(self.pid, signal.SIGKILL)
             # Only after the kill: until the template has waited for it, its id and group cannot belong to others.
             self._template.forget(self.pid)
             for descriptor in self._open:
                 self._loop.remove_reader(descriptor)
             for descriptor in (self._output, self._words):
                 os.close(descriptor)
-
-    def _kill(self) -> None:
-        """Kill it with its group: a bubblewrap that is killed while it starts leaves a second process that waits for
-        ever."""
-        with contextlib.suppress(ProcessLookupError):  # all of it has ended
-            os.killpg(self.pid, signal.SIGKILL)
 
     def _watch(self, descriptor: int, take: Callable[[bytes], None]) -> None:
         os.set_blocking(descriptor, False)

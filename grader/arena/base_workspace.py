@@ -202,9 +202,15 @@ def _entries(path: str) -> list[str]:
 
 def read_kept(name: str, bytes_max: int = BYTES_MAX) -> bytes | None:
     """Return what was kept under that name; None where there is none that is whole and only this user's."""
+    folder = user_folder("cache")
     with suppress(OSError):
-        if _is_private(user_folder("cache").lstat()):
-            return _verify_sum(_read(name, bytes_max))
+        status = folder.lstat()
+        if status.st_uid != os.geteuid() or stat.S_IMODE(status.st_mode) != stat.S_IRWXU:
+            return None
+        with open_untrusted(folder, name) as file:
+            status = os.fstat(file.fileno())
+            own = status.st_uid == os.geteuid() and not status.st_mode & _OTHERS_WRITE
+            return _verify_sum(file.read(bytes_max)) if own else None
     return None
 
 
@@ -225,17 +231,6 @@ def keep(name: str, data: bytes) -> None:
         files.sort(key=lambda path: path.lstat().st_mtime_ns, reverse=True)
         for old in files[FILES_MAX:]:
             old.unlink()
-
-
-def _is_private(status: os.stat_result) -> bool:
-    return status.st_uid == os.geteuid() and stat.S_IMODE(status.st_mode) == stat.S_IRWXU
-
-
-def _read(name: str, bytes_max: int) -> bytes:
-    with open_untrusted(user_folder("cache"), name) as file:
-        status = os.fstat(file.fileno())
-        own = status.st_uid == os.geteuid() and not status.st_mode & _OTHERS_WRITE
-        return file.read(bytes_max) if own else b""
 
 
 def _verify_sum(data: bytes) -> bytes | None:

@@ -72,10 +72,8 @@ def find_cgroups() -> Cgroups:
 
 def remove_groups(cgroups: Cgroups, arena: int) -> bool:
     """Remove the groups that an arena left which was killed, by its process id. False while processes are in them."""
-    folders = [
-        Path(found.folder) for found in (cgroups.memory, cgroups.pids, cgroups.cpuacct) if found is not None
-    ]
-    groups = [group for folder in folders for group in folder.glob(f"grader-{arena}-*")]
+    found = filter(None, (cgroups.memory, cgroups.pids, cgroups.cpuacct))
+    groups = [group for one in found for group in Path(one.folder).glob(f"grader-{arena}-*")]
     for group in groups:
         with suppress(OSError):
             group.rmdir()
@@ -243,9 +241,8 @@ def _handed_over(group: Path) -> bool:
             if os.getxattr(group, mark) == b"1":
                 return True
     given = group.stat().st_uid == os.geteuid() != 0 and USERS_OWN not in str(group)
-    containers = (
-        os.path.ismount(group) and (group / "cgroup.type").exists()
-    )  # the machine's own root has none
+    # the machine's own root group has no `cgroup.type`
+    containers = os.path.ismount(group) and (group / "cgroup.type").exists()
     return given or containers
 
 

@@ -126,10 +126,7 @@ def _window(live: RunState, until: Until, now_s: float) -> bool:
         return True
     topics = until.topics or tuple(live.topics)
     if until.topics:  # others whose rates are judged have their window too, once they are there
-        topics = (
-            *topics,
-            *(t for t in live.rates if t not in topics and t in live.topics and live.topics[t].count),
-        )
+        topics += tuple(t for t in live.rates.keys() & live.topics.keys() - {*topics} if live.topics[t].count)
     seen = [live.topics[t] for t in topics if live.topics[t].count]
     if not seen:
         return _talks_elsewhere(live, until, now_s)
@@ -225,11 +222,8 @@ def _silent(live: RunState, until: Until, now_s: float) -> str:
     waited = (*until.topics, *until.messages)
     seen = _talking(live)
     if waited and not seen:
-        return (
-            f"no message within {until.first_message_s:g} s"
-            if now_s > _began_s(live) + until.first_message_s
-            else ""
-        )
+        is_late = now_s > _began_s(live) + until.first_message_s
+        return f"no message within {until.first_message_s:g} s" if is_late else ""
     for topic, count in until.messages.items():
         topic_s = live.topics[topic].last_s
         last_s = max(topic_s or min(s.first_s for s in seen), live.started_s)

@@ -33,8 +33,8 @@ from grader.arena.workspace import Built, Workspace, read_archive, read_folder
 from grader.evidence.decode import FindText
 from grader.evidence.message_values import action_texts
 from grader.files import read_untrusted
-from grader.host_programs import find_host_program
-from grader.ros_env import SYSTEM_PATH, RosInstallation
+from grader.host_programs import HOST_PATH, find_host_program
+from grader.ros_env import RosInstallation
 
 TEXT_BYTES_MAX = 64 << 10
 LOOPBACK = "127.0.0.1"
@@ -380,5 +380,5 @@ class ProcessEnvironment:
 def search_path(ros: RosInstallation, path: str, *first: str) -> str:
     """Return the search path for programs. What the package adds comes last: a program of its own never takes the place
     of the system's or of ROS's."""
-    entries = [*first, *ros.env["PATH"].split(os.pathsep), *SYSTEM_PATH.split(":"), *path.split(os.pathsep)]
+    entries = [*first, *ros.env["PATH"].split(os.pathsep), *HOST_PATH.split(":"), *path.split(os.pathsep)]
     return os.pathsep.join(dict.fromkeys(e for e in entries if e))

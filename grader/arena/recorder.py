@@ -117,8 +117,8 @@ class Recorder:
         self._stack.close()
 
     def record_all(self, beside_build: Callable[[], None]) -> None:
-        """The package with its build, then every scenario, side by side. `beside_build` is called beside the build, in
-        another thread."""
+        """Record the package with its build, then every scenario, side by side. `beside_build` is called beside the
+        build, in another thread."""
         self._run(self._record_all(beside_build))
 
     def record_again(self, scenarios: Iterable[str]) -> None:
@@ -308,7 +308,8 @@ def _above(place: ProcessEnvironment, facts: PackageFacts) -> str:
 def _python_files(place: ProcessEnvironment, facts: PackageFacts) -> list[str]:
     """Return the files that ROS's Python is to compile, from the main package's folder in the workspace.
 
-    None where this Python is of the same version and had nothing to say against any: ROS's would find the same.
+    There are none where this Python is of the same version and had nothing to say against any: ROS's would find the
+    same.
     """
     packages = (facts, *facts.also)
     clean = not any(file.python_fault for one in packages for file in one.files)

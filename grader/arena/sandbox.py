@@ -91,9 +91,8 @@ class Sandbox(Record):
     def outer(self, limits: RunLimits) -> list[str]:
         """Return the programs of this machine that come first: they take rights away and set limits."""
         drop = [f"--reuid={self.uid}", f"--regid={self.uid}", "--clear-groups"] if self.uid else []
-        drop += (
-            [] if self.bubblewrap else ["--no-new-privs"]
-        )  # bubblewrap sees to that, and may be setuid itself
+        if not self.bubblewrap:  # it sees to that itself, and may be setuid
+            drop.append("--no-new-privs")
         become = [_program("setpriv"), *drop] if drop and find_host_program("setpriv") else []
         return [*become, _program("prlimit"), *self.rlimits(limits), "--"]
 
@@ -344,17 +343,9 @@ def _refusal(*more: str) -> str:
     calls = ["--seccomp", "0"] if system_call_filter() else []
     files = ["--ro-bind", "/", "/", "--proc", "/proc", "--clearenv", "--setenv", "LANG", "C.UTF-8"]
     walls = [*files, *WALLS, *more, *calls, "--die-with-parent", "/bin/true"]
-    return last_error_line(
-        [
-            # In a process of its own, since it leaves this process's namespaces.
-            sys.executable,
-            "-I",
-            str(NAMESPACES),
-            *words_to_drop_root(),
-            find_host_program("bwrap") or "bwrap",
-            *walls,
-        ]
-    )
+    # In a process of its own, since it leaves this process's namespaces.
+    command = [sys.executable, "-I", str(NAMESPACES), *words_to_drop_root(), _program("bwrap")]
+    return last_error_line([*command, *walls])
 
 
 def words_to_drop_root() -> list[str]:

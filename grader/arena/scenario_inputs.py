@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import yaml
 
 from grader.files import read_untrusted
+from grader.model.message_definitions import integer_limits
 from grader.rubric.scenario import Param, Probe
 
 PROBE_SHAPES = (
@@ -24,13 +25,6 @@ number is one that a lab counts."""
 # With fewer, there is no place in the middle for a value that comes twice.
 VALUES_FOR_ONE_TWICE = 4
 PAUSE_BEFORE_SAME = 3
-RANGES = {
-    f"std_msgs/{'U' * (not signed)}Int{bits}": (-(1 << bits - 1), (1 << bits - 1) - 1)
-    if signed
-    else (0, (1 << bits) - 1)
-    for bits in (8, 16, 32, 64)
-    for signed in (True, False)
-}
 # The system's randomness: a student's process cannot work out the next values from those that it has seen.
 _random = random.SystemRandom()
 FILE_BYTES_MAX = 256 << 10
@@ -79,9 +73,8 @@ def _values(probe: Probe) -> Iterator[Any]:
     again = probe.integers >= VALUES_FOR_ONE_TWICE
     shapes = cycle(_random.sample(PROBE_SHAPES, len(PROBE_SHAPES)))
     values: list[str | int] = [_made_up_text(next(shapes)) for _ in range(probe.text - twice)]
-    if probe.integers or probe.among:
-        low, high = RANGES[probe.type]
-        values += [*_integers(probe, probe.integers - again, low, high), *probe.among]
+    if limits := integer_limits(probe.type):
+        values += [*_integers(probe, probe.integers - again, *limits), *probe.among]
     _random.shuffle(values)
     if twice or again:
         _repeat_one(values)

@@ -530,11 +530,9 @@ class Killed:
 
     def first(self, *, last_run: bool) -> str:
         """Return the name of a process that the machine may have killed, or nothing."""
-        own = last_run and not self._from_outside and not self._short_of_memory()
+        short_of_memory = _kernel_kills() != self._kills_before or _available() < SHORT
+        own = last_run and not self._from_outside and not short_of_memory
         return "" if own else next((name for name in self._names if name not in self._limited), "")
-
-    def _short_of_memory(self) -> bool:
-        return _kernel_kills() != self._kills_before or _available() < SHORT
 
 
 def _kernel_kills() -> int:

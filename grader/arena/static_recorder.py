@@ -114,10 +114,8 @@ def attachments(folder: Path, facts: PackageFacts) -> Iterable[tuple[str, bytes]
 def left_out_events(facts: PackageFacts) -> Iterable[ActorEvent]:
     """Yield an event for each file that `attachments` leaves out, as a limit that was met."""
     for other in facts.also:
-        yield from (
-            event.model_copy(update={"actor": f"{other.asked}: {event.actor}"})
-            for event in left_out_events(other)
-        )
+        for event in left_out_events(other):
+            yield event.model_copy(update={"actor": f"{other.asked}: {event.actor}"})
     texts = _texts(facts)
     for file in texts[:ATTACHED_FILES_MAX]:
         if file.size_bytes > ATTACHED_BYTES_MAX:

@@ -330,12 +330,8 @@ class StepRunner:
                 self._announce(channel.topic, {**about, "latching": channel.latching})
 
     def _channels_to_play(self, play: Play) -> list[Channel]:
-        wanted = set(play.topics)
-        return [
-            channel
-            for channel in self._bags[play.bag]
-            if (channel.topic in wanted if wanted else channel.topic not in NOT_PLAYED)
-        ]
+        channels, wanted = self._bags[play.bag], set(play.topics)
+        return [c for c in channels if (c.topic in wanted if wanted else c.topic not in NOT_PLAYED)]
 
     async def _play(self, play: Play) -> None:
         channels = [c for c in self._channels_to_play(play) if self._md5sums[c.topic] == c.md5sum]
@@ -450,7 +446,7 @@ class StepRunner:
             self._tell(f"calling {service}")
             await self._ask(call)
         else:
-            arena.note(ActorEvent(action="note", actor="grader", topic=service, detail=NOT_OFFERED))
+            self._note("note", service, NOT_OFFERED)
 
     async def _ask(self, call: Call) -> None:
         text, fits = None, True
@@ -538,14 +534,9 @@ class StepRunner:
     def _patience_s(self, action: Action) -> float:
         """Return how long the result of a goal that is cancelled is waited for. Before another goal, it is the server
         that has to have an end."""
-        last = [
-            step.action for step in self._scenario.steps if step.action and step.action.name == action.name
-        ][-1]
-        return (
-            min(action.limit_s, self._cancels.get(action.name, math.inf))
-            if action is last
-            else action.limit_s
-        )
+        last = [s.action for s in self._scenario.steps if s.action and s.action.name == action.name][-1]
+        cancelled_s = self._cancels.get(action.name, math.inf) if action is last else math.inf
+        return min(action.limit_s, cancelled_s)
 
     async def _result(self, action: Action, name: str, limit_s: float) -> tuple[Any, str] | None:
         """Return the result of that goal and the word for its status."""

@@ -10,11 +10,9 @@ from grader.authoring.rubric_draft import (
     ANSWERED,
     ANSWERS_S,
     ASKED,
-    INTEGER_PROBES,
     MADE_UP,
     SENT,
-    STRING,
-    TEXT_PROBES,
+    WAIT,
     Observed,
     Parts,
     RubricEntry,
@@ -33,6 +31,7 @@ from grader.authoring.rubric_draft import (
     rubric_text,
     second_look,
     serves_of,
+    start_alone,
     step_for,
     wraps_of,
 )
@@ -117,7 +116,7 @@ class Proposal:
         self._add("build", "The package builds", "build", {}, requires=before, reproduce="catkin_make")
 
     def _definition(self, one: Interface) -> None:
-        """A message, service or action of the package's own, with all of its fields and constants."""
+        """Ask for a message, service or action of the package's own, with all of its fields and constants."""
         fields = {field.path: field.type for field in one.fields if field.value is None}
         constants = {field.path: field.value for field in one.fields if field.value is not None}
         about = {"fields": fields, "constants": constants, "ordered": len(fields) > 1}
@@ -134,9 +133,8 @@ class Proposal:
     def _node(self, name: str, script: str, seen: Observed) -> None:
         file = PurePosixPath(script).name
         requires: list[str] = []
-        if (
-            script.endswith(".py") and script not in self._installed_scripts()
-        ):  # which needs no executable bit
+        # One that is installed needs no executable bit.
+        if script.endswith(".py") and script not in self._installed_scripts():
             requires = [
                 self._add(
                     f"{name}-executable", f"{file} can be run", "executable", {"path": script},
@@ -150,8 +148,7 @@ class Proposal:
                 needs = ": the script has the package's name, and Python finds it first. Give it another one"
             self.notes.append(f"{script} was not observed ({why}){needs}")
             return
-        served = self._runs.get(f"{name}-served")
-        if served:
+        if served := self._runs.get(f"{name}-served"):
             self._client(name, file, served, requires)
             return
         self._scenario(name, seen)
@@ -168,25 +165,22 @@ class Proposal:
         self._hearing(name, script, seen, requires)
 
     def _called(self, name: str, service: str, kind: str, requires: str) -> None:
-        """What a service was seen to answer."""
+        """Ask for what a service was seen to answer."""
         scenario = f"{name}-asked"
         run = self._runs.get(scenario)
-        answers = (
-            [e.value for _, e in run.actors if (e.action, e.topic) == ("answer", service)] if run else []
-        )
+        actors = run.actors if run else ()
+        answers = [e.value for _, e in actors if (e.action, e.topic) == ("answer", service)]
         if not answers or None in answers:
             call = f"- call: {{service: {service}, type: {kind}, request: {self._request(kind)}}}"
             self.notes.append(f"what {service} answers is not covered: a step can call it, {call}")
             return
         calls = calls_of(self._seen[name], self._facts.interfaces)
         times_ns = [t for t, e in run.actors if e.action in {"call", "answer"}] if run else []
-        if (
-            max((b - a for a, b in zip(times_ns[::2], times_ns[1::2], strict=False)), default=0)
-            < QUICK_S * NS
-        ):
+        waits_ns = (end - begin for begin, end in zip(times_ns[::2], times_ns[1::2], strict=False))
+        if max(waits_ns, default=0) < QUICK_S * NS:
             # a service that sleeps is not waited for as long as one that computes
             calls = [call | {"limit_s": QUICK_LIMIT_S} for call in calls]
-        self.scenarios[scenario] = self._alone(name, ASKED, calls=calls, until={"nodes": 1})
+        self.scenarios[scenario] = start_alone(self._parts, name, ASKED, calls=calls, until={"nodes": 1})
         parameters = {"service": service, "expect": list(map(plain_fields, answers))}
         if len(answers) > 1 and all(answer == answers[0] for answer in answers):
             self.notes.append(
@@ -197,9 +191,11 @@ class Proposal:
         self._add(id_, title, "service-answers", parameters, scenario=scenario, requires=[requires])
 
     def _client(self, name: str, file: str, run: Run, requires: list[str]) -> None:
-        """What a program asks of a service of the package's, and prints of its answer."""
+        """Ask for what a program asks of a service of the package's, and prints of its answer."""
         scenario, serves = f"{name}-served", serves_of(name, self._seen, self._facts.interfaces)
-        self.scenarios[scenario] = self._alone(name, ANSWERED, serves=serves, until={"quiet_s": 2})
+        self.scenarios[scenario] = start_alone(
+            self._parts, name, ANSWERED, serves=serves, until={"quiet_s": 2}
+        )
         for served in serves:
             service, answer = served["service"], served["answer"]
             asked = [e.value["request"] for _, e in run.actors if (e.action, e.topic) == ("serve", service)]
@@ -218,29 +214,17 @@ class Proposal:
     def _request(self, kind: str) -> str:
         """Return a request of a service of the package's own, as it can be written in a step."""
         path = f"srv/{kind.rpartition('/')[2]}.srv"
-        fields = [
-            f.name for i in self._facts.interfaces if i.path == path for f in i.fields if f.part == "request"
-        ]
-        return f"{{{', '.join(f'{name}: …' for name in fields)}}}"
+        own = (field for one in self._facts.interfaces if one.path == path for field in one.fields)
+        return f"{{{', '.join(f'{field.name}: …' for field in own if field.part == 'request')}}}"
 
     def _words(self, name: str, file: str, seen: Observed, node: str) -> None:
-        """What it logs and which parameters it shows."""
+        """Ask for what it logs and which parameters it shows."""
         needs: RubricEntry = {"scenario": name, "requires": [node]}
         for text in seen.logged[:1] if not seen.topics else ():
             self._add(f"{name}-logs", f"{file} logs {text!r}", "logs", {"text": text}, **needs)
         if seen.read:
             names = {"names": list(seen.read)}
             self._add(f"{name}-reads", f"{file} shows the parameters", "params-read", names, **needs)
-
-    def _alone(self, name: str, words: str, *, clock: str = "", **how: object) -> RubricEntry:
-        """Return a scenario that starts one node, with the package's own parameters set before; `words` follow its
-        file's name in the title."""
-        script = self._parts.nodes[name]
-        scenario: RubricEntry = {"title": f"{PurePosixPath(script).name}{words}"}
-        if self._parts.configs:
-            scenario["params"] = [{"file": path} for path in self._parts.configs]
-        scenario |= {"clock": clock} if clock else {}
-        return {**scenario, "start": [{"name": name, "script": script}], **how}
 
     def _scenario(self, name: str, seen: Observed) -> None:
         periodic = [t.name for t in seen.topics if t.rate_hz]
@@ -249,7 +233,7 @@ class Proposal:
         )
         if seen.ended:
             until = {"quiet_s": 2}
-        self.scenarios[name] = self._alone(name, " in real time", until=until)
+        self.scenarios[name] = start_alone(self._parts, name, " in real time", until=until)
 
     def _life(self, name: str, script: str, seen: Observed, requires: list[str]) -> str:
         anonymous = "required" if seen.anonymous else "allowed"
@@ -301,7 +285,7 @@ class Proposal:
             self._counter(name, topic, [kind, node], fast)
 
     def _label(self, name: str, topic: Topic) -> str:
-        """By the topic, and by the node too where several publish on it."""
+        """Return a label by the topic, and by the node too where several publish on it."""
         publishers = [n for n in self._parts.nodes if topic.name in {t.name for t in self._seen[n].topics}]
         return label_of(topic.name) if len(publishers) == 1 else f"{name}-{label_of(topic.name)}"
 
@@ -314,7 +298,9 @@ class Proposal:
             last, first = wrap
             words = f" with a fast clock, {WRAPS} times around"
             until = {"messages": {topic.name: WRAPS * (last - first + 1) + 2}}
-            self.scenarios[f"{name}-fast"] = self._alone(name, words, clock="warped", until=until)
+            self.scenarios[f"{name}-fast"] = start_alone(
+                self._parts, name, words, clock="warped", until=until
+            )
             needs["scenario"] = f"{name}-fast"
         title, start = f"The counter begins with {topic.counts_from}", {**about, "start": topic.counts_from}
         self._add(f"{label}-start", title, "counter-start", start, **needs)
@@ -333,8 +319,10 @@ class Proposal:
         if not heard:
             return
         scenario = f"{name}-hears"
-        probes = [_probe(topic, found[topic]) for topic in heard]
-        self.scenarios[scenario] = self._alone(name, MADE_UP, probes=probes, until={"heard": True})
+        probes = [probe_for(topic, found[topic]) for topic in heard]
+        self.scenarios[scenario] = start_alone(
+            self._parts, name, MADE_UP, probes=probes, until={"heard": True}
+        )
         for topic, template in heard.items():
             parameters = {"topic": topic} | ({"template": template} if template != "{value}" else {})
             id_ = f"{name}-hears-{label_of(topic)}"
@@ -348,7 +336,7 @@ class Proposal:
         return set(answers_to(run, topic, ANSWERS_S)) - periodic if run else set()
 
     def _answering(self, name: str, script: str, listens: Mapping[str, str], requires: list[str]) -> None:
-        """What it publishes upon what it hears and does not print."""
+        """Ask for what it publishes upon what it hears and does not print."""
         scenario, steps = f"{name}-answers", []
         for topic, kind in listens.items():
             found = self._answers(name, topic)
@@ -364,8 +352,7 @@ class Proposal:
                 title = f"{PurePosixPath(script).name} publishes on {answer} after each message on {topic}"
                 self._add(id_, title, "reacts", parameters, scenario=scenario, requires=requires)
         if steps:
-            wait = {"wait": {"seconds": ANSWERS_S}}
-            self.scenarios[scenario] = self._alone(name, SENT, steps=[*steps, wait])
+            self.scenarios[scenario] = start_alone(self._parts, name, SENT, steps=[*steps, WAIT])
 
     def _launch(self, name: str, launch: str, seen: Observed) -> None:
         file = next(f for f in self._facts.launch_files if PurePosixPath(f.path).name == launch)
@@ -391,20 +378,14 @@ class Proposal:
         nodes = {str(n.name): str(n.pkg) for n in others}
         ours = [str(n.name) for n in file.nodes if n.pkg == self._facts.name]
         if len(ours) > len(own):  # one script is several nodes
-            nodes |= {
-                f"/{one}": self._facts.name for one in sorted(seen.nodes) if one.rpartition("/")[2] in ours
-            }
+            named_so = [one for one in sorted(seen.nodes) if one.rpartition("/")[2] in ours]
+            nodes |= {f"/{one}": self._facts.name for one in named_so}
         named = {"nodes": nodes} if nodes else {}
         parameters = wanted | ({"topic": seen.connected[0]} if seen.connected else {}) | named
         self._add(
             f"{name}-runs", f"roslaunch brings up the nodes of {launch}", "launch-runs", parameters,
             scenario=name, requires=[xml], reproduce=f"roslaunch {self._facts.name} {launch}",
         )  # fmt: skip
-
-
-def _probe(topic: str, kind: str) -> RubricEntry:
-    made_up = {"text": TEXT_PROBES} if kind == STRING else {"integers": INTEGER_PROBES, "among": [0]}
-    return {"topic": topic, "type": kind, **made_up}
 
 
 def drop_empty(**lists: list[str]) -> RubricEntry:

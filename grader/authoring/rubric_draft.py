@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 from math import isfinite
 from pathlib import Path, PurePosixPath
@@ -24,14 +25,13 @@ from grader.checks.support.processes import lives
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.evidence.inspect import periodic_share, rate_stats
 from grader.evidence.run import Channel, Run
+from grader.model.message_definitions import integer_limits
 from grader.model.package import Interface, PackageFacts
 from grader.model.record import Record
 from grader.rubric.load import LoadedRubric
-from grader.rubric.scenario import Call, Param, Probe, Scenario, Served, Start, Step, Until
 from grader.untrusted_text import line, visible, without_ci_commands
 
 SYSTEM_SERVICES = ("/get_loggers", "/set_logger_level")
-INTEGER_TYPES = frozenset(f"std_msgs/{u}Int{bits}" for u in ("", "U") for bits in (8, 16, 32, 64))
 ANONYMOUS = re.compile(r"_\d+_\d{9,}$")
 MESSAGES_MIN = 5
 INFO = 2
@@ -88,7 +88,7 @@ class Observed(Record):
 
 
 def observe(run: Run) -> Observed:
-    """What the run shows of the student's nodes."""
+    """Return what the run shows of the student's nodes."""
     names = [n.lstrip("/") for n in run.student_nodes()]
     early = [one for one in lives(run) if one.ended_early]
     bad = next((one for one in early if one.end and one.end.exit_code != 0), None)
@@ -108,14 +108,14 @@ def observe(run: Run) -> Observed:
 
 
 def wraps_of(run: Run, topic: str) -> tuple[int, int] | None:
-    """The (last, first) values around a counter's wrap; None where it never wrapped, or differently each time."""
+    """Return the (last, first) values around a counter's wrap; None where it never did, or differently each time."""
     values = [v for c in run.student_channels(topic) for v in c.data if isinstance(v, int)]
     found = {(a, b) for a, b in pairwise(values) if b != a + 1}
     return next(iter(found)) if len(found) == 1 and next(iter(found))[1] < next(iter(found))[0] else None
 
 
 def heard_template(run: Run, topic: str) -> str | None:
-    """What the lines say around the messages (`I heard {value}`); None where they are not all printed."""
+    """Return what the lines say around the messages (`I heard {value}`); None where they are not all printed."""
     lines = printed_lines(run)
     prefixes = set()
     for probe in probes_on(run, topic):
@@ -159,14 +159,14 @@ def printed_answer(run: Run, answer: Mapping[str, object]) -> RubricEntry:
 
 
 def _topic(channel: Channel) -> Topic:
-    values = channel.data
+    values, kind = channel.data, channel.type.replace("/msg/", "/")
     return Topic(
         name=channel.topic,
-        type=channel.type.replace("/msg/", "/"),
+        type=kind,
         rate_hz=nice_rate(channel.times_ns),
         latched=channel.latching,
         silent=not channel.times_ns,
-        counts_from=_counts_from(values) if channel.type.replace("/msg/", "/") in INTEGER_TYPES else None,
+        counts_from=_counts_from(values) if integer_limits(kind) else None,
         template=_template(values, channel.times_ns),
     )
 
@@ -193,7 +193,7 @@ def _counts_from(values: Sequence[object]) -> int | None:
 
 
 def _template(values: Sequence[object], times_ns: Sequence[int]) -> str:
-    """`hello world {seconds}` for texts that end in a time which grows as the clock does."""
+    """Return `hello world {seconds}` for texts that end in a time which grows as the clock does."""
     found = [_TIME.fullmatch(v) if isinstance(v, str) else None for v in values]
     matches = [m for m in found if m is not None]
     if len(matches) < MESSAGES_MIN or len(matches) < len(found) or len({m["words"] for m in matches}) > 1:
@@ -281,8 +281,8 @@ class _Dumper(yaml.SafeDumper):
 
 
 def _quote_text(dumper: _Dumper, text: str) -> yaml.ScalarNode:
-    """What a CI's log could take for a command stands in double quotes, where `without_ci_commands` writes escapes; and
-    so do lines, which are then on one."""
+    """Write text: what a CI's log could take for a command stands in double quotes, where `without_ci_commands` writes
+    escapes; and so do lines, which are then on one."""
     style = '"' if "##" in text or "::" in text or "\n" in text else None
     return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
 
@@ -347,6 +347,7 @@ TEXT_PROBES = 8
 INTEGER_PROBES = 9
 STRING = "std_msgs/String"
 ANSWERS_S, MESSAGES = 0.5, 3
+WAIT = {"wait": {"seconds": ANSWERS_S}}
 ASKED, ANSWERED = ", with calls of the grader's", ", with a service of the grader's"
 SERVICES: Mapping[str, list[tuple[str, str, str]]] = {
     "std_srvs/SetBool": [
@@ -378,11 +379,6 @@ class Parts(Record):
     launches: dict[str, str]
     configs: tuple[str, ...] = ()
 
-    @property
-    def params(self) -> tuple[Param, ...]:
-        """Every parameter of the package's own files, with made-up values."""
-        return tuple(Param(file=path) for path in self.configs)
-
 
 def find_parts(folder: Path, facts: PackageFacts) -> Parts:
     """Python files that call `init_node`, programs of `add_executable`, launch files that can be read."""
@@ -399,12 +395,12 @@ def find_parts(folder: Path, facts: PackageFacts) -> Parts:
 
 
 def first_look(package: str, parts: Parts) -> LoadedRubric:
-    """Each node alone, in real time, and each launch file."""
-    until = Until(alive_s=WATCH_S, messages={})
-    scenarios = {name: _alone(parts, name, " in real time", until=until) for name in parts.nodes}
+    """Return a rubric that runs each node alone, in real time, and each launch file."""
+    until = {"alive_s": WATCH_S}
+    scenarios = {name: start_alone(parts, name, " in real time", until=until) for name in parts.nodes}
     for name, launch in parts.launches.items():
-        until = Until(alive_s=QUIET_LAUNCH_S, quiet_s=0.0, messages={})
-        scenarios[name] = Scenario(title=launch, start=(Start(name=name, launch=launch),), until=until)
+        until = {"alive_s": QUIET_LAUNCH_S, "quiet_s": 0.0}
+        scenarios[name] = {"title": launch, "start": [{"name": name, "launch": launch}], "until": until}
     return LoadedRubric.to_record(package, scenarios)
 
 
@@ -413,26 +409,20 @@ def second_look(
 ) -> LoadedRubric | None:
     """Messages for the nodes that listen, calls for those that offer a service and answers for those that look for one,
     and a fast clock for those that count; None where there is nothing to see."""
-    scenarios: dict[str, Scenario] = {}
+    scenarios: dict[str, RubricEntry] = {}
     for name in parts.nodes:
-        if asked := tuple(map(Call.model_validate, calls_of(seen[name], interfaces))):
-            until = Until(nodes=1, messages={})
-            scenarios[f"{name}-asked"] = _alone(parts, name, ASKED, calls=asked, until=until)
-        if answers := tuple(map(Served.model_validate, serves_of(name, seen, interfaces))):
-            until = Until(quiet_s=2, messages={})
-            scenarios[f"{name}-served"] = _alone(parts, name, ANSWERED, serves=answers, until=until)
-        listens = seen[name].listens.items()
-        if probes := tuple(p for topic, kind in listens if (p := probe_for(topic, kind))):
-            until = Until(heard=True, messages={})
-            scenarios[f"{name}-hears"] = _alone(parts, name, MADE_UP, probes=probes, until=until)
+        alone, listens = partial(start_alone, parts, name), seen[name].listens.items()
+        if calls := calls_of(seen[name], interfaces):
+            scenarios[f"{name}-asked"] = alone(ASKED, calls=calls, until={"nodes": 1})
+        if serves := serves_of(name, seen, interfaces):
+            scenarios[f"{name}-served"] = alone(ANSWERED, serves=serves, until={"quiet_s": 2})
+        if probes := [probe for topic, kind in listens if (probe := probe_for(topic, kind))]:
+            scenarios[f"{name}-hears"] = alone(MADE_UP, probes=probes, until={"heard": True})
         if sent := [step_for(topic, kind) for topic, kind in listens if not probe_for(topic, kind)]:
-            steps = tuple(Step.model_validate(step) for step in (*sent, {"wait": {"seconds": ANSWERS_S}}))
-            scenarios[f"{name}-answers"] = _alone(parts, name, SENT, steps=steps, until=Until(messages={}))
-        counters = [topic.name for topic in seen[name].topics if topic.counts_from is not None]
-        if counters:
-            until = Until(messages=dict.fromkeys(counters, WARPED_MESSAGES))
-            fast = _alone(parts, name, " with a fast clock", clock="warped", until=until)
-            scenarios[f"{name}-fast"] = fast
+            scenarios[f"{name}-answers"] = alone(SENT, steps=[*sent, WAIT])
+        if counters := [topic.name for topic in seen[name].topics if topic.counts_from is not None]:
+            until = {"messages": dict.fromkeys(counters, WARPED_MESSAGES)}
+            scenarios[f"{name}-fast"] = alone(" with a fast clock", clock="warped", until=until)
     return LoadedRubric.to_record(package, scenarios) if scenarios else None
 
 
@@ -487,20 +477,23 @@ def _filled(fields: Iterable[tuple[str, str, str]], part: str, turn: int) -> Rub
     return found
 
 
-def _alone(parts: Parts, name: str, words: str, **how: Any) -> Scenario:  # noqa: ANN401 - fields of the scenario
-    """Return a scenario that starts one node; `words` follow its file's name in the title."""
+def start_alone(parts: Parts, name: str, words: str, *, clock: str = "", **how: object) -> RubricEntry:
+    """Return a scenario that starts one node, with the package's own parameters set before; `words` follow its
+    file's name in the title."""
     script = parts.nodes[name]
-    title, start = f"{PurePosixPath(script).name}{words}", (Start(name=name, script=script),)
-    return Scenario(title=title, params=parts.params, start=start, **how)
+    scenario: RubricEntry = {"title": f"{PurePosixPath(script).name}{words}"}
+    scenario |= {"params": [{"file": path} for path in parts.configs]} if parts.configs else {}
+    scenario |= {"clock": clock} if clock else {}
+    return {**scenario, "start": [{"name": name, "script": script}], **how}
 
 
-def probe_for(topic: str, kind: str) -> Probe | None:
-    """Made-up messages of that type, None for a type of which none can be made up."""
+def probe_for(topic: str, kind: str) -> RubricEntry:
+    """Return made-up messages of that type; nothing for a type of which none can be made up."""
     if kind == STRING:
-        return Probe(topic=topic, type=kind, text=TEXT_PROBES)
-    if kind in INTEGER_TYPES:
-        return Probe(topic=topic, type=kind, integers=INTEGER_PROBES, among=(0,))
-    return None
+        return {"topic": topic, "type": kind, "text": TEXT_PROBES}
+    if integer_limits(kind):
+        return {"topic": topic, "type": kind, "integers": INTEGER_PROBES, "among": [0]}
+    return {}
 
 
 def step_for(topic: str, kind: str) -> RubricEntry:
@@ -523,12 +516,12 @@ def _is_node(path: Path) -> bool:
 
 
 def _holds_parameters(path: str) -> bool:
-    """By its folder: other YAML files are someone else's, a CI's for instance."""
+    """Return whether it does, by its folder: other YAML files are someone else's, a CI's for instance."""
     return {"config", "cfg", "param", "params", "yaml"} & set(PurePosixPath(path).parts[:-1]) != set()
 
 
 def _name(path: str, taken: set[str]) -> str:
-    """A start's name that no other has: `scripts/numeric_talker.py` becomes `numeric-talker`."""
+    """Return a start's name that no other has: `scripts/numeric_talker.py` becomes `numeric-talker`."""
     stem = re.sub(r"[^a-z0-9]+", "-", PurePosixPath(path).stem.lower()).strip("-")
     stem = stem if stem[:1].isalpha() else f"p-{stem}".rstrip("-")
     stem += "-launch" if path.endswith(".launch") else ""

@@ -34,7 +34,7 @@ from grader.errors import SubmissionError
 from grader.intake.limits import IntakeLimits, Meter, too_much
 from grader.intake.names import brief, is_archive_name, listing
 from grader.intake.tree import NO_CONTENT, file_digest
-from grader.limited_child import Answer, ChildLimits, run_limited
+from grader.limited_child import ChildLimits, run_limited
 
 MEMORY_BYTES, CPU_S, WALL_S = 512 << 20, 60, 180.0
 CHUNK_BYTES = 1 << 20
@@ -98,7 +98,10 @@ def unpack(path: Path, into: Path, limits: IntakeLimits) -> Unpacked:
             memory_bytes=MEMORY_BYTES, cpu_s=CPU_S, wall_s=WALL_S, file_bytes=limits.total_bytes
         ),
     )
-    said = _parse(answer)
+    try:
+        said: dict[str, Any] | None = json.loads(answer.lines) if answer.done else None
+    except ValueError:
+        said = None
     if said is None:
         raise too_much(name, "takes more time or memory to unpack")
     if "refused" in said:
@@ -109,14 +112,6 @@ def unpack(path: Path, into: Path, limits: IntakeLimits) -> Unpacked:
     return Unpacked(
         root=into, sha256=said["sha256"], executable=said["executable"], hints=tuple(said["hints"])
     )
-
-
-def _parse(answer: Answer) -> dict[str, Any] | None:
-    """Return what the child said, None if it did not come to its end."""
-    try:
-        return cast("dict[str, Any]", json.loads(answer.lines)) if answer.done else None
-    except ValueError:
-        return None
 
 
 def unpack_here(path: str, into: str, limits: dict[str, int]) -> Iterator[dict[str, Any]]:

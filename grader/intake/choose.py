@@ -17,7 +17,7 @@ from lxml import etree
 from grader.errors import PackageNotFound, SubmissionError
 from grader.files import read_untrusted
 from grader.intake.names import LONGEST_PACKAGE_NAME, brief, encodable, is_archive_name, listing, printable
-from grader.intake.tree import NO_CONTENT, Folder, is_file, is_there, read_file, walk
+from grader.intake.tree import Folder, is_file, is_there, read_file, walk
 from grader.model.package import BUILD_SPACES, CMAKE, MANIFEST, meant_manifest
 from grader.wording import is_one_edit
 
@@ -126,7 +126,7 @@ def _best(matches: list[Candidate], wanted: WantedPackage) -> Choice:
 
     def key(c: Candidate) -> tuple[bool, int, bool, int, bool, bytes]:
         # only copies need to be told apart, and it takes a walk through each
-        files = -_count_files(c.folder, wanted.files) if len(looked_at) > 1 else 0
+        files = -len(_files_of(c.folder, wanted.files)) if len(looked_at) > 1 else 0
         is_named = c.folder.name == (wanted.asked or wanted.name)
         return not _in_workspace(c), files, "src" not in _above(c), c.depth, not is_named, os.fsencode(c.path)
 
@@ -167,18 +167,13 @@ def _left_behind(chosen: Candidate, others: list[Candidate], wanted: WantedPacka
             yield f"{printable(name)} is in {where}: move it to {printable(chosen.path)}, into the same folder there"
 
 
-def _count_files(folder: Path, names: frozenset[str]) -> int:
-    """Return how many of the lab's files are there by name, in whatever folder of the package."""
-    return len(_files_of(folder, names))
-
-
 def _files_of(folder: Path, names: frozenset[str], *, near: bool = False) -> frozenset[str]:
     """Return which of the lab's files are there by name, in whatever folder of the package; with `near`, only in those
     that a package has: what is deeper may be in another one, and the folder a workspace."""
     found: set[str] = set()
     if names:
         for below in islice(walk(folder, tolerant=True), FOLDERS_OF_A_COPY):
-            below.folders[:] = [name for name in below.folders if name not in NO_CONTENT | BUILD_SPACES]
+            below.folders[:] = [name for name in below.folders if name not in BUILD_SPACES]
             if near:
                 below.folders[:] = (
                     sorted(USUAL_FOLDERS.intersection(below.folders)) if below.path == "." else []
@@ -215,7 +210,7 @@ def not_found(
     """Return the error for a submission without the package; it says what is there instead, and what to do."""
     packages = sorted(
         (c for c in candidates if c.has_manifest),
-        key=lambda c: (-_count_files(c.folder, wanted.files), c.name),
+        key=lambda c: (-len(_files_of(c.folder, wanted.files)), c.name),
     )
     names = list(dict.fromkeys(c.name for c in packages))
     here = f"packages here: {listing(names)}" if names else f"no {MANIFEST} was found"
@@ -237,7 +232,7 @@ def _rename(root: Path, packages: list[Candidate], wanted: WantedPackage) -> str
         loose = _loose_files(root, wanted.files)
         made = f"`catkin_create_pkg {name} std_msgs rospy` makes it, to hold {loose}"
         return f"{told}: {made}." if loose else f"{told}: was it handed in (and pushed)?"
-    counts = {c: _count_files(c.folder, wanted.files) for c in seen.values()}
+    counts = {c: len(_files_of(c.folder, wanted.files)) for c in seen.values()}
     only = max(counts, key=lambda c: counts[c])
     # it is sure if no other package has half as many of the lab's files
     is_only = len(counts) == 1 or sum(count * 2 >= max(1, counts[only]) for count in counts.values()) == 1
@@ -283,10 +278,10 @@ def _windows(folder: Path, names: list[str]) -> str:
 
 
 def _where_it_went(root: Path, wanted: str, git_links: tuple[str, ...]) -> str:
-    """What students do to a package so that it is there and cannot be seen."""
+    """Return what students do to a package so that it is there and cannot be seen."""
     links = [path for path in git_links if path.rpartition("/")[2].casefold() == wanted.casefold()]
     # nothing else was handed in, so the package is behind one of the links, whatever its name
-    if not links and not _has_files(root):
+    if not links and not any(folder.others for folder in walk(root, tolerant=True)):
         links = list(git_links)
     if links:
         path = printable(links[0])
@@ -295,7 +290,6 @@ def _where_it_went(root: Path, wanted: str, git_links: tuple[str, ...]) -> str:
             f"delete {path}/.git, `git rm --cached {path}`, `git add {path}`, commit and push."
         )
     for folder in walk(root, tolerant=True):
-        folder.folders[:] = [name for name in folder.folders if name not in NO_CONTENT]
         files = {entry.name for entry in folder.others}
         if MANIFEST in files and manifest_name(root / folder.path, root=root) == wanted:
             return _hidden_place(folder.path)
@@ -320,14 +314,6 @@ def _hidden_place(path: str) -> str:
             f"{printable(path)} is only a copy in {printable(made)}/: hand in the package itself, from src/."
         )
     return f"{printable(path)} is below another {MANIFEST}, where catkin never looks: move it out."
-
-
-def _has_files(root: Path) -> bool:
-    for folder in walk(root, tolerant=True):
-        folder.folders[:] = [name for name in folder.folders if name not in NO_CONTENT]
-        if folder.others:
-            return True
-    return False
 
 
 FOLDERS_LOOKED_AT, ENTRIES_LOOKED_AT, SECONDS_LOOKED = 3000, 300_000, 3.0
@@ -409,7 +395,6 @@ def linked_candidate(root: Path, wanted: str) -> Candidate | None:
     such."""
     real_root = root.resolve()
     for folder in walk(root, tolerant=True):
-        folder.folders[:] = [name for name in folder.folders if name not in NO_CONTENT]
         for entry in folder.others:
             named = entry.name.casefold() == wanted.casefold() and entry.is_symlink()
             if named and is_file(Path(entry.path, MANIFEST)):
@@ -479,10 +464,7 @@ def _folders_to_enter(root: Path, folder: Folder, leave_out: Path | None) -> lis
     return [
         name
         for name in folder.folders
-        if name not in BUILD_SPACES
-        and name not in NO_CONTENT
-        and not name.startswith(".")
-        and root / folder.inside(name) != leave_out
+        if name not in BUILD_SPACES and not name.startswith(".") and root / folder.inside(name) != leave_out
     ]
 
 

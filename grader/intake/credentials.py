@@ -18,6 +18,8 @@ from grader.errors import UsageError
 from grader.host_programs import find_user_program, with_absolute_paths
 
 HELPER_S = 30
+SILENT = {"GIT_TERMINAL_PROMPT": "0", "GIT_ASKPASS": "", "SSH_ASKPASS": "", "GCM_INTERACTIVE": "never"}
+"""With these, git starts no program that would ask a person for a password, nor asks itself."""
 USER, PASSWORD = "GRADER_LOGIN_USER", "GRADER_LOGIN_PASSWORD"
 # git runs what begins with `!` in a shell; `store` and `erase`, which it also asks for, do nothing
 _HELPER = (
@@ -106,7 +108,6 @@ def helper_password(server: str) -> str:
     """
     parts = urlsplit(server)
     wanted = f"protocol={parts.scheme}\nhost={parts.netloc}\n\n"
-    silent = {"GIT_TERMINAL_PROMPT": "0", "GIT_ASKPASS": "", "SSH_ASKPASS": "", "GCM_INTERACTIVE": "never"}
     options = (
         "-c",
         "credential.interactive=false",
@@ -119,7 +120,7 @@ def helper_password(server: str) -> str:
         done = subprocess.run(
             [find_user_program("git") or "/usr/bin/git", *options, "credential", "fill"],
             input=wanted,
-            env={**with_absolute_paths(os.environ), **silent},
+            env={**with_absolute_paths(os.environ), **SILENT},
             cwd="/",
             capture_output=True,
             encoding="utf-8",

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import IO
 
 from grader.host_programs import find_user_program, git_setting, loading_environment, with_absolute_paths
-from grader.intake.credentials import Access, is_refusal, scrubbed
+from grader.intake.credentials import SILENT, Access, is_refusal, scrubbed
 from grader.portable import own_session
 
 # no setting may run a program, change a file on its way to the disk, or leave a process behind
@@ -239,24 +239,17 @@ class Git:
                 or "ssh"
             )
         try:
-            program = Path(shlex.split(self._ssh_command)[0]).name
+            is_openssh = Path(shlex.split(self._ssh_command)[0]).name == "ssh"
         except (ValueError, IndexError):
-            return self._ssh_command
+            is_openssh = False
         # PuTTY's plink and others do not know these options
-        return (
-            f"{self._ssh_command} -o BatchMode=yes -o ControlMaster=no"
-            if program == "ssh"
-            else self._ssh_command
-        )
+        return self._ssh_command + (" -o BatchMode=yes -o ControlMaster=no" if is_openssh else "")
 
 
 _ASK_NOTHING = {
+    **SILENT,
     "LC_ALL": "C",
-    "GIT_TERMINAL_PROMPT": "0",
-    "GIT_ASKPASS": "",
-    "SSH_ASKPASS": "",
     "SSH_ASKPASS_REQUIRE": "never",
-    "GCM_INTERACTIVE": "never",
     "GIT_LFS_SKIP_SMUDGE": "1",  # else a checkout would fetch what LFS's pointers stand for
     "GIT_OPTIONAL_LOCKS": "0",
 }

@@ -15,6 +15,7 @@ import stat
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 from grader.errors import SubmissionError, UsageError
@@ -178,19 +179,14 @@ def _is_plain(path: Path) -> bool:
     """Return whether it is there. Raises Unfit where it, or anything in it, is neither a file nor a folder."""
     if not is_there(path):
         return False
-    for count, place in enumerate(_below(path)):
+    below = (Path(top) / name for top, folders, files in os.walk(path) for name in (*folders, *files))
+    for count, place in enumerate(chain([path], below)):
         mode = place.lstat().st_mode
         if count > _MAX_FILES:
             raise Unfit(f"its {path.name} holds more than {_MAX_FILES} files")
         if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
             raise Unfit(f"there is a link or a pipe in its {path.name}")
     return True
-
-
-def _below(path: Path) -> Iterator[Path]:
-    yield path
-    for folder, folders, files in os.walk(path):
-        yield from (Path(folder) / name for name in (*folders, *files))
 
 
 def _refuse_borrowed(objects: Path) -> None:
@@ -381,7 +377,7 @@ def _staged_paths(view: View, package: Path) -> list[str]:
 
 
 def _batches(paths: Sequence[str]) -> Iterator[list[str]]:
-    """As many paths at once as a command line takes."""
+    """Yield as many paths at once as a command line takes."""
     batch: list[str] = []
     for path in paths:
         if batch and (len(batch) == PATHS_AT_ONCE or sum(map(len, batch)) + len(path) > COMMAND_CHARS):

@@ -17,7 +17,8 @@ _LETTERS = str.maketrans(
     | {"đ": "d", "Đ": "D", "ð": "d", "þ": "th", "\N{LATIN SMALL LETTER DOTLESS I}": "i"}
 )
 _ARCHIVE_SUFFIX = re.compile(r"\.(zip|tar|tar\.(gz|xz|bz2)|tgz|txz|tbz2?)$", re.IGNORECASE)
-_DEVICE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+DEVICE = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\.|$)", re.IGNORECASE)
+"""Names that Windows keeps for its devices, whatever ending they have."""
 _SHOWN_AT_MOST = 5
 _SHOWN_LETTERS = 120
 
@@ -32,7 +33,7 @@ def safe_name(text: str) -> str:
     plain = "".join(char for char in plain if not unicodedata.combining(char))
     lost = any(ord(char) > 127 and not char.isspace() for char in plain)
     name = re.sub(r"[^A-Za-z0-9._-]+", "-", plain).lstrip(".-").rstrip(".-")
-    name = f"submission-{name}" if _DEVICE.fullmatch(name) else name
+    name = f"submission-{name}" if DEVICE.match(name) else name
     if not lost and len(name) <= MAX_NAME:
         return name or "submission"
     digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:8]

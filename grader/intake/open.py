@@ -44,7 +44,7 @@ from grader.intake.package_files import (
 )
 from grader.intake.repository import clone
 from grader.intake.source import Source, parse_source
-from grader.intake.tree import NO_CONTENT, Entry, file_digest, is_there, list_entries, tree_digest, walk
+from grader.intake.tree import Entry, file_digest, is_there, list_entries, tree_digest, walk
 from grader.model.submission import RecordedSubmission, SourcePackage, Submission
 
 _OTHERS_AT_MOST = 200
@@ -312,7 +312,9 @@ def _read(opened: Opened, choice: Choice, repositories: Repositories, limits: In
     chosen = choice.package
     content = package_content(chosen.folder, limits=limits, leave_out=opened.leave_out)
     modes = _modes(opened, chosen, content.entries, repositories)
-    right = _right_in_git(opened, chosen, content, repositories.git)
+    right: frozenset[str] = frozenset()
+    if opened.in_place:
+        right = right_in_git(chosen.folder, content.entries, repositories.git, opened.leave_out)
     return _Read(
         package=_package(chosen, modes, content, right),
         modes=modes,
@@ -360,12 +362,6 @@ def _others(
         except (SubmissionError, OSError):
             continue
         yield _package(candidate, _modes(opened, candidate, content.entries, repositories), content)
-
-
-def _right_in_git(opened: Opened, chosen: Candidate, content: Content, git: Git) -> frozenset[str]:
-    if not opened.in_place:
-        return frozenset()
-    return right_in_git(chosen.folder, content.entries, git, opened.leave_out)
 
 
 def _package(
@@ -446,7 +442,7 @@ def find_recordings(root: Path, pattern: str) -> list[Path]:
     wanted = pattern.casefold().removeprefix("./")
     found: list[Path] = []
     for folder in walk(root, tolerant=True):
-        folder.folders[:] = [n for n in folder.folders if n not in NO_CONTENT and not n.startswith(".")]
+        folder.folders[:] = [name for name in folder.folders if not name.startswith(".")]
         names = [entry.name for entry in folder.others if entry.is_file(follow_symlinks=False)]
         found += [root / path for path in map(folder.inside, names) if _fits(path, wanted)]
     # files that are too large are refused later, and their digests would take long

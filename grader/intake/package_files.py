@@ -12,13 +12,14 @@ from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path, PurePosixPath
 
 from grader.errors import SubmissionError
 from grader.intake.git import Git, GitFailed, GitMissing, Repository
 from grader.intake.gitdir import Repositories, Unfit, link_repository, repository_around
 from grader.intake.limits import NO_CODE, IntakeLimits, too_much
-from grader.intake.names import brief, encodable, listing, printable
+from grader.intake.names import DEVICE, brief, encodable, listing, printable
 from grader.intake.source import GivenModes
 from grader.intake.tree import Entry, list_entries, read_file
 from grader.model.package import BUILD_SPACES
@@ -30,7 +31,6 @@ _MADE = frozenset({"build", "devel", "install", ".catkin_tools"})
 _ODD_NAMES_SHOWN = 3
 _LFS = b"version https://git-lfs.github.com/spec/"
 _LFS_BYTES = 1024
-_DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\.|$)", re.IGNORECASE)
 _FORBIDDEN = re.compile(r'[<>:"|?*\\\x00-\x1f]|[. ]$')
 
 
@@ -57,23 +57,18 @@ def package_content(
     if len(own) > limits.package_files:
         raise too_much(brief(folder.name), f"holds more than {limits.package_files} files")
     closed = [e.path for e in files if not os.access(folder / e.path, os.R_OK, effective_ids=True)]
-    if not tolerant:
-        _refuse_closed(closed)
+    for path in () if tolerant else closed:
+        hidden = any(part.startswith(".") for part in path.split("/"))
+        if not hidden and PurePosixPath(path).suffix.lower() not in NO_CODE:
+            raise SubmissionError(
+                f"{brief(path)} cannot be read: Permission denied", hint="Check its permissions (`ls -l`)."
+            )
     large = _too_large(own, limits)
     others = [e.path for e in entries if e.kind == "other"]
     # what a build left counts for nothing, but no giant among it is read either
     giants = (e.path for e in files if e.size_bytes > limits.file_bytes)
     left_out = frozenset((*closed, *large, *others, *giants))
     return Content(entries=entries, left_out=left_out, hints=tuple(_hints(closed, large, others)))
-
-
-def _refuse_closed(paths: Iterable[str]) -> None:
-    for path in paths:
-        hidden = any(part.startswith(".") for part in path.split("/"))
-        if not hidden and PurePosixPath(path).suffix.lower() not in NO_CODE:
-            raise SubmissionError(
-                f"{brief(path)} cannot be read: Permission denied", hint="Check its permissions (`ls -l`)."
-            )
 
 
 def _too_large(files: list[Entry], limits: IntakeLimits) -> list[str]:
@@ -102,12 +97,11 @@ def remarks(folder: Path, entries: list[Entry], left_out: Collection[str]) -> tu
     paths = [entry.path for entry in entries]
     small = [e.path for e in entries if e.kind == "file" and 0 < e.size_bytes <= _LFS_BYTES]
     pointers = [path for path in small if path not in left_out and _is_pointer(folder / path)]
-    return (*_odd(paths), *_clashes(paths), *_foreign(paths), *_pointers(pointers))
-
-
-def _odd(paths: Iterable[str]) -> list[str]:
     odd = [brief(path) for path in paths if not encodable(path)]
-    return [f"a file's name is not UTF-8, so it is left out: {name}" for name in odd[:_ODD_NAMES_SHOWN]]
+    return (
+        *(f"a file's name is not UTF-8, so it is left out: {name}" for name in odd[:_ODD_NAMES_SHOWN]),
+        *(*_clashes(paths), *_foreign(paths), *_pointers(pointers)),
+    )
 
 
 def _with_folders(paths: Iterable[str]) -> set[str]:
@@ -132,7 +126,7 @@ def _clashes(paths: Iterable[str]) -> Iterator[str]:
 
 def _foreign(paths: Iterable[str]) -> Iterator[str]:
     names = ((path, PurePosixPath(path).name) for path in _with_folders(paths) if encodable(path))
-    found = sorted(path for path, name in names if _FORBIDDEN.search(name) or _DEVICES.match(name))
+    found = sorted(path for path, name in names if _FORBIDDEN.search(name) or DEVICE.match(name))
     if found:
         yield f"names that Windows cannot hold: {listing(found)}"
 
@@ -185,7 +179,11 @@ def folder_modes(entries: Iterable[Entry], folder: Path, repositories: Repositor
     tracked = {path: bit for path, bit in index.items() if path in on_disk}
     if not tracked:
         return Modes(source="disk" if MODES_ON_DISK else "none", executable=dict(on_disk), hints=hints)
-    hints = (*hints, *_differences(folder, on_disk, tracked), *_untracked_hint(folder, on_disk, tracked))
+    new = sorted(path for path in on_disk.keys() - tracked.keys() if is_script(folder, path))
+    added = (
+        [f"not in git yet, so not handed in by a push: {listing(new)} (git add, git commit)"] if new else ()
+    )
+    hints = (*hints, *_differences(folder, on_disk, tracked), *added)
     return Modes(source="git", executable={**on_disk, **tracked}, hints=hints)
 
 
@@ -241,30 +239,18 @@ def is_script(folder: Path, path: str) -> bool:
         return False
 
 
-def _differences(folder: Path, on_disk: Mapping[str, bool | None], tracked: Mapping[str, bool]) -> list[str]:
-    hints: list[str] = []
+def _differences(
+    folder: Path, on_disk: Mapping[str, bool | None], tracked: Mapping[str, bool]
+) -> Iterator[str]:
     differing = (path for path, in_git in sorted(tracked.items()) if on_disk[path] not in (None, in_git))
-    for path in differing:
-        if len(hints) == _DIFFERENCES_SHOWN:
-            break
-        if not is_script(folder, path):
-            continue
+    scripts = (path for path in differing if is_script(folder, path))
+    for path in islice(scripts, _DIFFERENCES_SHOWN):
         shown = printable(path)
         if tracked[path]:
-            hints.append(f"{shown} is executable in git but not on this disk: chmod +x {shlex.quote(shown)}")
+            yield f"{shown} is executable in git but not on this disk: chmod +x {shlex.quote(shown)}"
         else:
             how = chmod_hint("git", shown, only_git_lacks_it=True)
-            hints.append(f"{shown} is executable on this disk but not in git: {how}")
-    return hints
-
-
-def _untracked_hint(
-    folder: Path, on_disk: Mapping[str, bool | None], tracked: Mapping[str, bool]
-) -> list[str]:
-    new = sorted(path for path in on_disk.keys() - tracked.keys() if is_script(folder, path))
-    return (
-        [f"not in git yet, so not handed in by a push: {listing(new)} (git add, git commit)"] if new else []
-    )
+            yield f"{shown} is executable on this disk but not in git: {how}"
 
 
 def right_in_git(folder: Path, entries: Iterable[Entry], git: Git, base: Path) -> frozenset[str]:

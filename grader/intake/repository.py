@@ -124,7 +124,7 @@ def _remote_refs(source: Source, git: Git, into: Path) -> dict[str, str]:
     into.mkdir(parents=True)
     # without a template, which may bring hooks along
     git.run("init", "--quiet", "--template=", ".", cwd=into)
-    listed = _ask(source, git, into, ("ls-remote", "--quiet"))
+    listed = ask(source, git, _own(into), ("ls-remote", "--quiet"))
     refs = parse_refs(os.fsdecode(listed))
     # A repository has one kind of hash, and it is chosen when it is made.
     if any(len(commit) == _FULL_HASHES[1] for commit in refs.values()):
@@ -161,11 +161,7 @@ def _everything(refs: dict[str, str], wanted: WantedRevision) -> tuple[str, ...]
 
 def _fetch_refs(source: Source, git: Git, into: Path, options: tuple[str, ...], *refspecs: str) -> None:
     always = ("--quiet", "--no-tags", "--no-recurse-submodules")
-    _ask(source, git, into, ("fetch", *always, *options), *refspecs)
-
-
-def _ask(source: Source, git: Git, into: Path, command: tuple[str, ...], *refspecs: str) -> bytes:
-    return ask(source, git, _own(into), command, *refspecs)
+    ask(source, git, _own(into), ("fetch", *always, *options), *refspecs)
 
 
 def ask(source: Source, git: Git, repository: Repository, command: tuple[str, ...], *refspecs: str) -> bytes:

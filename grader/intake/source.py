@@ -78,7 +78,7 @@ def parse_source(text: str) -> Source:
         return _from_scp(text, match)
     for left, ref in splits:
         if _existing(left):
-            raise UsageError(f"'{brief(ref)}' cannot be the name of a branch, tag or commit", hint=_SOURCES)
+            raise _no_ref(ref)
     web = "A web address begins with https://. " if _HOST_AND_PATH.match(text) else ""
     raise UsageError(f"{printable(text) or 'an empty SOURCE'} does not exist", hint=web + _SOURCES)
 
@@ -97,7 +97,7 @@ def with_ref(source: Source, ref: str | None) -> Source:
     if ref is None or ref == source.ref:
         return source
     if not _is_ref(ref):
-        raise UsageError(f"'{brief(ref)}' cannot be the name of a branch, tag or commit", hint=_SOURCES)
+        raise _no_ref(ref)
     if source.ref is not None:
         raise UsageError(
             f"{source.given} says @{brief(source.ref)}, the column ref says {brief(ref)}",
@@ -132,6 +132,10 @@ def _splits(text: str) -> list[tuple[str, str]]:
 
 def _is_ref(text: str) -> bool:
     return bool(text) and _NO_REF.search(text) is None
+
+
+def _no_ref(text: str) -> UsageError:
+    return UsageError(f"'{brief(text)}' cannot be the name of a branch, tag or commit", hint=_SOURCES)
 
 
 def _local(path: Path, ref: str | None, text: str, *, clone: bool = False) -> Source:
@@ -191,17 +195,14 @@ def _from_url(text: str, match: re.Match[str]) -> Source:
         raise UsageError(f"{scheme}:// is not the address of a git repository", hint=_SOURCES)
     if scheme == "file" and authority in ("", "localhost"):
         return _from_file_url(path, text)
+    server = f"{scheme}://{_without_password(scheme, authority)}"
     if scheme == "file" or authority.startswith("-"):
-        raise UsageError(
-            f"{brief(f'{scheme}://{_without_password(scheme, authority)}{path}')} names no repository",
-            hint=_SOURCES,
-        )
+        raise UsageError(f"{brief(f'{server}{path}')} names no repository", hint=_SOURCES)
     split_address(f"{scheme}://{authority}")
     path, ref = _split_remote(path)
     if not path.strip("/") or not authority:
-        named = printable(f"{scheme}://{_without_password(scheme, authority)}{path}")
-        raise UsageError(f"{named} names no repository", hint=_SOURCES)
-    shown = f"{scheme}://{_without_password(scheme, authority)}{path}" + (f"@{ref}" if ref else "")
+        raise UsageError(f"{printable(f'{server}{path}')} names no repository", hint=_SOURCES)
+    shown = f"{server}{path}" + (f"@{ref}" if ref else "")
     url = f"{scheme}://{authority}{path}"
     return Source(kind="repository", given=printable(shown), name=_last(path), url=url, ref=ref, remote=True)
 
@@ -238,7 +239,7 @@ def _split_remote(path: str) -> tuple[str, str | None]:
         return path, None
     path, ref = path[:cut], path[cut + 1 :]
     if not _is_ref(ref):
-        raise UsageError(f"'{brief(ref)}' cannot be the name of a branch, tag or commit", hint=_SOURCES)
+        raise _no_ref(ref)
     return path, ref
 
 

@@ -51,7 +51,8 @@ class Entry:
 
 
 def walk(root: Path, *, tolerant: bool = False) -> Iterator[Folder]:
-    """Yield every folder from `root` on, nearest first, in order of names; links are entries, never ways.
+    """Yield every folder from `root` on, nearest first, in order of names; links are entries, never ways, and folders
+    of NO_CONTENT are left out.
 
     Raises OSError for a folder that cannot be read, hidden ones left out, and SubmissionError for more than MAX_DEPTH
     folders in each other or too much in one of them; `tolerant` passes over those below the root. Raises
@@ -71,8 +72,9 @@ def walk(root: Path, *, tolerant: bool = False) -> Iterator[Folder]:
         seen += len(entries)
         if seen > MAX_IN_TREE:
             raise _too_many(root.name, MAX_IN_TREE)
-        names = [entry.name for entry in entries if entry.is_dir(follow_symlinks=False)]
+        folders = [entry for entry in entries if entry.is_dir(follow_symlinks=False)]
         others = [entry for entry in entries if not entry.is_dir(follow_symlinks=False)]
+        names = [entry.name for entry in folders if entry.name not in NO_CONTENT]
         folder = Folder(path=path, folders=names, others=others)
         yield folder
         below = [folder.inside(name) for name in folder.folders]
@@ -117,11 +119,7 @@ def list_entries(
     for count, folder in enumerate(walk(root, tolerant=tolerant)):
         if count > max_folders:
             raise _too_many(root.name, max_folders)
-        folder.folders[:] = [
-            name
-            for name in folder.folders
-            if name not in NO_CONTENT and root / folder.inside(name) != leave_out
-        ]
+        folder.folders[:] = [name for name in folder.folders if root / folder.inside(name) != leave_out]
         found += [_entry(folder, other) for other in folder.others if other.name not in NO_CONTENT]
     # by bytes, since a name need not be UTF-8; the digest depends on this order
     return sorted(found, key=lambda entry: os.fsencode(entry.path))

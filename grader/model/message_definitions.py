@@ -84,6 +84,16 @@ def exchanged_parts(found: Collection[InterfaceField], wanted: Collection[Interf
     return dict(places) if is_whole and any(old != new for old, new in places) else {}
 
 
+def integer_limits(type_: str) -> tuple[int, int] | None:
+    """Return the least and the greatest value of an integer type, `uint8` or `std_msgs/UInt8`; None of any other."""
+    plain = type_.removeprefix("std_msgs/").lower() if type_.startswith("std_msgs/") else type_
+    match = re.fullmatch(r"(u?)int(8|16|32|64)", plain)
+    if match is None:
+        return None
+    values = 2 ** int(match[2])
+    return (0, values - 1) if match[1] else (-values // 2, values // 2 - 1)
+
+
 def refuse_unknown(type_: str) -> None:
     """Raise ValueError where a type has the form of a built-in one, and is none."""
     base = type_.partition("[")[0]

@@ -14,6 +14,7 @@ from grader.checks.registry import Check
 from grader.checks.support.fields import is_number
 from grader.evidence.decode import definition, encode
 from grader.installable import noetic_messages
+from grader.model.message_definitions import integer_limits
 from grader.rubric.fault_words import model_faults
 from grader.rubric.model import ManualParams
 from grader.rubric.references import reference_faults
@@ -40,11 +41,6 @@ MANUAL = "manual"  # a person gives the points, no check does
 KINDS_OF_POINTS = ("points", "bonus", "penalty")
 KINDS_OF_START = ("script", "launch", "load", "program", "built", "tests")
 STRING = "std_msgs/String"
-INTEGERS = {
-    f"std_msgs/{prefix}Int{bits}": (low, high)
-    for bits in (8, 16, 32, 64)
-    for prefix, low, high in (("", -(2 ** (bits - 1)), 2 ** (bits - 1) - 1), ("U", 0, 2**bits - 1))
-}
 
 
 def cross_faults(
@@ -403,10 +399,11 @@ def _contents(at: KeyPath, probe: dict[str, Any], kind: str) -> Iterator[Fault]:
     yield from _misfits(at, kind, list(enumerate(as_list(probe.get("values")))))
     if probe.get("text") and kind != STRING:
         yield (*at, "text"), f"is not for {kind}"
+    limits = integer_limits(kind)
     for key in ("integers", "among"):
-        if probe.get(key) and kind not in INTEGERS:
+        if probe.get(key) and limits is None:
             yield (*at, key), f"is not for {kind}"
-    low, high = INTEGERS.get(kind, (-math.inf, math.inf))
+    low, high = limits or (-math.inf, math.inf)
     for position, value in enumerate(as_list(probe.get("among"))):
         if isinstance(value, int) and not low <= value <= high:
             yield (*at, "among", position), f"an {kind.partition('/')[2]} holds {low} to {high}, not {value}"

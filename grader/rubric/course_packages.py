@@ -99,15 +99,12 @@ def _programs(rubric: WrittenRubric, package: str, files: Mapping[str, bytes]) -
         elif owner == package and name.endswith(ROSTEST_ENDING):
             data = next(data for file, data in files.items() if file.endswith(f"/{name}"))
             text = _COMMENT.sub("", data.decode(errors="replace"))
-            yield from ((path, fault) for fault in _started_by_test(rubric, name, text))
+            # Where tests are, nothing of a student's runs.
+            for own in rubric.packages:
+                if re.search(rf"""pkg\s*=\s*["']{own}["']|\$\(find {own}\)""", text):
+                    there = f"{name} starts something of {own}: take it out"
+                    yield path, f"{there}, and start it in the scenario, before the tests"
             yield from _unknown_tests(rubric, at[1], start.get("name"), name, text)
-
-
-def _started_by_test(rubric: WrittenRubric, name: str, text: str) -> Iterator[str]:
-    """Yield why a `.test` file cannot be used: where tests are, nothing of a student's runs."""
-    for own in rubric.packages:
-        if re.search(rf"""pkg\s*=\s*["']{own}["']|\$\(find {own}\)""", text):
-            yield f"{name} starts something of {own}: take it out, and start it in the scenario, before the tests"
 
 
 def _unknown_tests(

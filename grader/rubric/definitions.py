@@ -16,7 +16,7 @@ from grader.checks.support.fields import is_number
 from grader.evidence.decode import full_definition
 from grader.evidence.definitions import Field, Types, parse
 from grader.evidence.message_values import ANGLES, CLOCKS, FORMS, NOW, MessageType
-from grader.model.message_definitions import DIVIDER, PARTS
+from grader.model.message_definitions import DIVIDER, PARTS, integer_limits
 from grader.ros_env import ros_packages
 from grader.rubric.yaml_lines import KeyPath, WrittenRubric, as_map, services_in
 from grader.wording import closest, did_you_mean, is_one_edit, join_words
@@ -168,21 +168,12 @@ def no_value(kind: str, value: object) -> str:
     got = "a text" if isinstance(value, str) else "true or false" if isinstance(value, bool) else "a number"
     if wanted != got and not (kind.startswith("float") and value in {".inf", "-.inf", "+.inf", ".nan"}):
         return f"is {wanted}, not {value!r}"
-    low, high = limits_of(kind) or (0, 0)
+    low, high = integer_limits(kind) or (0, 0)
     if isinstance(value, float) and low < high and not value.is_integer():
         return f"is {kind}, a whole number, and never {value:g}"
     if isinstance(value, int | float) and low < high and not low <= value <= high:
         return f"is {kind}, {low} to {high}, and never {value:g}"
     return ""
-
-
-def limits_of(kind: str) -> tuple[int, int] | None:
-    """Return the least and the greatest value of an integer type."""
-    match = re.fullmatch(r"(u?)int(\d+)", kind)
-    if match is None:
-        return None
-    bits = int(match[2])
-    return (0, 2**bits - 1) if match[1] else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
 
 
 class Definitions:

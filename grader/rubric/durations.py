@@ -171,10 +171,8 @@ def within_faults(about: WrittenCriterion) -> Iterator[Fault]:
     if not is_number(within_s):
         return
     if goal is not None and is_number(limit_s := _limit_s(goal)) and within_s > limit_s:
-        yield (
-            at,
-            f"the step waits {limit_s:g} s for the result (limit_s), and gives it up before {within_s:g} s",
-        )
+        waits = f"the step waits {limit_s:g} s for the result (limit_s)"
+        yield at, f"{waits}, and gives it up before {within_s:g} s"
     after_s = (goal or {}).get("cancel_after_s")
     if goal is not None and all(map(is_number, (after_s, limit_s := _limit_s(goal)))):
         left_s = limit_s - after_s

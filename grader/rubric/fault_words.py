@@ -9,6 +9,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from grader.checks import CHECKS
@@ -126,9 +127,7 @@ def _data_path(data: object, detail: ErrorDetails) -> KeyPath:
 
 
 def _holds(data: object, part: str | int) -> bool:
-    if isinstance(data, dict):
-        return part in data
-    return isinstance(data, list) and isinstance(part, int) and part < len(data)
+    return part in (data if isinstance(data, dict) else range(len(data)) if isinstance(data, list) else ())
 
 
 def _elsewhere(model: type[BaseModel], data: Any, path: KeyPath, base: KeyPath) -> str:  # noqa: ANN401 - as above
@@ -142,7 +141,7 @@ def _elsewhere(model: type[BaseModel], data: Any, path: KeyPath, base: KeyPath) 
             return f": it belongs beside {path[end]}, and not into it"
     if base[-1:] == ("with",) and key in {"scenario", "requires", "points", "title", "hint", "reproduce"}:
         return ": it belongs beside with, and not into it"
-    inside = {name for name, one in _fields(model, path[:-1]) if key in _keys_of(one)}
+    inside = {name for name, one in _fields(model, path[:-1]) if key in dict(_fields(one.annotation))}
     return f": it belongs into {inside.pop()}" if len(inside) == 1 else ""
 
 
@@ -167,7 +166,8 @@ def _message(model: type[BaseModel], path: KeyPath, detail: ErrorDetails) -> str
         "missing": lambda: "is missing",
         "extra_forbidden": lambda: "is not known here",
         "string_pattern_mismatch": lambda: (
-            f"{_pattern(context['pattern'])}, not {shown(value)}{_as_named(context['pattern'], value)}"
+            f"{PATTERN_RULES.get(context['pattern'], 'must match ' + context['pattern'])}, not {shown(value)}"
+            f"{_as_named(context['pattern'], value)}"
         ),
         "literal_error": lambda: _literal(value, context["expected"]),
         "string_too_long": lambda: f"has at most {context['max_length']} characters, not {len(value)}",
@@ -231,10 +231,6 @@ def _other_shape(path: KeyPath, kind: str, value: object) -> str:
     return ""
 
 
-def _pattern(pattern: str) -> str:
-    return PATTERN_RULES.get(pattern, f"must match {pattern}")
-
-
 def _as_named(pattern: str, text: str) -> str:
     """Return how a type or a file's name is written that has another form: `std_msgs.msg.String`, `Add.srv`."""
     if pattern == TYPE_PATTERN and (parts := _TYPE_ELSEWHERE.fullmatch(text)):
@@ -275,24 +271,16 @@ def _keys(model: type[BaseModel], path: KeyPath) -> list[str]:
     return [name for name, _ in _fields(model, path)]
 
 
-def _keys_of(annotation: object) -> list[str]:
-    return [f.alias or n for m in _models(annotation) for n, f in m.model_fields.items()]
-
-
-def _fields(model: type[BaseModel], path: KeyPath) -> Iterator[tuple[str, object]]:
-    """Yield the fields of the record at `path`, and their types."""
-    found: object = model
+def _fields(model: object, path: KeyPath = ()) -> Iterator[tuple[str, FieldInfo]]:
+    """Yield the fields of the record at `path`, by their keys."""
     for part in path:
-        found = next(_inside(found, part), None)
-    yield from ((f.alias or n, f.annotation) for m in _models(found) for n, f in m.model_fields.items())
+        model = next(_inside(model, part), None)
+    yield from ((f.alias or n, f) for m in _models(model) for n, f in m.model_fields.items())
 
 
 def _is_share(model: type[BaseModel], path: KeyPath) -> bool:
     """Return whether a field is between 0 and 1."""
-    found: object = model
-    for part in path[:-1]:
-        found = next(_inside(found, part), None)
-    fields = [m.model_fields[str(path[-1])] for m in _models(found) if path and path[-1] in m.model_fields]
+    fields = [field for name, field in _fields(model, path[:-1]) if (name,) == path[-1:]]
     return any(getattr(one, "le", None) == 1 for field in fields for one in field.metadata)
 
 

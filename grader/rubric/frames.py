@@ -4,7 +4,7 @@ where messages have radians."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 from grader.checks.support.fields import is_number
@@ -17,6 +17,8 @@ from grader.rubric.yaml_lines import (
     as_map,
     as_maps,
     given_steps,
+    items_in,
+    numbers_in,
     parts_of,
 )
 
@@ -61,12 +63,7 @@ def _sent_turns(path: KeyPath, scenario: dict[str, Any], rubric: WrittenRubric) 
 def _turns(path: KeyPath, value: object, *, is_angle: bool = False) -> Iterator[Fault]:
     if is_angle and is_number(value) and abs(value) in IN_DEGREES:
         yield path, f"angles are in radians here: write {math.radians(value):.4f} for {value:g} degrees"
-    inside: Iterable[tuple[str | int, object]] = ()
-    if isinstance(value, dict):
-        inside = value.items()
-    elif isinstance(value, list):
-        inside = enumerate(value)
-    for key, inner in inside:
+    for key, inner in items_in(value):
         yield from _turns((*path, key), inner, is_angle=is_angle or key in IN_RADIANS)
 
 
@@ -138,18 +135,17 @@ def _slash(path: KeyPath, frame: object) -> Iterator[Fault]:
 
 def _in_values(path: KeyPath, value: object) -> Iterator[Fault]:
     """Yield the faults of a part of the rubric and of all parts in it."""
-    inside = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     given = as_map(value)
     if str(given.get("field")).rpartition(".")[2] in FRAME_KEYS:
         yield from _slash((*path, "value"), given.get("value"))
-    for key, inner in inside:
+    for key, inner in items_in(value):
         at = (*path, key)
         if key in FRAME_KEYS:
             yield from _slash(at, inner)
         elif key in {"orientation", "rotation"}:
             yield from _no_rotation(at, inner)
         elif key in ANGLES:
-            for angle in _numbers(inner):
+            for _, angle in numbers_in((), inner):
                 if degrees := _in_degrees(angle):
                     yield at, f"{angle:g} is {degrees} degrees in radians: write {degrees}"
         yield from _in_values(at, inner)
@@ -165,14 +161,6 @@ def _no_rotation(path: KeyPath, value: object) -> Iterator[Fault]:
             f"is a quaternion, whose length is 1, not {length:.3g}: write {{rpy_deg: [0, 0, 90]}}, in degrees"
         )
         yield path, fault
-
-
-def _numbers(value: object) -> Iterator[float]:
-    if isinstance(value, dict | list):
-        for inner in value.values() if isinstance(value, dict) else value:
-            yield from _numbers(inner)
-    elif isinstance(value, float):
-        yield value
 
 
 def _in_degrees(angle: float) -> int:

@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 from grader.checks import CHECKS, Check
@@ -23,7 +23,6 @@ from grader.rubric.find import BUILT_IN, known_labs, locate, rubric_ids, rubrics
 from grader.rubric.made_up import draw_values, faults_of_sample, made_up_faults, sample_data, with_values
 from grader.rubric.model import Criterion, Rubric
 from grader.rubric.own_checks import Beside, known_checks, read_instructor, run_checks_file
-from grader.rubric.scenario import Scenario
 from grader.rubric.spelling import misspelt_names, names_seen_once
 from grader.rubric.validation_warnings import warnings
 from grader.rubric.yaml_lines import Fault, KeyPath, Source, Value, WrittenRubric, as_map, read_source
@@ -57,7 +56,7 @@ class LoadedRubric(Record):
         return known_checks(folder, run_checks_file(folder.resolve() / self.rubric.checks, self.own).checks)
 
     @classmethod
-    def to_record(cls, package: str, scenarios: Mapping[str, Scenario]) -> LoadedRubric:
+    def to_record(cls, package: str, scenarios: Mapping[str, object]) -> LoadedRubric:
         """Return a rubric that only says what to run; its criterion is never judged."""
         first = next(iter(scenarios), None)
         criterion = Criterion.model_validate(
@@ -89,12 +88,14 @@ def load_rubric(name_or_path: str) -> LoadedRubric:
     lab.
     """
     name, pin = split_pin(name_or_path)
-    address = ADDRESS.match(name) is not None
-    of_course = None if address else split_name(name)
-    if of_course:
+    if ADDRESS.match(name):
+        from grader.rubric.download import fetch_rubric  # noqa: PLC0415 - slow to import, and seldom needed
+
+        loaded = _load_file(fetch_rubric(name, pin), name)
+    elif of_course := split_name(name):
         loaded = _load_of_course(*of_course)
     else:
-        loaded = _load_file(*(_fetch_pinned(name, pin) if address else locate(name)))
+        loaded = _load_file(*locate(name))
     if not pin:
         return loaded
     if pin != loaded.digest:
@@ -128,12 +129,6 @@ def _load_file(path: Path, name: str) -> LoadedRubric:
         handed_out=beside.handed_out,
         origin="grader" if path.resolve().is_relative_to(rubrics_folder().resolve()) else "elsewhere",
     )
-
-
-def _fetch_pinned(url: str, pin: str) -> tuple[Path, str]:
-    from grader.rubric.download import fetch_rubric  # noqa: PLC0415 - slow to import, and seldom needed
-
-    return fetch_rubric(url, pin), url
 
 
 def split_pin(text: str) -> tuple[str, str]:
@@ -311,24 +306,22 @@ def names_in(criterion: Criterion) -> set[str]:
 
 def needs_package(loaded: LoadedRubric) -> bool:
     """Return whether there is anything to run, or any check that looks at the package's files."""
-    rubric, checks = loaded.rubric, loaded.checks
-    return bool(select_started(rubric).scenarios) or any(_looks_at_files(c, checks) for c in rubric.criteria)
+    return _needs(loaded, lambda check: not check.messages_only and not _OF_FILES.isdisjoint(check.facts))
 
 
 def needs_ros(loaded: LoadedRubric) -> bool:
     """Return whether anything is to be built or run: files alone decide everything else."""
-    rubric, checks = loaded.rubric, loaded.checks
-    return bool(select_started(rubric).scenarios) or any(_needs_build(c, checks) for c in rubric.criteria)
+    return _needs(loaded, lambda check: "build" in check.facts)
 
 
-def _needs_build(criterion: Criterion, checks: Mapping[str, Check]) -> bool:
-    check = checks.get(criterion.check)
-    return check is not None and "build" in check.facts
+_OF_FILES = {"package", "build"}
 
 
-def _looks_at_files(criterion: Criterion, checks: Mapping[str, Check]) -> bool:
-    check = checks.get(criterion.check)
-    return check is not None and not check.messages_only and bool({"package", "build"} & set(check.facts))
+def _needs(loaded: LoadedRubric, is_meant: Callable[[Check], bool]) -> bool:
+    """Return whether there is anything to run, or a criterion with a check that is meant."""
+    checks = loaded.checks
+    found = (checks[c.check] for c in loaded.rubric.criteria if c.check in checks)
+    return bool(select_started(loaded.rubric).scenarios) or any(map(is_meant, found))
 
 
 def rates_of(rubric: Rubric) -> dict[str, tuple[RateBounds, ...]]:

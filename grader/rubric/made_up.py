@@ -21,7 +21,17 @@ from pydantic import Field, ValidationError
 
 from grader.errors import EvidenceError
 from grader.model.record import Record
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, criteria_of, dotted, give_one
+from grader.rubric.yaml_lines import (
+    Fault,
+    KeyPath,
+    as_map,
+    as_maps,
+    as_texts,
+    criteria_of,
+    dotted,
+    give_one,
+    items_in,
+)
 from grader.wording import did_you_mean, join_words
 
 if TYPE_CHECKING:
@@ -53,8 +63,6 @@ NAMED = ("name", "topic", "service", "action", "process", "child")
 """The keys of these parts that name them."""
 _IN_TEXT = re.compile(r"\{made_up: ?([\w-]+)\}")
 _NEARLY = re.compile(r"\{ ?made[ _-]?up\b", re.IGNORECASE)
-
-
 _NEARLY_TOO = re.compile(r"\{\{ ?made_up\b|^made_up:? *[\w-]+$")
 
 
@@ -263,12 +271,12 @@ def places(part: object, path: KeyPath = ()) -> Iterator[tuple[KeyPath, str]]:
     """Yield where made-up values stand in a part of a rubric's data, and their names."""
     if isinstance(part, dict) and is_place(part):
         yield path, part[KEY]
-    elif isinstance(part, dict | list):
-        for key, value in part.items() if isinstance(part, dict) else enumerate(part):
-            yield from ((path, name) for name in _IN_TEXT.findall(str(key)))
-            yield from places(value, (*path, key))
-    elif isinstance(part, str):
+        return
+    if isinstance(part, str):
         yield from ((path, name) for name in _IN_TEXT.findall(part))
+    for key, value in items_in(part):
+        yield from ((path, name) for name in _IN_TEXT.findall(str(key)))
+        yield from places(value, (*path, key))
 
 
 def names_in(part: object) -> set[str]:
@@ -384,8 +392,8 @@ def _no_names(part: object, path: KeyPath) -> Iterator[Fault]:
         yield (*path, KEY), "takes the name of one value: {made_up: rate}"
     elif isinstance(part, str) and (_NEARLY.search(_IN_TEXT.sub("", part)) or _NEARLY_TOO.search(part)):
         yield path, "a made-up value is written {made_up: rate}, with its own name"
-    elif isinstance(part, dict | list):
-        for key, inner in part.items() if isinstance(part, dict) else enumerate(part):
+    else:
+        for key, inner in items_in(part):
             yield from _no_names(f"{{{key}" if inner is None else inner, (*path, key))
 
 

@@ -11,7 +11,14 @@ from typing import Any
 from grader.checks.support.fields import is_number
 from grader.evidence.definitions import Field
 from grader.installable import noetic_messages
-from grader.model.message_definitions import BUILT_IN, FULL_NAMES, PARTS, parse_definition, parse_interface
+from grader.model.message_definitions import (
+    BUILT_IN,
+    FULL_NAMES,
+    PARTS,
+    integer_limits,
+    parse_definition,
+    parse_interface,
+)
 from grader.ros_env import ros_packages
 from grader.rubric.definitions import (
     SUFFIXES,
@@ -19,7 +26,6 @@ from grader.rubric.definitions import (
     Misfit,
     Shape,
     instead_of,
-    limits_of,
     no_name,
     no_value,
     own_texts,
@@ -33,6 +39,7 @@ from grader.rubric.yaml_lines import (
     WrittenRubric,
     as_map,
     as_maps,
+    items_in,
     parts_of,
     services_in,
 )
@@ -156,7 +163,7 @@ def _no_place(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fa
     given = criterion.given
     types = {str(kind) for kind in types_of(str(given.get("topic")), rubric, criterion.scenario)}
     are_known = types and all(kind.partition("/")[0] in noetic_messages() for kind in types)
-    if are_known and "fields" not in given and types.isdisjoint({*POSES, *VELOCITIES, *rubric.own_packages}):
+    if are_known and "fields" not in given and types.isdisjoint({*POSES, *VELOCITIES}):
         fault = f"{given['topic']} carries {min(types)}, which has neither a pose nor a velocity"
         yield (*criterion.at, "topic"), fault
 
@@ -165,7 +172,7 @@ def _counted(path: KeyPath, given: dict[str, Any], types: list[str]) -> Iterator
     """Yield values of a counter that its field never has."""
     for key in COUNTED & given.keys():
         kinds = [kind.partition("/")[2].lower() for kind in types if kind.startswith("std_msgs/")]
-        wrong = [no_value(kind, given[key]) if limits_of(kind) else "" for kind in kinds]
+        wrong = [no_value(kind, given[key]) if integer_limits(kind) else "" for kind in kinds]
         if wrong and all(wrong) and len(wrong) == len(types):
             yield (*path, key), f"data of {types[0]} {wrong[0]}"
 
@@ -184,11 +191,10 @@ def _quoted(path: KeyPath, value: object, topic: str = "", *, are_fields: bool =
         yield path, f'"{value}" in quotes is text: write {value.lower()}{_or_type(topic)}'
     elif isinstance(value, str) and topic and _NUMBER.fullmatch(value):
         yield path, f'"{value}" in quotes is text: write {value}{_or_type(topic)}'
-    elif isinstance(value, dict | list):
-        for key, one in value.items() if isinstance(value, dict) else enumerate(value):
-            if are_fields and (fault := no_name(str(key))):
-                yield path, fault
-            yield from _quoted((*path, key), one, topic, are_fields=are_fields)
+    for key, one in items_in(value):
+        if are_fields and (fault := no_name(str(key))):
+            yield path, fault
+        yield from _quoted((*path, key), one, topic, are_fields=are_fields)
 
 
 def _or_type(topic: str) -> str:
@@ -250,10 +256,8 @@ def _other_type(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[
     there = {one for one in there if not ros_packages().type_fault(one, "msg", own)}
     others = sorted(there - {kind})
     if isinstance(topic, str) and kind in there and others:
-        yield (
-            (*criterion.at, "type"),
-            f"elsewhere in the rubric {topic} carries {join_words(others)}, not {kind}",
-        )
+        fault = f"elsewhere in the rubric {topic} carries {join_words(others)}, not {kind}"
+        yield (*criterion.at, "type"), fault
 
 
 def _no_such(shape: Shape, path: object, given: dict[str, Any]) -> str:
@@ -283,7 +287,7 @@ def _no_bounds(field: Field, given: dict[str, Any], what: str) -> str:
         return f"{what} a list: name one item with [0], or all with [*]"
     if field.type == "string" or not field.primitive:
         return f"{what} {field.type}, and bounds are for numbers"
-    low, high = limits_of(field.type) or (-math.inf, math.inf)
+    low, high = integer_limits(field.type) or (-math.inf, math.inf)
     if bounds.get("min", low) > high or bounds.get("max", high) < low:
         return f"{what} {field.type}, {low} to {high}: none of these is within the bounds"
     return ""

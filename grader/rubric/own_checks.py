@@ -126,14 +126,13 @@ def _run(path: Path, raw: bytes) -> LineFault | None:
     """Run the file as a module of its own, which stays: records of parameters look their types up in it."""
     # By path and content: another rubric's file of this name, or this one once it has changed, is another module.
     name = f"grader_own_{hashlib.sha256(str(path).encode() + raw).hexdigest()[:16]}"
-    module = importlib.util.module_from_spec(ModuleSpec(name, _Loader(path, raw), origin=str(path)))
+    loader = _Loader(path, raw)
+    module = importlib.util.module_from_spec(ModuleSpec(name, loader, origin=str(path)))
     module.__file__ = str(path)
     sys.modules[name] = module
     try:
-        assert module.__spec__ is not None  # noqa: S101 - made two lines above
-        assert module.__spec__.loader is not None  # noqa: S101 - as above
         with printing_to_stderr():
-            module.__spec__.loader.exec_module(module)
+            loader.exec_module(module)
     except SyntaxError as error:
         # Else the syntax error is in a file that this one imports.
         own = error.filename in {str(path), None}

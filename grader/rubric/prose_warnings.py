@@ -19,6 +19,7 @@ from grader.rubric.yaml_lines import (
     WrittenRubric,
     as_map,
     as_texts,
+    numbers_in,
     parts_of,
     starts_of,
     texts_in,
@@ -185,15 +186,6 @@ def _is_setting(path: KeyPath) -> bool:
     return bool(
         re.search(r"_s$|^(?:rate_hz|warp|points|bonus|penalty|at_most|digits|goal|number)$", str(path[-1]))
     )
-
-
-def numbers_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, float]]:
-    """Yield all numbers in a part of a rubric, each with its place."""
-    if is_number(value):
-        yield path, float(value)
-    elif isinstance(value, dict | list):
-        for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
-            yield from numbers_in((*path, key), inner)
 
 
 def _other_node(criterion: WrittenCriterion, handout: str) -> Iterator[Fault]:

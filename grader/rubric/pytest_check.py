@@ -63,11 +63,8 @@ class PytestParams(Record):
         return self
 
 
-class _Test(NamedTuple):
-    """A test, and the names by which `-k` knows it."""
-
-    name: str
-    names: tuple[str, ...]
+_Names = tuple[str, ...]
+"""The names by which pytest's `-k` knows a test: its own, then those of its class and its decorators."""
 
 
 def faults_of_tests(rubric: WrittenRubric, files: Mapping[str, bytes]) -> Iterator[Fault]:
@@ -90,7 +87,7 @@ def faults_of_tests(rubric: WrittenRubric, files: Mapping[str, bytes]) -> Iterat
         read.add(file)
         tests = _tests_in(tree, files[file])
         if isinstance(select, str) and select.strip() and not _selects(select.strip(), tests):
-            there = join_words(sorted({test.name for test in tests}))
+            there = join_words(sorted({name for name, *_ in tests}))
             yield (*criterion.at, "select"), f"fits no test of {file}: there is {there}"
 
 
@@ -134,23 +131,23 @@ def _other_name(name: str, known: Collection[str], handout: str) -> str:
     return near if re.sub(r"\d", "", near) != re.sub(r"\d", "", name) else ""
 
 
-def _selects(select: str, tests: Sequence[_Test]) -> bool:
+def _selects(select: str, tests: Sequence[_Names]) -> bool:
     """Return whether one of the tests is selected, or may be: pytest has more forms of it than are read here."""
     try:
         expression = ast.parse(select, mode="eval").body
-        return not tests or any(_fits(expression, test.names) for test in tests)
+        return not tests or any(_fits(expression, names) for names in tests)
     except (SyntaxError, ValueError):
         return True
 
 
-def _tests_in(tree: ast.Module, raw: bytes) -> list[_Test]:
+def _tests_in(tree: ast.Module, raw: bytes) -> list[_Names]:
     """Return the tests of a file; none where they cannot be known."""
     if "params=" in raw.decode(errors="replace"):  # of fixtures: their ids are selected, too
         return []
     classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
     places = [(tree.body, []), *((one.body, [one.name, *_words_of(one)]) for one in classes)]
     return [
-        _Test(node.name, (node.name, *above, *_words_of(node)))
+        (node.name, *above, *_words_of(node))
         for body, above in places
         for node in body
         if isinstance(node, ast.FunctionDef) and node.name.startswith("test")

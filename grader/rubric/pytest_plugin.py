@@ -119,7 +119,7 @@ class _Notes:
         elif call.excinfo is not None and report.failed and not isinstance(error, SAYING):
             self._faults.append(self._exception(item, call.excinfo))
         if report.when == "call" or not report.passed:
-            self._note(item, self._outcome(report, error), error, report)
+            self._note(item, error, report)
         return report
 
     def pytest_sessionfinish(self) -> None:
@@ -127,25 +127,19 @@ class _Notes:
         outcome = SessionOutcome(tests=tuple(self._tests.values()), faults=tuple(self._faults))
         self._path.write_bytes(outcome.model_dump_json().encode())
 
-    def _outcome(self, report: pytest.TestReport, error: BaseException | None) -> Outcome:
+    def _note(self, item: pytest.Item, error: BaseException | None, report: pytest.TestReport) -> None:
+        outcome: Outcome = report.outcome
         if isinstance(error, NotRecorded):
-            return "open" if error.verdict.status is Status.INCONCLUSIVE else "failed"
-        return report.outcome
-
-    def _note(
-        self, item: pytest.Item, outcome: Outcome, error: BaseException | None, report: pytest.TestReport
-    ) -> None:
-        function = getattr(item, "function", None)
-        title = (inspect.getdoc(function) or "").partition("\n")[0].strip()
+            outcome = "open" if error.verdict.status is Status.INCONCLUSIVE else "failed"
+        title = (inspect.getdoc(getattr(item, "function", None)) or "").partition("\n")[0].strip()
         message = "" if outcome == "passed" else self._message(error, report)
-        name = item.name
         own = error if isinstance(error, StudentError) else StudentError("")
         cause, hint = self._explanation(own)
         noted = self._tests.get(item.nodeid)
         # A teardown that fails counts, too, but does not take the place of what failed before it.
         if noted is None or noted.outcome == "passed":
             self._tests[item.nodeid] = TestOutcome(
-                name=name,
+                name=item.name,
                 title=title,
                 outcome=outcome,
                 message=self._short(f"{own.call} raises {cause}") if cause else message,
@@ -179,9 +173,8 @@ class _Notes:
 
     def _message(self, error: BaseException | None, report: pytest.TestReport) -> str:
         """Return the first line of what was asserted."""
-        if error is None:
-            return self._short(report.longreprtext.strip().partition("\n")[0])
-        return self._short(str(error).strip().partition("\n")[0] or "an assertion does not hold")
+        said = report.longreprtext if error is None else str(error).strip() or "an assertion does not hold"
+        return self._short(said.strip().partition("\n")[0])
 
     def _exception(self, item: pytest.Item, info: pytest.ExceptionInfo[BaseException]) -> str:
         """Return what a test raised in place of an assertion, with the last line of its file that took part."""

@@ -452,10 +452,6 @@ def _sent_topics(scenario: dict[str, Any]) -> set[str]:
     return sent | set(topics_in(scenario.get("steps")))
 
 
-def _actions(scenario: dict[str, Any]) -> list[str]:
-    return [str(one.get("name")) for one in given_steps(scenario, "action")]
-
-
 def _served_names(scenario: dict[str, Any]) -> list[str]:
     return [str(one.get("service") or one.get("action")) for _, one in as_maps(scenario.get("serves"))]
 
@@ -466,7 +462,10 @@ LISTED: Mapping[str, tuple[str, Callable[[dict[str, Any]], Iterable[str]]]] = {
         lambda scenario: [PurePosixPath(f).name for f in values_of(starts_of(scenario), "launch")],
     ),
     "sent": ("no probe of {name} sends on {value}{instead}", _sent_topics),
-    "action": ("no step of {name} sends a goal to {value}{instead}", _actions),
+    "action": (
+        "no step of {name} sends a goal to {value}{instead}",
+        lambda scenario: [str(one.get("name")) for one in given_steps(scenario, "action")],
+    ),
     "rostest": (
         '{name} starts no .test file as "{value}"{instead}',
         lambda scenario: [

@@ -495,12 +495,7 @@ class Scenario(Record):
         left_out: dict[str, Any] = {"title": True}
         # Keys that a scenario does not use are left out: a newer grader that knows more keys gives the same digest, and
         # what was recorded before still fits.
-        if not self.steps:
-            left_out["steps"] = True
-        if not self.keeps:
-            left_out["keeps"] = True
-        if not self.serves:
-            left_out["serves"] = True
+        left_out |= {key: True for key in ("steps", "keeps", "serves") if not getattr(self, key)}
         if not any(call.definition for call in self.calls):
             left_out["calls"] = {"__all__": {"definition"}}
         unset = {key for key in ("tests", "package") if not any(getattr(start, key) for start in self.start)}

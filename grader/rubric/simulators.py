@@ -6,10 +6,20 @@ import math
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeGuard
 
 from grader.checks.support.fields import is_number
-from grader.rubric.yaml_lines import Fault, KeyPath, WrittenCriterion, as_map, as_maps, as_texts, set_in
+from grader.checks.support.geometry import off_m
+from grader.rubric.yaml_lines import (
+    Fault,
+    KeyPath,
+    WrittenCriterion,
+    as_map,
+    as_maps,
+    as_texts,
+    set_in,
+    starts_of,
+)
 from grader.wording import closest
 
 Spot = tuple[float, float]
@@ -77,18 +87,19 @@ OTHERS_SCAN = {"/base_scan": {"turtlebot3": "/scan"}, "/scan": {"stage": "/base_
 
 def topics_of_programs(scenario: dict[str, Any]) -> dict[str, str]:
     """Return the topics, with their types, of the programs that a scenario starts. Arguments may rename them."""
-    starts = [start for _, start in as_maps(scenario.get("start")) if not start.get("args")]
-    programs = [PROGRAMS[program] for start in starts if (program := str(start.get("program"))) in PROGRAMS]
+    programs = [PROGRAMS[program] for program in _plain_programs(scenario) if program in PROGRAMS]
     return {topic: kind for program in programs for topic, kind in program.topics.items()}
+
+
+def _plain_programs(scenario: dict[str, Any]) -> list[str]:
+    """Return the programs that a scenario starts without arguments, which could give them other names and topics."""
+    return [str(start.get("program")) for start in starts_of(scenario) if not start.get("args")]
 
 
 def robot_of(scenario: dict[str, Any]) -> dict[str, Any]:
     """Return what the robot world's robot is like in a scenario, by the names of its parameters; empty where it is not
     started, or under another name."""
-    starts = [start for _, start in as_maps(scenario.get("start"))]
-    if not any(
-        start.get("program") == "robot_world/robot_world" and not start.get("args") for start in starts
-    ):
+    if "robot_world/robot_world" not in _plain_programs(scenario):
         return {}
     values = {str(one.get("name")).strip("/"): one.get("value") for _, one in set_in(scenario)}
     given = {
@@ -99,12 +110,9 @@ def robot_of(scenario: dict[str, Any]) -> dict[str, Any]:
 
 def only_publisher(topic: str, scenario: dict[str, Any]) -> str:
     """Return the program of the grader's that publishes there, and no one else would; "" for none."""
-    programs = {
-        str(start.get("program")) for _, start in as_maps(scenario.get("start")) if not start.get("args")
-    }
-    return next(
-        (name for name, p in PROGRAMS.items() if name in programs and p.published.fullmatch(topic)), ""
-    )
+    programs = _plain_programs(scenario)
+    found = (name for name, p in PROGRAMS.items() if name in programs and p.published.fullmatch(topic))
+    return next(found, "")
 
 
 def parameter_faults(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
@@ -141,12 +149,8 @@ def _no_parameter(program: Program, private: str) -> str:
     return f"{program.node} has no parameter {private}{instead}"
 
 
-def _are_numbers(value: object, count: int) -> bool:
+def _are_numbers(value: object, count: int) -> TypeGuard[list[float]]:
     return isinstance(value, list) and len(value) == count and all(map(is_number, value))
-
-
-def _is_in_radians(place: object) -> bool:
-    return isinstance(place, list) and abs(place[2]) <= WHOLE_TURN
 
 
 def _are_all(value: object, is_one: Callable[[object], bool], at_least: int = 0) -> bool:
@@ -157,7 +161,7 @@ FORMS: Mapping[str, tuple[str, Callable[[object], bool]]] = {
     "robot": ("turtlebot3 or stage", lambda value: value in ["turtlebot3", "stage"]),
     "start": (
         "[x, y, heading], in metres and radians",
-        lambda value: _are_numbers(value, 3) and _is_in_radians(value),
+        lambda value: _are_numbers(value, 3) and abs(value[2]) <= WHOLE_TURN,
     ),
     "boxes": ("[[x0, y0, x1, y1], …]", lambda value: _are_all(value, lambda box: _are_numbers(box, 4))),
     "walls": (
@@ -183,11 +187,8 @@ def asked_faults(
     for key, is_publisher in (("publisher", True), ("subscriber", False)):
         node = nodes.get(str(given.get(key)))
         if node and topic in node.topics and bool(node.published.fullmatch(topic)) != is_publisher:
-            does = "hears what comes" if is_publisher else "publishes"
-            yield (
-                (key,),
-                f"{node.node} {does} on {topic}, and {'sends' if is_publisher else 'hears'} nothing there",
-            )
+            does, never = ("hears what comes", "sends") if is_publisher else ("publishes", "hears")
+            yield (key,), f"{node.node} {does} on {topic}, and {never} nothing there"
     for name in as_map(given.get("params")):
         for _, program in as_texts(given.get("programs")):
             known = PROGRAMS[program].params if program in PROGRAMS else ()
@@ -227,7 +228,7 @@ def start_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
     lines, place, radius_m = _lines(robot), _start(robot), robot.get("radius")
     if not lines or place is None or not is_number(radius_m):
         return
-    away_m = min(_distance(place, *ends) for line in lines for ends in pairwise(line))
+    away_m = min(off_m(place, *ends) for line in lines for ends in pairwise(line))
     boxes = [line for line in _boxes(robot) if _is_inside(place, line)]
     given = (at for at, one in set_in(scenario) if str(one.get("name")).endswith("/start"))
     where = (*path, *next(given, ("start",)))
@@ -250,7 +251,7 @@ def room_faults(about: WrittenCriterion, most_s: float | None) -> Iterator[Fault
     lines, place, radius_m = _lines(robot), _start(robot), robot.get("radius")
     if not lines or place is None or not is_number(radius_m) or any(start_faults((), scenario)):
         return
-    away_m = min(_distance(place, *ends) for line in lines for ends in pairwise(line))
+    away_m = min(off_m(place, *ends) for line in lines for ends in pairwise(line))
     if about.check == "stays-within" and given.get("topic") == TRUE_POSE:
         is_always = not given.get("walls") and not given.get("from_s") and given.get("share", 1) == 1
         for key, sign in (("min_m", 1), ("max_m", -1)):
@@ -265,11 +266,11 @@ def room_faults(about: WrittenCriterion, most_s: float | None) -> Iterator[Fault
         yield (*about.at, "cause", "max"), f"the nearest wall is {far}: the cause never comes"
     goal, tolerance_m = given.get("goal"), given.get("tolerance_m")
     is_place = about.check == "ends-at" and given.get("topic") == TRUE_POSE and not given.get("relative")
-    if is_place and isinstance(goal, list) and _are_numbers(goal, 2) and is_number(tolerance_m):
+    if is_place and _are_numbers(goal, 2) and is_number(tolerance_m):
         spot = (goal[0], goal[1])
         for line in lines if math.dist(place, spot) - 2 * tolerance_m <= way_m else ():  # said elsewhere
             is_apart = line[0] == line[-1] and _is_inside(place, line) != _is_inside(spot, line)
-            if is_apart and min(_distance(spot, *ends) for ends in pairwise(line)) > tolerance_m:
+            if is_apart and min(off_m(spot, *ends) for ends in pairwise(line)) > tolerance_m:
                 fault = f"walls are between the start, {pair(place)}, and {pair(spot)}"
                 yield (*about.at, "goal"), fault
                 return
@@ -278,8 +279,9 @@ def room_faults(about: WrittenCriterion, most_s: float | None) -> Iterator[Fault
 def _start(robot: dict[str, Any]) -> Spot | None:
     """Return where the robot starts; None where that is not known, or a map has walls too."""
     start = robot.get("start")
-    is_known = isinstance(start, list) and FORMS["start"][1](start) and "map" not in robot
-    return (start[0], start[1]) if isinstance(start, list) and is_known else None
+    if not _are_numbers(start, 3) or not FORMS["start"][1](start) or "map" in robot:
+        return None
+    return start[0], start[1]
 
 
 def _lines(robot: dict[str, Any]) -> list[list[Spot]]:
@@ -292,15 +294,6 @@ def _lines(robot: dict[str, Any]) -> list[list[Spot]]:
 
 def _boxes(robot: dict[str, Any]) -> list[list[Spot]]:
     return [[(a, b), (c, b), (c, d), (a, d), (a, b)] for a, b, c, d in robot.get("boxes", [])]
-
-
-def _distance(spot: Spot, one: Spot, other: Spot) -> float:
-    """Return how far a spot is from the line between two others."""
-    dx, dy = other[0] - one[0], other[1] - one[1]
-    squared = dx * dx + dy * dy
-    along = ((spot[0] - one[0]) * dx + (spot[1] - one[1]) * dy) / squared if squared else 0.0
-    along = min(max(along, 0.0), 1.0)
-    return math.dist(spot, (one[0] + along * dx, one[1] + along * dy))
 
 
 def _is_inside(spot: Spot, line: Sequence[Spot]) -> bool:

@@ -70,10 +70,8 @@ def names_seen_once(rubric: WrittenRubric, folder: Path) -> Iterator[Fault]:
         if not near:
             yield path, f"nothing else in the rubric names {text}: is it spelt as in the handout?"
     for path, word, near in _misspelt_words(rubric, code=False):
-        yield (
-            path,
-            f'nothing else in the rubric has the word {word}: did you mean "{near}", as in the handout?',
-        )
+        fault = f'nothing else in the rubric has the word {word}: did you mean "{near}", as in the handout?'
+        yield path, fault
 
 
 def misspelt_names(rubric: WrittenRubric, folder: Path) -> Iterator[Fault]:
@@ -279,10 +277,13 @@ def _unknown_topics(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Itera
                 yield ("scenarios", name, "until", *at), f"no criterion and no probe names {topic}{meant}"
         steps = [step for _, step in as_maps(scenario.get("steps")) if "wait" not in step]
         there = {*named, *topics_in(steps)}
-        for at, topic in _waits_in_steps(scenario):
-            near = "" if topic in there else _near(topic, named, cutoff=SURE)
-            if near:
-                yield ("scenarios", name, *at), f'no criterion names {topic} (did you mean "{near}"?)'
+        for index, step in as_maps(scenario.get("steps")):
+            awaited = as_map(step.get("wait")).get("topic")
+            if not isinstance(awaited, str) or awaited in there:
+                continue
+            if near := _near(awaited, named, cutoff=SURE):
+                fault = f'no criterion names {awaited} (did you mean "{near}"?)'
+                yield ("scenarios", name, "steps", index, "wait", "topic"), fault
 
 
 def _unknown_causes(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator[Fault]:
@@ -366,13 +367,6 @@ def _misspelt_nodes(rubric: WrittenRubric) -> Iterator[Fault]:
             if near:
                 fault = f'the node is called {near}, and not {node} (did you mean "/{near}/{private}"?)'
                 yield ("scenarios", name, *at, "name"), fault
-
-
-def _waits_in_steps(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
-    for index, step in as_maps(scenario.get("steps")):
-        topic = as_map(step.get("wait")).get("topic")
-        if isinstance(topic, str):
-            yield ("steps", index, "wait", "topic"), topic
 
 
 def _waited_for(until: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from grader.checks.registry import Check
 from grader.rubric.definitions import slip_of
 from grader.rubric.scenario import ROSTEST_ENDING
-from grader.rubric.simulators import PROGRAMS, asked_topics
+from grader.rubric.simulators import PROGRAMS, TRUE_POSE, asked_topics
 from grader.rubric.spelling import PROSE, is_slip
 from grader.rubric.yaml_lines import (
     Fault,
@@ -73,12 +73,14 @@ def _other_packages(rubric: WrittenRubric) -> Iterator[Fault]:
     for at, start in rubric.starts():
         owner, is_given = str(start.get("package") or first), start.get("package") is not None
         files = [(key, start[key]) for key in KINDS_OF_FILES if isinstance(start.get(key), str)]
-        named += [((*at, key), _plain(file), owner, is_given) for key, file in files]
+        named += [((*at, key), PurePosixPath(file).name, owner, is_given) for key, file in files]
     for criterion in rubric.criteria:
         given, package = criterion.given, criterion.data.get("package")
         owner, asked = str(package or first), given.get("name")
         if criterion.check == "executable" and isinstance(given.get("path"), str):
-            named.append(((*criterion.at, "path"), _plain(given["path"]), owner, package is not None))
+            named.append(
+                ((*criterion.at, "path"), PurePosixPath(given["path"]).name, owner, package is not None)
+            )
         if criterion.check in NAMED_AS_PACKAGE and asked in packages and asked != owner:
             fault = (
                 f"this criterion judges {owner}: write name: {owner}, or package: {asked} beside its check"
@@ -92,10 +94,6 @@ def _other_packages(rubric: WrittenRubric) -> Iterator[Fault]:
                 f"is looked for in {owner}, and elsewhere it is in {elsewhere}: write package: {elsewhere}"
             )
             yield at, fault
-
-
-def _plain(path: str) -> str:
-    return PurePosixPath(path).name
 
 
 def _without_program(rubric: WrittenRubric) -> Iterator[Fault]:
@@ -121,7 +119,7 @@ OWNERS = frozenset(program.partition("/")[0] for program in PROGRAMS)
 
 def _is_own(topic: str, program: str) -> bool:
     """Return whether nothing but the program would publish there: `/scan` and `/odom` may come from anywhere."""
-    return program.startswith("turtlesim/") or topic == "/base_pose_ground_truth"
+    return program.startswith("turtlesim/") or topic == TRUE_POSE
 
 
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")

@@ -32,6 +32,7 @@ from grader.rubric.yaml_lines import (
     as_texts,
     give_one,
     given_steps,
+    items_in,
     starts_of,
 )
 from grader.wording import did_you_mean
@@ -163,16 +164,9 @@ def _action(at: KeyPath, given: dict[str, Any], types: dict[str, str]) -> Iterat
         if one != other and re.sub(r"(Action)?(Goal|Result|Feedback)$", "", one) == other:
             fault = f"has to be the same for all goals of {name}, that of the .action file: {other}"
             yield (*at, "type"), fault
-    yield from _cancelled_late(at, given)
-
-
-def _cancelled_late(at: KeyPath, given: dict[str, Any]) -> Iterator[Fault]:
-    after_s, limit_s = (
-        given.get("cancel_after_s"),
-        given.get("limit_s", Action.model_fields["limit_s"].default),
-    )
-    numbers = isinstance(after_s, int | float) and isinstance(limit_s, int | float)
-    if numbers and after_s >= limit_s:
+    after_s = given.get("cancel_after_s")
+    limit_s = given.get("limit_s", Action.model_fields["limit_s"].default)
+    if isinstance(after_s, int | float) and isinstance(limit_s, int | float) and after_s >= limit_s:
         fault = f"{after_s:g} s is not before limit_s, {limit_s:g} s, after which the run goes on: nothing is cancelled"
         yield (*at, "cancel_after_s"), fault
 
@@ -189,9 +183,9 @@ def _publish(at: KeyPath, publish: dict[str, Any], types: dict[str, str]) -> Ite
     topic, kind = publish.get("topic"), publish.get("type")
     if ("value" in publish) == bool(publish.get("values")):
         yield at, "give one of value and values"
-    if publish.get("count") is not None and publish.get("duration_s") is not None:
-        yield at, "give count or duration_s, not both"
     listed, count = publish.get("values"), publish.get("count")
+    if count is not None and publish.get("duration_s") is not None:
+        yield at, "give count or duration_s, not both"
     if isinstance(listed, list) and isinstance(count, int) and 0 < count < len(listed):
         yield (*at, "count"), f"only {count} of the {len(listed)} values are sent"
     if not isinstance(topic, str) or not isinstance(kind, str) or "/" not in kind:
@@ -201,15 +195,8 @@ def _publish(at: KeyPath, publish: dict[str, Any], types: dict[str, str]) -> Ite
     values = enumerate(listed) if isinstance(listed, list) else ()
     places: list[tuple[KeyPath, Any]] = [((*at, "values", index), value) for index, value in values]
     places += [((*at, "value"), publish["value"])] if "value" in publish else []
-    yield from misfits((*at, "type"), kind, places, endless=_is_endless(publish))
-
-
-def _is_endless(publish: dict[str, Any]) -> bool:
-    return (
-        publish.get("background") is True
-        and publish.get("count") is None
-        and publish.get("duration_s") is None
-    )
+    is_endless = publish.get("background") is True and count is None and publish.get("duration_s") is None
+    yield from misfits((*at, "type"), kind, places, endless=is_endless)
 
 
 def misfits(
@@ -242,15 +229,14 @@ def empty_in(value: object, done: str = "") -> str:
     """Return where a value has a key or an item without anything; "" if nowhere."""
     if value is None:
         return done
-    inside = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    named = ((f"[{key}]" if isinstance(key, int) else f".{key}", inner) for key, inner in inside)
+    named = ((f"[{key}]" if isinstance(key, int) else f".{key}", inner) for key, inner in items_in(value))
     return next(filter(None, (empty_in(inner, (done + key).lstrip(".")) for key, inner in named)), "")
 
 
 def _changes(value: object) -> bool:
     """Return whether a value differs from message to message."""
-    inside = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
-    return (isinstance(value, dict) and bool({"from", "each"} & value.keys())) or any(map(_changes, inside))
+    is_made = isinstance(value, dict) and not {"from", "each"}.isdisjoint(value)
+    return is_made or any(_changes(inner) for _, inner in items_in(value))
 
 
 def _transform(at: KeyPath, transform: dict[str, Any]) -> Iterator[Fault]:
@@ -371,17 +357,12 @@ def served_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
         for key in OF_ACTIONS if kind == "service" else OF_SERVICES:
             if key in served:
                 yield (*at, key), f"is not for {'a service' if kind == 'service' else 'an action'}"
-        if kind == "service":
-            yield from _answers(at, served)
-        else:
+        answers = [key for key in ANSWERS if served.get(key) or served.get(key) == {}]
+        if kind == "service" and len(answers) != 1:
+            yield at, give_one(ANSWERS, answers)
+        elif kind == "action":
             yield from _action_name(at, served)
         yield from of_type(at, served)
-
-
-def _answers(at: KeyPath, served: dict[str, Any]) -> Iterator[Fault]:
-    given = [key for key in ANSWERS if served.get(key) or served.get(key) == {}]
-    if len(given) != 1:
-        yield at, give_one(ANSWERS, given)
 
 
 def of_type(at: KeyPath, served: dict[str, Any]) -> Iterator[Fault]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import date
@@ -130,7 +130,24 @@ def source_of(raw: bytes, name: str, form: Form) -> Source:
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
         raise RubricError([f"{name}:{line}: the file is not UTF-8: save it as UTF-8"]) from error
-    return _compose(text, raw, name, form)
+    loader: yaml.SafeLoader | None = None
+    try:
+        loader, node = _load_nodes(text)
+        if node is None and form.may_be_empty:
+            return Source(name=name, raw=raw, data={}, lines={})
+        if node is None:
+            raise RubricError([f"{name}:1: the file is empty"])
+        reader = _Reader(loader, form)
+        data = reader.read(node, ())
+    except yaml.YAMLError as error:
+        raise RubricError([_yaml_fault(error, text, name)]) from error
+    except RecursionError as error:
+        raise RubricError([f"{name}:1: is nested too deeply"]) from error
+    finally:
+        if loader is not None:
+            # A loader refers to itself: without this it would wait for the garbage collector.
+            loader.dispose()
+    return Source(name=name, raw=raw, data=data, lines=reader.lines, faults=reader.faults)
 
 
 class WrittenCriterion(NamedTuple):
@@ -198,13 +215,15 @@ class WrittenRubric:
 
     def starts(self) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
         """Yield what the scenarios start, each with its place."""
-        for name, scenario in self.scenarios.items():
-            yield from ((("scenarios", name, "start", n), one) for n, one in as_maps(scenario.get("start")))
+        return self._listed("start")
 
     def steps(self) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
         """Yield the steps of the scenarios, each with its place."""
+        return self._listed("steps")
+
+    def _listed(self, key: str) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
         for name, scenario in self.scenarios.items():
-            yield from ((("scenarios", name, "steps", n), one) for n, one in as_maps(scenario.get("steps")))
+            yield from ((("scenarios", name, key, n), one) for n, one in as_maps(scenario.get(key)))
 
     def params(self) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
         """Yield the parameters that the scenarios set, each with its place."""
@@ -267,27 +286,6 @@ def read_bytes(path: Path, name: str, form: Form) -> bytes:
     return raw
 
 
-def _compose(text: str, raw: bytes, name: str, form: Form) -> Source:
-    loader: yaml.SafeLoader | None = None
-    try:
-        loader, node = _load_nodes(text)
-        if node is None and form.may_be_empty:
-            return Source(name=name, raw=raw, data={}, lines={})
-        if node is None:
-            raise RubricError([f"{name}:1: the file is empty"])
-        reader = _Reader(loader, form)
-        data = reader.read(node, ())
-    except yaml.YAMLError as error:
-        raise RubricError([_yaml_fault(error, text, name)]) from error
-    except RecursionError as error:
-        raise RubricError([f"{name}:1: is nested too deeply"]) from error
-    finally:
-        if loader is not None:
-            # A loader refers to itself: without this it would wait for the garbage collector.
-            loader.dispose()
-    return Source(name=name, raw=raw, data=data, lines=reader.lines, faults=reader.faults)
-
-
 def compose(text: str) -> yaml.Node | None:
     """Return the nodes of a YAML text, with their places in it; None of an empty one. Raises YAMLError."""
     loader, node = _load_nodes(text)
@@ -328,7 +326,8 @@ def _yaml_fault(error: yaml.YAMLError, text: str, name: str) -> str:
     """Return PyYAML's error as one line, in plain words where its own are hard to understand."""
     if isinstance(error, yaml.reader.ReaderError):
         line = text.count("\n", 0, error.position) + 1
-        return f"{name}:{line}: a character that YAML does not allow (U+{ord(_char(error)):04X})"
+        code = error.character if isinstance(error.character, int) else ord(error.character)
+        return f"{name}:{line}: a character that YAML does not allow (U+{code:04X})"
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
     problem = getattr(error, "problem", None) or "is not YAML"
     begun = getattr(error, "context_mark", None) or mark
@@ -344,11 +343,6 @@ def _yaml_fault(error: yaml.YAMLError, text: str, name: str) -> str:
         if "is not closed" in problem and any(re.search(r"[^\s#].*\s#", one) for one in lines):
             problem += "; what comes after a blank and # is a comment: text with # needs quotes"
     return f"{name}:{mark.line + 1 if mark else 1}: {problem}"
-
-
-def _char(error: yaml.reader.ReaderError) -> str:
-    character = error.character
-    return chr(character) if isinstance(character, int) else str(character)
 
 
 class _Reader:
@@ -499,27 +493,35 @@ def as_map(value: object) -> dict[str, Any]:
 
 def as_maps(value: object) -> list[tuple[int, dict[str, Any]]]:
     """Return the maps in a list, each with its place in the list."""
-    items = value if isinstance(value, list) else []
-    return [(index, item) for index, item in enumerate(items) if isinstance(item, dict)]
+    return [(index, item) for index, item in enumerate(as_list(value)) if isinstance(item, dict)]
 
 
 def as_texts(value: object) -> list[tuple[int, str]]:
     """Return the texts in a list, each with its place in the list."""
-    items = value if isinstance(value, list) else []
-    return [(index, item) for index, item in enumerate(items) if isinstance(item, str)]
+    return [(index, item) for index, item in enumerate(as_list(value)) if isinstance(item, str)]
+
+
+def items_in(value: object) -> Iterable[tuple[str | int, Any]]:
+    """Return what a map or a list holds, each with its key or its place; nothing of any other value."""
+    return value.items() if isinstance(value, dict) else enumerate(as_list(value))
 
 
 def texts_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, str]]:
     """Yield all texts in a part of a rubric, keys too, each with its place."""
     if isinstance(value, str):
         yield path, value
-    elif isinstance(value, dict):
-        for key, inner in value.items():
+    for key, inner in items_in(value):
+        if isinstance(value, dict):
             yield (*path, key), str(key)
-            yield from texts_in((*path, key), inner)
-    elif isinstance(value, list):
-        for index, inner in enumerate(value):
-            yield from texts_in((*path, index), inner)
+        yield from texts_in((*path, key), inner)
+
+
+def numbers_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, float]]:
+    """Yield all numbers in a part of a rubric, each with its place."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        yield path, float(value)
+    for key, inner in items_in(value):
+        yield from numbers_in((*path, key), inner)
 
 
 def starts_of(scenario: dict[str, Any]) -> list[dict[str, Any]]:

@@ -149,6 +149,12 @@ def test_what_is_there_instead_is_named(files, message, hint, tmp_path):
             "--package NAME.",
         ),
         ({"week1/talker.py": "x"}, "no package.xml", "makes it, to hold talker.py in week1/."),
+        # However much git keeps beside it.
+        (
+            {**{f".git/objects/{n:03}/x": "" for n in range(300)}, "my/lab/week1/talker.py": "x"},
+            "no package.xml",
+            "makes it, to hold talker.py in my/lab/week1/.",
+        ),
         (
             {"week1/talker.py": "#!/usr/bin/env python\r\n", "week1/listener.py": "#!/usr/bin/env python\n"},
             "no package.xml",

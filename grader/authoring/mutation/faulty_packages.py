@@ -18,7 +18,6 @@ from grader.authoring.mutation.solution import Site, Solution, Tree, TreeFile
 from grader.authoring.rubric_draft import dump_flow
 from grader.errors import RubricError, UsageError
 from grader.model.mutants import (
-    ChosenFile,
     Cost,
     MoveFiles,
     Mutant,
@@ -26,7 +25,6 @@ from grader.model.mutants import (
     MutantsFile,
     PackageEdit,
     ReplaceText,
-    SymbolicLink,
     WriteFile,
 )
 from grader.model.record import Record
@@ -301,14 +299,6 @@ def _write(tree: Tree, edit: WriteFile) -> None:
     tree[edit.file] = TreeFile(data=edit.text.encode(), executable=executable)
 
 
-def _delete(tree: Tree, edit: ChosenFile) -> None:
-    del tree[edit.file]
-
-
-def _link(tree: Tree, edit: SymbolicLink) -> None:
-    tree[edit.file] = TreeFile(data=b"", link=edit.to)
-
-
 def _move(tree: Tree, edit: MoveFiles) -> None:
     moved = [name for name in tree if name.startswith(edit.old)]  # a folder moves with all that is below it
     if not moved:
@@ -324,10 +314,10 @@ CHANGES: dict[str, Callable[[TreeFile, Any], TreeFile]] = {
     "bom": lambda file, _: replace(file, data=b"\xef\xbb\xbf" + file.data),
 }
 """Edits that change one file, by what they make of it."""
-EDITS: dict[str, Callable[..., None]] = {
+EDITS: dict[str, Callable[[Tree, Any], object]] = {
     "replace": _replace,
     "write": _write,
-    "delete": _delete,
-    "link": _link,
+    "delete": lambda tree, edit: tree.pop(edit.file),
+    "link": lambda tree, edit: tree.update({edit.file: TreeFile(data=b"", link=edit.to)}),
     "move": _move,
 }

@@ -36,14 +36,14 @@ class Endpoint:
 
 
 def last_name(node: ast.AST) -> str:
-    """`Rate` of `rospy.Rate` and of `Rate`."""
+    """Return `Rate` of `rospy.Rate` and of `Rate`."""
     if isinstance(node, ast.Attribute):
         return node.attr
     return node.id if isinstance(node, ast.Name) else ""
 
 
 def calls(script: Script, *names: str) -> Iterator[ast.Call]:
-    """The calls of functions of these names, whatever they are attributes of."""
+    """Yield the calls of functions of these names, whatever they are attributes of."""
     return (call for call in script.of(ast.Call) if last_name(call.func) in names)
 
 
@@ -55,7 +55,7 @@ def argument(call: ast.Call, position: int, *keywords: str) -> ast.expr | None:
 
 
 def literal(script: Script, node: ast.AST | None) -> ast.Constant | None:
-    """The constant, or the one that the only assignment to this name gives it."""
+    """Return the constant, or the one that the only assignment to this name gives it."""
     if isinstance(node, ast.Constant):
         return node
     if not isinstance(node, ast.Name | ast.Attribute):
@@ -128,14 +128,14 @@ each_subscriber = partial(each_endpoint, kinds=["Subscriber"])
 
 
 def publish_calls(script: Script, publisher: Endpoint) -> list[ast.Call]:
-    """`pub.publish(…)` by the publisher's own name; of an only publisher, by whatever name."""
+    """Return `pub.publish(…)` by the publisher's own name; of an only publisher, by whatever name."""
     found = [c for c in calls(script, "publish") if isinstance(c.func, ast.Attribute)]
     own = [c for c in found if publisher.target and ast.unparse(c.func.value) == publisher.target]  # type: ignore[attr-defined]
     return own or (found if len(endpoints(script, "Publisher")) == 1 else [])
 
 
 def message_name(callback: Function | ast.Lambda) -> str:
-    """What the callback calls the message: its first argument after `self`."""
+    """Return what the callback calls the message: its first argument after `self`."""
     names = [a.arg for a in callback.args.args if a.arg not in {"self", "cls"}]
     return names[0] if names else ""
 
@@ -183,13 +183,13 @@ Assignment = ast.Assign | ast.AugAssign | ast.AnnAssign
 
 
 def assignments(script: Script, names: Iterable[str]) -> list[Assignment]:
-    """Those to one of the names or to a field of one (`msg.data` for `msg`)."""
+    """Return those to one of the names or to a field of one (`msg.data` for `msg`)."""
     wanted = set(names)
     return [a for a in script.of(ast.stmt) if isinstance(a, Assignment) and targets(a) & wanted]
 
 
 def targets(node: Assignment) -> set[str]:
-    """What it assigns to, and the object of each field that it sets."""
+    """Return what it assigns to, and the object of each field that it sets."""
     found = set()
     for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
         found.add(ast.unparse(target))
@@ -210,7 +210,7 @@ def names_in(node: ast.AST | None) -> set[str]:
 
 
 def sources(script: Script, publisher: Endpoint) -> list[ast.expr]:
-    """The expressions that make up what is published: the arguments, and what is assigned to their names."""
+    """Return the expressions that make up what is published: the arguments, and what is assigned to their names."""
     found: list[ast.expr] = []
     for call in publish_calls(script, publisher):
         found += [*call.args, *(keyword.value for keyword in call.keywords)]
@@ -259,7 +259,7 @@ def find_counter(script: Script, publisher: Endpoint) -> Counter | None:
 
 
 def _steps(script: Script, name: str) -> list[ast.Constant]:
-    """The numbers that are added to it."""
+    """Return the numbers that are added to it."""
     found = []
     for assignment in assignments(script, [name]):
         if isinstance(assignment, ast.AugAssign) and isinstance(assignment.op, ast.Add):
@@ -314,6 +314,6 @@ def _constants(nodes: Iterable[ast.AST], least: float = -math.inf) -> list[ast.C
 
 
 def counted_names(script: Script, publisher: Endpoint) -> set[str]:
-    """The variables that are published and counted up."""
+    """Return the variables that are published and counted up."""
     read = {name for value in sources(script, publisher) for name in names_in(value)}
     return {name for name in read if _steps(script, name)}

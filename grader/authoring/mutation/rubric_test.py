@@ -74,9 +74,8 @@ def run_test(plan: Plan, progress: Progress) -> RubricTest:
 
 
 def _grade_reference(plan: Plan, progress: Progress) -> GradingResult:
-    (graded,) = _grade_trees(
-        plan, {REFERENCE: plan.solution.tree}, 1, lambda _: progress.step(REFERENCE, "running")
-    )
+    trees = {REFERENCE: plan.solution.tree}
+    (graded,) = _grade_trees(plan, trees, 1, lambda _: progress.step(REFERENCE, "running"))
     if graded.result is None:
         raise HostError(f"the reference solution could not be graded: {graded.error}")
     doubtful = [c for c in graded.result.criteria if c.status.is_retryable]
@@ -194,15 +193,10 @@ def _grade_trees(
     The trees are written outside of any repository: the modes that git knows would count for more than the disk's.
     """
     with temporary_folder("mutants") as folder:
-        work = []
         for name, tree in trees.items():
-            source = folder / name
-            write_tree(tree, source)
-            work.append(
-                FolderJob(
-                    name=name, source=source, rubric=plan.rubric.path, out=plan.out, sandbox=plan.sandbox
-                )
-            )
+            write_tree(tree, folder / name)
+        about = {"rubric": plan.rubric.path, "out": plan.out}
+        work = [FolderJob(name=n, source=folder / n, sandbox=plan.sandbox, **about) for n in trees]
         yield from grade_all(work, jobs, begun)
 
 
@@ -262,7 +256,11 @@ def compare(
     if expected is None:
         return Comparison(state="killed" if lost else "survived")
     known = {c.id for c in criteria}
-    missing = tuple(_missing(name, known) for name in expected if name not in lost)
+    missing = tuple(
+        name if name in known else f"{name} (the rubric has no such criterion)"
+        for name in expected
+        if name not in lost
+    )
     surplus = tuple(name for name in lost if name not in expected)
     differing = tuple(
         f"{name} is {lost[name]}, not {wanted}"
@@ -273,7 +271,3 @@ def compare(
         return Comparison(state="killed")
     state: State = "differs" if lost else "survived"
     return Comparison(state=state, missing=missing, surplus=surplus, differing=differing)
-
-
-def _missing(name: str, known: Collection[str]) -> str:
-    return name if name in known else f"{name} (the rubric has no such criterion)"

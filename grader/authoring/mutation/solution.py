@@ -42,7 +42,7 @@ Tree = dict[str, TreeFile]
 
 
 def read_tree(folder: Path, *, modes: bool = True) -> Tree:
-    """Every file below `folder`, by its posix path.
+    """Return every file below `folder`, by its posix path.
 
     Without `modes`, the folder cannot be trusted to have kept executable bits (an installed wheel's data): then
     what begins with a shebang is executable. Raises UsageError for a folder that no reference solution would be.
@@ -94,13 +94,8 @@ def write_tree(tree: Tree, folder: Path) -> None:
 
 def unified_diff(before: Tree, after: Tree) -> str:
     """Return the changes as a unified diff; modes, line ends and moves are said in git's words."""
-    names = sorted(before.keys() | after.keys())
-    return "".join(
-        line
-        for name in names
-        if before.get(name) != after.get(name)
-        for line in _file_diff(name, before, after)
-    )
+    changed = (name for name in sorted(before.keys() | after.keys()) if before.get(name) != after.get(name))
+    return "".join(line for name in changed for line in _file_diff(name, before, after))
 
 
 def _file_diff(name: str, before: Tree, after: Tree) -> Iterator[str]:
@@ -200,7 +195,7 @@ class Solution:
     @cached_property
     def programs(self) -> tuple[str, ...]:
         """The files that begin with a shebang."""
-        return tuple(name for name in self.files if self.entry(name).data.startswith(b"#!"))
+        return tuple(name for name in self.files if self.entry(name).data.startswith(SHEBANG))
 
     @cached_property
     def scripts(self) -> tuple[Script, ...]:
@@ -322,10 +317,8 @@ def reference_at(folder: Path) -> Reference:
 def load_solution(reference: Reference, package: str) -> Solution:
     """Return the package of that name within the folder. Raises UsageError where it is not there."""
     tree = read_tree(reference.folder, modes=reference.modes)
-    manifests = sorted(
-        (p for p in tree if PurePosixPath(p).name == MANIFEST), key=lambda p: (p.count("/"), p)
-    )
-    for path in manifests:
+    manifests = (path for path in tree if PurePosixPath(path).name == MANIFEST)
+    for path in sorted(manifests, key=lambda path: (path.count("/"), path)):
         if _name(tree, path).lower() == package.lower():
             return Solution(tree=tree, folder=path.removesuffix(MANIFEST), name=package)
     raise UsageError(

@@ -40,7 +40,7 @@ def line_at(text: str, position: int) -> int:
 
 
 def whole_lines(text: str, start: int, end: int) -> tuple[int, int]:
-    """The span with its indentation and its line end, where it has its lines for itself; else the span as it is."""
+    """Return the span with its indentation and line end, where it has its lines for itself; else the span as it is."""
     first = text.rfind("\n", 0, start) + 1
     last = text.find("\n", end)
     last = len(text) if last < 0 else last + 1
@@ -55,12 +55,12 @@ WORD = re.compile(r"\{[^{}]*\}|%\(\w+\)\w|%[-+ #0-9.]*[a-z]|\\.|([^\W\d_]{3,})")
 
 
 def misspelt_name(name: str) -> str:
-    """A name without its last letter but one: `chattr`."""
+    """Return a name without its last letter but one: `chattr`."""
     return name[:-2] + name[-1:] if len(name) > 2 else f"{name}{name[-1:]}"
 
 
 def misspelt_literal(source: str) -> str:
-    """A text's source with its first word misspelt, places for values left alone; as it was where there is none."""
+    """Return a text's source with its first word misspelt, places for values left alone; unchanged without one."""
     opening = OPENING.match(source)
     start = opening.end() if opening else 0
     for match in WORD.finditer(source, start):
@@ -70,7 +70,8 @@ def misspelt_literal(source: str) -> str:
 
 
 def texts_in(node: ast.AST) -> Iterator[ast.Constant | ast.JoinedStr]:
-    """The texts of an expression, an f-string as one; none that only names something (`get_param('x')`, `d['x']`)."""
+    """Yield the texts of an expression, an f-string as one; none that only names something (`get_param('x')`,
+    `d['x']`)."""
     if isinstance(node, ast.JoinedStr) or (isinstance(node, ast.Constant) and isinstance(node.value, str)):
         yield node
         return
@@ -209,7 +210,7 @@ class Script:
         return {child: node for node in ast.walk(self.module) for child in ast.iter_child_nodes(node)}
 
     def above(self, node: ast.AST) -> Iterator[ast.AST]:
-        """The nodes around it, from the nearest outwards."""
+        """Yield the nodes around it, from the nearest outwards."""
         while node in self.parents:
             node = self.parents[node]
             yield node
@@ -217,9 +218,6 @@ class Script:
     def statement(self, node: ast.AST) -> ast.stmt:
         """Return the innermost statement that the node belongs to."""
         return next(n for n in (node, *self.above(node)) if isinstance(n, ast.stmt))
-
-    def function(self, node: ast.AST) -> Function | None:
-        return next((n for n in self.above(node) if isinstance(n, Function)), None)
 
     def block(self, statement: ast.stmt) -> list[ast.stmt]:
         """Return the list of statements that it stands in."""
@@ -286,7 +284,7 @@ class Script:
         return TextEdit(start, end, self._indent(first, [header]) + inner + self._indent(first, footer))
 
     def can_wrap(self, statements: Sequence[ast.stmt]) -> bool:
-        """Whether deeper indentation keeps their meaning: lines of their own, and no string over several lines."""
+        """Return whether deeper indentation keeps their meaning: lines of their own, no string over several lines."""
         strings = [n for s in statements for n in ast.walk(s) if isinstance(n, ast.Constant | ast.JoinedStr)]
         long = any(n.end_lineno != n.lineno for n in strings)
         return bool(statements) and not long and all(self.has_lines(s) for s in statements)

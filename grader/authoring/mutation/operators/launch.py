@@ -202,8 +202,7 @@ def _has_line(text: str, key: yaml.ScalarNode, value: yaml.ScalarNode) -> bool:
 
 
 def _line_end(text: str, value: yaml.ScalarNode) -> int:
-    end = text.find("\n", value.end_mark.index)
-    return end if end >= 0 else len(text)
+    return (text + "\n").index("\n", value.end_mark.index)
 
 
 def _yaml_files(solution: Solution) -> Iterator[tuple[CodePlace, list[Leaf]]]:

@@ -180,7 +180,7 @@ def _counters(solution: Solution) -> Iterator[tuple[CodePlace, Script, Counter]]
 
 
 def _add(script: Script, constants: list[ast.Constant], number: int) -> list[TextEdit]:
-    """Each of the constants once, changed by `number`."""
+    """Return each of the constants once, changed by `number`."""
     distinct = {script.span(c): c for c in constants}.values()
     return [script.replace(c, str(c.value + number)) for c in distinct if isinstance(c.value, int)]
 
@@ -248,7 +248,7 @@ def never_reset(script: Script, counter: Counter) -> list[TextEdit]:
 
 
 def _without_if(script: Script, test: ast.If) -> list[TextEdit]:
-    """What is left where the branch that sets back is never taken."""
+    """Return what is left where the branch that sets back is never taken."""
     if not script.has_lines(test):
         return []
     counts = [b for b in (test.body, test.orelse) if b and not _sets_back(b)]

@@ -125,7 +125,7 @@ def other_type(script: Script, endpoint: Endpoint, params: OtherTypeParams) -> l
 
 
 def _constructors(script: Script, publisher: Endpoint) -> list[ast.expr]:
-    """The type where the published messages are made: `Int8` of `Int8(5)`."""
+    """Return the type where the published messages are made: `Int8` of `Int8(5)`."""
     made = [n for value in sources(script, publisher) for n in ast.walk(value) if isinstance(n, ast.Call)]
     return [call.func for call in dict.fromkeys(made) if last_name(call.func) == publisher.type_name]
 
@@ -141,7 +141,7 @@ def _send_time(script: Script, publisher: Endpoint) -> list[TextEdit]:
 
 
 def _import(script: Script, kind: ast.expr, to: str) -> list[TextEdit] | None:
-    """The import that the other type needs; None where it cannot be told how this one was imported."""
+    """Return the import that the other type needs; None where it cannot be told how this one was imported."""
     if isinstance(kind, ast.Attribute):
         return []
     for statement in script.of(ast.ImportFrom):
@@ -201,7 +201,7 @@ class Pace:
     unit: Literal["hz", "s"]
 
     def times(self, factor: float) -> str:
-        """The number, as source, for `factor` times as often."""
+        """Return the number, as source, for `factor` times as often."""
         value = self.value * factor if self.unit == "hz" else self.value / factor
         return f"{value:.6g}"
 
@@ -262,7 +262,7 @@ def _turns(solution: Solution) -> Iterator[tuple[CodePlace, Script, Pace, list[a
 
 
 def _declares(statement: ast.stmt) -> bool:
-    """A docstring, or names of variables from outside."""
+    """Return whether it is a docstring, or names of variables from outside."""
     text = isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
     return text or isinstance(statement, ast.Global | ast.Nonlocal)
 
@@ -272,7 +272,7 @@ def _sleeps(statement: ast.stmt) -> bool:
 
 
 def _calls_in(script: Script, statements: Sequence[ast.stmt]) -> Iterator[ast.Call]:
-    """The calls in the statements, and in the script's own functions that they call."""
+    """Yield the calls in the statements, and in the script's own functions that they call."""
     own = {f.name: f for f in script.of(ast.FunctionDef)}
     waiting: list[ast.AST] = list(statements)
     seen: set[Function] = set()
