@@ -16,7 +16,7 @@ from benchmarks.figures import NotMeasured
 from benchmarks.machine import Meter
 from grader.arena.limits import RunLimits
 from grader.arena.process_environment import ProcessEnvironment
-from grader.arena.scenario import process_specs
+from grader.arena.run_scenario import process_specs
 from grader.arena.session import ArenaSession
 from grader.evidence.writer import EvidenceWriter
 from grader.rubric.scenario import Start

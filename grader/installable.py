@@ -15,7 +15,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from grader.errors import UsageError
-from grader.wording import is_one_edit
+from grader.wording import ON_THE_MACHINE, is_one_edit
 
 SLIP_CHARS_MIN = 4
 """Shorter names differ by one letter because they are different names."""
@@ -53,9 +53,6 @@ MODULE_OF = {
     for name in names.split()
 }
 """What a script may use without an import, by its name, and the one module that it is taken from."""
-NOTHING_TO_DO = "nothing for you to do: "
-ON_THE_MACHINE = f"{NOTHING_TO_DO}tell your instructor. On the grading machine: "
-"""How every hint begins that only the instructor can follow: grading again changes nothing before."""
 _PREFIX = re.compile(r"/opt/ros/([a-z]+)\b")
 
 

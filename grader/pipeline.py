@@ -28,7 +28,7 @@ from grader.evidence.run import Run, console_log
 from grader.faults import GradingContext, classify_errors
 from grader.files import temporary_folder
 from grader.intake.choose import WantedPackage
-from grader.intake.open import open_recorded, open_recording, open_submission
+from grader.intake.open import open_recording_file, open_recordings_only, open_submission
 from grader.intake.source import Source, local_path
 from grader.judging.judge import judge_files
 from grader.judging.summary import assemble_result, environment_info
@@ -40,10 +40,10 @@ from grader.model.submission import RecordedSubmission, Submission
 from grader.package.facts import read_packages
 from grader.portable import wait_for_children
 from grader.recording import (
-    Judged,
     RecordingJob,
     RecordingOptions,
-    import_later,
+    RunsAndJudgement,
+    import_deferred,
     judge_folder,
     judge_recorded,
     make_recorder,
@@ -110,7 +110,7 @@ def grade(
         open_source(source, rubric, options, progress) as submission,
     ):
         context.submission = submission_info(submission)
-        # from here on its made-up values are drawn, and all that follows sees plain ones
+        # each `made_up` of the rubric becomes this submission's own random value
         rubric = rubric.of_submission(submission.digest, context.submission.package)
         context.rubric_origin = origin_of(rubric, (local_path(source), options.repository))
         # before the folder is locked and prepared: a result that stays needs neither
@@ -159,19 +159,19 @@ def record(
     return [out / submission.id / EVIDENCE / name for name in names]
 
 
-def prepare(options: GradeOptions) -> None:
+def provide_base_workspace(options: GradeOptions) -> None:
     """Make what many gradings share, before the first. If it cannot be made, each of them reports why."""
-    from grader.arena.base_workspace import provide_base  # noqa: PLC0415 - see recording.LATER
+    from grader.arena.base_workspace import provide_base  # noqa: PLC0415 - see recording.DEFERRED_IMPORTS
 
     if not options.static_only:
         with suppress(GraderError), wait_for_children():
             provide_base(options.sandbox)
 
 
-def warm_up() -> None:
+def preload_worker() -> None:
     """Do once what every grading needs, in the process that the workers of a batch are copies of (`workers.run_each`):
     imports, what is asked of this machine, and the process that arenas are copies of."""
-    from grader import repaired_copy, submitted_recordings  # noqa: F401, PLC0415 - see recording.LATER
+    from grader import repaired_copy, submitted_recordings  # noqa: F401, PLC0415 - see recording.DEFERRED_IMPORTS
     from grader.arena import recorder  # noqa: F401, PLC0415
     from grader.arena.arena_process import template_of  # noqa: PLC0415
     from grader.arena.sandbox import choose_sandbox  # noqa: PLC0415
@@ -180,7 +180,7 @@ def warm_up() -> None:
     from grader.report import figures, junit, markdown  # noqa: F401, PLC0415
     from grader.report.html.page import load_template  # noqa: PLC0415
 
-    import_later()
+    import_deferred()
     build_records()
     load_template()
     ros = find_ros()
@@ -202,12 +202,12 @@ def open_source(
         submission_id = options.submission_id
         submission: Submission | RecordedSubmission | None
         # first, since a recording needs no package, whatever the rubric is about
-        submission = open_recording(source, submission_id=submission_id)
+        submission = open_recording_file(source, submission_id=submission_id)
         if submission is None and needs_package(rubric):
             package = wanted_package(rubric.rubric, options.package)
             submission = open_submission(source, package=package, workdir=folder, submission_id=submission_id)
         elif submission is None:
-            submission = open_recorded(source, workdir=folder, submission_id=submission_id)
+            submission = open_recordings_only(source, workdir=folder, submission_id=submission_id)
         progress.step("intake", "done", submission.id)
         yield submission
 
@@ -249,7 +249,7 @@ def recording_job(
     )
 
 
-def record_and_judge(job: RecordingJob, *, keep_hidden: bool) -> tuple[Recording, Judged]:
+def record_and_judge(job: RecordingJob, *, keep_hidden: bool) -> tuple[Recording, RunsAndJudgement]:
     """Record every scenario, and judge it; then what a lost mark needs besides."""
     job.progress.early(lambda: judge_early(job.facts, job.rubric, keep_hidden=keep_hidden))
     with make_recorder(job) as recorder:
@@ -262,9 +262,9 @@ def record_and_judge(job: RecordingJob, *, keep_hidden: bool) -> tuple[Recording
 
 def copy_and_judge(
     submission: RecordedSubmission, rubric: LoadedRubric, evidence: Path, progress: Progress
-) -> Judged:
+) -> RunsAndJudgement:
     """Copy a submission's recordings into the folder `evidence`, and judge them."""
-    from grader.submitted_recordings import copy_recordings  # noqa: PLC0415 - see recording.LATER
+    from grader.submitted_recordings import copy_recordings  # noqa: PLC0415 - see recording.DEFERRED_IMPORTS
 
     copy_recordings(rubric.rubric, submission, evidence, progress)
     return judge_folder(evidence, rubric)
@@ -315,7 +315,7 @@ def write(
 def draw_figures(rubric: LoadedRubric, runs: dict[str, Run], result: GradingResult) -> Figures | None:
     """Return what the reports show beside the verdicts. A result without figures is better than none."""
     with suppress(Exception):
-        from grader.report import figures  # noqa: PLC0415 - see recording.LATER
+        from grader.report import figures  # noqa: PLC0415 - see recording.DEFERRED_IMPORTS
 
         return figures.figures_of(rubric.rubric, runs, result.criteria)
     return None

@@ -36,11 +36,11 @@ if TYPE_CHECKING:
     from grader.arena.static_recorder import StaticRecorder
     from grader.model import SandboxMode
 
-LATER = "grader.evidence.reader"
+DEFERRED_IMPORTS = "grader.evidence.reader"
 """Slow to import, and needed by no verdict that the files alone decide: imported while the build runs. The arena is
 imported when it begins, and what judges or reports recordings when it is called."""
 
-Judged: TypeAlias = tuple[dict[str, Run], Judgement]
+RunsAndJudgement: TypeAlias = tuple[dict[str, Run], Judgement]
 """The runs by scenario, and what was judged by them."""
 
 
@@ -75,7 +75,7 @@ def make_recorder(
 ) -> Recorder | StaticRecorder:
     """Return what records the rubric's scenarios (`only` these), to be used as a context: the arena, or a recorder of
     files alone where nothing is to be run, or can be. `about` goes into the metadata."""
-    from grader.arena.static_recorder import STATIC_ONLY, StaticRecorder  # noqa: PLC0415 - see LATER
+    from grader.arena.static_recorder import STATIC_ONLY, StaticRecorder  # noqa: PLC0415 - see DEFERRED_IMPORTS
 
     make_folder(job.evidence)
     rubric, options = job.rubric.rubric, job.options
@@ -92,7 +92,7 @@ def make_recorder(
             progress=job.progress,
             recorded=options.reused,
         )
-    from grader.arena.recorder import Recorder  # noqa: PLC0415 - see LATER
+    from grader.arena.recorder import Recorder  # noqa: PLC0415 - see DEFERRED_IMPORTS
 
     refuse_missing(rubric)
     made_up = {KEY: json.dumps(rubric.values)} if rubric.values else {}
@@ -126,29 +126,31 @@ def refuse_missing(rubric: Rubric) -> None:
 
 def record_all(job: RecordingJob, recorder: Recorder | StaticRecorder) -> None:
     """Record every scenario, and copy the recordings that scenarios name in the submission."""
-    recorder.record_all(import_later)
-    from grader.submitted_recordings import copy_recordings  # noqa: PLC0415 - see LATER
+    recorder.record_all(import_deferred)
+    from grader.submitted_recordings import copy_recordings  # noqa: PLC0415 - see DEFERRED_IMPORTS
 
     copy_recordings(job.rubric.rubric, job.submission, job.evidence, job.progress)
 
 
-def import_later() -> None:
+def import_deferred() -> None:
     """Import it before it is needed."""
-    import_module(LATER)
+    import_module(DEFERRED_IMPORTS)
 
 
-def judge_folder(evidence: Path, rubric: LoadedRubric) -> Judged:
+def judge_folder(evidence: Path, rubric: LoadedRubric) -> RunsAndJudgement:
     """Read and judge what is in the folder. Raises EvidenceError."""
-    from grader.evidence.reader import load_evidence  # noqa: PLC0415 - see LATER
+    from grader.evidence.reader import load_evidence  # noqa: PLC0415 - see DEFERRED_IMPORTS
 
     runs = load_evidence([evidence])
     return runs, judge_all_runs(rubric.rubric, runs, rubric.checks, rubric.handed_out)
 
 
-def judge_recorded(recorder: Recorder | StaticRecorder, evidence: Path, rubric: LoadedRubric) -> Judged:
+def judge_recorded(
+    recorder: Recorder | StaticRecorder, evidence: Path, rubric: LoadedRubric
+) -> RunsAndJudgement:
     """Judge what is in the folder. What this recorder recorded and cannot be judged because the machine was late is
     recorded again, alone, at most `RETRIES` times."""
-    from grader.arena.static_recorder import RETRIES  # noqa: PLC0415 - see LATER
+    from grader.arena.static_recorder import RETRIES  # noqa: PLC0415 - see DEFERRED_IMPORTS
 
     runs, judged = judge_folder(evidence, rubric)
     for _ in range(RETRIES):
@@ -161,7 +163,9 @@ def judge_recorded(recorder: Recorder | StaticRecorder, evidence: Path, rubric: 
     return runs, judged
 
 
-def record_other_runs(job: RecordingJob, recorder: Recorder | StaticRecorder, judged: Judged) -> bool:
+def record_other_runs(
+    job: RecordingJob, recorder: Recorder | StaticRecorder, judged: RunsAndJudgement
+) -> bool:
     """Record what a lost mark needs besides the first runs, which were `judged`, and return whether there was anything.
 
     A run whose timing could have cost the mark is repeated. Where a mechanical repair could be the reason for the loss,

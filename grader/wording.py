@@ -12,6 +12,9 @@ from itertools import chain
 
 LISTED_MAX = 6
 PART_CHARS_MIN = 3
+NOTHING_TO_DO = "nothing for you to do: "
+ON_THE_MACHINE = f"{NOTHING_TO_DO}tell your instructor. On the grading machine: "
+"""How every hint begins that only the instructor can follow: grading again changes nothing before."""
 
 
 def number(value: float, digits: int = 3) -> str:

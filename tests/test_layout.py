@@ -14,7 +14,8 @@ from pathlib import Path
 import pytest
 
 GRADER = Path(__file__).resolve().parent.parent / "grader"
-ROS_SIDE = GRADER / "arena" / "ros"
+ROS_SIDE = (GRADER / "arena" / "ros", GRADER / "package" / "lint")
+"""What ROS's own Python runs."""
 ROOT = GRADER.parent
 NAMED = re.compile(r"(?<!`)`([\w./-]+)`(?!`)")
 """A path or a name in the text of a page or a docstring."""
@@ -158,13 +159,17 @@ def test_the_support_of_checks_imports_no_family_of_checks() -> None:
 
 
 def test_the_ros_side_needs_ros_and_the_standard_library_only() -> None:
-    own = {path.stem for path in ROS_SIDE.glob("*.py")}
+    own = {path.stem for side in ROS_SIDE for path in side.glob("*.py")}
     known = own | ROS_MODULES | sys.stdlib_module_names | {"distutils"}  # which ROS's own Python has
-    found = {module.split(".")[0] for path in _sources(ROS_SIDE) for module in _imports(path)}
+    found = {
+        module.split(".")[0] for side in ROS_SIDE for path in _sources(side) for module in _imports(path)
+    }
     assert found - known == set()
 
 
-@pytest.mark.parametrize("path", sorted(ROS_SIDE.glob("*.py")), ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "path", sorted(path for side in ROS_SIDE for path in side.glob("*.py")), ids=lambda path: path.name
+)
 def test_the_ros_side_is_python_3_8(path) -> None:
     tree = ast.parse(path.read_text(encoding="utf-8"), feature_version=(3, 8))
     assert tree.body
@@ -277,7 +282,7 @@ class Hidden:
 sys.meta_path.insert(0, Hidden())
 import grader
 for module in pkgutil.walk_packages(grader.__path__, "grader."):
-    if not any(part in module.name for part in (".arena.ros", ".standins", "__main__")):
+    if not any(part in module.name for part in (".arena.ros", ".package.lint", ".standins", "__main__")):
         try:
             importlib.import_module(module.name)
         except ModuleNotFoundError:

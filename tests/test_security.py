@@ -79,7 +79,7 @@ BOUNDS = {
     ),
     "CMake's trace": (files.READ_MAX // MB, cmake.LINES_MAX, cmake.FILES_BYTES_MAX // 1000),
     "remarks on Python files": (
-        python.REPORT_BYTES_MAX // MB, "ros/slips:SLIPS_LIMIT", "ros/syntax:ALL_SLIPS_LIMIT", build.STEP_S,
+        python.REPORT_BYTES_MAX // MB, "lint/slips:SLIPS_LIMIT", "lint/syntax:ALL_SLIPS_LIMIT", build.STEP_S,
     ),
     "archives": (archive.MEMORY_BYTES // MB, archive.CPU_S, int(archive.WALL_S)),
     "calls of the master": (

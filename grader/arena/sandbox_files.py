@@ -25,6 +25,7 @@ RECORD_SHIM = "grader-rosbag-record"
 COURSE = "/run/grader/course"
 FUNCTIONS, ROSTESTS = "grader-functions.py", "grader-rostests.py"
 ROS_SIDE = Path(__file__).parent / "ros"
+LINT = Path(__file__).parents[1] / "package" / "lint"
 TERMINALS = (
     "gnome-terminal", "konsole", "lxterminal", "mate-terminal", "rxvt", "terminator", "tilix", "urxvt",
     "x-terminal-emulator", "xfce4-terminal", "xterm",
@@ -68,8 +69,8 @@ def prepare(place: Path, ros: RosInstallation) -> None:
     # Both are ROS's interpreter: a newer system has no `python`, and its `python3` may be another one.
     for name in ("python", "python3"):
         (shims / name).symlink_to(ros.python)
-    shutil.copyfile(ROS_SIDE / "syntax.py", shims / "grader-syntax.py")
-    for module in (ROS_SIDE / "slips.py", *ROS_SIDE.glob("script_*.py")):
+    shutil.copyfile(LINT / "syntax.py", shims / "grader-syntax.py")
+    for module in (LINT / "slips.py", *LINT.glob("script_*.py")):
         shutil.copyfile(module, shims / module.name)
     shutil.copyfile(ROS_SIDE / "functions.py", shims / FUNCTIONS)
     shutil.copyfile(ROS_SIDE / "rostests.py", shims / ROSTESTS)

@@ -25,8 +25,8 @@ from grader.model.verdict import (
 FAMILIES = (
     "package_files", "cmake", "build", "executable", "node", "topics", "messages", "reacts", "stamps", "interfaces",
     "transform", "rate", "counter", "listener", "console", "files_left", "launch_files", "launch_runs",
-    "launch_params", "parameter_files", "parameters", "services", "calls", "actions", "rostest", "two_copies",
-    "robot_path", "robot_places",
+    "launch_params", "parameter_files", "parameters", "service_servers", "service_clients", "actions", "rostest",
+    "two_copies", "robot_path", "robot_places",
 )  # fmt: skip
 for family in FAMILIES:
     import_module(f"grader.checks.{family}")

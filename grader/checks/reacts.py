@@ -12,7 +12,7 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
-from grader.checks.services import exchanges, no_answer, not_offered, offers
+from grader.checks.service_servers import exchanges, no_answer, not_offered, offers
 from grader.checks.support.clocks import excused, no_clock, run_seconds, why_late
 from grader.checks.support.fields import (
     FieldPath,

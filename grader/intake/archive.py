@@ -71,7 +71,7 @@ GIT_COMMENT = re.compile(rb"[0-9a-f]{40}|[0-9a-f]{64}")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Unpacked:
+class UnpackResult:
     """`executable` is keyed by path below `root`; None where the archive carries no mode for that file."""
 
     root: Path
@@ -80,7 +80,7 @@ class Unpacked:
     hints: tuple[str, ...]
 
 
-def unpack(path: Path, into: Path, limits: IntakeLimits) -> Unpacked:
+def unpack(path: Path, into: Path, limits: IntakeLimits) -> UnpackResult:
     """Unpack the archive at `path` into the new folder `into`, in a child process.
 
     Raises SubmissionError for anything but an archive, or one that is damaged, has a password, is too large or reaches
@@ -109,7 +109,7 @@ def unpack(path: Path, into: Path, limits: IntakeLimits) -> Unpacked:
         raise SubmissionError(message, hint=hint)
     if "errno" in said:
         raise OSError(said["errno"], said["strerror"], said["filename"])
-    return Unpacked(
+    return UnpackResult(
         root=into, sha256=said["sha256"], executable=said["executable"], hints=tuple(said["hints"])
     )
 

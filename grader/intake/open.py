@@ -118,7 +118,9 @@ def open_submission(
     return _with_id(submission, submission_id)
 
 
-def open_recording(source: str | Source, *, submission_id: str | None = None) -> RecordedSubmission | None:
+def open_recording_file(
+    source: str | Source, *, submission_id: str | None = None
+) -> RecordedSubmission | None:
     """Return the submission where `source` is itself a recording (a bag or an MCAP file), None where it is anything
     else.
 
@@ -135,7 +137,7 @@ def open_recording(source: str | Source, *, submission_id: str | None = None) ->
     return _with_id(submission, submission_id)
 
 
-def open_recorded(
+def open_recordings_only(
     source: str | Source, *, workdir: Path, submission_id: str | None = None
 ) -> RecordedSubmission:
     """Return the submission of a lab that asks for recordings alone: as `open_submission`, and no package is looked

@@ -24,7 +24,6 @@ from grader.checks.support.text import Language, near_names, texts_in
 from grader.checks.support.topics import unheard_programs
 from grader.evidence.events import PACKAGE_RUN, RECORDING_MISSING, RECORDING_PROBLEM
 from grader.evidence.run import Run
-from grader.installable import NOTHING_TO_DO
 from grader.model.package import LaunchFile, PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
@@ -32,7 +31,7 @@ from grader.model.verdict import Verdict, failed, inconclusive, machine_lacks, u
 from grader.rubric.message_fields import said_types
 from grader.rubric.model import Criterion, Rubric
 from grader.rubric.scenario import Scenario, Start
-from grader.wording import join_words
+from grader.wording import NOTHING_TO_DO, join_words
 
 NOT_RUN = "not_run"
 REACTS = "reacts"

@@ -37,7 +37,7 @@ from grader.checks.support.text import (
 )
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
-from grader.installable import NOTHING_TO_DO, PYTHON_2
+from grader.installable import PYTHON_2
 from grader.judging.cited_lines import LINE_CHARS, LINES_READ, LOOPS, OF_DATA, PLACES, loop_spins, lost_fields
 from grader.judging.facts import Facts, is_other_rate, names_started, scripts_of, sources_of
 from grader.judging.repeats_and_repairs import text_as_handed_in
@@ -46,7 +46,7 @@ from grader.model.python_slip import PythonSlip
 from grader.model.repair import Repair
 from grader.model.verdict import Verdict, cited_lines
 from grader.rubric.model import Criterion, Rubric
-from grader.wording import join_words, on_lines, significant
+from grader.wording import NOTHING_TO_DO, join_words, on_lines, significant
 
 NAMES_SHOWN = 3
 ASKS = re.compile(r"[^#'\"]*\b(?:raw_)?input\s*\(")

@@ -19,7 +19,7 @@ from grader.installable import known_packages
 from grader.model.package import Fault, LateRemap, LaunchArg, LaunchLine, LaunchLoad, LaunchNode, LaunchParam
 from grader.model.record import Record
 from grader.package.xml import line_of
-from grader.package.xml_slips import ATTRIBUTES
+from grader.package.xml_corrections import ATTRIBUTES
 from grader.wording import PAIR, is_one_edit
 
 INCLUDES_MAX = 50

@@ -32,7 +32,7 @@ from grader.syntax_fixes import (
     without_texts,
 )
 
-CHECK = "grader.arena.ros.syntax:check_all"
+CHECK = "grader.package.lint.syntax:check_all"
 MEMORY_BYTES, CPU_S = 1 << 30, 20
 REPORT_BYTES_MAX = 8 << 20
 """More than `syntax.py` has to say of as many files as a package may have."""
@@ -169,8 +169,8 @@ class _RawEntry(Record):
 
 
 def read_syntax_report(output: bytes | str) -> SyntaxReport:
-    """Return the report of `grader/arena/ros/syntax.py` from what it printed; foreign lines are passed over, and what
-    is past `REPORT_BYTES_MAX` is not read."""
+    """Return the report of `lint/syntax.py` from what it printed; foreign lines are passed over, and what is
+    past `REPORT_BYTES_MAX` is not read."""
     checked: list[str] = []
     faults: dict[str, Fault] = {}
     slips: list[PythonSlip] = []

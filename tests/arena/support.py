@@ -12,10 +12,10 @@ import pytest
 
 from grader.arena.limits import RunLimits
 from grader.arena.process_environment import ProcessEnvironment
+from grader.arena.run_scenario import run_scenario
 from grader.arena.run_state import RunState
 from grader.arena.sandbox import choose_sandbox, why_no_sandbox
 from grader.arena.sandbox_files import prepare
-from grader.arena.scenario import run_scenario
 from grader.arena.workspace import make_workspace, run_in_place
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run

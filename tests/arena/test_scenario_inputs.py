@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from grader.arena.process_environment import TEXT_BYTES_MAX, ProcessEnvironment
-from grader.arena.scenario import SLEEPING, set_params, sleeps_elsewhere
+from grader.arena.run_scenario import SLEEPING, set_params, sleeps_elsewhere
 from grader.arena.scenario_inputs import FILE_BYTES_MAX, made_up, make_shots
 from grader.arena.static_recorder import (
     ATTACHED_BYTES_MAX,

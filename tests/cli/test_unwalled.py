@@ -20,7 +20,7 @@ COMMANDS = {
     "grade": (["grade", SOLUTION, "--rubric", LAB, "--out", "o"], GRADE),
     "check": (["check", SOLUTION, "--rubric", LAB], GRADE),
     "ci": (["ci", "gitlab"], GRADE),
-    "batch": (["batch", "roster.csv", "--rubric", LAB, "--out", "o"], "grader.cli.classes.run_batch"),
+    "batch": (["batch", "roster.csv", "--rubric", LAB, "--out", "o"], "grader.cli.class_actions.run_batch"),
     "record": (["record", SOLUTION, "--rubric", LAB, "--out", "o"], "grader.pipeline.record"),
     "rubric new": (["rubric", "new", "--from", SOLUTION], "grader.authoring.propose.propose_rubric"),
     "rubric test": (["rubric", "test", LAB], "grader.cli.labs.run_test"),
@@ -33,7 +33,7 @@ def _begins(tmp_path: Path, monkeypatch) -> None:
 
     What takes these functions' names at its import is imported before, or it would keep the stand-ins for later tests.
     """
-    for module in ("grader.cli.classes", "grader.cli.labs", "grader.authoring.propose"):
+    for module in ("grader.cli.class_actions", "grader.cli.labs", "grader.authoring.propose"):
         importlib.import_module(module)
 
     def begin(*_args: object, **_more: object) -> None:

@@ -14,7 +14,7 @@ import pytest
 
 from grader.errors import PackageNotFound, SubmissionError
 from grader.intake.limits import IntakeLimits
-from grader.intake.open import open_recorded, open_recording, open_submission
+from grader.intake.open import open_recording_file, open_recordings_only, open_submission
 from grader.intake.source import identify, parse_source
 from tests.intake.samples import commit, git, lab, opened, repository, write
 from tests.support.processes import lives, until
@@ -382,5 +382,5 @@ def test_a_source_that_was_read_already(repo, history, tmp_path):
     assert (submission.commit, submission.source) == (history["first"], "https://h/student@v1")
     assert submission.hints == ("from elsewhere",)
     assert identify(source, "s1") == ("s1", "https://h/student@v1")
-    assert open_recording(source) is None
-    assert open_recorded(source, workdir=tmp_path / "work").commit == history["first"]
+    assert open_recording_file(source) is None
+    assert open_recordings_only(source, workdir=tmp_path / "work").commit == history["first"]

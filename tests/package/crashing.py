@@ -1,4 +1,4 @@
-"""What `grader/arena/ros/syntax.py` would be if a file named `crash` crashed Python, and `slow` took very long."""
+"""What `grader/package/lint/syntax.py` would be if a file named `crash` crashed Python, and `slow` took very long."""
 
 from __future__ import annotations
 

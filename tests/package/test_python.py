@@ -109,7 +109,7 @@ GOOD = {
     "warns": b"x = 1 is 1\ny = '\\d'\n",
 }
 
-SYNTAX = Path(__file__).resolve().parents[2] / "grader/arena/ros/syntax.py"
+SYNTAX = Path(__file__).resolve().parents[2] / "grader/package/lint/syntax.py"
 PYTHONS = [p for p in (f"python3.{minor}" for minor in (8, 9, 10, 12, 13, 14)) if shutil.which(p)]
 
 

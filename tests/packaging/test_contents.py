@@ -87,7 +87,7 @@ def test_the_wheel_holds_every_file_of_ours_and_no_other(wheel: ZipFile):
     [
         "grader/py.typed",
         "grader/arena/standins/turtlesim/turtlesim_node",
-        "grader/arena/ros/syntax.py",
+        "grader/package/lint/syntax.py",
         "grader/report/html/templates/report.html",
         "grader/report/html/style.css",
         "grader/report/class_page/class.js",

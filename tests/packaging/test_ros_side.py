@@ -9,7 +9,7 @@ import pytest
 
 from tests.packaging.making import BIN, ROOT, find
 
-SIDES = ("grader/arena/ros", "grader/arena/standins")
+SIDES = ("grader/arena/ros", "grader/package/lint", "grader/arena/standins")
 NEWER = {
     "syntax": "match 1:\n    case 1:\n        pass\n",
     "library": "import zoneinfo\n",
@@ -37,7 +37,7 @@ def vermin(*paths: Path) -> subprocess.CompletedProcess[str]:
 
 def test_both_sides_are_found():
     assert {path.relative_to(ROOT).as_posix() for path in scripts()} > {
-        "grader/arena/ros/syntax.py",
+        "grader/package/lint/syntax.py",
         "grader/arena/ros/__main__.py",
         "grader/arena/standins/turtlesim/turtlesim_node",
     }

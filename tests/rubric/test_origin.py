@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.cli.classes import rubric_source
+from grader.cli.class_actions import rubric_source
 from grader.errors import HostError, UsageError
 from grader.model.figure import Figures
 from grader.report.html.page import render_html

@@ -80,9 +80,9 @@ class Arena:
         from actor import Actor, SlaveApi  # noqa: PLC0415 - a build needs no ROS imports
         from guard import Guard  # noqa: PLC0415
         from master import RecordingMaster  # noqa: PLC0415
-        from recorder import Recorder  # noqa: PLC0415
         from rpc import serve  # noqa: PLC0415
         from sockets import Owners  # noqa: PLC0415
+        from topic_recorder import Recorder  # noqa: PLC0415
 
         name = "/grader_{}" + config["suffix"]
         guard, own_ports = Guard(self._wire), set()

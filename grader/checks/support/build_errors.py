@@ -28,7 +28,6 @@ from grader.checks.support.scripts import OF_FILES, OF_INTERFACES, cmake_calls, 
 from grader.checks.support.text import near_names, shown
 from grader.installable import (
     LIBRARIES,
-    ON_THE_MACHINE,
     ROS_2,
     exists_somewhere,
     install_hint,
@@ -47,7 +46,7 @@ from grader.model.package import (
     meant_command,
 )
 from grader.model.verdict import FileCitation
-from grader.wording import is_word_of, join_words, on_lines, there_is
+from grader.wording import ON_THE_MACHINE, is_word_of, join_words, on_lines, there_is
 
 ALWAYS_THERE = ("catkin", "rospy", "roscpp", "std_msgs")
 ONE_EDIT = 0.88

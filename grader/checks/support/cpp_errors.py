@@ -10,11 +10,10 @@ from collections.abc import Sequence
 from grader.checks.support.build_output import FIRST_ERROR_HINT, Explain, Explained, told
 from grader.checks.support.scripts import cmake_calls
 from grader.checks.support.text import near_names
-from grader.installable import ON_THE_MACHINE
 from grader.model.package import CMAKE, PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.verdict import FileCitation
-from grader.wording import on_lines
+from grader.wording import ON_THE_MACHINE, on_lines
 
 CPP_SUFFIXES = (".c", ".cc", ".cpp", ".cxx")
 STANDARD = {

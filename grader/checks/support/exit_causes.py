@@ -64,12 +64,12 @@ from grader.checks.support.text import (
 )
 from grader.evidence.events import STOPPED
 from grader.evidence.run import Run
-from grader.installable import NOTHING_TO_DO, ON_THE_MACHINE, install_hint
+from grader.installable import install_hint
 from grader.model.package import Fault, PackageFacts, SourceFile
 from grader.model.python_slip import PythonSlip
 from grader.model.verdict import Citations, FileCitation, Span, Verdict, machine_lacks
 from grader.syntax_fixes import COMMENTED_OUT, corrected, without_brace
-from grader.wording import join_words, on_lines
+from grader.wording import NOTHING_TO_DO, ON_THE_MACHINE, join_words, on_lines
 
 OTHER_NAMES_SHOWN = 3
 """Names of the same script that are not defined either."""

@@ -458,7 +458,7 @@ def _line_with(source: str, wrong: str, right: str) -> str:
 
 
 IMPORT = "write `import %s` at the top"
-"""The fix of a module's name that is not there, as `arena/ros/script_names.py` writes it."""
+"""The fix of a module's name that is not there, as `package/lint/script_names.py` writes it."""
 
 
 class NameSlip(NamedTuple):

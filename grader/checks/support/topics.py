@@ -37,7 +37,6 @@ from grader.checks.support.text import (
 )
 from grader.evidence.events import MISFIT, UNHEARD, UNSENDABLE
 from grader.evidence.run import Channel, Run
-from grader.installable import NOTHING_TO_DO
 from grader.model.package import LaunchNode, PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.record import Record
@@ -50,7 +49,7 @@ from grader.model.verdict import (
     inconclusive,
     unjudged,
 )
-from grader.wording import join_words, plural
+from grader.wording import NOTHING_TO_DO, join_words, plural
 
 SYSTEM_TOPICS = frozenset({"/rosout", "/rosout_agg", "/clock"})
 End = Literal["publishers", "subscribers"]

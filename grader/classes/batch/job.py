@@ -31,12 +31,12 @@ from grader.model import SandboxMode
 from grader.model.batch import Entry
 from grader.model.record import Record
 from grader.model.result import NO_TIME, GradingResult, HandedIn, Override, Silence, StepState, SubmissionInfo
-from grader.pipeline import GradeOptions, grade, prepare
+from grader.pipeline import GradeOptions, grade, provide_base_workspace
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.workers import WorkerEnded, run_each
 
 OutcomeStatus = Literal["graded", "inconclusive", "error"]
-WARM_UP = "grader.pipeline:warm_up"
+WARM_UP = "grader.pipeline:preload_worker"
 KILLED_HINT = "check whether this machine has too little memory, then grade it again with --only"
 
 
@@ -276,7 +276,7 @@ def grade_all(
 ) -> Iterator[GradedSubmission]:
     """Yield each job's result as it comes, `most` at a time. `begun` gets each job's name when it starts."""
     for sandbox in {job.sandbox for job in jobs}:
-        prepare(GradeOptions(sandbox=sandbox))
+        provide_base_workspace(GradeOptions(sandbox=sandbox))
     return run_each(
         _grade_folder,
         jobs,

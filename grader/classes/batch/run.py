@@ -29,7 +29,7 @@ from grader.judging.summary import passed
 from grader.model import SandboxMode
 from grader.model.batch import MISSING, BatchRun, Counts, CriterionInfo, Entry, Roster, RosterFault, State
 from grader.model.result import GradingResult, RubricInfo
-from grader.pipeline import GradeOptions, prepare
+from grader.pipeline import GradeOptions, provide_base_workspace
 from grader.report.class_page.page import write_class_page
 from grader.results import finish_killed
 from grader.rubric.load import LoadedRubric
@@ -157,7 +157,7 @@ def _grade_all(batch: _Batch, executor: Executor, watcher: Watcher) -> Iterator[
     todo = list(_select(batch.roster.entries, options.only, batch.folder.earlier))
     watcher.planned(len(todo))
     if todo and not options.cluster:  # what is made here is of no use on the machines of a cluster
-        prepare(GradeOptions(sandbox=options.sandbox, static_only=options.static_only))
+        provide_base_workspace(GradeOptions(sandbox=options.sandbox, static_only=options.static_only))
     # whatever is fetched from here on is fresh enough for every job
     since = time.time()
     entries = {entry.id: entry for entry, _ in todo}

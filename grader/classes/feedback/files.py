@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Literal
 
 from grader.classes.feedback.forms import PAGE, TEXT, Feedback, Sender, SendSettings
-from grader.classes.gradebook.platforms import kinds
-from grader.classes.roster.platforms import platform_name
+from grader.classes.gradebook.matching import kinds
+from grader.classes.roster.exports import platform_name
 from grader.errors import NotSent, UsageError
 from grader.files import atomic_write, whole_file
 

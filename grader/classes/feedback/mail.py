@@ -22,7 +22,7 @@ from ipaddress import ip_address
 from urllib.parse import urlsplit
 
 from grader.classes.feedback.forms import PAGE, Feedback, Sender, SendSettings, Unsure
-from grader.classes.gradebook.platforms import kinds
+from grader.classes.gradebook.matching import kinds
 from grader.errors import HostError, NotSent, UsageError
 from grader.files import atomic_write
 from grader.model.batch import Entry

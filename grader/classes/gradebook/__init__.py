@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
-from grader.classes.gradebook.platforms import Platform, marks_of, new_import_file, remarks_of, wanted_columns
+from grader.classes.gradebook.matching import Platform, marks_of, new_import_file, remarks_of, wanted_columns
 from grader.classes.gradebook.table import (
     FORMS,
     Book,

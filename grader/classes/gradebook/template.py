@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from grader.classes.gradebook.platforms import (
+from grader.classes.gradebook.matching import (
     ColumnKind,
     Identity,
     Mark,

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from grader.classes.roster.entries import OWN_FOLDER, Local, entries_of, read_table
-from grader.classes.roster.platforms import (
+from grader.classes.roster.exports import (
     from_folder,
     from_gitlab,
     is_classroom,

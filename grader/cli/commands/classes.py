@@ -88,15 +88,15 @@ def batch(
     """Grade a class, or continue a batch that was stopped."""
     with loading():
         from grader.classes.batch.run import BatchOptions
-        from grader.cli import classes, publishing
+        from grader.cli import class_actions, publishing
         from grader.rubric.load import load_rubric
     loaded = load_rubric(rubric)
     out = out or DEFAULT_OUT
-    local = classes.allowed_folders(allow_local, remote_only=remote_only)
-    named = classes.with_package(classes.read_listed(roster, out, local), package or "")
+    local = class_actions.allowed_folders(allow_local, remote_only=remote_only)
+    named = class_actions.with_package(class_actions.read_listed(roster, out, local), package or "")
     options = BatchOptions(
         out=out,
-        jobs=jobs or classes.default_jobs(loaded, static=static),
+        jobs=jobs or class_actions.default_jobs(loaded, static=static),
         sandbox=sandbox,
         static_only=static,
         before=publishing.parse_option_time("--before", before),
@@ -106,7 +106,7 @@ def batch(
         allow_local=tuple(str(folder) for folder in local.folders),
         remote_only=remote_only,
     )
-    return classes.grade_class(named, rubric, loaded, options, exchange, as_json=as_json)
+    return class_actions.grade_class(named, rubric, loaded, options, exchange, as_json=as_json)
 
 
 @command("regrade", group=INSTRUCTORS, exit_codes=CLASS_EXIT_CODES, runs_code=True)
@@ -127,7 +127,7 @@ def regrade(
         from grader.classes.batch.job import LocalExecutor
         from grader.classes.batch.regrade import regrade as judge_again
         from grader.classes.batch.regrade import run_missing
-        from grader.cli import classes
+        from grader.cli import class_actions
         from grader.cli.class_display import open_class_display, print_regraded
         from grader.cli.host_support import warn_without_sandbox
         from grader.cli.output import say_beside
@@ -141,16 +141,16 @@ def regrade(
     def stopped(done: int, of: int) -> None:
         say_beside(f"{done} of {of} judged again; the same command continues")
 
-    batch, regraded = judge_again(batch, loaded, classes.rubric_source(source), jobs or own, stopped)
+    batch, regraded = judge_again(batch, loaded, class_actions.rubric_source(source), jobs or own, stopped)
     if run_missing_too and any(one.missing for one in regraded):
         warn_without_sandbox(sandbox, loaded)
         with open_class_display() as watcher:
-            executor = LocalExecutor(jobs or own * classes.JOBS_PER_CORE)
+            executor = LocalExecutor(jobs or own * class_actions.JOBS_PER_CORE)
             batch, regraded = run_missing(
                 batch, loaded, regraded, executor=executor, watcher=watcher, sandbox=sandbox
             )
     print_regraded(batch, regraded, as_json=as_json)
-    return classes.exit_code(batch.run)
+    return class_actions.exit_code(batch.run)
 
 
 @command("review", group=INSTRUCTORS)
@@ -183,12 +183,12 @@ def review(
     with loading():
         from grader.classes.review.markers import share_of
         from grader.classes.review.session import open_session
-        from grader.cli import classes
-    name = classes.reviewer(marker if author is None else author)
+        from grader.cli import class_actions
+    name = class_actions.reviewer(marker if author is None else author)
     review = open_session(folder)
     review.blind = blind
     review.share = share_of(folder, marker, of, group)
-    return classes.serve_review(review, port=port, author=name, no_browser=no_browser)
+    return class_actions.serve_review(review, port=port, author=name, no_browser=no_browser)
 
 
 @command("overrides merge", group=INSTRUCTORS, exit_codes=MERGE_EXIT_CODES)
@@ -239,11 +239,11 @@ def gradebook(
     What a person has to know about it goes to stderr. Raises UsageError if the template would be overwritten.
     """
     with loading():
-        from grader.cli import classes
-    wanted = classes.WantedBook(
+        from grader.cli import class_actions
+    wanted = class_actions.WantedBook(
         form=form, out=out, template=template, column=column, wide=per_criterion, drafts=drafts
     )
-    return classes.write_class_gradebook(folder, wanted)
+    return class_actions.write_class_gradebook(folder, wanted)
 
 
 @command("report", group=INSTRUCTORS, exit_codes=REPORT_EXIT_CODES)
@@ -321,7 +321,7 @@ def similar(
     require_extra("similarity", "comparing submissions", "copydetect")
     with loading():
         from grader.classes.similarity.comparison import compare, write_similarity
-        from grader.cli.classes import print_similarity, starter_of, submissions_in
+        from grader.cli.class_actions import print_similarity, starter_of, submissions_in
         from grader.cli.output import say_json
         from grader.portable import cores
     folders, names, groups = submissions_in(folder)
@@ -464,8 +464,8 @@ LAB = Argument("NAME", "the lab's name in that file")
 def show_course(*, course: Annotated[Path, COURSE], as_json: JsonFlag = False) -> ExitCode:
     """List the labs of a course: what is graded, open, published and sent, and the next command for each."""
     with loading():
-        from grader.cli import classes
-    return classes.print_status(course, as_json=as_json)
+        from grader.cli import class_actions
+    return class_actions.print_status(course, as_json=as_json)
 
 
 @command("course grade", group=INSTRUCTORS, exit_codes=CLASS_EXIT_CODES, runs_code=True)
@@ -485,8 +485,8 @@ def grade_course(
     The same command continues one that was stopped.
     """
     with loading():
-        from grader.cli import classes
-    return classes.grade_lab(
+        from grader.cli import class_actions
+    return class_actions.grade_lab(
         course,
         lab,
         jobs=jobs,
@@ -508,8 +508,8 @@ def publish_course(
 ) -> ExitCode:
     """Publish one lab of a course, and return it to the students by the course's form of feedback."""
     with loading():
-        from grader.cli import classes
-    return classes.publish_lab(course, lab, dry_run=dry_run, author=author)
+        from grader.cli import class_actions
+    return class_actions.publish_lab(course, lab, dry_run=dry_run, author=author)
 
 
 @command("course gradebook", group=INSTRUCTORS)
@@ -530,8 +530,8 @@ def write_book(
     It has what is published; of a lab of which nothing is published, it has results as they are now, and says so.
     """
     with loading():
-        from grader.cli import classes
-    wanted = classes.WantedBook(
+        from grader.cli import class_actions
+    wanted = class_actions.WantedBook(
         form=form, out=out, template=template, column=column, wide=per_lab, drafts=drafts
     )
-    return classes.write_course_gradebook(course, wanted)
+    return class_actions.write_course_gradebook(course, wanted)

@@ -11,7 +11,7 @@ A new kind needs
 4. its name in `FIXED` of `cli/fixing.py` if `grader check --fix` may do it: never what decides what a program does.
 
 One more line of Python for a kind that is there is a correction in `syntax_fixes.py`, or a step in
-`package/source_repair.py`.
+`package/python_repairs/examine.py`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Repairs of Python sources: what does not parse, names and calls that are missing, and names that ROS is told.
 
-The sources are read in a child process with limits (`package/source_repair.py`); here its answer is put in words.
+The sources are read in a child process with limits (`python_repairs/examine.py`); here its answer is put in words.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from grader.package.repairs.editing import KEEP_ONE, Files, emptied_lines
 from grader.syntax_fixes import COMMENTED_OUT, DELETE_LINE, MERGED, OUT_OF_BLOCK, Reason
 from grader.wording import is_one_edit, join_words, numbers_text, plural
 
-EXAMINE = "grader.package.source_repair:examine"
-TURN = "grader.package.source_repair:with_sign_turned"
+EXAMINE = "grader.package.python_repairs.examine:examine"
+TURN = "grader.package.python_repairs.examine:with_sign_turned"
 LIMITS = {"memory_bytes": 1 << 30, "cpu_s": 20, "file_bytes": 32 << 20, "answer_bytes": 16 << 20}
 WALL_S = 10.0
 INDENTED_SHOWN = 12

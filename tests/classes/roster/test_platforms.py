@@ -13,7 +13,7 @@ import pytest
 
 from grader.classes.fetching.obtain import source_of
 from grader.classes.roster import read_roster
-from grader.classes.roster.platforms import Named, is_download, platform_name, unpack_download
+from grader.classes.roster.exports import Named, is_download, platform_name, unpack_download
 from grader.errors import UsageError
 from tests.classes.roster.helpers import ids, read, said
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.cli.classes import starter_of
+from grader.cli.class_actions import starter_of
 from grader.cli.main import run as grader
 from grader.model.batch import BatchRun, Entry, Similarity
 from grader.model.result import RubricInfo

@@ -1,7 +1,7 @@
 """Repairs of what belongs to an object: a dot that is missing or another sign, a misspelt member or argument.
 
-The text of a script that parses comes in, and the steps go out that repair it, as in `call_repair.py`. It runs in a
-child process as `source_repair.py` does: the standard library only, and nothing is executed.
+The text of a script that parses comes in, and the steps go out that repair it, as in `calls.py`. It runs in a
+child process as `examine.py` does: the standard library only, and nothing is executed.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from difflib import get_close_matches
 from itertools import chain
 from typing import NamedTuple
 
-from grader.package.name_repair import bound_in
-from grader.package.syntax_repair import Step, edited, last_name, nodes_in, span_of, step_to, tree_of
+from grader.package.python_repairs.names import bound_in
+from grader.package.python_repairs.syntax import Step, edited, last_name, nodes_in, span_of, step_to, tree_of
 from grader.wording import is_one_edit
 
 MEMBERS = {

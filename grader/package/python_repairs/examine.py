@@ -2,7 +2,7 @@
 
 `examine` is the entry; it runs in a child process with limits (`limited_child.py`). Pairs of a file's name and its text
 come in; for each, the steps go out (a mistake, and the text that has it repaired), and the names that the last text
-uses. Nothing is executed. What does not parse is for `syntax_repair.py`, calls are for `call_repair.py`;
+uses. Nothing is executed. What does not parse is for `syntax.py`, calls are for `calls.py`;
 `package/repairs/python.py` puts the answer in words.
 """
 
@@ -17,7 +17,7 @@ from difflib import get_close_matches
 from itertools import pairwise
 from typing import Any
 
-from grader.package.call_repair import (
+from grader.package.python_repairs.calls import (
     with_arguments,
     with_callbacks,
     with_calls,
@@ -26,10 +26,15 @@ from grader.package.call_repair import (
     with_quoted_calls,
     with_values_called,
 )
-from grader.package.import_repair import with_classes, with_imports, with_message_classes, without_suffixes
-from grader.package.member_repair import Known, with_members
-from grader.package.name_repair import bound_in, meant_by, with_methods, with_names, with_self
-from grader.package.syntax_repair import (
+from grader.package.python_repairs.imports import (
+    with_classes,
+    with_imports,
+    with_message_classes,
+    without_suffixes,
+)
+from grader.package.python_repairs.members import Known, with_members
+from grader.package.python_repairs.names import bound_in, meant_by, with_methods, with_names, with_self
+from grader.package.python_repairs.syntax import (
     Step,
     as_python3,
     edited,

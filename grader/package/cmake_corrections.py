@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from cmake_parser import CMakeError, parse_raw
 
 from grader.model.package import CMAKE_COMMANDS
-from grader.package.line_slips import LineSlip, changed_line, doubled_and_turned
+from grader.package.line_corrections import LineSlip, changed_line, doubled_and_turned
 from grader.wording import join_words, numbers_text
 
 _CHARS_MAX = 12_000

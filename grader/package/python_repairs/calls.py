@@ -2,7 +2,7 @@
 belong to an object or to the whole file.
 
 The text of a script that parses comes in, and the steps go out that repair it. What is said of them is the part of
-`package/repairs/python.py`. It runs in a child process as `source_repair.py` does: the standard library only, and
+`package/repairs/python.py`. It runs in a child process as `examine.py` does: the standard library only, and
 nothing is executed.
 """
 
@@ -16,9 +16,9 @@ from collections.abc import Set as AbstractSet
 from itertools import chain, pairwise
 from typing import Literal, NamedTuple, TypeGuard
 
-from grader.package.member_repair import with_place
-from grader.package.name_repair import bound_in
-from grader.package.syntax_repair import (
+from grader.package.python_repairs.members import with_place
+from grader.package.python_repairs.names import bound_in
+from grader.package.python_repairs.syntax import (
     Step,
     edited,
     is_docstring,

@@ -1,6 +1,6 @@
 """Repairs of a script's imports, and of the classes of messages that it names with their module.
 
-The text of a script that parses comes in, and the steps go out that repair it, as in `source_repair.py`. It runs in a
+The text of a script that parses comes in, and the steps go out that repair it, as in `examine.py`. It runs in a
 child process: the standard library only, and nothing is executed.
 """
 
@@ -13,8 +13,8 @@ from collections.abc import Collection, Iterator
 from difflib import get_close_matches
 
 from grader.installable import MODULE_OF
-from grader.package.name_repair import bound_in, meant_by
-from grader.package.syntax_repair import (
+from grader.package.python_repairs.names import bound_in, meant_by
+from grader.package.python_repairs.syntax import (
     Step,
     edited,
     is_docstring,

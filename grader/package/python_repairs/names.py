@@ -1,6 +1,6 @@
 """Repairs of names in a script that nothing gives a value, and that are nearly the same as one that has one.
 
-The text of a script that parses comes in, and the steps go out that repair it, as in `source_repair.py`. It runs in a
+The text of a script that parses comes in, and the steps go out that repair it, as in `examine.py`. It runs in a
 child process: the standard library only, and nothing is executed.
 """
 
@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterator, Sequence
 from difflib import get_close_matches
 from string import digits
 
-from grader.package.syntax_repair import Step, edited, last_name, nodes_in, span_of, step_to, tree_of
+from grader.package.python_repairs.syntax import Step, edited, last_name, nodes_in, span_of, step_to, tree_of
 from grader.wording import is_one_edit
 
 OF_PYTHON = (

@@ -1,7 +1,7 @@
 """Repairs of Python sources that do not parse, step by step: tabs, Python 2, braces, a token that is missing.
 
 A text comes in, and the steps go out after which it parses; what one line could mean is known to
-`grader/syntax_fixes.py`. It runs in a child process as `source_repair.py` does: the standard library and fissix only,
+`grader/syntax_fixes.py`. It runs in a child process as `examine.py` does: the standard library and fissix only,
 and nothing is executed.
 """
 
