@@ -1,8 +1,7 @@
 """What is wrong with a line that Python cannot parse, in a student's words, and the line as it should be.
 
 A line and what Python says of it come in; a cause and the corrected line go out. The table knows the habits of
-Python 2, C++ and the shell. Pure, and the standard library only, as is `wording.py`:
-`package/python_repairs/examine.py` calls it in a child process.
+Python 2, C++ and the shell. Pure, and the standard library only: `python_repairs/examine.py` calls it in a child.
 """
 
 from __future__ import annotations

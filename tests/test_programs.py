@@ -55,7 +55,7 @@ STARTS = {
         "environment", "cwd", "its repository's data; no setting, hook or filter of it"
     ),
     "intake/credentials.py:helper_password": Start(
-        "{**with_absolute_paths(os.environ), **silent}",
+        "{**with_absolute_paths(os.environ), **SILENT}",
         "'/'",
         "nothing: the address of the course's own server",
     ),

@@ -88,7 +88,7 @@ BOUNDS = {
         "ros/rpc:REQUEST_S",
     ),
     "answers of nodes": (
-        ("ros/bounded_sockets:ANSWER_BYTES_MAX", MB), "ros/links:CONNECTIONS_MAX", "ros/recorder:CONNECT_S",
+        ("ros/bounded_sockets:ANSWER_BYTES_MAX", MB), "ros/links:CONNECTIONS_MAX", "ros/topic_recorder:CONNECT_S",
         "ros/links:BUS_INFO_S", "ros/master:NOTIFY_S", "ros/quotas:EACH_MAX",
     ),
     "connections to": (
@@ -96,7 +96,7 @@ BOUNDS = {
     ),
     "headers of publishers": (
         ("ros/tcpros:HEADER_BYTES_MAX", KB), "ros/tcpros:FIELD_CHARS_MAX", "ros/tcpros:DEFINITION_CHARS_MAX",
-        "ros/recorder:OPEN_MAX", "ros/recorder:SAME_MAX", "ros/recorder:CONNECT_S",
+        "ros/topic_recorder:OPEN_MAX", "ros/topic_recorder:SAME_MAX", "ros/topic_recorder:CONNECT_S",
     ),
     "messages": (
         ("ros/connection:MESSAGE_BYTES_MAX", MB), RUN.channel_bytes // MB, RUN.channel_messages, RUN.channels,
@@ -151,7 +151,8 @@ def test_bounds_are_as_they_are(begin: str) -> None:
 def _constant(name: str) -> float:
     """`ros/rpc:REQUEST_S` from the text of the file, which only ROS's own Python imports."""
     file, _, wanted = name.partition(":")
-    tree = ast.parse((ROOT / "grader/arena" / f"{file}.py").read_text(encoding="utf-8"))
+    room = "package" if file.startswith("lint/") else "arena"
+    tree = ast.parse((ROOT / "grader" / room / f"{file}.py").read_text(encoding="utf-8"))
     for node in tree.body:
         if isinstance(node, ast.Assign):
             target, value = node.targets[0], node.value

@@ -584,26 +584,3 @@ def test_imports_that_are_not_used_or_not_there(tmp_path, text, found):
 def test_every_kind_is_described() -> None:
     rows = re.findall(r"^- (`.*?`):", inspect.getdoc(PythonSlip) or "", re.MULTILINE)
     assert sorted(re.findall(r"`([\w-]+)`", " ".join(rows))) == sorted(get_args(SlipKind))
-
-
-@pytest.mark.parametrize(
-    ("text", "fixes"),
-    [
-        ("    if g.n < 0:\n        s.set_aborted(r)\n    s.set_succeeded(r)\n", ["below line 3, write `return`"]),
-        ("    while n:\n        if s.is_preempt_requested():\n            s.set_preempted()\n        n -= 1\n",
-         ["below line 4, write `return`"]),
-        ("    if g.n < 0:\n        s.set_aborted(r)\n        return\n    s.set_succeeded(r)\n", []),
-        ("    if g.n < 0:\n        s.set_aborted(r)\n    else:\n        s.set_succeeded(r)\n", []),
-        ("    if ok:\n        s.set_succeeded(r)\n    print('done')\n", []),
-        ("    if stop:\n        s.set_preempted()\n        ok = False\n    if ok:\n        s.set_succeeded(r)\n", []),
-        ("    while not done:\n        if near(g):\n            done = True\n            s.set_succeeded()\n", []),
-        ("    while s.is_active():\n        if near(g):\n            s.set_succeeded()\n", []),
-        ("    if not ok:\n        s.set_aborted()\n    if ok:\n        s.set_succeeded()\n", []),
-        ("    if stop:\n        s.set_preempted()\n    if s.is_active():\n        s.set_succeeded()\n", []),
-        ("    while not over():\n        g = s.accept_new_goal()\n        if g:\n            s.set_succeeded()\n", []),
-        ("    for one in goals:\n        if near(one):\n            one.set_succeeded()\n", []),
-    ],
-)  # fmt: skip
-def test_callbacks_that_go_on_after_their_goal(text: str, fixes: list[str], tmp_path: Path) -> None:
-    (tmp_path / "a.py").write_text(f"def do(g):\n{text}", encoding="utf-8")
-    assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "goes-on"] == fixes

@@ -303,3 +303,26 @@ def test_what_comes_behind_a_function_that_never_ends_is_never_reached(text, fou
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "never-reached"]
     assert [(s.kind, s.line) for s in slips] == [one[:2] for one in found]
     assert all(one[2] in slip.fix for slip, one in zip(slips, found, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("text", "fixes"),
+    [
+        ("    if g.n < 0:\n        s.set_aborted(r)\n    s.set_succeeded(r)\n", ["below line 3, write `return`"]),
+        ("    while n:\n        if s.is_preempt_requested():\n            s.set_preempted()\n        n -= 1\n",
+         ["below line 4, write `return`"]),
+        ("    if g.n < 0:\n        s.set_aborted(r)\n        return\n    s.set_succeeded(r)\n", []),
+        ("    if g.n < 0:\n        s.set_aborted(r)\n    else:\n        s.set_succeeded(r)\n", []),
+        ("    if ok:\n        s.set_succeeded(r)\n    print('done')\n", []),
+        ("    if stop:\n        s.set_preempted()\n        ok = False\n    if ok:\n        s.set_succeeded(r)\n", []),
+        ("    while not done:\n        if near(g):\n            done = True\n            s.set_succeeded()\n", []),
+        ("    while s.is_active():\n        if near(g):\n            s.set_succeeded()\n", []),
+        ("    if not ok:\n        s.set_aborted()\n    if ok:\n        s.set_succeeded()\n", []),
+        ("    if stop:\n        s.set_preempted()\n    if s.is_active():\n        s.set_succeeded()\n", []),
+        ("    while not over():\n        g = s.accept_new_goal()\n        if g:\n            s.set_succeeded()\n", []),
+        ("    for one in goals:\n        if near(one):\n            one.set_succeeded()\n", []),
+    ],
+)  # fmt: skip
+def test_callbacks_that_go_on_after_their_goal(text: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"def do(g):\n{text}", encoding="utf-8")
+    assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "goes-on"] == fixes

@@ -1,5 +1,5 @@
 """Finds what is wrong with the loops of a student's Python, for `slips.py`: those that never end, never wait or stop
-too soon, also in callbacks, and those that do not end on Ctrl-C; besides, the rates that a script asks for.
+too soon, also in callbacks, and those that do not end on Ctrl-C.
 
 Nothing is executed. Python 3.8, standard library only.
 """
@@ -23,62 +23,12 @@ from script_names import (
     published_type,
     set_in,
     slip,
-    text_of,
     walk,
 )
+from script_rates import constant
 
 CALLED_BACK = {"Subscriber": "callback", "Service": "handler"}
 """What calls a function of the script's, and the name of that argument."""
-
-
-def loop_rates(tree):
-    """Rates of loops and timers: a parameter that is read there, its name as written; or a number, in Hz as text.
-
-    Either may have been given to a name once.
-    """
-    bound, looped = {}, set()
-    for node in walk(tree):
-        if isinstance(node, ast.Assign) and len(node.targets) == 1:
-            bound.setdefault(ast.dump(node.targets[0]).replace("Store()", "Load()"), []).append(node.value)
-        elif isinstance(node, LOOPS):
-            looped.update(map(id, calls_in(node, "sleep")))
-
-    def given(node):
-        values = bound.get(ast.dump(node), [node])
-        return values[0] if len(values) == 1 else node
-
-    for node in calls_in(tree, "Rate", "sleep", "Timer"):
-        timed = node.func.attr
-        if not node.args or (timed == "sleep" and id(node) not in looped):
-            continue
-        value = given(node.args[0])
-        whole = nanoseconds_apart(value) if is_call(value, "Duration") else None
-        pause = dotted(node.func) if timed == "sleep" else ""
-        if is_call(value, "Duration") and value.args and not whole:
-            pause, value = dotted(value.func) if timed == "Timer" else pause, given(value.args[0])
-        yield from loop_rate(node, timed, value, whole or constant(value, given), pause)
-
-
-def loop_rate(call, timed, value, number, pause):
-    """Yield the rate that a `Rate(…)`, `sleep(…)` or `Timer(…)` asks for: of the last two, `number` is in seconds, and
-    `pause` is what takes it."""
-    name = read_parameter(value) if timed == "Rate" else None
-    if name:
-        yield slip(value.lineno, "rate-parameter", name)
-    elif number:
-        hz = "%.12g" % (number if timed == "Rate" else 1.0 / number)
-        fix = ""
-        if is_call(value, "Duration"):
-            pause, fix = dotted(value.func), "its second number counts nanoseconds, so it is %.9g s" % number
-        yield slip(call.lineno, "rate-number", hz, fix, pause)
-
-
-def nanoseconds_apart(call):
-    """Return how many seconds `Duration(0, 100)` is, of whole seconds and of nanoseconds; None of any other call."""
-    parts = [getattr(one, "value", None) for one in call.args]
-    if len(parts) != 2 or not all(type(one) is int and 0 <= one < 1 << 31 for one in parts) or not parts[1]:
-        return None
-    return parts[0] + parts[1] * 1e-9
 
 
 MAKES = ("init_node", "Publisher", "Subscriber", "Service")
@@ -93,18 +43,8 @@ def never_reached(tree):
     functions, classes = functions_in(tree), {n.name: n for n in all_of(tree, ast.ClassDef)}
     made = {dotted(n.targets[0]): n.value for n in all_of(tree, ast.Assign)} if classes else {}
 
-    def run_by(node):  # `A()`, `A().f()`, `a.f()` and `f()`
-        func = getattr(node, "func", None)
-        owner = getattr(func, "value", None)
-        kind = classes.get(
-            func.id if isinstance(func, ast.Name) else called_name(made.get(dotted(owner), owner))
-        )
-        own = (
-            [n for n in kind.body if getattr(n, "name", "") == getattr(func, "attr", "__init__")]
-            if kind
-            else []
-        )
-        return own[0] if own else called_own(node, functions)
+    def run_by(node):
+        return method_run_by(node, classes, made) or called_own(node, functions)
 
     def word(node):
         name = called_name(node)
@@ -136,6 +76,15 @@ def never_reached(tree):
                     fix = unreached_fix(one, loop, behind[0], later, called)
                     yield slip(loop.lineno, "never-reached", message, fix)
                 break  # nothing behind it in the block runs
+
+
+def method_run_by(node, classes, made):
+    """Return the method that `A()`, `A().f()` or `a.f()` runs, `made` being what names stand for; else None."""
+    func = getattr(node, "func", None)
+    owner = getattr(func, "value", None)
+    kind = classes.get(func.id if isinstance(func, ast.Name) else called_name(made.get(dotted(owner), owner)))
+    name = getattr(func, "attr", "__init__")
+    return next((n for n in kind.body if getattr(n, "name", "") == name), None) if kind else None
 
 
 def holding(block):
@@ -509,25 +458,6 @@ def is_unchanging(loop, function):
     own, changed = set_in(function) - {name for n in outer for name in n.names}, set_in(loop)
     is_plain_test = not any(isinstance(n, (ast.Call, ast.Attribute, ast.Subscript)) for n in inside)
     return bool(names) and is_plain_test and names <= own - changed
-
-
-def constant(node, given, depth=4):
-    """Return the positive number that an expression of numbers comes to, None where it is something else."""
-    node = given(node)
-    if isinstance(node, ast.Constant) and type(node.value) in (int, float) and 0 < node.value < 1e9:
-        return float(node.value)
-    if depth and isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Div, ast.Mult)):
-        left, right = constant(node.left, given, depth - 1), constant(node.right, given, depth - 1)
-        if left and right:
-            return left / right if isinstance(node.op, ast.Div) else left * right
-    return None
-
-
-def read_parameter(node):
-    """Return the name in `get_param('name')`, also within `float(…)`."""
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and len(node.args) == 1:
-        node = node.args[0] if node.func.id in ("float", "int") else node
-    return text_of(node.args[0]) if is_call(node, "get_param") and node.args else ""
 
 
 SWALLOWS = {"", "KeyboardInterrupt", "ROSInterruptException", "ROSException", "Exception", "BaseException"}

@@ -2,8 +2,8 @@
 
 What nothing calls, statements without an effect, values that are none, imports. Names are for `script_names.py`, texts
 for `script_texts.py`, objects for `script_objects.py`, callbacks for `script_callbacks.py`, loops for
-`script_loops.py`, counters and clocks for `script_counters.py`. Nothing is executed; it is here because a file has to
-be parsed by ROS's own Python, which is to run it. Python 3.8, standard library only.
+`script_loops.py`, their rates for `script_rates.py`, counters and clocks for `script_counters.py`. Nothing is
+executed. A file has to be parsed by ROS's own Python, which is to run it: Python 3.8, standard library only.
 """
 
 import ast
@@ -18,6 +18,7 @@ import script_counters as counters
 import script_loops as loops
 import script_names as names
 import script_objects as objects
+import script_rates as rates
 from script_names import (
     LOOPS,
     all_of,
@@ -41,7 +42,7 @@ SLIPS_LIMIT = 100
 def slips(tree):
     """What compiles and is not meant: names that are not called or not there, questions that wait for a keyboard."""
     finders = (
-        uncalled_and_asked, objects.names_of_objects, names.misspelt, loops.loop_rates, counters.resets, never_run,
+        uncalled_and_asked, objects.names_of_objects, names.misspelt, rates.loop_rates, counters.resets, never_run,
         loops.never_reached, loops.stopped_loops, loops.published_before, loops.sleepless_loops, loops.sleeps_twice,
         loops.publishes_twice, callbacks.callbacks, loops.waiting_callbacks, objects.queue_sizes, objects.graph_names,
         objects.object_slips, said_texts, loops.deaf_loops, counters.clock_values, counters.counter_slips,
