@@ -44,6 +44,11 @@ class Pair(unittest.TestCase):
 
 
 class Average(Pair):
+    def test_first_two(self):  # tests run in the order of their names, so nothing came before these
+        self.send(4, 8)
+        self.assertAlmostEqual(self.heard[0], 4, 3, "after the first distance, 4, the mean is %g" % self.heard[0])
+        self.assertAlmostEqual(self.heard[1], 6, 3, "after the first two, 4 and 8, the mean is %g" % self.heard[1])
+
     def test_mean_of_three(self):
         self.send(1, 2, 6)
         self.assertAlmostEqual(
