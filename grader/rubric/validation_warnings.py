@@ -9,12 +9,13 @@ import json
 import math
 import re
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.support.fields import is_number
 from grader.rubric.prose_warnings import prose_warnings
-from grader.rubric.simulators import robot_of, topics_of_programs
+from grader.rubric.simulators import TRUE_POSE, robot_of, topics_of_programs
 from grader.rubric.started import argument_warnings
 from grader.rubric.step_faults import count_causes
 from grader.rubric.yaml_lines import (
@@ -363,7 +364,7 @@ def _hard(criterion: WrittenCriterion) -> Iterator[Fault]:
 
 
 def _easy(criterion: WrittenCriterion) -> Iterator[Fault]:
-    """Yield demands that a wrong node meets too."""
+    """Yield demands that a wrong node meets too, or a right one may not."""
     at, check, given = criterion.at, criterion.check, criterion.given
     tolerance = given.get("tolerance")
     if check == "rate" and is_number(tolerance) and tolerance >= LAX and is_number(given.get("rate_hz")):
@@ -380,6 +381,13 @@ def _easy(criterion: WrittenCriterion) -> Iterator[Fault]:
         if is_number(value) and is_number(off) and off >= abs(value) > 0 and "field" in asked:
             fault = f"is as large as the value, {value:g}: a field that is always 0 passes"
             yield (*place, "tolerance"), fault
+    values = (
+        as_list(given.get("values")) if given.get("repeats") is False and not given.get("tolerance") else []
+    )
+    for number, (one, other) in enumerate(pairwise(values), 1):
+        if one == other:
+            fault = "is the value before it, too: with repeats: false, another one has to come between them"
+            yield (*at, "values", number), fault
     if check == "field-bounds" and is_number(given.get("min")) and given.get("min") == given.get("max"):
         yield (*at, "max"), f"is min, too: only {given['min']:g} is within these bounds"
     if check == "stamps" and is_number(within_s := given.get("within_s")):
@@ -390,10 +398,12 @@ def _easy(criterion: WrittenCriterion) -> Iterator[Fault]:
 
 
 def _there_already(criterion: WrittenCriterion) -> Iterator[Fault]:
-    """Yield a goal so near to the start that a robot of the robot world that never moves has reached it."""
+    """Yield a goal so near to the start that a robot of the robot world that never moves has reached it. In odometry,
+    its start is another."""
     given, start = criterion.given, robot_of(criterion.scenario).get("start")
     goal, off_m = given.get("goal"), given.get("tolerance_m")
-    if criterion.check != "ends-at" or not isinstance(start, list) or not isinstance(goal, list):
+    is_place = criterion.check == "ends-at" and given.get("topic") == TRUE_POSE
+    if not is_place or not isinstance(start, list) or not isinstance(goal, list):
         return
     numbers = [*start[:2], *goal[:2]]
     if len(numbers) == 4 and all(map(is_number, [*numbers, off_m])) and not given.get("relative"):
