@@ -79,6 +79,7 @@ def warnings(rubric: WrittenRubric) -> Iterator[Fault]:
         yield from _hard(criterion)
         yield from _easy(criterion)
         yield from _there_already(criterion)
+        yield from _repeated(criterion)
         if criterion.check == "connected":
             yield from _process_for_node(criterion, rubric)
     yield from prose_warnings(rubric)
@@ -364,7 +365,7 @@ def _hard(criterion: WrittenCriterion) -> Iterator[Fault]:
 
 
 def _easy(criterion: WrittenCriterion) -> Iterator[Fault]:
-    """Yield demands that a wrong node meets too, or a right one may not."""
+    """Yield demands that a wrong node meets too."""
     at, check, given = criterion.at, criterion.check, criterion.given
     tolerance = given.get("tolerance")
     if check == "rate" and is_number(tolerance) and tolerance >= LAX and is_number(given.get("rate_hz")):
@@ -381,13 +382,6 @@ def _easy(criterion: WrittenCriterion) -> Iterator[Fault]:
         if is_number(value) and is_number(off) and off >= abs(value) > 0 and "field" in asked:
             fault = f"is as large as the value, {value:g}: a field that is always 0 passes"
             yield (*place, "tolerance"), fault
-    values = (
-        as_list(given.get("values")) if given.get("repeats") is False and not given.get("tolerance") else []
-    )
-    for number, (one, other) in enumerate(pairwise(values), 1):
-        if one == other:
-            fault = "is the value before it, too: with repeats: false, another one has to come between them"
-            yield (*at, "values", number), fault
     if check == "field-bounds" and is_number(given.get("min")) and given.get("min") == given.get("max"):
         yield (*at, "max"), f"is min, too: only {given['min']:g} is within these bounds"
     if check == "stamps" and is_number(within_s := given.get("within_s")):
@@ -395,6 +389,18 @@ def _easy(criterion: WrittenCriterion) -> Iterator[Fault]:
         if is_number(lasting_s) and within_s >= lasting_s:
             fault = f"the run's window is {lasting_s:g} s: the time of the first message passes for all"
             yield (*at, "within_s"), fault
+
+
+def _repeated(criterion: WrittenCriterion) -> Iterator[Fault]:
+    """Yield values that follow an equal one where no message may repeat the one before it."""
+    given = criterion.given
+    values = (
+        as_list(given.get("values")) if given.get("repeats") is False and not given.get("tolerance") else []
+    )
+    for number, (one, other) in enumerate(pairwise(values), 1):
+        if one == other:
+            fault = "is the value before it, too: with repeats: false, another one has to come between them"
+            yield (*criterion.at, "values", number), fault
 
 
 def _there_already(criterion: WrittenCriterion) -> Iterator[Fault]:
