@@ -27,7 +27,7 @@ from grader.model.message_rate import RateBounds
 from grader.rubric.course_packages import LAUNCH_ENDINGS
 from grader.rubric.scenario import Param, Scenario, Start
 
-NAPS = re.compile(rb"\bsleep\(\s*[^)\s]|Timer\(")
+NAPS = re.compile(rb"sleep\s*\(\s*[^)\s]|Timer\s*\(")
 """A sleep of so many seconds, `rospy.sleep(0.5)` and not `rate.sleep()`, or a timer."""
 PUBLISHES = re.compile(
     rb"^[^#\n]*?(?:publish(?!er)|sendTransform|send_goal|set_succeeded|set_aborted)", re.MULTILINE
@@ -39,12 +39,13 @@ GIVES_UP = re.compile(rb"[wW]ait_?[fF]or_?[sS]erv(?:er|ice)\([^)\n]*(?:,|timeout
 """A wait for a service or an action's server that ends without it."""
 ENDLESS = rb"(?:True|1|not\s+(?:rospy\.)?is_shutdown\(\))"
 IDLE = re.compile(
-    rb"^[ \t]*while\s*\(?\s*" + ENDLESS + rb"\s*\)?\s*:\s*(?:#[^\n]*\n\s*)*(?:pass|continue)\b", re.MULTILINE
+    rb"^[ \t]*while(?:\s*\()?\s*" + ENDLESS + rb"\s*(?:\)\s*)?:\s*(?:#[^\n]*\n\s*)*(?:pass|continue)\b",
+    re.MULTILINE,
 )
 """A loop that does nothing and never ends: `while True: pass`."""
 SLEEPS = rb"(?:print|rospy\.log\w+|[\w.]*sleep)\b[^\n;]*(?:\n|\Z)|[ \t]*(?:#[^\n]*)?\n"
 SLEEPING = re.compile(
-    rb"^([ \t]*)while\s*\(?\s*" + ENDLESS + rb"\s*\)?\s*:[ \t]*"
+    rb"^([ \t]*)while(?:\s*\()?\s*" + ENDLESS + rb"\s*(?:\)\s*)?:[ \t]*"
     rb"(?:[\w.]*sleep\([^\n;]*(?:\n|\Z)|(?:#[^\n]*)?\n(?:\1[ \t]+" + SLEEPS + rb")+(?!\1[ \t]|[ \t]*[#\n]))",
     re.MULTILINE,
 )
@@ -52,8 +53,8 @@ SLEEPING = re.compile(
 
 
 def sleeps_elsewhere(text: bytes) -> bool:
-    """Return whether a source sleeps outside of such loops, too: then it may go on after its sleep."""
-    return NAPS.search(SLEEPING.sub(b"", text)) is not None
+    """Return whether a source sleeps or waits outside of such loops, too: then what calls it may go on after that."""
+    return re.search(NAPS.pattern + rb"|[wW]ait_?[fF]or", SLEEPING.sub(b"", text)) is not None
 
 
 # Of the run's time. A node's timer or sleep is late by one step at most.
@@ -171,11 +172,11 @@ def _tell_what_is_known(
     session.live.naps = place.has_line(NAPS)
     scripts = {spec["name"]: spec["script"] for _, spec in starts if spec["script"] is not None}
     session.live.endless = frozenset(s["name"] for _, s in starts if place.has_line(IDLE, s["script"]))
-    session.live.sleeping = frozenset(
-        s["name"]
-        for _, s in starts
-        if place.has_line(SLEEPING, s["script"]) and not place.has_line(sleeps_elsewhere, s["script"])
-    )
+    session.live.sleeping = frozenset(s["name"] for _, s in starts if place.has_line(SLEEPING, s["script"]))
+    if session.live.sleeping and place.has_line(
+        sleeps_elsewhere
+    ):  # in a file that the script may import, too
+        session.live.sleeping = frozenset()
     session.live.mute = frozenset(
         name
         for name, path in scripts.items()

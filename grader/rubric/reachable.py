@@ -74,7 +74,6 @@ def reach_faults(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator
         yield from _never_sent(about, others)
         if about.check in {"ends-at", "path", "stays-within"}:
             yield from _too_far(about, others)
-    yield from _repeated(criteria)
     yield from _contradictions(criteria)
     yield from _other_effects(criteria)
     yield from _other_ends(criteria)
@@ -136,16 +135,6 @@ def _too_few(criteria: Sequence[WrittenCriterion]) -> Iterator[Fault]:
         window_s, rate_hz = until.get("window_s"), given.get("rate_hz")
         if criterion.check == "rate" and is_number(window_s) and is_number(rate_hz):
             yield from (((*path, "rate_hz"), fault) for fault in _seldom(rate_hz, window_s))
-
-
-def _repeated(criteria: Sequence[WrittenCriterion]) -> Iterator[Fault]:
-    """Yield values that follow an equal one where no message may repeat the one before it."""
-    for criterion in criteria:
-        values = as_list(criterion.given.get("values")) if criterion.given.get("repeats") is False else []
-        for number, (one, other) in enumerate(pairwise(values), 1):
-            if one == other:
-                fault = "is the value before it, too, and repeats: false allows no two in a row"
-                yield (*criterion.at, "values", number), fault
 
 
 def _seldom(rate_hz: float, window_s: float) -> Iterator[str]:

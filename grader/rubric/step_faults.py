@@ -141,10 +141,11 @@ def _faults_of(at: KeyPath, kind: str, given: dict[str, Any], types: dict[str, s
 
 
 def call_faults(at: KeyPath, given: dict[str, Any], types: dict[str, str]) -> Iterator[Fault]:
-    """Yield the faults of a call. `types` are those of the services that earlier ones call."""
+    """Yield the faults of a call. `types` are those of the services that earlier ones call, and of topics."""
     name, asked = str(given.get("service")), given.get("type")
-    if asked is not None and types.setdefault(name, asked) != asked:
-        yield (*at, "type"), f"an earlier call of {name} has {types[name]}: a service has one type"
+    known = asked and types.setdefault(f"service {name}", asked)  # a topic may have the same name
+    if known != asked:
+        yield (*at, "type"), f"an earlier call of {name} has {known}: a service has one type"
     yield from of_type(at, given)
 
 

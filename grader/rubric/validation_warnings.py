@@ -9,12 +9,13 @@ import json
 import math
 import re
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.support.fields import is_number
 from grader.rubric.prose_warnings import prose_warnings
-from grader.rubric.simulators import robot_of, topics_of_programs
+from grader.rubric.simulators import TRUE_POSE, robot_of, topics_of_programs
 from grader.rubric.started import argument_warnings
 from grader.rubric.step_faults import count_causes
 from grader.rubric.yaml_lines import (
@@ -78,6 +79,7 @@ def warnings(rubric: WrittenRubric) -> Iterator[Fault]:
         yield from _hard(criterion)
         yield from _easy(criterion)
         yield from _there_already(criterion)
+        yield from _repeated(criterion)
         if criterion.check == "connected":
             yield from _process_for_node(criterion, rubric)
     yield from prose_warnings(rubric)
@@ -389,11 +391,25 @@ def _easy(criterion: WrittenCriterion) -> Iterator[Fault]:
             yield (*at, "within_s"), fault
 
 
+def _repeated(criterion: WrittenCriterion) -> Iterator[Fault]:
+    """Yield values that follow an equal one where no message may repeat the one before it."""
+    given = criterion.given
+    values = (
+        as_list(given.get("values")) if given.get("repeats") is False and not given.get("tolerance") else []
+    )
+    for number, (one, other) in enumerate(pairwise(values), 1):
+        if one == other:
+            fault = "is the value before it, too: with repeats: false, another one has to come between them"
+            yield (*criterion.at, "values", number), fault
+
+
 def _there_already(criterion: WrittenCriterion) -> Iterator[Fault]:
-    """Yield a goal so near to the start that a robot of the robot world that never moves has reached it."""
+    """Yield a goal so near to the start that a robot of the robot world that never moves has reached it. In odometry,
+    its start is another."""
     given, start = criterion.given, robot_of(criterion.scenario).get("start")
     goal, off_m = given.get("goal"), given.get("tolerance_m")
-    if criterion.check != "ends-at" or not isinstance(start, list) or not isinstance(goal, list):
+    is_place = criterion.check == "ends-at" and given.get("topic") == TRUE_POSE
+    if not is_place or not isinstance(start, list) or not isinstance(goal, list):
         return
     numbers = [*start[:2], *goal[:2]]
     if len(numbers) == 4 and all(map(is_number, [*numbers, off_m])) and not given.get("relative"):

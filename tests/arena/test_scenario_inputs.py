@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from grader.arena.process_environment import TEXT_BYTES_MAX, ProcessEnvironment
-from grader.arena.run_scenario import SLEEPING, set_params, sleeps_elsewhere
+from grader.arena.run_scenario import IDLE, NAPS, SLEEPING, set_params, sleeps_elsewhere
 from grader.arena.scenario_inputs import FILE_BYTES_MAX, made_up, make_shots
 from grader.arena.static_recorder import (
     ATTACHED_BYTES_MAX,
@@ -178,4 +178,15 @@ def test_who_sleeps_elsewhere_too_may_go_on() -> None:
     """A node that waits for five seconds at its start, and sleeps at its end in place of `rospy.spin()`."""
     end = "while not rospy.is_shutdown():\n    rospy.sleep(1)\n"
     assert not sleeps_elsewhere(f"while True: time.sleep(1)\nrate.sleep()\n{end}".encode())
-    assert sleeps_elsewhere(f"for i in range(5):\n    time.sleep(1)\nrospy.init_node('a')\n{end}".encode())
+    for before in (
+        "for i in range(5):\n    time.sleep(1)",
+        "time.sleep (1)",
+        "rospy.wait_for_service('/spawn')",
+    ):
+        assert sleeps_elsewhere(f"{before}\nrospy.init_node('a')\n{end}".encode())
+
+
+@pytest.mark.parametrize("text", ["while{}x", "while True{}x", "while(True{}x", "while not{}x", "sleep{}x"])
+def test_blanks_without_end_are_read_in_linear_time(text: str) -> None:
+    blanks = text.format(" " * 200_000).encode()
+    assert not any(pattern.search(blanks) for pattern in (SLEEPING, IDLE, NAPS))

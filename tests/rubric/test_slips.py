@@ -23,6 +23,7 @@ from grader.rubric.find import rubrics_folder
 from grader.rubric.load import load_rubric, warnings_of
 from grader.rubric.simulators import FIELD_M, ROBOTS
 from grader.rubric.simulators import PROGRAMS as PROGRAMS_KNOWN
+from grader.rubric.step_faults import step_faults
 from tests.rubric.samples import faults
 
 SLIPS = Path(__file__).with_name("slips.yaml")
@@ -112,6 +113,28 @@ def test_calls_of_one_service_have_one_type(examples: Path) -> None:
     path = _spoiled(examples, "service-own-type", old, old.replace("Clamp", "Clip"))
     fault = "scenarios.server.calls[1].type: an earlier call of /clamp has own_service/Clamp: a service has one type"
     assert f"spoiled.yaml:21: {fault}" in faults(path)
+
+
+def test_a_topic_and_a_service_may_have_one_name() -> None:
+    publish = {"topic": "/reset", "type": "std_msgs/Empty", "value": {}}
+    call = {"service": "/reset", "type": "std_srvs/Empty", "request": {}}
+    assert not [*step_faults((), {"steps": [{"publish": publish}, {"call": call}]})]
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        # odometry does not begin at the robot's place in the world
+        ("follow-wall", "/base_pose_ground_truth, goal: [3.4, 1.8]", "/odom, goal: [1.2, 0.6]"),
+        # values that are nearly equal do not repeat each other
+        ("battery", "values: [false, true, false]", "values: [1, 1], tolerance: 0.1"),
+    ],
+)
+def test_what_a_right_node_can_do_is_asked_without_a_warning(
+    examples: Path, name: str, old: str, new: str
+) -> None:
+    found = warnings_of(load_rubric(str(_spoiled(examples, name, old, new))), "x")
+    assert not [one for one in found if "never moves" in one or "repeats" in one]
 
 
 @pytest.mark.parametrize("path", sorted(rubrics_folder().rglob("*.yaml")), ids=lambda path: path.stem)
