@@ -413,6 +413,9 @@ def _written_in(package: PackageFacts, path: str) -> Language:
     if file is not None and file.python:
         return "python"
     built = any(name.stem == one.target or one.is_called(name.name) for one in programs(package))
+    # Where CMake makes no program of that name, its source still tells
+    sources = {f"{name.stem}{suffix}" for suffix in CPP_SUFFIXES} if file is None else set()
+    built = built or any(PurePosixPath(one.path).name in sources for one in package.files)
     return "cpp" if built or name.suffix in CPP_SUFFIXES else "python"
 
 
