@@ -356,12 +356,18 @@ def corrections(line: str, message: str = "", column: int | None = None) -> Iter
     yield from _with_quote(line, message, column)
 
 
+_BRACES = re.compile(r"\{[^{}]*\}")
+_F_STRING = re.compile(r"(?<=[fF])(['\"])(?:(?!\1)[^{}\\]|\{\{|\}\}|\{[^{}]*\})*\1")
+"""Whatever quotes its braces have."""
+
+
 def other_quotes(line: str) -> str:
     """Return the line with the other quotes inside the braces of an f-string; "" where that is no good line."""
-    found = re.search(r"(?<=[fF])(['\"]).*\1", line)
-    inside, quote = (found[0], found[1]) if found else ("", "'")
-    swapped = re.sub(r"\{[^{}]*\}", lambda one: one[0].replace(quote, "'\""[quote == "'"]), inside)
-    return changed if swapped != inside and _parses(changed := line.replace(inside, swapped)) else ""
+    changed = _F_STRING.sub(
+        lambda found: _BRACES.sub(lambda one: one[0].replace(found[1], "'\""[found[1] == "'"]), found[0]),
+        line,
+    )
+    return changed if changed != line and _parses(changed) else ""
 
 
 def without_doubled(line: str) -> Iterator[tuple[str, str]]:
@@ -586,15 +592,3 @@ def _parses(line: str) -> bool:
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return False
     return True
-
-
-def first_version(text: str) -> str:
-    """Return the text with empty lines in place of git's merge markers and of all versions but the first. The others
-    stand behind `=======` and, for the one that both come from, behind `|||||||`."""
-    kept, part = [], ""
-    for line in text.split("\n"):
-        marker = MERGE_MARKER.match(line)
-        part = marker[1][0] if marker and (part or line[0] == "<") else part
-        kept.append("" if part and (marker or part in "|=") else line)
-        part = "" if part == ">" else part
-    return "\n".join(kept)

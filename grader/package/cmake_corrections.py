@@ -57,14 +57,20 @@ _END_OF_C = re.compile(r"(?<=\))\s*;(?=\s*(?:#|$))")
 def _habits_of_c(lines: list[str]) -> Iterator[LineSlip]:
     """Yield the text with `#` for what begins comments in other languages, and the one without `;` behind commands, on
     all of its lines."""
-    changed, signs, inside = dict[int, str](), dict[str, None](), False
+    changed, signs, inside, depth = dict[int, str](), dict[str, None](), False, 0
     for number, line in enumerate(lines, 1):
         hit = _OTHER_COMMENT.match(line)
+        if hit and depth > 0 and hit[2] in {"--", "%"}:  # `--option`, an argument
+            hit = None
+        if "*/" in line and line.split("*/", 1)[1].strip():
+            hit, inside = None, False  # a command may stand behind the comment
         if hit or inside:
             changed[number] = (
                 f"# {line.strip()}" if inside or hit is None else _OTHER_COMMENT.sub(r"\1#", line)
             )
             signs |= {f"`{hit[2]}`": None} if hit and not inside else {}
+        code = "" if number in changed and not (hit and hit[1]) else line.partition("#")[0]
+        depth += code.count("(") - code.count(")")
         inside = "*/" not in line and (inside or (hit is not None and hit[2] == "/*"))
     begun = join_words(signs, "or")
     yield from _changed_lines(

@@ -255,10 +255,15 @@ def _included(element: etree._Element, scope: Scope, path: str) -> Scope:
     return inside.model_copy(update={"file": path, "args": args})
 
 
+_NUMBER = re.compile(r"\d|[xyz]\b|[xyz](?=_)|(?<=_)[xyz]|(?<![^\W_])[a-z](?![^\W_])")
+"""What tells names apart on purpose: a digit, an axis, a letter alone."""
+
+
 def _is_slip(asked: str, name: str) -> bool:
-    """Return whether one letter, or capitals, tell the names of two arguments apart: not a digit, nor all they have."""
+    """Return whether one letter, or capitals, tell the names of two arguments apart: not a digit or an axis, nor all
+    they have."""
     one, other = asked.lower(), name.lower()
-    numbered = re.sub(r"\d", "", one) == re.sub(r"\d", "", other) and one != other
+    numbered = _NUMBER.sub("", one) == _NUMBER.sub("", other) and one != other
     return len(one) > PAIR and not numbered and (one == other or is_one_edit(one, other))
 
 

@@ -299,6 +299,8 @@ def test_a_name_that_only_cmake_knows_may_be_any(tmp_path):
             "project(x)\nfoo()  # a\n",
         ),
         ('set(x "http://a;b")\nproject(x)\n', "", ""),
+        ("foo(\n  --option\n  % b\n)\n", "", ""),
+        ("-- a\nfoo(\n  --option\n)\n", "where the comment begins", "# a\nfoo(\n  --option\n)\n"),
     ],
 )
 def test_what_other_languages_write_is_put_right_on_all_lines(text, fix, after):

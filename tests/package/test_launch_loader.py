@@ -8,6 +8,7 @@ import pytest
 
 from grader.model.package import LaunchFile, PackageFacts
 from grader.package.launch import parse_launch, read_launch_files
+from grader.package.launch_loader import _is_slip
 
 
 def loaded(folder: Path, files: dict[str, str], name: str = "launch/a.launch") -> LaunchFile:
@@ -200,3 +201,17 @@ def test_arguments_that_a_run_gives_decide_the_names(tmp_path: Path) -> None:
         for argv in (other, (*other, "robot:=tb3"))
     ]
     assert names == ["/r/x", "/tb3/x"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "name", "is_slip"),
+    [
+        ("hearrer", "hearer", True),
+        ("Talker", "talker", True),
+        ("x_pose", "y_pose", False),
+        ("robot_a", "robot_b", False),
+        ("robot1", "robot2", False),
+    ],
+)
+def test_arguments_that_one_letter_tells_apart_on_purpose_are_no_slip(asked, name, is_slip):
+    assert _is_slip(asked, name) is is_slip

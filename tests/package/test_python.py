@@ -11,7 +11,7 @@ import pytest
 
 from grader.checks.support.exit_causes import syntax_hint
 from grader.package.python import check_syntax, read_syntax_report, reason_of
-from grader.syntax_fixes import corrected, parsed
+from grader.syntax_fixes import corrected, other_quotes, parsed
 
 pytestmark = pytest.mark.usefixtures("without_processes")
 """What the child may take, and what ends it, is looked at in test_hostile.py."""
@@ -389,3 +389,16 @@ def test_threads_that_parse_at_the_same_time() -> None:
 
     with ThreadPoolExecutor(4) as pool:
         assert list(pool.map(parse, range(4))) == [15 * 300] * 4
+
+
+@pytest.mark.parametrize(
+    ("line", "right"),
+    [
+        ('print(f"{a["b"]} and {c["d"]}")', "print(f\"{a['b']} and {c['d']}\")"),
+        ("print(f'{a['b']}', {'c': 1})", "print(f'{a[\"b\"]}', {'c': 1})"),
+        ("print(f\"{a['b']}\")", ""),
+        ('print(f"{x}", {"b": 1}, "c")', ""),
+    ],
+)
+def test_quotes_in_the_braces_of_an_f_string_become_the_others(line, right):
+    assert other_quotes(line) == right

@@ -107,6 +107,8 @@ CASES = {
                 ("publisher.publish(", "publisher.publish('100%', ")), []),
     "latin-1": Case({TALKER: SCRIPT.replace("import rospy\n", "import rospy  # caf\u00e9\n").encode("latin-1")},
                 ["encoding"], "not saved as UTF-8"),
+    "two-accents-together": Case({TALKER: (SCRIPT + "# Gr\u00f6\u00dfe\n").encode("cp1252")}, ["encoding"],
+                "not saved as UTF-8", after={TALKER: SCRIPT + "# Gr\u00f6\u00dfe\n"}),
     "gbk": Case({TALKER: (SCRIPT + "\u8ba1\u6570 = 0\n").encode("gbk")}, ["encoding"], "not saved as UTF-8",
                 after={TALKER: SCRIPT + "\u8ba1\u6570 = 0\n"}),
     "no-shebang-and-a-slip": Case(

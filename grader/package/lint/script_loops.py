@@ -8,6 +8,7 @@ import ast
 from collections import Counter
 
 from script_names import (
+    FUNCTIONS,
     LOOPS,
     all_of,
     argument,
@@ -32,6 +33,8 @@ CALLED_BACK = {"Subscriber": "callback", "Service": "handler"}
 
 
 MAKES = ("init_node", "Publisher", "Subscriber", "Service")
+LEAVES = (ast.Return, ast.Raise, ast.Yield, ast.YieldFrom)
+"""A function with one of these may go on, or is a generator, whose call runs nothing."""
 
 
 def never_reached(tree):
@@ -54,7 +57,10 @@ def never_reached(tree):
 
     def held(function):
         if function not in known:
-            known[function] = holding(function.body), set(map(word, ast.walk(function)))
+            nodes = list(ast.walk(function))
+            inner = {n for one in nodes[1:] if isinstance(one, FUNCTIONS) for n in ast.walk(one)}
+            left = any(isinstance(n, LEAVES) and n not in inner for n in nodes)
+            known[function] = None if left else holding(function.body), set(map(word, nodes))
         return known[function]
 
     for node in walk(tree):

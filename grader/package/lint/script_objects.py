@@ -21,7 +21,9 @@ from script_names import (
     functions_in,
     is_call,
     listed,
+    names_in,
     published_type,
+    set_in,
     slip,
     targets_of,
     text_of,
@@ -286,9 +288,13 @@ def text_behind(node, tree):
 def subscribed_again(tree):
     """Yield each `Subscriber(…)` in a loop that runs until the node ends: each turn makes another one. So does
     `wait_for_message(…)`, for one message, where the script has no other."""
+    told = set(calls_in(tree, "Subscriber"))
     for loop in all_of(tree, ast.While):
         waits = next(iter(calls_in(loop, "wait_for_message")), None)
-        if waits is not None and not calls_in(tree, "Subscriber"):
+        left = any(isinstance(n, (ast.Break, ast.Return)) for n in ast.walk(loop)) if waits else True
+        # a loop that what it hears may end wants one message
+        if not left and not told and not names_in(loop.test) & set_in(loop):
+            told = {waits}
             message = "wait_for_message(…) on line %d listens for one message in each turn of its loop, and not between"
             fix = "write a callback that prints, and rospy.Subscriber(…) with it and rospy.spin() in place of the loop"
             yield slip(waits.lineno, "subscribed-again", message % waits.lineno, fix)

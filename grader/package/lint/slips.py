@@ -25,6 +25,7 @@ from script_names import (
     called_name,
     calls_in,
     dotted,
+    is_call,
     key_of,
     names_in,
     parents_of,
@@ -159,6 +160,7 @@ def wrong_values(tree):
     index that is a float."""
     made = [n for n in all_of(tree, ast.Assign) if called_name(n.value) in IN_DEGREES]
     degrees = {dotted(target) for n in made for target in n.targets}
+    own = {dotted(n.targets[0]) for n in all_of(tree, ast.Assign) if getattr(n.value, "attr", "") != "theta"}
     for node in walk(tree):
         line = getattr(node, "lineno", 0)
         if isinstance(node, ast.Compare) and any(map(is_nan, [node.left, *node.comparators])):
@@ -173,6 +175,8 @@ def wrong_values(tree):
                 yield slip(line, "wrong-value", message, fix, "degrees")
         elif called_name(node) in TO_RADIANS and node.args and getattr(node.args[0], "attr", "") == "theta":
             angle = dotted(node.args[0])
+            if angle in own:
+                continue  # a name of the script's own, which may be in degrees
             fix = "on line %d, write `%s` alone, without `%s(…)`" % (line, angle, called_name(node))
             yield slip(line, "wrong-value", "`%s` is already in radians" % angle, fix, "added")
         elif isinstance(node, ast.Subscript) and is_quotient(key_of(node)):
@@ -313,20 +317,35 @@ def decided_by_values(condition, kind):
 CLOCKS = ("now", "get_time", "time", "get_rostime", "to_sec", "toSec")
 
 
+def function_around(node, tree):
+    """Return the name of the function that a node is in, "" outside all of them."""
+    while node is not tree and not isinstance(node, ast.FunctionDef):
+        node = parents_of(tree)[node]
+    return getattr(node, "name", "")
+
+
 def last_one_counts(tree):
     """`way += speed * (t1 - t0)` in a loop that leaves t0 as it is; and an `if` with an `else` in a loop, both of which
     give one name a fixed value, so that what the loop saw before its last turn is forgotten.
     """
+    given = [n for n in all_of(tree, ast.Assign) if calls_in(n.value, *CLOCKS)]
+    timed, started_in = {id(n.value) for n in given}, {}
+    for node, target in ((n, target) for n in given for target in n.targets):
+        started_in.setdefault(dotted(target), set()).add(function_around(node, tree))
+    shared = {name for n in all_of(tree, ast.Global, ast.Nonlocal) for name in n.names}
     for loop in all_of(tree, ast.While, ast.For):
-        given = [n for n in ast.walk(loop) if isinstance(n, ast.Assign)]
-        stored = {dotted(target): n.value for n in given for target in n.targets}
+        inside = list(ast.walk(loop))
+        stored = dict.fromkeys(dotted(n) for n in inside if isinstance(getattr(n, "ctx", None), ast.Store))
+        here = {function_around(loop, tree), "__init__"}
+        stored.update((dotted(t), n.value) for n in inside if isinstance(n, ast.Assign) for t in n.targets)
         for node in loop.body:
             is_sum = isinstance(node, ast.AugAssign) and isinstance(node.op, ast.Add)
             spans = [n for n in ast.walk(node.value) if isinstance(n, ast.BinOp)] if is_sum else ()
             for span in spans:
                 start, end = dotted(getattr(span, "right", None)), stored.get(dotted(span.left), span.left)
-                is_clock = isinstance(span.op, ast.Sub) and bool(calls_in(end, *CLOCKS))
-                if is_clock and start not in stored and "..." not in start:
+                is_clock = isinstance(span.op, ast.Sub) and (id(end) in timed or is_call(end, *CLOCKS))
+                renewed = ("." in start or start in shared) and started_in.get(start, here) - here
+                if is_clock and start not in stored and "..." not in start and not renewed:
                     name = dotted(node.target)
                     message = "`%s +=` adds the whole time since `%s` again in each turn" % (name, start)
                     fix = "on line %d, write `%s =` instead of `%s +=`" % (node.lineno, name, name)
@@ -368,10 +387,14 @@ def overwritten(loop, choice):
         }
         for block in (choice.body, choice.orelse)
     )
+    read = {dotted(n) for n in ast.walk(choice) if isinstance(getattr(n, "ctx", None), ast.Load)}
     names = [name for name in one if name in other and ast.dump(one[name]) != ast.dump(other[name])]
+    names = [name for name in names if name not in read]
     if names and type(choice.test.ops[0]) in SIGNS:
         near = type(choice.test.ops[0]) in BELOW
-        usual = getattr((other if near else one)[names[0]], "value", "…")
+        value = (other if near else one)[names[0]]
+        sign = {ast.USub: "-", ast.Not: "not ", ast.Invert: "~"}.get(type(getattr(value, "op", None)), "")
+        usual = sign + repr(getattr(value, "operand", value).value)
         message = "each turn of this loop sets `%s`, so that only the last one counts" % names[0]
         part = "`else`" if near else "`if`"
         fix = "set `%s` to %s above the loop on line %d, and not in the %s" % (

@@ -15,11 +15,11 @@ from functools import lru_cache
 from itertools import takewhile
 from typing import Any
 
+from grader.package.line_corrections import first_version
 from grader.syntax_fixes import (
     DELETE_LINE,
     PLAIN,
     corrections,
-    first_version,
     reason_of_line,
     without_brace,
     without_comment_sign,

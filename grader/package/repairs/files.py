@@ -109,7 +109,8 @@ def to_utf8(data: bytes) -> bytes:
     if data.startswith(UTF16):
         text = data.decode("utf-16", "replace")
     else:
-        text = next(filter(None, (_decoded(data, one) for one in OLD_ENCODINGS)), "")
+        encodings = OLD_ENCODINGS[not TWO_OF_CHINA.search(data) :]
+        text = next(filter(None, (_decoded(data, one) for one in encodings)), "")
     lines = text.split("\n", 2)
     for number, line in enumerate(lines[:2]):
         if COOKIE.match(line):
@@ -118,7 +119,8 @@ def to_utf8(data: bytes) -> bytes:
 
 
 OLD_ENCODINGS = ("gb2312", "cp1252", "latin-1")
-"""In this order: accents mostly stand alone, and are no GB 2312 then, in which a character takes two of these bytes."""
+TWO_OF_CHINA = re.compile(rb"[\xa1-\xfe]{4}")
+"""Two characters of GB 2312, which comes first then. Two accents may stand together, as in Größe, but not four."""
 
 
 def _decoded(data: bytes, encoding: str) -> str:
