@@ -15,7 +15,8 @@ PARTS = {".msg": ("",), ".srv": ("request", "response"), ".action": ("goal", "re
 """What a file is divided into by `---`, by its ending."""
 NOT_FINITE = {".inf": math.inf, "+.inf": math.inf, "-.inf": -math.inf, ".nan": math.nan}
 """As YAML writes them. A rubric's data holds them as text, as JSON has no other form for them."""
-DIVIDER = re.compile(r"^---\s*$", re.MULTILINE)
+DIVIDER = re.compile(r"^---.*$", re.MULTILINE)
+"""ROS looks at the first three signs of a line alone: `-----` divides, and an indented `---` does not."""
 DIVIDING = "---"
 RULE = "=" * 80
 """Before the types that a full definition brings along, behind its own."""
@@ -46,11 +47,12 @@ _CHARS_MAX = 200
 def parse_interface(data: bytes, path: str) -> Interface:
     """Return one definition from its bytes. Never raises: the first line that is none is the record's `fault`."""
     parts = PARTS[PurePosixPath(path).suffix]
-    lines = data.decode("utf-8-sig", "replace").splitlines()
+    # Not `splitlines()`: ROS ends lines where Python's `open()` does, and a comment may hold other signs.
+    lines = re.split(r"\r\n?|\n", data.decode("utf-8-sig", "replace"))
     fields: list[InterfaceField] = []
     number, fault = 0, None
     for line, text in enumerate(lines, 1):
-        if text.partition("#")[0].strip() == DIVIDING:
+        if text.startswith(DIVIDING):
             number += 1
             continue
         one = _parse_line(text, parts[min(number, len(parts) - 1)], line)
@@ -119,10 +121,15 @@ def _no_field(text: str, path: str, line: int) -> Fault:
     bare = shown.partition("//")[0].strip().rstrip(";, ")
     # Also dashes that a word processor made of `---`.
     if re.fullmatch(r"[-_=*\u2013\u2014]{1,}", bare) and not path.endswith(".msg"):
-        cause = f"`{shown}` on line {line} does not divide its parts: that takes three of `-`"
-        return Fault(
-            file=path, line=line, kind="NoField", message=cause, cause=cause, fix=f"write `{DIVIDING}`"
-        )
+        cause, fix = f"`{shown}` on line {line} does not divide its parts", f"write `{DIVIDING}`"
+        if bare.startswith(DIVIDING):
+            cause, fix = (
+                f"{cause}: it has to stand at the beginning of the line",
+                f"{fix} without spaces before it",
+            )
+        else:
+            cause += ": that takes three of `-`"
+        return Fault(file=path, line=line, kind="NoField", message=cause, cause=cause, fix=fix)
     # `float64: speed` and `int32 A: 5` with ROS's own signs, `std_msgs.Header` with a slash.
     right = re.sub(
         r"^(\w+\s+\w+)\s*(?::=?|==|\s)\s*(?=[-\d])", r"\1 = ", re.sub(r"^(\w+)\.", r"\1/", bare)

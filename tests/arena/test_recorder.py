@@ -273,5 +273,8 @@ def test_a_run_says_how_many_messages_it_dropped_and_so_do_its_verdicts(tmp_path
     asked = {"package": PACKAGE, "run": seen, "params": CHECKS["counter-step"].params.model_validate(params)}
     check = CHECKS["counter-step"]
     verdict = account_for_losses(check, asked, check.function(**asked))
-    assert verdict.status.value == "pass"
-    assert verdict.measured.endswith("; the recorder kept 1000 messages of /numbers, dropped 7000")
+    # On a full machine the recorder may fall behind such a flood, and then too little came whole
+    behind = any(event.event == "behind" for _, event in seen.recorder)
+    assert verdict.status.value == ("inconclusive" if behind else "pass"), verdict.message
+    told = verdict.message if behind else verdict.measured
+    assert told.endswith("; the recorder kept 1000 messages of /numbers, dropped 7000")

@@ -138,7 +138,7 @@ def test_parameters_of_a_file_are_made_up(tmp_path: Path, sandbox: str) -> None:
     assert all(repr(values[f"/details/{n}"]) in line for n in ("name", "phone", "weight", "digits", "street"))
     assert [(e.name, e.value) for _, e in seen.params if e.caller_id == "/reader"] == [("/done", 5)]
     asked = {(e.actor, e.topic, e.detail) for _, e in seen.actors if e.action == "read"}
-    assert asked >= {("/reader", "/details", ""), ("/reader", "/other", "not there")}
+    assert asked >= {("/reader", "/details", ""), ("/reader", "/other", "not there (has_param)")}
     assert seen.outcome.outcome == "ended"
 
 
