@@ -53,7 +53,7 @@ class ActionResultParams(Record):
     result: dict[str, Any] = Field(default_factory=dict)
     """The fields of the result that matter, and their values."""
     tolerance: Annotated[float, Field(ge=0)] = 1e-6
-    """How far numbers of the result may be off."""
+    """How far numbers of the result, and of `reports`, may be off."""
     feedback: Annotated[int, Field(ge=0)] = 0
     """The least number of feedback messages."""
     reports: dict[str, list[Any]] = Field(default_factory=dict)
@@ -191,7 +191,7 @@ def _other_reports(run: Run, goal: Goal, params: ActionResultParams) -> Verdict 
     for name, wanted in params.reports.items():
         came = [one.get(name) for one in _feedback(run, goal, params)]
         left = iter(came)
-        if all(any(value == one for value in left) for one in wanted):
+        if all(any(not any(differences(value, one, params.tolerance)) for value in left) for one in wanted):
             continue
         shown_values = f"{join_words(map(str, came[:LISTED]))}{' …' * (len(came) > LISTED)}"
         message = f"the feedback on {goal.name} of {params.action} has {name} {shown_values or 'nowhere'}"
