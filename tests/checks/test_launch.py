@@ -68,6 +68,14 @@ def node(name: str, namespace: str = "/") -> LaunchNode:
             ],
             "red:34 has no space in it",
         ),
+        (
+            [
+                "RLException: error loading <rosparam> tag: ",
+                "\t'param' attribute must be set for non-dictionary values",
+                'XML is <rosparam command="load" file="a.yaml"/>',
+            ],
+            "cannot load its file",
+        ),
         (["RLException: ERROR: unknown machine [raspi]"], "no <machine> of the name raspi"),
         (["RLException: multiple files named [a.launch] in package [p]:"], "two launch files"),
         (["RLException: Unknown substitution command [findpkg p]. Valid commands are"], "findpkg p"),
