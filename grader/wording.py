@@ -182,6 +182,11 @@ def on_lines(numbers: Iterable[int]) -> str:
     return f"line{'s' * (len(known) > 1)} {numbers_text(known)}"
 
 
+def the_same_on(numbers: Sequence[int]) -> str:
+    """Return `, and the same on line 3` behind what to do on another line; "" without further lines."""
+    return f", and the same on {on_lines(numbers)}" if numbers else ""
+
+
 def lines_text(first: int, last: int) -> str:
     """Return `line 3`, or `lines 3 to 5`, of lines from 0."""
     return f"line {first + 1}" if last == first else f"lines {first + 1} to {last + 1}"

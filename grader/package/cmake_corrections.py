@@ -9,7 +9,7 @@ from cmake_parser import CMakeError, parse_raw
 
 from grader.model.package import CMAKE_COMMANDS
 from grader.package.line_corrections import LineSlip, changed_line, doubled_and_turned
-from grader.wording import join_words, numbers_text
+from grader.wording import join_words, the_same_on
 
 _CHARS_MAX = 12_000
 _CALL_LINES_MAX = 12
@@ -84,13 +84,11 @@ def _habits_of_c(lines: list[str]) -> Iterator[LineSlip]:
 
 
 def _changed_lines(lines: list[str], changed: dict[int, str], why: str, fix: str) -> Iterator[LineSlip]:
+    """Yield the slip that these lines have, by their numbers, all of which are changed at once."""
     if changed:
         first, *more = changed
-        same = (
-            f", and the same on {'lines' if len(more) > 1 else 'line'} {numbers_text(more)}" if more else ""
-        )
         text = "\n".join(changed.get(number, line) for number, line in enumerate(lines, 1))
-        yield LineSlip(why, first, f"{fix}{same}", text, is_within=True)
+        yield LineSlip(why, first, f"{fix}{the_same_on(more)}", text, is_within=True)
 
 
 def _slips_in(lines: list[str], number: int) -> Iterator[LineSlip]:

@@ -92,13 +92,10 @@ def slips_of(path: str, text: str) -> Iterator[PythonSlip]:
     yield from _made_again(path, code)
     yield from _without_main(path, text, code)
     yield from _degrees(path, code)
-    yield from _deaf(path, code)
-    read = next(_ARGUMENT.finditer(code), None)
-    if read is not None and _COUNTED.search(code) is None:
-        line, given = code.count("\n", 0, read.start()) + 1, f"argv[{read['n']}]"
-        message = f"it reads {given} on line {line} of {path}"
-        fix = f'write `argc > {read["n"]} ? {given} : "…"` there, with what it should be without an argument'
-        yield PythonSlip(file=path, line=line, kind="no-argument", message=message, fix=fix, name=read["n"])
+    if _MAIN.search(code):
+        yield from _endless(path, code)
+        yield from _asleep(path, code)
+    yield from _unasked_argument(path, code)
 
 
 def _waiting(path: str, code: str) -> Iterator[PythonSlip]:
@@ -124,68 +121,71 @@ def _unspun(path: str, code: str) -> Iterator[PythonSlip]:
     yield PythonSlip(file=path, line=line, kind="callback-waits", message=message, fix=fix)
 
 
-def _deaf(path: str, code: str) -> Iterator[PythonSlip]:
-    """Yield what keeps a program from ending on Ctrl-C, of which roscpp only makes a note: an endless loop that does
-    not ask for it, and a long sleep, whose `name` is its length in seconds."""
-    for match in _DEAF.finditer(code) if _MAIN.search(code) else ():
-        brace = code.find("{", match.end())
-        end = (
-            _closing(code, brace + 1) if brace >= 0 and not code[match.end() : brace].strip() else match.end()
-        )
+def _endless(path: str, code: str) -> Iterator[PythonSlip]:
+    """Yield the loops that keep a program from ending on Ctrl-C, of which roscpp only makes a note."""
+    for match in _DEAF.finditer(code):
+        opened = _OPENS.match(code, match.end())
+        end = _closing(code, opened.end()) if opened else match.end()
         line = code.count("\n", 0, match.start()) + 1
         if match["ok"] or not _ENDS.search(code, match.end(), end):
             message = f"nothing in the loop on line {line} of {path} asks whether the node should end"
             message = f"`{match['ok']}` has no brackets on line {line} of {path}" if match["ok"] else message
             fix = f"write `while ({match['ok'] or 'ros::ok'}())` on line {line}"
             yield PythonSlip(file=path, line=line, kind="deaf", message=message, fix=fix)
-    for match in _LONG.finditer(code) if _MAIN.search(code) else ():
-        pause = (
-            1 / float(match["hz"])
-            if match["hz"] and float(match["hz"])
-            else float(match["s"] or match["n"] or 0)
-        )
-        if pause > LONG_S:
-            line, name = code.count("\n", 0, match.start()) + 1, f"{pause:g}"
+
+
+def _asleep(path: str, code: str) -> Iterator[PythonSlip]:
+    """Yield the long sleeps, which Ctrl-C does not end; `name` is the length in seconds."""
+    for match in _LONG.finditer(code):
+        hz = float(match["hz"] or 0)
+        pause_s = 1 / hz if hz else float(match["s"] or match["n"] or 0)
+        if pause_s > LONG_S:
+            line, name = code.count("\n", 0, match.start()) + 1, f"{pause_s:g}"
             message = f"line {line} of {path} lets it sleep for {name} s at a time"
             yield PythonSlip(file=path, line=line, kind="deaf", message=message, name=name)
 
 
+def _unasked_argument(path: str, code: str) -> Iterator[PythonSlip]:
+    """Yield the first argument of the command line that is read although nothing asks whether it is there."""
+    read = next(_ARGUMENT.finditer(code), None)
+    if read is not None and _COUNTED.search(code) is None:
+        line, given = code.count("\n", 0, read.start()) + 1, f"argv[{read['n']}]"
+        message = f"it reads {given} on line {line} of {path}"
+        fix = f'write `argc > {read["n"]} ? {given} : "…"` there, with what it should be without an argument'
+        yield PythonSlip(file=path, line=line, kind="no-argument", message=message, fix=fix, name=read["n"])
+
+
 def _made_again(path: str, code: str) -> Iterator[PythonSlip]:
     """Yield the publisher that a callback makes each time it is called, and what a loop makes in each of its turns."""
-    places = [(body, f"callback `{body.name}`" if body.name else "callback") for body in _callbacks(code)]
-    for loop in _LOOP.finditer(code):
-        if begin := _OPENS.match(code, loop.end()):
-            line = code.count("\n", 0, loop.start()) + 1
-            places.append((_Body("", begin.end(), _closing(code, begin.end())), f"loop on line {line}"))
-    for body, what in dict.fromkeys(places):
-        calls = _MADE.finditer(code, body.start, body.end)
-        made = next(
-            (
-                m
-                for m in calls
-                if not _ONCE.search(code, max(body.start, m.start() - BEFORE_CHARS), m.start())
-            ),
-            None,
-        )
-        before = code[body.start : made.start()] if made else ""
-        if made is None or before.count("{") != before.count("}"):
-            continue
-        line = code.count("\n", 0, made.start("call")) + 1
-        if made["call"] == "advertise":
+    once = "make the publisher once, in `main` or in the constructor, and keep it in a variable that stays"
+    for body in dict.fromkeys(_callbacks(code)):
+        what = f"callback `{body.name}`" if body.name else "callback"
+        if (made := _made_in(body, code)) and made["call"] == "advertise":
+            line = code.count("\n", 0, made.start("call")) + 1
             message = f"the {what} makes another publisher each time (line {line}), and nothing is connected to it yet"
-        elif what.startswith("loop"):
-            message = (
-                f"the {what} subscribes again in each turn, on line {line}, and misses what comes in between"
+            fix = f"{once}: a global one, or a member"
+            yield PythonSlip(file=path, line=line, kind="callback-waits", message=message, fix=fix)
+    for loop in _LOOP.finditer(code):
+        begin = _OPENS.match(code, loop.end())
+        if begin and (made := _made_in(_Body("", begin.end(), _closing(code, begin.end())), code)):
+            line = code.count("\n", 0, made.start("call")) + 1
+            message = f"the loop on line {code.count(NEW_LINE, 0, loop.start()) + 1} "
+            message += (
+                f"makes another publisher each time (line {line}), and nothing is connected to it yet"
+                if made["call"] == "advertise"
+                else f"subscribes again in each turn, on line {line}, and misses what comes in between"
             )
-        else:
-            continue
-        kept = "publisher" if made["call"] == "advertise" else "subscriber"
-        where = "above the loop" if what.startswith("loop") else "in `main` or in the constructor"
-        fix = (
-            f"make the {kept} once, {where}, and keep it in a variable that stays: a global one, or a member"
-        )
-        fix = f"move line {line} above the loop" if where == "above the loop" else fix
-        yield PythonSlip(file=path, line=line, kind="callback-waits", message=message, fix=fix)
+            fix = f"move line {line} above the loop"
+            yield PythonSlip(file=path, line=line, kind="callback-waits", message=message, fix=fix)
+
+
+def _made_in(body: _Body, code: str) -> re.Match[str] | None:
+    """Return the first `advertise(…)` or `subscribe(…)` of a body that runs each time, and in no inner block."""
+    for made in _MADE.finditer(code, body.start, body.end):
+        if not _ONCE.search(code, max(body.start, made.start() - BEFORE_CHARS), made.start()):
+            before = code[body.start : made.start()]
+            return made if before.count("{") == before.count("}") else None
+    return None
 
 
 def _callbacks(code: str) -> Iterator[_Body]:

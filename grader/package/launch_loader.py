@@ -255,7 +255,7 @@ def _included(element: etree._Element, scope: Scope, path: str) -> Scope:
     return inside.model_copy(update={"file": path, "args": args})
 
 
-_NUMBER = re.compile(r"\d|[xyz]\b|[xyz](?=_)|(?<=_)[xyz]|(?<![^\W_])[a-z](?![^\W_])")
+_TOLD_APART = re.compile(r"\d|[xyz]\b|[xyz](?=_)|(?<=_)[xyz]|(?<![^\W_])[a-z](?![^\W_])")
 """What tells names apart on purpose: a digit, an axis, a letter alone."""
 
 
@@ -263,8 +263,8 @@ def _is_slip(asked: str, name: str) -> bool:
     """Return whether one letter, or capitals, tell the names of two arguments apart: not a digit or an axis, nor all
     they have."""
     one, other = asked.lower(), name.lower()
-    numbered = _NUMBER.sub("", one) == _NUMBER.sub("", other) and one != other
-    return len(one) > PAIR and not numbered and (one == other or is_one_edit(one, other))
+    on_purpose = one != other and _TOLD_APART.sub("", one) == _TOLD_APART.sub("", other)
+    return len(one) > PAIR and not on_purpose and (one == other or is_one_edit(one, other))
 
 
 def _with_arg(element: etree._Element, scope: Scope) -> Scope:

@@ -106,9 +106,8 @@ def holding(block):
 def unreached_fix(one, loop, behind, later, called):
     """Return how to get to the call `behind` a statement that stays in its `loop`; `later` holds that call itself,
     `called` is the function that the statement calls."""
-    if (
-        isinstance(loop, ast.Expr) and getattr(called, "name", "") == "__init__"
-    ):  # what is behind needs the object
+    if isinstance(loop, ast.Expr) and getattr(called, "name", "") == "__init__":
+        # What is behind needs the object, so it cannot move above
         return "move the spin() of line %d below line %d" % (loop.lineno, behind.lineno)
     above = "move line %d above line %d" % (behind.lineno, one.lineno)
     if isinstance(later, ast.While) and isinstance(loop, ast.While):

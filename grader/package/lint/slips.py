@@ -48,7 +48,8 @@ def slips(tree):
         loops.publishes_twice, callbacks.callbacks, loops.waiting_callbacks, objects.queue_sizes, objects.graph_names,
         objects.object_slips, said_texts, loops.deaf_loops, counters.clock_values, counters.counter_slips,
         counters.counter_starts, without_effect, names.assigned_late, objects.hidden_names, objects.subscribed_again,
-        imports, objects.taken_off, objects.unstarted_servers, wrong_values, decided_conditions, last_one_counts,
+        imports, objects.taken_off, objects.unstarted_servers, wrong_values, decided_conditions,
+        times_added_again, overwritten_values,
         callbacks.unprinted_messages, counters.values_left_out, counters.published_unchanged,
         objects.unused_publishers, loops.loops_of_numbers, finished_goals, counters.sends_no_time, without_node,
     )  # fmt: skip
@@ -324,10 +325,8 @@ def function_around(node, tree):
     return getattr(node, "name", "")
 
 
-def last_one_counts(tree):
-    """`way += speed * (t1 - t0)` in a loop that leaves t0 as it is; and an `if` with an `else` in a loop, both of which
-    give one name a fixed value, so that what the loop saw before its last turn is forgotten.
-    """
+def times_added_again(tree):
+    """`way += speed * (t1 - t0)` in a loop that leaves t0 as it is."""
     given = [n for n in all_of(tree, ast.Assign) if calls_in(n.value, *CLOCKS)]
     timed, started_in = {id(n.value) for n in given}, {}
     for node, target in ((n, target) for n in given for target in n.targets):
@@ -350,31 +349,29 @@ def last_one_counts(tree):
                     message = "`%s +=` adds the whole time since `%s` again in each turn" % (name, start)
                     fix = "on line %d, write `%s =` instead of `%s +=`" % (node.lineno, name, name)
                     yield slip(node.lineno, "wrong-value", message, fix, "added")
-        only = loop.body[0] if isinstance(loop, ast.For) and len(loop.body) == 1 else None
+
+
+def overwritten_values(tree):
+    """An `if` with an `else`, alone in a `for` loop, both of which give one name a fixed value, so that what the loop
+    saw before its last turn is forgotten.
+    """
+    for loop in all_of(tree, ast.For):
+        only = loop.body[0] if len(loop.body) == 1 else None
         if isinstance(only, ast.If) and isinstance(only.test, ast.Compare) and not acts(only):
             yield from overwritten(loop, only)
 
 
-HARMLESS = (
-    "print",
-    "loginfo",
-    "logwarn",
-    "str",
-    "format",
-    "round",
-    "abs",
-    "float",
-    "isnan",
-    "isinf",
-    "append",
-)
+HARMLESS = {
+    "print", "loginfo", "logwarn", "str", "format", "round", "abs", "float", "isnan", "isinf", "append",
+}  # fmt: skip
+"""Calls that change nothing outside the loop that a student may see."""
 
 
 def acts(node):
     """Whether something leaves a loop, or happens in its turns beyond what is computed and printed."""
     calls = {called_name(n) or "" for n in ast.walk(node) if isinstance(n, ast.Call)}
     leaving = (ast.Break, ast.Return, ast.Raise, ast.Yield)
-    return not calls <= set(HARMLESS) or any(isinstance(n, leaving) for n in ast.walk(node))
+    return not calls <= HARMLESS or any(isinstance(n, leaving) for n in ast.walk(node))
 
 
 def overwritten(loop, choice):
@@ -396,13 +393,8 @@ def overwritten(loop, choice):
         sign = {ast.USub: "-", ast.Not: "not ", ast.Invert: "~"}.get(type(getattr(value, "op", None)), "")
         usual = sign + repr(getattr(value, "operand", value).value)
         message = "each turn of this loop sets `%s`, so that only the last one counts" % names[0]
-        part = "`else`" if near else "`if`"
-        fix = "set `%s` to %s above the loop on line %d, and not in the %s" % (
-            names[0],
-            usual,
-            loop.lineno,
-            part,
-        )
+        fix = "set `%s` to %s above the loop on line %d, and not in the `%s`"
+        fix %= (names[0], usual, loop.lineno, "else" if near else "if")
         yield slip(choice.lineno, "wrong-value", message, fix, "added")
 
 

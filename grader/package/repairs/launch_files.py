@@ -13,7 +13,7 @@ from grader.package.launch import parse_launch
 from grader.package.manifest import parse_manifest
 from grader.package.repairs.editing import Files, keep_first_version, repair_xml
 from grader.package.repairs.names import Wanted, is_near
-from grader.wording import on_lines
+from grader.wording import the_same_on
 
 TAG_LINES_MAX = 20
 NO_SCRIPTS = (".launch", ".xml", ".txt", ".yaml", ".yml", ".md", ".test")
@@ -143,13 +143,12 @@ def _set_attribute(
         changed = pattern.sub(lambda m: m["head"] + new, lines[number], count=1)
         if changed != lines[number]:
             lines[number] = changed
-            same = ""
+            fix = ""
             if kind == "package-name":
                 others = [n for n, one in enumerate(lines, 1) if pattern.search(one)]
                 lines = [pattern.sub(lambda m: m["head"] + new, one) for one in lines]
-                same = f", and the same on {on_lines(others)}" if others else ""
+                fix = f'write pkg="{new}" instead of pkg="{old}"{the_same_on(others)}'
             message = f'line {number + 1} of {file}: {attribute}="{old}" should be {attribute}="{new}"'
-            fix = f'write pkg="{new}" instead of pkg="{old}"{same}' if kind == "package-name" else ""
             files.change(kind, file, "\n".join(lines), message, fix)
             return
         if number >= line and "<" in lines[number].replace("<!--", ""):

@@ -12,7 +12,7 @@ from grader.package.repairs.editing import UTF16, Files, as_text, keep_first_ver
 from grader.package.repairs.files import to_utf8
 from grader.package.repairs.names import Wanted, is_near
 from grader.package.xml import parse_xml
-from grader.wording import is_one_edit, is_word_of, numbers_text
+from grader.wording import is_one_edit, is_word_of, the_same_on
 
 FORMAT_1 = r"<package(\s+format\s*=\s*[\"']1[\"'])?\s*>"
 VALUES = (
@@ -87,8 +87,7 @@ def _rename_dependencies(files: Files) -> None:
         changed = f"{changed[: one.start()]}{one[1]}exec_depend{changed[one.end() :]}"
     first, *more = sorted({text.count("\n", 0, one.start()) + 1 for one in found})
     message = f"line {first} of {MANIFEST}: only format 1 has <run_depend>"
-    same = f", and the same on {'lines' if len(more) > 1 else 'line'} {numbers_text(more)}" if more else ""
-    fix = f"write exec_depend instead of run_depend{same}"
+    fix = f"write exec_depend instead of run_depend{the_same_on(more)}"
     files.change("manifest-line", MANIFEST, changed, message, fix)
 
 
