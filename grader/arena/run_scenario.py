@@ -173,9 +173,8 @@ def _tell_what_is_known(
     scripts = {spec["name"]: spec["script"] for _, spec in starts if spec["script"] is not None}
     session.live.endless = frozenset(s["name"] for _, s in starts if place.has_line(IDLE, s["script"]))
     session.live.sleeping = frozenset(s["name"] for _, s in starts if place.has_line(SLEEPING, s["script"]))
-    if session.live.sleeping and place.has_line(
-        sleeps_elsewhere
-    ):  # in a file that the script may import, too
+    # A file that the script may import counts, too
+    if session.live.sleeping and place.has_line(sleeps_elsewhere):
         session.live.sleeping = frozenset()
     session.live.mute = frozenset(
         name

@@ -224,7 +224,8 @@ def test_a_node_that_answers_what_it_hears_gets_a_step_for_it() -> None:
     )
 
 
-def test_a_service_of_the_packages_own_is_called_and_its_client_answered() -> None:
+def service_and_client() -> tuple[Interface, Parts, dict[str, Run]]:
+    """A service of the package's own, the scripts of its server and its client, and what each does alone."""
     fields = [
         ("request", "string", "unit"),
         ("request", "float64", "value"),
@@ -234,15 +235,19 @@ def test_a_service_of_the_packages_own_is_called_and_its_client_answered() -> No
         path="srv/Convert.srv",
         fields=tuple(InterfaceField(part=p, type=t, name=n, line=1) for p, t, n in fields),
     )
-    text = "string unit\nfloat64 value\n---\nfloat64 result\n"
     offers = [{"at_s": 0.5, "nodes": ["/node"], "services": {"/convert": ["/node"]},
                "processes": {"/node": "node"}, "service_types": {"/convert": "lab1/Convert"}}]  # fmt: skip
     up = [{"at_s": 0.5, "nodes": ["/client"], "processes": {"/client": "node"}}]
     looks = [{"action": "lookup", "actor": "/client", "topic": "/convert", "detail": "no such service"}]
-    first = {"node": run_of(graph=offers), "client": run_of(graph=up, actors=looks)}
+    parts = Parts(nodes={"node": "src/node.py", "client": "src/client.py"}, launches={})
+    return own, parts, {"node": run_of(graph=offers), "client": run_of(graph=up, actors=looks)}
+
+
+def test_a_service_of_the_packages_own_is_called_and_its_client_answered() -> None:
+    own, parts, first = service_and_client()
+    text = "string unit\nfloat64 value\n---\nfloat64 result\n"
     seen = {name: observe(run) for name, run in first.items()}
     assert seen["client"].sought == ("/convert",)
-    parts = Parts(nodes={"node": "src/node.py", "client": "src/client.py"}, launches={})
     again = second_look("lab1", parts, seen, [own])
     assert again is not None
     calls = again.rubric.scenarios["node-asked"].calls
