@@ -76,9 +76,8 @@ def grade(
     """Grade one submission, as `grader grade` does: build it, run it, record it, judge the recording, write reports.
 
     `source` is a folder, an archive (`.zip`, `.tar.*`), a recording (`.bag`, `.mcap`, `.db3`) or a git URL with an
-    optional `@ref`. `rubric` is what `load_rubric` takes or returns. Results go to `out/<submission id>/` and
-    replace older ones; missing folders are made. `submission_id` is by default made from `source`.
-    `package` is the name of the package to grade, whatever the rubric calls it.
+    optional `@ref`. `rubric` is what `load_rubric` takes or returns. Results go to `out/<submission id>/` and replace
+    older ones; missing folders are made. By default, the id is made from `source`, and `package` is the rubric's.
 
     `sandbox`: `auto` confines students' code where this machine can, `require` raises SandboxMissing (a HostError)
     where it cannot, `none` never does. `static_only` runs nothing: what only a run can show is `inconclusive`. Without

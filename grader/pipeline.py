@@ -114,8 +114,7 @@ def grade(
         rubric = rubric.of_submission(submission.digest, context.submission.package)
         context.rubric_origin = origin_of(rubric, (local_path(source), options.repository))
         # before the folder is locked and prepared: a result that stays needs neither
-        earlier = options.find_earlier(context.submission)
-        if earlier is not None:
+        if (earlier := options.find_earlier(context.submission)) is not None:
             return earlier
         with Results(out / submission.id) as results:
             recording = None

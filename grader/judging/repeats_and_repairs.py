@@ -147,20 +147,17 @@ def apply_repaired_copy(
     """
     verdicts, uses = dict(first), dict[str, Repaired]()
     on_copy = {name: with_lines_as_handed_in(verdict, repairs) for name, verdict in on_copy.items()}
+    by_logic = {one for one in repairs if one.kind in OF_LOGIC}
+    helped = _helped(rubric, first, on_copy) if by_logic else set[str]()
     needs = {
         c.id: tuple(
             one
             for one in repairs
-            if concerns(one, c, rubric, first, built=built, builds=builds, launched=launched)
+            if (one not in by_logic or c.id in helped)
+            and concerns(one, c, rubric, first, built=built, builds=builds, launched=launched)
         )
         for c in rubric.criteria
     }
-    if any(one.kind in OF_LOGIC for one in repairs):
-        helped = _helped(rubric, first, on_copy)
-        needs = {
-            i: tuple(one for one in ones if one.kind not in OF_LOGIC or i in helped)
-            for i, ones in needs.items()
-        }
     better = {c.id for c in rubric.criteria if _is_better(first, on_copy, c, needs[c.id])}
     charges = charge_repairs(rubric, first, better, needs)
     for criterion in rubric.criteria:

@@ -125,27 +125,9 @@ class Root:
         With the folder of their `locks`, graders in the root and those of this machine take turns.
         Raises Failed where `check` is set and it ends with another code than 0.
         """
-        settings, binds = network_settings() if network else ({}, [])
-        if locks is not None:
-            binds = [*binds, "--bind", str(locks), f"{HOST}/locks"]
-            settings["XDG_RUNTIME_DIR"] = f"{HOST}/locks"
-        variables = {"PATH": PATH, "HOME": "/root", **settings, **self.env, **(env or {})}
         groups = "--clear-groups" if (user or "").isdecimal() else "--init-groups"  # a number may be nobody's
         who = ["setpriv", f"--reuid={user}", f"--regid={user}", groups, "--inh-caps=-all"] if user else []
-        place = f"{self.rooms.tmpfs}/{self.place}/root"
-        if privileged:
-            assert not network
-            box = [*ALONE, "sh", "-c", PRIVILEGED, "sh", place, str(locks or ""), cwd]
-            box += ["env", "-i", *(f"{name}={value}" for name, value in variables.items())]
-        else:
-            box = [
-                "bwrap", "--die-with-parent", "--bind", place, "/",
-                "--proc", "/proc", "--dev", "/dev", "--unshare-pid", "--unshare-ipc", "--unshare-uts",
-                *([] if network else ["--unshare-net"]), "--tmpfs", HOST, *binds, "--clearenv",
-                *(word for capability in CAPABILITIES for word in ("--cap-add", f"CAP_{capability}")),
-                *(word for name, value in variables.items() for word in ("--setenv", name, value)),
-                "--chdir", cwd, "--",
-            ]  # fmt: skip
+        box = self._box(env or {}, cwd, locks, network=network, privileged=privileged)
         command = [*self.rooms.enter, *box, *who, *argv]
         done = subprocess.run(
             command,
@@ -161,6 +143,29 @@ class Root:
                 f"{' '.join(argv)} ended with {done.returncode}:\n{done.stdout[-4000:]}\n{done.stderr[-4000:]}"
             )
         return done
+
+    def _box(
+        self, env: Mapping[str, str], cwd: str, locks: Path | None, *, network: bool, privileged: bool
+    ) -> list[str]:
+        """Return the command that runs another one in the root."""
+        settings, binds = network_settings() if network else ({}, [])
+        if locks is not None:
+            binds = [*binds, "--bind", str(locks), f"{HOST}/locks"]
+            settings["XDG_RUNTIME_DIR"] = f"{HOST}/locks"
+        variables = {"PATH": PATH, "HOME": "/root", **settings, **self.env, **env}
+        place = f"{self.rooms.tmpfs}/{self.place}/root"
+        if privileged:
+            assert not network
+            box = [*ALONE, "sh", "-c", PRIVILEGED, "sh", place, str(locks or ""), cwd]
+            return [*box, "env", "-i", *(f"{name}={value}" for name, value in variables.items())]
+        return [
+            "bwrap", "--die-with-parent", "--bind", place, "/",
+            "--proc", "/proc", "--dev", "/dev", "--unshare-pid", "--unshare-ipc", "--unshare-uts",
+            *([] if network else ["--unshare-net"]), "--tmpfs", HOST, *binds, "--clearenv",
+            *(word for capability in CAPABILITIES for word in ("--cap-add", f"CAP_{capability}")),
+            *(word for name, value in variables.items() for word in ("--setenv", name, value)),
+            "--chdir", cwd, "--",
+        ]  # fmt: skip
 
     def copy_in(self, source: Path, target: str) -> None:
         """Copy a file or a folder to the path `target` in the root, modes and links as they are."""

@@ -64,8 +64,6 @@ class Lab:
         topic = {"topic": "/chatter", "callerid": self.talker_node, "count": 62}
         topic |= {"values": {"text": self.text}} | (channel or {})
         up = launched or {"topics": [{"topic": "/chatter", "callerid": "/pub_node"}]}
-        scripts = files or (self.talker, self.listener)
-        texts = {self.launch: (launch or self.launch_text).encode()}
         return {
             "runs": {
                 talker: {
@@ -90,19 +88,25 @@ class Lab:
                 "package": {"processes": [{"name": "catkin_make", "role": "build", "exit_code": 0}]},
             },
             "package": {
+                **self._files(files or (self.talker, self.listener), launch),
                 "name": self.package,
                 "manifest": {
                     "dependencies": [["buildtool_depend", "catkin"], *(["exec_depend", d] for d in depends)]
                 },
                 "cmake": {"calls": list(calls or self.calls())},
-                "files": [
-                    {"path": "package.xml"},
-                    {"path": "CMakeLists.txt"},
-                    {"path": self.launch},
-                    *({"path": path, "shebang": SHEBANG} for path in scripts),
-                ],
-                "launch_files": [file.model_dump() for file in parse_launch_files(texts, (self.package,))],
             },
+        }
+
+    def _files(self, scripts: tuple[str, ...], launch: str) -> dict[str, Any]:
+        texts = {self.launch: (launch or self.launch_text).encode()}
+        return {
+            "files": [
+                {"path": "package.xml"},
+                {"path": "CMakeLists.txt"},
+                {"path": self.launch},
+                *({"path": path, "shebang": SHEBANG} for path in scripts),
+            ],
+            "launch_files": [file.model_dump() for file in parse_launch_files(texts, (self.package,))],
         }
 
     def calls(self, *scripts: str) -> tuple[list[str], ...]:

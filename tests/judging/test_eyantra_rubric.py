@@ -54,7 +54,6 @@ def submission(
         assert old in texts[f"launch/{name}"]
         texts[f"launch/{name}"] = texts[f"launch/{name}"].replace(old, new)
     files = parse_launch_files({path: text.encode() for path, text in texts.items()}, ("pkg_ros_basics",))
-    scripts = ("scripts/node_hello_ros.py", "scripts/node_param_get_set.py")
     return {
         "runs": {
             "programs": {"outcome": "ended"},
@@ -82,21 +81,24 @@ def submission(
             },
             "package": {"processes": [{"name": "catkin_make", "role": "build", "exit_code": 0}]},
         },
-        "package": {
-            "name": "pkg_ros_basics",
-            "manifest": {
-                "dependencies": [["buildtool_depend", "catkin"], *(["exec_depend", d] for d in depends)]
-            },
-            "cmake": {
-                "calls": [["project", "pkg_ros_basics"], ["find_package", "catkin"], ["catkin_package"]]
-            },
-            "files": [
-                {"path": "config/config_my.yaml", "executable": False},
-                {"path": "launch/webpage_launch.sh", "shebang": "#!/bin/bash"},
-                *({"path": path, "shebang": SHEBANG} for path in scripts),
-            ],
-            "launch_files": [file.model_dump() for file in files],
+        "package": _package(depends, [file.model_dump() for file in files]),
+    }
+
+
+def _package(depends: tuple[str, ...], launch_files: list[dict[str, Any]]) -> dict[str, Any]:
+    scripts = ("scripts/node_hello_ros.py", "scripts/node_param_get_set.py")
+    return {
+        "name": "pkg_ros_basics",
+        "manifest": {
+            "dependencies": [["buildtool_depend", "catkin"], *(["exec_depend", d] for d in depends)]
         },
+        "cmake": {"calls": [["project", "pkg_ros_basics"], ["find_package", "catkin"], ["catkin_package"]]},
+        "files": [
+            {"path": "config/config_my.yaml", "executable": False},
+            {"path": "launch/webpage_launch.sh", "shebang": "#!/bin/bash"},
+            *({"path": path, "shebang": SHEBANG} for path in scripts),
+        ],
+        "launch_files": launch_files,
     }
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from grader.judging import judge, reached_pass_mark, total_points
-from tests.judging.labs import STOPPED, assert_sound, lost_of, rubric_of
+from tests.judging.labs import SHEBANG, STOPPED, assert_sound, lost_of, rubric_of
 from tests.support.timeline import build_runs
 
 POINTS = {
@@ -32,60 +32,60 @@ ADVICE = {"dependencies": 0, "talker-name": 0}
 RUBRIC = rubric_of("leeds-comp3631-lab1")
 NUMBERS = {"topic": "/numeric_chatter", "type": "std_msgs/Int8", "callerid": "/numeric_talker"}
 
+PACKAGE = {
+    "manifest": {
+        "dependencies": [["buildtool_depend", "catkin"], ["depend", "rospy"], ["depend", "std_msgs"]]
+    },
+    "cmake": {"calls": [["project", "lab1"], ["find_package", "catkin"], ["catkin_package"]]},
+    "files": [{"path": f"src/numeric_{n}.py", "shebang": SHEBANG} for n in ("talker", "listener")],
+    "launch_files": [{"path": "launch/lab1.launch"}],
+}
+
 
 def submission(last: int = 127, **numbers: Any) -> dict[str, Any]:
     values = {"count_from": 0, "wrap_after": last}
     counter = {**NUMBERS, "values": values, **numbers}
-    script = "#!/usr/bin/env python"
+    return {"runs": _runs(counter), "package": PACKAGE}
+
+
+def _runs(counter: dict[str, Any]) -> dict[str, Any]:
     return {
-        "runs": {
-            "talker": {
-                "topics": [
-                    {"topic": "/chatter", "callerid": "/numeric_talker", "count": 61},
-                    {**counter, "count": 61},
-                ],
-                "processes": [
-                    {"name": "talker", "script": "src/numeric_talker.py", "exit_s": 6.9, **STOPPED}
-                ],
-                "actors": [{"action": "interrupt", "actor": "grader", "detail": "talker", "at_s": 6.6}],
-            },
-            "wraps": {
-                "clock": "warped",
-                "warp": 20,
-                "topics": [{**counter, "count": 258, "rate_hz": 200}],
-                "processes": [{"name": "talker", **STOPPED}],
-            },
-            "listener": {
-                "processes": [{"name": "listener", **STOPPED}],
-                "actors": [
-                    {"action": "publish", "topic": "/chatter", "values": ["qwertz", "asdfgh"], "at_s": 1},
-                    {
-                        "action": "publish",
-                        "topic": "/numeric_chatter",
-                        "values": [5, -128, 0, 127],
-                        "at_s": 2,
-                    },
-                ],
-                "console": [
-                    {"process": "listener", "lines": ["I heard qwertz", "I heard asdfgh"], "at_s": 1.01},
-                    {"process": "listener", "lines": ["5", "-128", "0", "127"], "at_s": 2.01},
-                ],
-            },
-            "launch": {
-                "topics": [{"topic": "/chatter", "callerid": "/talker"}],
-                "subscribers": {"/chatter": ["/listener"]},
-                "processes": [{"name": "roslaunch", **STOPPED}],
-            },
-            "package": {"processes": [{"name": "catkin_make", "role": "build", "exit_code": 0}]},
+        "talker": {
+            "topics": [
+                {"topic": "/chatter", "callerid": "/numeric_talker", "count": 61},
+                {**counter, "count": 61},
+            ],
+            "processes": [{"name": "talker", "script": "src/numeric_talker.py", "exit_s": 6.9, **STOPPED}],
+            "actors": [{"action": "interrupt", "actor": "grader", "detail": "talker", "at_s": 6.6}],
         },
-        "package": {
-            "manifest": {
-                "dependencies": [["buildtool_depend", "catkin"], ["depend", "rospy"], ["depend", "std_msgs"]]
-            },
-            "cmake": {"calls": [["project", "lab1"], ["find_package", "catkin"], ["catkin_package"]]},
-            "files": [{"path": f"src/numeric_{n}.py", "shebang": script} for n in ("talker", "listener")],
-            "launch_files": [{"path": "launch/lab1.launch"}],
+        "wraps": {
+            "clock": "warped",
+            "warp": 20,
+            "topics": [{**counter, "count": 258, "rate_hz": 200}],
+            "processes": [{"name": "talker", **STOPPED}],
         },
+        "listener": {
+            "processes": [{"name": "listener", **STOPPED}],
+            "actors": [
+                {"action": "publish", "topic": "/chatter", "values": ["qwertz", "asdfgh"], "at_s": 1},
+                {
+                    "action": "publish",
+                    "topic": "/numeric_chatter",
+                    "values": [5, -128, 0, 127],
+                    "at_s": 2,
+                },
+            ],
+            "console": [
+                {"process": "listener", "lines": ["I heard qwertz", "I heard asdfgh"], "at_s": 1.01},
+                {"process": "listener", "lines": ["5", "-128", "0", "127"], "at_s": 2.01},
+            ],
+        },
+        "launch": {
+            "topics": [{"topic": "/chatter", "callerid": "/talker"}],
+            "subscribers": {"/chatter": ["/listener"]},
+            "processes": [{"name": "roslaunch", **STOPPED}],
+        },
+        "package": {"processes": [{"name": "catkin_make", "role": "build", "exit_code": 0}]},
     }
 
 

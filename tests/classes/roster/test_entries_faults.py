@@ -10,33 +10,34 @@ from grader.classes.roster.entries import OUT
 from grader.model.batch import RosterFault
 from tests.classes.roster.helpers import ids, read, said
 
+FAULTY = (
+    "id,source,submitted_at,extension_days\n"
+    ",d,,\n"
+    "bob,,,\n"
+    "cem,../../secret,,\n"
+    "dan,d,yesterday,many\n"
+    "eva,d,20/11/2026 23:59,\n"
+    "fay,d,,-1\n"
+    'gil,"a\nb",,\n'
+    "HUI,d,,\n"
+    "hui,d,,\n"
+    "ida,d,,,,more\n"
+    "jan,d,2026-01-01,1.5\n"
+    "kim,handed-in/kim.zip,,\n"
+    "lea,\\\\server\\share\\lea,,\n"
+    "max,C:/Users/max,,\n"
+    "noa,github.com/noa/lab1,,\n"
+    "!!!,d,,\n"
+    f"{'o' * 256},d,,\n"
+    "pia,p\0a,,\n"
+    '"q\nr",d,,\n'
+    "hui,,,\n"
+)
+
 
 def test_every_fault_by_its_line(tmp_path: Path) -> None:
     (tmp_path / "d").mkdir()
-    text = (
-        "id,source,submitted_at,extension_days\n"
-        ",d,,\n"
-        "bob,,,\n"
-        "cem,../../secret,,\n"
-        "dan,d,yesterday,many\n"
-        "eva,d,20/11/2026 23:59,\n"
-        "fay,d,,-1\n"
-        'gil,"a\nb",,\n'
-        "HUI,d,,\n"
-        "hui,d,,\n"
-        "ida,d,,,,more\n"
-        "jan,d,2026-01-01,1.5\n"
-        "kim,handed-in/kim.zip,,\n"
-        "lea,\\\\server\\share\\lea,,\n"
-        "max,C:/Users/max,,\n"
-        "noa,github.com/noa/lab1,,\n"
-        "!!!,d,,\n"
-        f"{'o' * 256},d,,\n"
-        "pia,p\0a,,\n"
-        '"q\nr",d,,\n'
-        "hui,,,\n"
-    )
-    roster = read(tmp_path, text)
+    roster = read(tmp_path, FAULTY)
     assert said(roster) == [
         "roster.csv:2: no id",
         "roster.csv:3: no source",
