@@ -10,12 +10,12 @@ from typing import NamedTuple
 from grader.checks.registry import NoParams, check
 from grader.checks.support.build_errors import UNKNOWN_COMMAND, explain_error_of_build
 from grader.checks.support.build_output import FIRST_ERROR_HINT, first_error
-from grader.checks.support.cpp_errors import CPP_SUFFIXES
 from grader.checks.support.exit_causes import RUN_IT, explain_end
 from grader.checks.support.launch import IGNORE
 from grader.checks.support.processes import NO_SCRIPT_HINT, Life, lives
 from grader.checks.support.scripts import (
     BUILD_FIRST_HINT,
+    CPP_SUFFIXES,
     add_hint,
     cmake_calls,
     copies_of,

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 from grader.checks.executable import ExecutableParams, executable
 from grader.checks.registry import LaunchName, ProgramName, check
-from grader.checks.support.cpp_errors import CPP_SUFFIXES
 from grader.checks.support.launch import (
     console_lines,
     died,
@@ -37,7 +36,7 @@ from grader.checks.support.launch_slips import (
     refusals,
     starts_built,
 )
-from grader.checks.support.scripts import RIGHT_SHEBANG, add_hint, find_script, programs
+from grader.checks.support.scripts import CPP_SUFFIXES, RIGHT_SHEBANG, add_hint, find_script, programs
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run

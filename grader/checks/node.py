@@ -7,7 +7,6 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.checks.registry import NodeName, ProcessName, Refers, check
-from grader.checks.support.cpp_errors import slips_of_program
 from grader.checks.support.exit_causes import (
     explain_end,
     explain_traceback,
@@ -33,6 +32,7 @@ from grader.checks.support.processes import (
     was_talking,
     wrong_name,
 )
+from grader.checks.support.scripts import slips_of_program
 from grader.checks.support.text import ANONYMOUS, INIT, LOOP, both
 from grader.checks.support.topics import cite, run_slip
 from grader.evidence.run import Run

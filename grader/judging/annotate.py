@@ -14,11 +14,18 @@ from pathlib import PurePosixPath
 from typing import NamedTuple, TypeVar
 
 from grader.checks.messages import code_of
-from grader.checks.support.cpp_errors import CPP_SUFFIXES
 from grader.checks.support.exit_causes import syntax_hint
 from grader.checks.support.launch import not_executable
 from grader.checks.support.launch_slips import node_slip, own_script
-from grader.checks.support.scripts import BACKUPS, PYTHON, SYNTAX, installed, is_product, names_script
+from grader.checks.support.scripts import (
+    BACKUPS,
+    CPP_SUFFIXES,
+    PYTHON,
+    SYNTAX,
+    installed,
+    is_product,
+    names_script,
+)
 from grader.checks.support.text import RATE_SLOT, TYPE_SLOT, VALUE_SLOT, in_language
 from grader.evidence.events import PACKAGE_RUN
 from grader.installable import noetic_messages

@@ -15,11 +15,10 @@ from grader.checks.build import run_hint
 from grader.checks.reacts import ReactsParams
 from grader.checks.registry import Check, Evidence
 from grader.checks.support.build_errors import unreadable_file
-from grader.checks.support.cpp_errors import CPP_SUFFIXES
 from grader.checks.support.exit_causes import syntax_hint
 from grader.checks.support.launch_slips import own_script, read_launch
 from grader.checks.support.processes import ended_programs, failed_program, plain_type
-from grader.checks.support.scripts import SYNTAX, find_script, programs, syntax_fault
+from grader.checks.support.scripts import CPP_SUFFIXES, SYNTAX, find_script, programs, syntax_fault
 from grader.checks.support.text import Language, near_names, texts_in
 from grader.checks.support.topics import unheard_programs
 from grader.evidence.events import PACKAGE_RUN, RECORDING_MISSING, RECORDING_PROBLEM

@@ -43,7 +43,8 @@ def find_slip(text: str, number: int) -> LineSlip | None:
     last = min(len(lines), number + _CALL_LINES_MAX)
     near = [number, *range(number + 1, last + 1), *range(first, number)]
     slips = (
-        *_habits_of_c(lines),
+        *_other_comments(lines),
+        *_ends_of_c(lines),
         *(one for n in near for one in _slips_in(lines, n)),
         *doubled_and_turned(lines, near),
     )

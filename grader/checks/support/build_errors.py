@@ -18,13 +18,12 @@ from grader.checks.support.build_output import (
 )
 from grader.checks.support.cpp_errors import (
     CPP_ERRORS,
-    CPP_SUFFIXES,
     missing_header,
     missing_link,
     other_namespace,
     programs_without,
 )
-from grader.checks.support.scripts import OF_FILES, OF_INTERFACES, cmake_calls, installed
+from grader.checks.support.scripts import CPP_SUFFIXES, OF_FILES, OF_INTERFACES, cmake_calls, installed
 from grader.checks.support.text import near_names, shown
 from grader.installable import (
     LIBRARIES,

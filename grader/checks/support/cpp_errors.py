@@ -1,5 +1,4 @@
-"""What the compiler and the linker say of a C++ source, in a student's words, and what to do; and what a program lacks
-that they accept."""
+"""What the compiler and the linker say of a C++ source, in a student's words, and what to do."""
 
 from __future__ import annotations
 
@@ -8,14 +7,12 @@ import re
 from collections.abc import Sequence
 
 from grader.checks.support.build_output import FIRST_ERROR_HINT, Explain, Explained, told
-from grader.checks.support.scripts import cmake_calls
+from grader.checks.support.scripts import CPP_SUFFIXES, cmake_calls
 from grader.checks.support.text import near_names
 from grader.model.package import CMAKE, PackageFacts
-from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.verdict import FileCitation
 from grader.wording import ON_THE_MACHINE, on_lines
 
-CPP_SUFFIXES = (".c", ".cc", ".cpp", ".cxx")
 STANDARD = {
     **dict.fromkeys(("cout", "cin", "cerr", "endl"), "iostream"),
     **dict.fromkeys(("string", "to_string", "stoi"), "string"),
@@ -242,27 +239,3 @@ def missing_link(found: re.Match[str], _package: PackageFacts, _lines: Sequence[
     why = f"it is linked with the library {found[1]}, which this grading machine lacks"
     hint = f"{ON_THE_MACHINE}install the library {found[1]}, then grade again"
     return Explained(why, hint, of_machine=True)
-
-
-def slips_of_program(argv: Sequence[str], package: PackageFacts, kind: SlipKind) -> list[PythonSlip]:
-    """Return the slips of this kind in the sources of the program of this command line."""
-    calls = [
-        c
-        for c in cmake_calls(package, "add_executable")
-        if c.args[:1] == (posixpath.basename("".join(argv[:1])),)
-    ]
-    made = {file for call in calls for file in call.args[1:]}
-    return [slip for slip in package.slips if slip.kind == kind and slip.file in made]
-
-
-def argument_not_given(
-    ended: str, argv: Sequence[str], package: PackageFacts
-) -> tuple[str, str, tuple[FileCitation, ...]] | None:
-    """Return the cause, the hint and the place where the program of this command line reads an argument that it does
-    not get. Remappings are ROS's."""
-    words = [one for one in argv if ":=" not in one]
-    for slip in slips_of_program(words, package, "no-argument"):
-        if int(slip.name) >= len(words):
-            place = FileCitation(file=slip.file, line=slip.line)
-            return f"{ended}: {slip.message}, and gets none", slip.fix, (place,)
-    return None

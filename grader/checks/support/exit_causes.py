@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 from grader.checks.registry import Check
 from grader.checks.support.console_output import Traceback, tracebacks, unpack_traceback
-from grader.checks.support.cpp_errors import argument_not_given
 from grader.checks.support.exceptions import (
     OF_ROSCPP,
     SLIPS,
@@ -47,6 +46,7 @@ from grader.checks.support.scripts import (
     BUILD_FIRST_HINT,
     OF_INTERFACES,
     SYNTAX,
+    argument_not_given,
     copies_of,
     move_hint,
     path_in_package,

@@ -8,9 +8,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.checks.support.cpp_errors import CPP_SUFFIXES
 from grader.checks.support.scripts import (
     BUILD_FIRST_HINT,
+    CPP_SUFFIXES,
     add_hint,
     can_be_moved,
     cmake_calls,

@@ -1,4 +1,4 @@
-"""Scripts and other files of a package: where they lie, and what `CMakeLists.txt` installs."""
+"""Scripts, C++ programs and other files of a package: where they lie, and what `CMakeLists.txt` makes and installs."""
 
 from __future__ import annotations
 
@@ -9,9 +9,12 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.model.package import CMakeCall, Executable, Fault, PackageFacts, SourceFile
+from grader.model.python_slip import PythonSlip, SlipKind
+from grader.model.verdict import FileCitation
 from grader.wording import has_role_of, is_role
 
 PYTHON = "catkin_install_python"
+CPP_SUFFIXES = (".c", ".cc", ".cpp", ".cxx")
 BUILD_FIRST_HINT = "first get the build to pass: catkin_make"
 RIGHT_SHEBANG = "#!/usr/bin/env python3"
 NODE_FOLDERS = ("scripts", "src", "nodes", "bin")
@@ -139,6 +142,26 @@ def cmake_calls(package: PackageFacts, *names: str) -> tuple[CMakeCall, ...]:
 def programs(package: PackageFacts) -> tuple[Executable, ...]:
     """Return the programs that CMake makes, in the order of their calls."""
     return package.cmake.executables if package.cmake else ()
+
+
+def slips_of_program(argv: Sequence[str], package: PackageFacts, kind: SlipKind) -> list[PythonSlip]:
+    """Return the slips of this kind in the sources of the program of this command line."""
+    program = posixpath.basename(argv[0]) if argv else ""
+    calls = [call for call in cmake_calls(package, "add_executable") if call.args[:1] == (program,)]
+    sources = {file for call in calls for file in call.args[1:]}
+    return [slip for slip in package.slips if slip.kind == kind and slip.file in sources]
+
+
+def argument_not_given(
+    ended: str, argv: Sequence[str], package: PackageFacts
+) -> tuple[str, str, tuple[FileCitation, ...]] | None:
+    """Return the cause, the hint and the place where the program of this command line reads an argument that it does
+    not get. Remappings are ROS's."""
+    words = [one for one in argv if ":=" not in one]
+    for slip in slips_of_program(words, package, "no-argument"):
+        if int(slip.name) >= len(words):
+            return f"{ended}: {slip.message}, and gets none", slip.fix, (slip.place,)
+    return None
 
 
 def is_elsewhere(program: Executable, package: PackageFacts) -> bool:
