@@ -52,34 +52,35 @@ def find_slip(text: str, number: int) -> LineSlip | None:
 
 
 _OTHER_COMMENT = re.compile(r"^([^#\"]*\)\s*(?=//)|\s*)(//|/\*|<!--|--|%)")
+_OF_ARGUMENTS = {"--", "%"}
+"""What an argument may begin with too, as in `--option`."""
 _END_OF_C = re.compile(r"(?<=\))\s*;(?=\s*(?:#|$))")
 
 
-def _habits_of_c(lines: list[str]) -> Iterator[LineSlip]:
-    """Yield the text with `#` for what begins comments in other languages, and the one without `;` behind commands, on
-    all of its lines."""
-    changed, signs, inside, depth = dict[int, str](), dict[str, None](), False, 0
+def _other_comments(lines: list[str]) -> Iterator[LineSlip]:
+    """Yield the text with `#` for what begins comments in other languages, on all of its lines."""
+    changed, signs, depth, is_inside = dict[int, str](), dict[str, None](), 0, False
     for number, line in enumerate(lines, 1):
-        hit = _OTHER_COMMENT.match(line)
-        if hit and depth > 0 and hit[2] in {"--", "%"}:  # `--option`, an argument
+        _, end, behind = line.partition("*/")
+        # a command may stand behind the comment
+        hit = None if behind.strip() else _OTHER_COMMENT.match(line)
+        if hit and depth > 0 and hit[2] in _OF_ARGUMENTS:
             hit = None
-        if "*/" in line and line.split("*/", 1)[1].strip():
-            hit, inside = None, False  # a command may stand behind the comment
-        if hit or inside:
-            changed[number] = (
-                f"# {line.strip()}" if inside or hit is None else _OTHER_COMMENT.sub(r"\1#", line)
-            )
-            signs |= {f"`{hit[2]}`": None} if hit and not inside else {}
-        code = "" if number in changed and not (hit and hit[1]) else line.partition("#")[0]
+        if is_inside and not behind.strip():
+            changed[number], code = f"# {line.strip()}", ""
+        elif hit:
+            changed[number], code = _OTHER_COMMENT.sub(r"\1#", line), hit[1]
+            signs[f"`{hit[2]}`"] = None
+        else:
+            code = line.partition("#")[0]
         depth += code.count("(") - code.count(")")
-        inside = "*/" not in line and (inside or (hit is not None and hit[2] == "/*"))
-    begun = join_words(signs, "or")
-    yield from _changed_lines(
-        lines,
-        changed,
-        f"a comment begins with `#`, and not with {begun}",
-        "write `#` where the comment begins",
-    )
+        is_inside = not end and (is_inside or (hit is not None and hit[2] == "/*"))
+    why = f"a comment begins with `#`, and not with {join_words(signs, 'or')}"
+    yield from _changed_lines(lines, changed, why, "write `#` where the comment begins")
+
+
+def _ends_of_c(lines: list[str]) -> Iterator[LineSlip]:
+    """Yield the text without the `;` that C has behind a command, on all of its lines."""
     ended = {n: one for n, line in enumerate(lines, 1) if (one := _END_OF_C.sub("", line, count=1)) != line}
     yield from _changed_lines(lines, ended, "no `;` comes behind a command", "delete the `;`")
 

@@ -301,6 +301,11 @@ def test_a_name_that_only_cmake_knows_may_be_any(tmp_path):
         ('set(x "http://a;b")\nproject(x)\n', "", ""),
         ("foo(\n  --option\n  % b\n)\n", "", ""),
         ("-- a\nfoo(\n  --option\n)\n", "where the comment begins", "# a\nfoo(\n  --option\n)\n"),
+        (
+            "  // see foo(\n-- a\nproject(x)\n",
+            "where the comment begins, and the same on line 2",
+            "  # see foo(\n# a\nproject(x)\n",
+        ),
     ],
 )
 def test_what_other_languages_write_is_put_right_on_all_lines(text, fix, after):
