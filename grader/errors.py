@@ -22,6 +22,7 @@ Each carries one line that says what is wrong and, as `hint`, what to do about i
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from enum import IntEnum
 from typing import Literal
 
@@ -133,3 +134,15 @@ class OutputLost(HostError):
 
 class Busy(HostError):
     kind = "busy"
+
+
+def blame(kind: str) -> Blame:
+    """Return whose fault an error of this kind is."""
+    # kinds without a class, such as `killed` and `worker-lost`, are the grader's own
+    return next((found.blame for found in _kinds(GraderError) if found.kind == kind), "grader")
+
+
+def _kinds(error: type[GraderError]) -> Iterator[type[GraderError]]:
+    yield error
+    for below in error.__subclasses__():
+        yield from _kinds(below)

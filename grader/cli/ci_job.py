@@ -30,9 +30,10 @@ from grader.integrations.ci_results import (
 from grader.integrations.ci_systems import RUNNERS, JobSettings, read_settings, with_pass_mark
 from grader.judging.summary import overall_status, total_fields
 from grader.model.result import GradingResult
+from grader.report.hidden_criteria import hidden_ids, without_hidden
 from grader.report.sentences import rubric_words, without_sandbox
 from grader.report.terminal import Terminal, open_console
-from grader.report.view import hidden_ids, is_students_fault, without_hidden
+from grader.report.view import is_students_fault
 from grader.results import RESULT, read_result
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric

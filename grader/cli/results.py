@@ -43,10 +43,10 @@ from grader.portable import cores
 from grader.report.class_page.page import write_class_page
 from grader.report.class_page.submissions import salt_in
 from grader.report.forms import FORMS, ReportInput
+from grader.report.hidden_criteria import without_hidden
 from grader.report.sentences import missing_hidden
 from grader.report.terminal import Terminal, emit, open_console
 from grader.report.text import line
-from grader.report.view import without_hidden
 from grader.results import RESULT, load_result
 from grader.rubric.find import named_labs
 from grader.rubric.load import LoadedRubric, load_rubric

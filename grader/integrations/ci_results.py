@@ -16,10 +16,11 @@ from grader.files import atomic_write, make_folder
 from grader.judging.summary import scaled_pass_mark
 from grader.model.result import GradingResult
 from grader.report.forms import FORMS, ReportInput
+from grader.report.hidden_criteria import hidden_ids
 from grader.report.losses import arrange
 from grader.report.markdown import render_markdown
 from grader.report.sentences import RUBRIC_FROM
-from grader.report.view import hidden_ids, is_students_fault
+from grader.report.view import is_students_fault
 from grader.results import EVIDENCE, RESULT
 from grader.rubric.model import Rubric
 from grader.wording import number

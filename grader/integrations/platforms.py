@@ -22,10 +22,10 @@ from grader.integrations.bundle import (
     wheel,
 )
 from grader.model.result import CriterionResult, GradingResult
+from grader.report.hidden_criteria import hidden_ids
 from grader.report.platforms import LIMIT, LOOK, render_gradescope
 from grader.report.sentences import STATES, score_words, without_sandbox
 from grader.report.text import html, line, text_limit
-from grader.report.view import hidden_ids
 from grader.rubric.load import LoadedRubric
 from grader.wording import number
 

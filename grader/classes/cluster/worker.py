@@ -29,11 +29,10 @@ import pydantic
 
 import grader
 from grader.classes.batch.job import GradingJob, SubmissionOutcome, grade_job, outcome_of_ended
-from grader.errors import GraderError, HostError, UsageError
+from grader.errors import GraderError, HostError, UsageError, blame
 from grader.files import make_folder, temporary_folder
 from grader.intake.names import safe_name
 from grader.model.record import Record
-from grader.report.view import blame
 from grader.ros_env import find_ros
 from grader.workers import Worker, WorkerEnded, WorkerLimits
 

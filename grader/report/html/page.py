@@ -13,21 +13,21 @@ from typing import TypeVar
 from jinja2 import Template
 from markupsafe import Markup
 
+from grader.errors import blame
 from grader.evidence.events import PACKAGE_RUN
 from grader.model.figure import Figure, Figures
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import FileCitation, Status
 from grader.report import losses, sentences
+from grader.report.hidden_criteria import hidden_ids
 from grader.report.html.figures import Drawer, Drawn, code_places
 from grader.report.html.shell import environment, policy, prose, script, style
 from grader.report.losses import Loss
 from grader.report.text import line
 from grader.report.view import (
-    blame,
     commands_in,
     file_places,
     headline,
-    hidden_ids,
     hint_beside,
     not_graded,
     of_points,

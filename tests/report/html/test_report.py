@@ -15,7 +15,7 @@ from hypothesis import given
 from lxml import html as parser
 
 from grader.checks import CHECKS
-from grader.errors import GraderError
+from grader.errors import GraderError, blame
 from grader.model.figure import Figures
 from grader.model.result import ErrorInfo, GradingResult, Lateness, Note
 from grader.model.verdict import FileCitation, Mistake, Status
@@ -23,7 +23,6 @@ from grader.report.html.page import BYTES_MAX, render_html
 from grader.report.html.shell import policy, script
 from grader.report.sentences import FAULTS, MINUS
 from grader.report.text import code_parts, line, visible
-from grader.report.view import blame
 from tests.report.anything import FIELDS, HUGE, SOME, decided, of, results, spoiled
 from tests.report.hostile import CRITERIA, result, rubric
 from tests.report.html.made import SCRIPT, code, console, figures, graph, hostile_figures
