@@ -18,7 +18,7 @@ from grader.faults import fault_of
 from grader.files import atomic_write, make_folder
 from grader.intake.source import Source, parse_source
 from grader.integrations.bundle import BundleSettings, ContainerLayout, LostModes, read_settings
-from grader.integrations.platforms import GRADESCOPE, PRAIRIELEARN
+from grader.integrations.platform_exports import GRADESCOPE, PRAIRIELEARN
 from grader.model.result import GradingResult, Silence
 from grader.report.terminal import Terminal, open_console
 from grader.report.text import json_text, line

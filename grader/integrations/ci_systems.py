@@ -25,7 +25,7 @@ from grader.intake.names import is_package_name
 from grader.integrations.ci_results import OF_CODE, TITLES, JobResult, JobStatus, summarize
 from grader.model import SandboxMode
 from grader.report.findings import EACH_MAX, Severity, github_annotation, render_annotations
-from grader.report.platforms import render_classroom
+from grader.report.platform_results import render_classroom
 from grader.report.text import line, markdown
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric

@@ -120,11 +120,13 @@ _FORMS = (
         "the same for GitHub: commands that a step prints",
         cites_lines=True,
     ),
-    Form("gradescope", "gradescope.json", "platforms:render_gradescope", "Gradescope's `results.json`"),
+    Form(
+        "gradescope", "gradescope.json", "platform_results:render_gradescope", "Gradescope's `results.json`"
+    ),
     Form(
         "classroom",
         "classroom.txt",
-        "platforms:render_classroom",
+        "platform_results:render_classroom",
         "GitHub Classroom's autograding reporter: a line of base64 for its `<ID>_RESULTS`, always without "
         "hidden criteria",
         cites_lines=True,

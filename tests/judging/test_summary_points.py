@@ -16,7 +16,7 @@ from grader.report.hidden_criteria import without_hidden
 from grader.report.junit import render_junit
 from grader.report.losses import arrange
 from grader.report.markdown import render_markdown
-from grader.report.platforms import render_classroom, render_gradescope
+from grader.report.platform_results import render_classroom, render_gradescope
 from grader.report.terminal import Terminal, open_console
 from grader.report.view import points_of
 from grader.rubric.model import Rubric

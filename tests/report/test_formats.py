@@ -25,7 +25,7 @@ from grader.report.findings import findings, render_annotations, render_sarif, r
 from grader.report.forms import FORMS
 from grader.report.junit import render_junit
 from grader.report.markdown import BYTES_MAX, EDGES_MAX, PARTS_MAX, mermaid, render_markdown
-from grader.report.platforms import render_gradescope
+from grader.report.platform_results import render_gradescope
 from tests.report import hostile
 from tests.report.nasty import STEERING, TO_A_CI
 from tests.report.worst import DOCS, LONG, MERMAID, MORE, TEXTS, figures, rubric, worst

@@ -10,7 +10,7 @@ import pytest
 
 from grader.arena.control_groups import Cgroups
 from grader.arena.sandbox import Sandbox
-from grader.integrations.platforms import GRADESCOPE
+from grader.integrations.platform_exports import GRADESCOPE
 from grader.judging.summary import NOTHING_RUN
 from grader.model.figure import Figures
 from grader.model.result import GradingResult

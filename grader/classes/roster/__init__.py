@@ -34,7 +34,7 @@ A new kind takes
    (`entries.py` has `gather`, `entries_of` and the checks of paths), with `modes_lost=True` where files lost their
    executable bits on the way;
 2. a line here, before the kinds that would take its paths too;
-3. where it comes packed as one file: `is_download` and `unpack_download` (`platforms.py`);
+3. where it comes packed as one file: `is_download` and `unpack_download` (`exports.py`);
 4. an example in `tests/classes/roster/`, and its section in `docs/how-to/rosters.md`.
 """
 

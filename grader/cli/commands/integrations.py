@@ -70,7 +70,7 @@ def export_gradescope(
     with loading():
         from grader.cli.output import say
         from grader.files import atomic_write
-        from grader.integrations.platforms import gradescope_autograder
+        from grader.integrations.platform_exports import gradescope_autograder
         from grader.rubric.load import load_rubric
     rubric = load_rubric(lab)
     settings = _settings(minutes, package, sandbox, assume_executable=assume_executable)
@@ -106,7 +106,7 @@ def export_prairielearn(
     """Write a question with an external grader for PrairieLearn."""
     with loading():
         from grader.cli.output import say
-        from grader.integrations.platforms import prairielearn_question, write_question
+        from grader.integrations.platform_exports import prairielearn_question, write_question
         from grader.rubric.load import load_rubric
     rubric = load_rubric(lab)
     settings = _settings(minutes, package, sandbox, assume_executable=assume_executable)

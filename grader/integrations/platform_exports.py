@@ -23,7 +23,7 @@ from grader.integrations.bundle import (
 )
 from grader.model.result import CriterionResult, GradingResult
 from grader.report.hidden_criteria import hidden_ids
-from grader.report.platforms import LIMIT, LOOK, render_gradescope
+from grader.report.platform_results import LIMIT, LOOK, render_gradescope
 from grader.report.sentences import STATES, score_words, without_sandbox
 from grader.report.text import html, line, text_limit
 from grader.rubric.load import LoadedRubric
