@@ -60,7 +60,7 @@ _COUNTED = re.compile(
 """A test whether there are arguments: there is always one, the program's name."""
 _TURNED = re.compile(r"180|rad|PI\b", re.IGNORECASE)
 """So an angle in degrees is made one in radians."""
-NEW_LINE = "\n"
+_BRACE, _BRACKET = re.compile(r"[{}]"), re.compile(r"[][(){},]")
 _WHOLE_TURN = 7
 """Of a number of radians, no one writes more."""
 
@@ -86,6 +86,7 @@ def cpp_slips(folder: Path, paths: Iterable[str]) -> tuple[PythonSlip, ...]:
 
 def slips_of(path: str, text: str) -> Iterator[PythonSlip]:
     """Yield the slips of one source, in the order of their kinds."""
+    # blanks of the same length, so that each place is that of the source
     code = _TEXT.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), text)
     yield from _waiting(path, code)
     yield from _unspun(path, code)
@@ -103,10 +104,10 @@ def _waiting(path: str, code: str) -> Iterator[PythonSlip]:
         found = next(_waits_in(body, code), None)
         if found is not None:
             at, message, fix = found
-            line = code.count("\n", 0, at) + 1
-            name = body.name or f"line {code.count(NEW_LINE, 0, body.start) + 1}"
-            called = f"`{name}`" if body.name else f"on {name}"
+            line, begins = _line(code, at), f"line {_line(code, body.start)}"
+            called = f"`{body.name}`" if body.name else f"on {begins}"
             words = {"message": message.format(name=called, line=line), "fix": fix.format(line=line)}
+            name = body.name or begins
             yield PythonSlip(file=path, line=line, kind="callback-waits", name=name, **words)
 
 
@@ -115,7 +116,7 @@ def _unspun(path: str, code: str) -> Iterator[PythonSlip]:
     loop = _LOOP.search(code)
     if loop is None or not _LISTENS.search(code) or _SPINS.search(code) or not _MAIN.search(code):
         return  # of a class, the file with its main() may spin
-    line = code.count("\n", 0, loop.start()) + 1
+    line = _line(code, loop.start())
     message = f"the loop on line {line} never calls ros::spinOnce(), so that no callback is ever called"
     fix = f"write `ros::spinOnce();` in the loop on line {line}"
     yield PythonSlip(file=path, line=line, kind="callback-waits", message=message, fix=fix)
@@ -125,11 +126,14 @@ def _endless(path: str, code: str) -> Iterator[PythonSlip]:
     """Yield the loops that keep a program from ending on Ctrl-C, of which roscpp only makes a note."""
     for match in _DEAF.finditer(code):
         opened = _OPENS.match(code, match.end())
-        end = _closing(code, opened.end()) if opened else match.end()
-        line = code.count("\n", 0, match.start()) + 1
+        end = end_of_block(code, opened.end()) if opened else match.end()
+        line = _line(code, match.start())
         if match["ok"] or not _ENDS.search(code, match.end(), end):
-            message = f"nothing in the loop on line {line} of {path} asks whether the node should end"
-            message = f"`{match['ok']}` has no brackets on line {line} of {path}" if match["ok"] else message
+            message = (
+                f"`{match['ok']}` has no brackets on line {line} of {path}"
+                if match["ok"]
+                else f"nothing in the loop on line {line} of {path} asks whether the node should end"
+            )
             fix = f"write `while ({match['ok'] or 'ros::ok'}())` on line {line}"
             yield PythonSlip(file=path, line=line, kind="deaf", message=message, fix=fix)
 
@@ -140,16 +144,16 @@ def _asleep(path: str, code: str) -> Iterator[PythonSlip]:
         hz = float(match["hz"] or 0)
         pause_s = 1 / hz if hz else float(match["s"] or match["n"] or 0)
         if pause_s > LONG_S:
-            line, name = code.count("\n", 0, match.start()) + 1, f"{pause_s:g}"
-            message = f"line {line} of {path} lets it sleep for {name} s at a time"
-            yield PythonSlip(file=path, line=line, kind="deaf", message=message, name=name)
+            line, pause = _line(code, match.start()), f"{pause_s:g}"
+            message = f"line {line} of {path} lets it sleep for {pause} s at a time"
+            yield PythonSlip(file=path, line=line, kind="deaf", message=message, name=pause)
 
 
 def _unasked_argument(path: str, code: str) -> Iterator[PythonSlip]:
     """Yield the first argument of the command line that is read although nothing asks whether it is there."""
     read = next(_ARGUMENT.finditer(code), None)
     if read is not None and _COUNTED.search(code) is None:
-        line, given = code.count("\n", 0, read.start()) + 1, f"argv[{read['n']}]"
+        line, given = _line(code, read.start()), f"argv[{read['n']}]"
         message = f"it reads {given} on line {line} of {path}"
         fix = f'write `argc > {read["n"]} ? {given} : "…"` there, with what it should be without an argument'
         yield PythonSlip(file=path, line=line, kind="no-argument", message=message, fix=fix, name=read["n"])
@@ -161,20 +165,20 @@ def _made_again(path: str, code: str) -> Iterator[PythonSlip]:
     for body in dict.fromkeys(_callbacks(code)):
         what = f"callback `{body.name}`" if body.name else "callback"
         if (made := _made_in(body, code)) and made["call"] == "advertise":
-            line = code.count("\n", 0, made.start("call")) + 1
+            line = _line(code, made.start("call"))
             message = f"the {what} makes another publisher each time (line {line}), and nothing is connected to it yet"
             fix = f"{once}: a global one, or a member"
             yield PythonSlip(file=path, line=line, kind="callback-waits", message=message, fix=fix)
     for loop in _LOOP.finditer(code):
         begin = _OPENS.match(code, loop.end())
-        if begin and (made := _made_in(_Body("", begin.end(), _closing(code, begin.end())), code)):
-            line = code.count("\n", 0, made.start("call")) + 1
-            message = f"the loop on line {code.count(NEW_LINE, 0, loop.start()) + 1} "
-            message += (
+        if begin and (made := _made_in(_Body("", begin.end(), end_of_block(code, begin.end())), code)):
+            line = _line(code, made.start("call"))
+            what = (
                 f"makes another publisher each time (line {line}), and nothing is connected to it yet"
                 if made["call"] == "advertise"
                 else f"subscribes again in each turn, on line {line}, and misses what comes in between"
             )
+            message = f"the loop on line {_line(code, loop.start())} {what}"
             fix = f"move line {line} above the loop"
             yield PythonSlip(file=path, line=line, kind="callback-waits", message=message, fix=fix)
 
@@ -197,7 +201,7 @@ def _callbacks(code: str) -> Iterator[_Body]:
             named = _NAMED.fullmatch(given) or _BOUND.search(given)
             if found := _LAMBDA.search(given):
                 at = start + found.end()
-                yield _Body("", at, _closing(code, at))
+                yield _Body("", at, end_of_block(code, at))
             elif named and (body := _body(named["name"].rpartition("::")[2], code)):
                 yield body
             else:
@@ -208,7 +212,7 @@ def _callbacks(code: str) -> Iterator[_Body]:
 def _arguments(code: str, start: int) -> Iterator[tuple[int, int]]:
     """Yield where each argument of a call begins and ends, whose bracket is the one before `start`."""
     depth, begin = 0, start
-    for match in re.compile(r"[][(){},]").finditer(code, start):
+    for match in _BRACKET.finditer(code, start):
         if match[0] == "," and not depth:
             yield begin, match.start()
             begin = match.end()
@@ -226,24 +230,29 @@ def _body(name: str, code: str) -> _Body | None:
     word = re.escape(name)
     head = re.search(rf"\b(?:\w+::)*{word}\s*\([^;{{}}]*\)\s*(?:const\s*)?{{", code)
     head = head or re.search(rf"\b{word}\s*=\s*{_LAMBDA.pattern}", code)
-    return _Body(name, head.end(), _closing(code, head.end())) if head else None
+    return _Body(name, head.end(), end_of_block(code, head.end())) if head else None
 
 
-def _closing(code: str, start: int) -> int:
-    """Return where the brace is that closes the one before `start`."""
-    depth = 1
-    for match in re.compile(r"[{}]").finditer(code, start):
-        depth += 1 if match[0] == "{" else -1
-        if not depth:
-            return match.start()
+def end_of_block(code: str, at: int) -> int:
+    """Return where the block ends in which a place is: its closing brace, or the end of the code."""
+    depth = 0
+    for brace in _BRACE.finditer(code, at):
+        depth += 1 if brace[0] == "{" else -1
+        if depth < 0:
+            return brace.start()
     return len(code)
+
+
+def _line(text: str, at: int) -> int:
+    """Return the number of the line, from 1, in which a place is."""
+    return text.count("\n", 0, at) + 1
 
 
 def _waits_in(body: _Body, code: str) -> Iterator[tuple[int, str, str]]:
     """Yield where the function does not come to its end, or late, with what to say and to do."""
     for match in _ENDLESS.finditer(code, body.start, body.end):
         brace = code.find("{", match.end(), body.end)
-        end = _closing(code, brace + 1) if brace >= 0 else body.end
+        end = end_of_block(code, brace + 1) if brace >= 0 else body.end
         if not _LEAVES.search(code, match.end(), end):
             yield (
                 match.start(),
@@ -269,7 +278,7 @@ def _without_main(path: str, text: str, code: str) -> Iterator[PythonSlip]:
     """A `main` that stands in a comment, where the file has no other."""
     begins = next(_DEFINES_MAIN.finditer(text), None) if not _DEFINES_MAIN.search(code) else None
     if begins is not None:
-        line = text.count("\n", 0, begins.start()) + 1
+        line = _line(text, begins.start())
         message, fix = (
             f"`main` is a comment (line {line})",
             "take `main` out of the comment, down to its last `}`",
@@ -289,6 +298,6 @@ def _degrees(path: str, code: str) -> Iterator[PythonSlip]:
             fix = f"write `{match['call']}({given} * M_PI / 180)`"
         else:
             continue
-        line = code.count("\n", 0, match.start()) + 1
+        line = _line(code, match.start())
         message = f"`{match['call']}` takes radians, and gets degrees"
         yield PythonSlip(file=path, line=line, kind="wrong-value", message=message, fix=fix, name="degrees")

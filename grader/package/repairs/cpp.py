@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+from grader.package.cpp import end_of_block
 from grader.package.repairs.editing import Files
 
 SPIN = "ros::spin();"
@@ -25,6 +26,7 @@ _LOCAL = re.compile(
 )
 _FUNCTION = re.compile(r"\b(?P<name>~?\w+)\s*\([^;{}]*\)\s*(?:const\s*)?(?::[^;{}]*)?$")
 _BLOCK = frozenset({"if", "while", "for", "switch", "catch"})
+HEAD_CHARS_MAX = 500
 
 
 def repair_cpp(files: Files, path: str) -> None:
@@ -41,7 +43,7 @@ def _keep_locals(files: Files, path: str) -> None:
     lines = text.split("\n")
     for found in _LOCAL.finditer(code):
         function = _function_around(code, found.start())
-        body = code[found.end() : _end_of(code, found.end())]
+        body = code[found.end() : end_of_block(code, found.end())]
         used = re.search(rf"\b{found['name']}\b|\b(?:spin|ok|while|waitForShutdown)\b", body)
         if function in ("", "main") or used:
             continue
@@ -49,8 +51,10 @@ def _keep_locals(files: Files, path: str) -> None:
         line = lines[number - 1]
         lines[number - 1] = f"{found['indent']}static {line.lstrip()}"
         what = "subscription" if found["call"] == "subscribe" else "service"
-        message = f"line {number} of {path}: {found['name']} is a variable of the function {function}"
-        message += f", and the {what} ends with it"
+        where = f"line {number} of {path}"
+        message = (
+            f"{where}: {found['name']} is a variable of the function {function}, and the {what} ends with it"
+        )
         fix = f"make {found['name']} a member of the class, or write `static` before it"
         files.change("missing-call", path, "\n".join(lines), message, fix)
 
@@ -66,19 +70,6 @@ def _function_around(code: str, at: int) -> str:
     return ""
 
 
-def _end_of(code: str, at: int) -> int:
-    """Return where the block ends in which a place is."""
-    depth = 0
-    for brace in re.compile(r"[{}]").finditer(code, at):
-        depth += 1 if brace[0] == "{" else -1
-        if depth < 0:
-            return brace.start()
-    return len(code)
-
-
-HEAD_CHARS_MAX = 500
-
-
 def _keep_subscribers(files: Files, path: str) -> None:
     """Give a name to what `nh.subscribe(…);` returns."""
     text = files.text(path) or ""
@@ -91,9 +82,10 @@ def _keep_subscribers(files: Files, path: str) -> None:
         kind, name = KEPT[found["name"]]
         name = name if not re.search(rf"\b{name}\b", text) else f"{name}_{number + 1}"
         lines[number] = f"{found['indent']}{kind} {name} = {found['call']}"
-        call = f"{found['name']}(…)"
-        message = f"line {number + 1} of {path}: what {call} returns is dropped, and with it the "
-        message += "subscription" if found["name"] == "subscribe" else "service"
+        what = "subscription" if found["name"] == "subscribe" else "service"
+        message = (
+            f"line {number + 1} of {path}: what {found['name']}(…) returns is dropped, and with it the {what}"
+        )
         files.change("missing-call", path, "\n".join(lines), message)
 
 
