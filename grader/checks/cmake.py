@@ -137,25 +137,30 @@ def _respell(call: CMakeCall, name: str) -> Wrong:
     return Wrong(why, f"write {name} instead of {call.name}", call.line)
 
 
-def _of_workspace(package: PackageFacts, facts: CMakeFacts, wanted: str) -> Wrong | None:
-    """Return the fault of a file that `catkin_init_workspace` made, and not of a package."""
+def _of_another(package: PackageFacts, facts: CMakeFacts, wanted: str) -> Wrong | None:
+    """Return the fault of a file that was never a package's of ROS 1: a workspace's, or one for ROS 2."""
     made = _first(facts, "catkin_workspace")
-    if made is None or _first(facts, "catkin_package") is not None:
+    found = [c for c in facts.calls if c.name == "find_package" and c.args]
+    ament = next((c for c in found if c.args[0].startswith("ament_")), None)
+    if made is not None and _first(facts, "catkin_package") is None:
+        why = f"it is the file that catkin_init_workspace makes for the folder src/ of a workspace: line {made.line}"
+        why = f"{why} calls catkin_workspace()"
+    elif ament is not None and all(c.args[0] != "catkin" for c in found):
+        made, why = ament, f"it is for a ROS 2 package: line {ament.line} finds {ament.args[0]}"
+    else:
         return None
-    declared = package.manifest.dependencies if package.manifest else ()
+    declared = package.manifest.dependencies if package.manifest and made is not ament else ()
     needs = " ".join(dict.fromkeys(d.name for d in declared if d.name != "catkin"))
-    found = f"find_package(catkin REQUIRED{f' COMPONENTS {needs}' if needs else ''})"
-    why = f"it is the file that catkin_init_workspace makes for the folder src/ of a workspace: line {made.line}"
-    lines = f"cmake_minimum_required(VERSION 3.0.2), project({wanted}), {found} and catkin_package()"
-    hint = f"write these lines in place of all of it: {lines}"
-    return Wrong(f"{why} calls catkin_workspace()", hint, made.line)
+    catkin = f"find_package(catkin REQUIRED{f' COMPONENTS {needs}' if needs else ''})"
+    lines = f"cmake_minimum_required(VERSION 3.0.2), project({wanted}), {catkin} and catkin_package()"
+    return Wrong(why, f"write these lines in place of all of it: {lines}", made.line)
 
 
 def _wrong(package: PackageFacts, facts: CMakeFacts, names: tuple[str, str]) -> Iterator[Wrong]:
     """Yield what is wrong or missing. The names are the manifest's and the lab's, which both are to have."""
     given, wanted = names
     # All that such a file lacks follows from what it is.
-    if other := _of_workspace(package, facts, wanted):
+    if other := _of_another(package, facts, wanted):
         yield other
         return
     both = "" if given == wanted else f" here, and <name>{wanted}</name> in package.xml"

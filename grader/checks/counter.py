@@ -42,8 +42,6 @@ from grader.wording import join_words, plural, significant
 CONNECT_NS = 1_000_000_000
 LARGEST = 2.0**64
 
-FIRST_STEPS = 50
-
 
 class StartParams(OnTopic):
     """Where the counting begins."""
@@ -79,8 +77,8 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
     How it is measured
         The recorder is connected before the publisher's registration returns, so the first message is not
         missed. If the first value seen is a later one and earlier ones could have been missed, this counts
-        only if a second run shows it too. In a flood of messages it does not count at all, because the
-        publisher itself may drop the first ones.
+        only if a second run shows it too. In a flood of messages the publisher itself may drop the first
+        ones: there it counts only where a line of the script shows why.
 
     How to fix
         Set the counter before the loop, publish it, and only then add one. `rostopic echo <topic>`, started
@@ -100,7 +98,10 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
 def _cite_start(
     verdict: Verdict, first: Count, run: Run, package: PackageFacts, params: StartParams
 ) -> Verdict:
-    """Return a lost verdict with the line that gives the counter its value, or adds one before it is published."""
+    """Return a lost verdict with the line that gives the counter its value, or adds one before it is published.
+
+    A flood begins before anything is connected to it, and its queue drops values: there only such a line counts.
+    """
     if verdict.status is not Status.FAIL:
         return verdict
     early = added_early(first, run, package, params.start)
@@ -111,6 +112,8 @@ def _cite_start(
     wrong = [one for one in starts if int(one.message) == value]
     # Of several such lines, or with one added first, none is known to be what made the first value.
     if len(wrong) != 1 or slips_of(package, run, first.callerid, "added-first"):
+        if first.values[0] > params.start and first.is_flood(run, params.rate_hz):
+            return judge_flood(params.topic, "drops the first values", params.rate_hz)
         return verdict
     slip = wrong[0]
     where = f"line {slip.line} of {slip.file}"
@@ -129,11 +132,6 @@ def judge_start(first: Count, run: Run, params: StartParams) -> Verdict:
         return grade_again(f"the recorder missed the first messages on {params.topic}")
     hint = f"set the counter to {params.start} before the loop, and add one after publish(…), not before"
     message = f"the first value on {params.topic} is {significant(first.values[0])}, not {params.start}"
-    # a full queue drops values again and again: where the next ones came whole, it was not full
-    drops = first.is_flood(run, params.rate_hz) and any(s.change > 1 for s in first.steps[:FIRST_STEPS])
-    if first.values[0] > params.start and drops:
-        why = f"{message}; but the node floods its topics, and in a flood the publisher's queue drops values"
-        return grade_again(why)
     verdict = failed(message, hint=hint)
     # Earlier values could have been lost in that time: another run has to show the same.
     return verdict.if_repeated() if _may_follow_others(run, first, params) else verdict

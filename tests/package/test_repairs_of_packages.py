@@ -495,6 +495,7 @@ CASES = {
         ["build-line"], "delete the calls on lines 2 and 3", after={CMAKELISTS: "\n\nproject(lab)"},
     ),
     "cmake-of-a-workspace": Case({CMAKELISTS: "project(Project)\nfind_package(catkin)\ncatkin_workspace()\n"}, []),
+    "cmake-of-ros-2": Case({CMAKELISTS: "project(lab)\nfind_package(ament_cmake REQUIRED)\nament_package()\n"}, []),
     "project-and-package-of-other-names": Case(
         {CMAKELISTS: CMAKE.replace("project(lab)", "project(other)"), XML: MANIFEST.replace(">lab<", ">lessons<"),
          LAUNCHED: LAUNCH.replace('"lab"', '"lessons"')},

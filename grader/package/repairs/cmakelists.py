@@ -93,7 +93,7 @@ def repair_cmake(
     keep_first_version(files, CMAKE, "build-line")
     _correct_line(files)
     _close_bracket(files)
-    if commands_of(cmake_text(files).encode()) is None or _is_of_workspace(files):
+    if commands_of(cmake_text(files).encode()) is None or _is_of_another(files):
         return
     _spell_commands(files)
     _spell_keywords(files)
@@ -127,9 +127,11 @@ def repair_cmake(
     _name_project(files, package, name, wanted.package)
 
 
-def _is_of_workspace(files: Files) -> bool:
-    """Return whether the file is what `catkin_init_workspace` makes: the package needs one of its own."""
-    return bool(calls_of(files, OF_WORKSPACE)) and not calls_of(files, "catkin_package")
+def _is_of_another(files: Files) -> bool:
+    """Return whether the file is what `catkin_init_workspace` makes, or one for ROS 2: the package needs its own."""
+    found = [words[0].value for words in map(words_of, calls_of(files, "find_package")) if words]
+    ament = any(name.startswith("ament_") for name in found) and "catkin" not in found
+    return ament or (bool(calls_of(files, OF_WORKSPACE)) and not calls_of(files, "catkin_package"))
 
 
 def _calls_catkin(files: Files, package: PackageFacts) -> bool:

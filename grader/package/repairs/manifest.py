@@ -107,7 +107,7 @@ def _add_required(files: Files, name: str) -> None:
 def _add_buildtool(files: Files) -> None:
     text = files.text(MANIFEST) or ""
     plain = _blank_comments(text)
-    if re.search(r"<buildtool_depend[^>]*>\s*catkin\s*<", plain) or not _parses(text):
+    if re.search(r"<buildtool_depend[^>]*>\s*catkin\s*<|<build_type>\s*ament", plain) or not _parses(text):
         return
     message = f"{MANIFEST} does not name catkin as its build tool"
     named = re.finditer(r"<buildtool_depend>([\w-]+)<", plain)
