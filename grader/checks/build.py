@@ -296,6 +296,7 @@ def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
     """
     verdict = judge_build(package, build)
     expected = f"{verdict.expected}; each program of add_executable starts"
+    verdict = (_unseen(package) if verdict.status is Status.PASS else None) or verdict
     if verdict.status is not Status.PASS:
         return verdict.about(expected=expected)
     started = [one for one in lives(run) if "/" in one.name]

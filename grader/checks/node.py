@@ -39,7 +39,7 @@ from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
+from grader.model.verdict import FileCitation, Verdict, failed, grade_again, passed, unjudged
 from grader.wording import join_words, on_lines, plural, seconds
 
 IN_A_LOOP = f"loop with `{LOOP}`" + both(" and catch rospy.ROSInterruptException around it", "")
@@ -248,7 +248,15 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
         return None
     end = explain_traceback(of_script[-1], package)
     message = f"{_script(one)} ends on Ctrl-C with a traceback: {end.cause}"
-    return failed(message, hint=end.hint or IN_A_LOOP, citations=end.citations)
+    late = [s for s in package.slips if s.kind == "read-late" for c in end.citations if _is_within(c, s)]
+    message, hint = (
+        (f"{message}; {late[0].message}", late[0].fix) if late else (message, end.hint or IN_A_LOOP)
+    )
+    return failed(message, hint=hint, citations=end.citations)
+
+
+def _is_within(place: FileCitation, slip: PythonSlip) -> bool:
+    return place.file == slip.file and slip.line <= (place.line or 0) <= int(slip.name)
 
 
 LONG_TURN_S = 4.0

@@ -59,6 +59,7 @@ OF_TOPICS = ("hears", "topic-type")
 """Checks that say by themselves that a node is on another topic, and not of which type."""
 
 
+INTERFACES = {"add_message_files": "msg/", "add_service_files": "srv/", "add_action_files": "action/"}
 CALL_LINES = 2
 """How many more lines a call that prints may have."""
 CALL_CHARS = 200
@@ -193,7 +194,8 @@ class Later:
         """Yield how each is repaired."""
         by_check = {
             "rate": self._rate, "node-name": self._node_name, "hears": self._heard, "topic-type": self._published,
-            "build": self._built, "message": self._message, "logs": self._logged, "copies": self._copied,
+            "build": self._built, "build-and-run": self._built, "message": self._message, "logs": self._logged,
+            "copies": self._copied,
         }  # fmt: skip
         if not self._ran:
             yield from self._names()
@@ -259,20 +261,18 @@ class Later:
                 yield Fix(f"write `while not {slip.name}():` on {_line(slip)}", (slip.fix,))
 
     def _built(self) -> Iterator[Fix]:
-        """Sources of C++ that are not there: CMake asks for them only once it has found all packages."""
-        calls = cmake_calls(self._package, "add_executable", "add_library")
-        words = (word for call in calls for word in call.args[1:])
-        named = dict.fromkeys(word for word in words if PurePosixPath(word).suffix in CPP_SUFFIXES)
-        there = [one.path for one in self._package.files if PurePosixPath(one.path).suffix in CPP_SUFFIXES]
+        """Sources of C++, and messages, that are not there: CMake asks for them only once it has found all packages."""
+        calls = cmake_calls(self._package, "add_executable", "add_library", *INTERFACES)
+        asked = (call for call in calls if "DIRECTORY" not in call.args)
+        words = (f"{INTERFACES.get(call.name, '')}{word}" for call in asked for word in call.args)
+        kinds = (*CPP_SUFFIXES, ".msg", ".srv", ".action")
+        named = dict.fromkeys(word for word in words if PurePosixPath(word).suffix in kinds)
+        there = [one.path for one in self._package.files if PurePosixPath(one.path).suffix in kinds]
         for path in (one for one in named if "$" not in one and self._package.file(one) is None):
             near = near_names(path, there)
-            fix = (
-                f"write {near[0]} instead of {path}"
-                if near
-                else f"add {path}, which is not there, and push it"
-            )
+            fix = f"add {path}, which is not there, and push it, since CMakeLists.txt names it"
             if path not in self._verdict.message:
-                yield Fix(f"{fix}, since CMakeLists.txt builds a target of it" if not near else fix)
+                yield Fix(f"write {near[0]} instead of {path}" if near else fix)
 
     def _function_at(self, slip: PythonSlip) -> int:
         """Return the line of the last `def` above the slip: what gives a name its value there is of use below it."""

@@ -19,7 +19,7 @@ SlipKind = Literal[
     "hides-class", "float-index",
     "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed", "printed-in-part",
     "published-in-part", "never-published", "takes-number", "typed-text", "goes-on",
-    "no-argument",
+    "no-argument", "read-late",
 ]  # fmt: skip
 
 
@@ -48,6 +48,8 @@ class PythonSlip(Placed, Record):
     - `never-called`: a function that makes a node, publishes or waits, and that nothing calls.
     - `main-guard`: `__name__` is compared with another word than `__main__`.
     - `never-reached`: an endless loop before the first `init_node(…)` or `publish(…)`.
+    - `read-late`: the first of the lines that such a loop, or `spin()`, holds up until the node ends, where one of them
+      reads a parameter; `name` is the last.
     - `spin-in-loop`: a loop that publishes and waits in `spin()`.
     - `loop-left`: a loop that ends in its first turn, or after a number of them, or a callback that ends the node, or
       the only `publish(…)`, above a loop that waits; `name` is the function that it asks, where a `not` is missing.

@@ -584,3 +584,15 @@ def test_arguments_without_a_value_are_named_behind_what_roslaunch_says_first() 
         '; then on line 3 of launch/a.launch write <arg name="rate" default="…"/> and '
         'below <launch> in launch/a.launch add <arg name="speed" default="…"/>'
     )
+
+
+def test_messages_that_are_not_there_are_named_where_catkin_sees_no_package() -> None:
+    calls = [["project", "lab1"], ["add_message_files", "FILES", "Note.msg"], ["catkin_package"]]
+    package = {"files": [{"path": "CMakeLists.txt"}], "cmake": {"calls": calls}}
+    built = {"processes": [{"name": "catkin_make", "role": "build", "exit_code": 0, "exit_s": 2}]}
+    manifest = {"id": "manifest", "check": "manifest", "with": {"name": "lab1"}}
+    build = {"id": "build", "check": "build", "requires": ["manifest"]}
+    found = judge(rubric(manifest, build), build_runs({"runs": {"package": built}, "package": package}))
+    assert found[0].hint.endswith(
+        "; then add msg/Note.msg, which is not there, and push it, since CMakeLists.txt names it"
+    )

@@ -139,6 +139,8 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (node(LOOP + "        rate.sleep()\n    p.publish(1)\n") + CALLED,
          [("never-reached", 4, "the publish(…) on line 6")]),
         (node("    rospy.spin()\n    p.publish(1)\n") + CALLED, [("never-reached", 4, "the spin() on line 4")]),
+        (node("    rospy.spin()\n") + CALLED + "    a = rospy.get_param('a')\n    b = a['b']\n",
+         [("read-late", 7, "line 7 runs only once the node ends, below line 4")]),
         ("class A:\n    def __init__(s):\n        r.spin()\n    def go(s):\n        r.Service(a, B)\na = A()\na.go()",
          [("never-reached", 3, "the spin() on line 3 never ends, so the go(…) on line 7")]),
         ("def go():\n    rospy.spin()\np = rospy.Publisher('a', B)\np.publish(1)\ngo()\n", []),

@@ -18,6 +18,7 @@ from script_names import (
     dotted,
     functions_in,
     is_call,
+    lines_from,
     listed,
     names_in,
     parents_of,
@@ -71,6 +72,7 @@ def never_reached(tree):
                 if loop is None:
                     continue
                 within = set(map(word, ast.walk(loop))) if within is None else within
+                yield from read_late(block[index + 1 :], loop)
                 rest = [n for later in block[index + 1 :] for n in ast.walk(later)]
                 behind = [n for n in rest if word(n) and word(n) not in within]
                 if behind and ("publish" not in within or word(behind[0]) in own):
@@ -82,6 +84,16 @@ def never_reached(tree):
                     fix = unreached_fix(one, loop, behind[0], later, called)
                     yield slip(loop.lineno, "never-reached", message, fix)
                 break  # nothing behind it in the block runs
+
+
+def read_late(rest, loop):
+    """Lines behind a loop without an end, or `spin()`, that read a parameter: nothing needs it any more."""
+    if any(calls_in(one, "get_param") for one in rest):
+        message = "line %d runs only once the node ends, below line %d" % (rest[0].lineno, loop.lineno)
+        last = rest[-1].end_lineno
+        yield slip(
+            rest[0].lineno, "read-late", message, "delete " + lines_from(rest[0].lineno, last), str(last)
+        )
 
 
 def method_run_by(node, classes, made):
