@@ -57,8 +57,6 @@ OF_LAUNCHES = ("launch-runs", "launch-connects")
 OF_CALLBACKS = ("callback-called", "callback-values")
 OF_TOPICS = ("hears", "topic-type")
 """Checks that say by themselves that a node is on another topic, and not of which type."""
-
-
 INTERFACES = {"add_message_files": "msg/", "add_service_files": "srv/", "add_action_files": "action/"}
 CALL_LINES = 2
 """How many more lines a call that prints may have."""
@@ -564,7 +562,10 @@ class Later:
 
     def _logged(self) -> Iterator[Fix]:
         text, said = str(self._wanted.get("text", "")), self._of("prints")
-        if len(said) == 1 and "{" not in said[0].message and text not in said[0].message:
+        source = "\n".join(line for path in self._paths for line in self._lines(path)).casefold()
+        if source and not any(word in source for word in re.findall(r"\w{3,}", text.casefold())):
+            yield Fix(f"log {text!r}, which no line of {join_words(sorted(self._paths))} does")
+        elif len(said) == 1 and "{" not in said[0].message and text not in said[0].message:
             yield Fix(f"log {text!r} on {_line(said[0])}, not {said[0].message!r}")
 
 

@@ -587,12 +587,14 @@ def test_arguments_without_a_value_are_named_behind_what_roslaunch_says_first() 
 
 
 def test_messages_that_are_not_there_are_named_where_catkin_sees_no_package() -> None:
-    calls = [["project", "lab1"], ["add_message_files", "FILES", "Note.msg"], ["catkin_package"]]
-    package = {"files": [{"path": "CMakeLists.txt"}], "cmake": {"calls": calls}}
+    package = {"cmake": {"calls": [["add_message_files", "FILES", "Note.msg"], ["catkin_package"]]}}
     built = {"processes": [{"name": "catkin_make", "role": "build", "exit_code": 0, "exit_s": 2}]}
-    manifest = {"id": "manifest", "check": "manifest", "with": {"name": "lab1"}}
-    build = {"id": "build", "check": "build", "requires": ["manifest"]}
-    found = judge(rubric(manifest, build), build_runs({"runs": {"package": built}, "package": package}))
-    assert found[0].hint.endswith(
-        "; then add msg/Note.msg, which is not there, and push it, since CMakeLists.txt names it"
-    )
+    named = {"id": "manifest", "check": "manifest", "with": {"name": "lab1"}}
+    asked = rubric(named, {"id": "build", "check": "build", "requires": ["manifest"]})
+    found = judge(asked, build_runs({"runs": {"package": built}, "package": package}))
+    assert "; then add msg/Note.msg, which is not there, and push it" in found[0].hint
+
+
+def test_a_text_that_no_line_has_is_named() -> None:
+    told = hint_of("node", DIES, [NODE | ROOT, LOGS], source="rospy.loginfo('at %f', x)\n")
+    assert told.endswith(f"; then log 'Hello World!', which no line of {FILE} does")
