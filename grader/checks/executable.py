@@ -9,14 +9,13 @@ from grader.checks.build import judge_build
 from grader.checks.registry import check
 from grader.checks.support.exit_causes import syntax_hint
 from grader.checks.support.scripts import (
-    PYTHON,
     RIGHT_SHEBANG,
     Obstacle,
     add_hint,
+    asks_for_wrapper,
     can_be_moved,
     find_script,
     installed,
-    is_found,
     move_hint,
     names_script,
     paths_by_name,
@@ -106,7 +105,8 @@ def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: Ex
     fault = syntax_fault(found)
     what = f"{found.path} {'; it also '.join(o.why for o in obstacles)}"
     if fault is not None:
-        verdict = _syntax_verdict(found, fault, [] if has_wrapper(package, build, found.path) else obstacles)
+        may_do = asks_for_wrapper(package, found.path) and not any(_builds(build))
+        verdict = _syntax_verdict(found, fault, [] if may_do else obstacles)
     elif found.executable and not obstacles:
         verdict = passed(f"{found.path} is executable and names {_interpreter(found)}", hint=hint)
     elif has_wrapper(package, build, found.path):
@@ -115,7 +115,7 @@ def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: Ex
         verdict = passed(told, measured=f"{found.path}: made a program by catkin_install_python", hint=hint)
     elif obstacles and (unmade := _unmade_wrapper(package, build, found.path)):
         verdict = _judge_unmade(what, found.path, unmade)
-    elif obstacles and _asks_for_wrapper(package, found.path):  # and no build was tried
+    elif obstacles and asks_for_wrapper(package, found.path):  # and no build was tried
         message = f"{what}: only the build shows whether catkin_install_python makes a program of it"
         verdict = inconclusive(message, hint="; ".join(o.fix for o in obstacles))
     elif obstacles:
@@ -160,19 +160,17 @@ def _cite_shebang(file: SourceFile) -> FileCitation:
 
 def has_wrapper(package: PackageFacts, build: Run, path: str) -> bool:
     """Return whether the build worked, and `catkin_install_python` put this script where `rosrun` looks."""
-    built = any(e.event == "exit" and e.name == CATKIN_MAKE and e.exit_code == 0 for _, e in build.processes)
-    return built and _asks_for_wrapper(package, path)
+    return 0 in _builds(build) and asks_for_wrapper(package, path)
 
 
-def _asks_for_wrapper(package: PackageFacts, path: str) -> bool:
-    named = (i for i in installed(package) if i.call.name == PYTHON and i.kind == "PROGRAMS")
-    return any(names_script(i, path) and is_found(i.destination or "", package) for i in named)
+def _builds(build: Run) -> list[int | None]:
+    """Return the exit code of each build that was tried."""
+    return [e.exit_code for _, e in build.processes if e.event == "exit" and e.name == CATKIN_MAKE]
 
 
 def _unmade_wrapper(package: PackageFacts, build: Run, path: str) -> Verdict | None:
     """Return why the build did not come to the wrapper that the package asks for; None where it was not tried."""
-    tried = any(e.event == "exit" and e.name == CATKIN_MAKE for _, e in build.processes)
-    return judge_build(package, build) if tried and _asks_for_wrapper(package, path) else None
+    return judge_build(package, build) if _builds(build) and asks_for_wrapper(package, path) else None
 
 
 def _judge_unmade(why: str, path: str, build: Verdict) -> Verdict:

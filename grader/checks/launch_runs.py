@@ -46,7 +46,7 @@ from grader.checks.support.launch_slips import (
 )
 from grader.checks.support.parameters import absolute_name
 from grader.checks.support.processes import GlobalName, early_end
-from grader.checks.support.scripts import shebang_obstacles
+from grader.checks.support.scripts import asks_for_wrapper, shebang_obstacles
 from grader.checks.support.text import SPIN, near_names
 from grader.checks.support.topics import cite, connected_nodes, nodes_on
 from grader.evidence.run import Run
@@ -179,7 +179,8 @@ def _comes_up(nodes: Sequence[str]) -> str:
 
 def _absent(package: PackageFacts, run: Run, nodes: Sequence[str], absent: Sequence[LaunchNode]) -> Verdict:
     """Return why nodes of the launch file did not come up: all that lack the executable bit, or the first."""
-    scripts = [script for node in absent if (script := own_script(package, node))]
+    own = (script for node in absent if (script := own_script(package, node)))
+    scripts = [script for script in own if not asks_for_wrapper(package, script.path)]
     plain = [script for script in scripts if script.executable is False]
     unstarted = {script.path: script for script in scripts if any(shebang_obstacles(script))}
     several = bool(plain) or len(unstarted) > 1

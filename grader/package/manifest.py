@@ -35,7 +35,8 @@ _FILTERS = threading.Lock()
 _CONTEXT = {"ROS_VERSION": "1", "ROS_DISTRO": "noetic", "ROS_PYTHON_VERSION": "3"}
 # catkin_pkg's message, the tag whose line is named, and the words ({0}, {1}: the pattern's groups)
 _CAUSES: tuple[tuple[str, ...], ...] = (
-    (r'contain a single "package" root', "", "the file must hold one `<package> ... </package>`"),
+    (r'contain a single "package" root', "", "the file must hold one `<package> ... </package>`",
+     "write it as catkin_create_pkg makes it"),
     (r'exactly one "(\w+)" tag', "{0}", "there must be exactly one `<{0}>` tag", "delete one of them"),
     (r'not contain more than one "(\w+)"', "{0}", "there may be only one `<{0}>` tag", "delete one of them"),
     (r'"(\w+)" tag must have the attribute "(\w+)"', "{0}", '`<{0}>` needs {1}="..."'),

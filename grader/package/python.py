@@ -56,11 +56,13 @@ _NEXT_BLOCK = re.compile(r"\s*(?:@|(?:def|async def|class|if __name__)\b)")
 _SAME_QUOTES = re.compile(r"""\b[rR]?[fF](['"])[^'"{]*\{[^'"}]*[\[(]\1""")
 _NEVER_ENDED = re.compile("never closed|EOL while|unterminated (f-)?string")
 _UNCLOSED = re.compile(r"'([(\[{])' was never closed")
+_ONE_WIDTH = "use four spaces everywhere"
+_TAB_SIZE = "let your editor turn the tabs into spaces, at a tab size of {}"
 _OUT_OF_BLOCK = "this line is indented less than the lines around it, which belong to one block"
 _COPIED = "copied from a PDF or a web page"
 
 _MESSAGES: tuple[tuple[str, ...], ...] = (
-    (r"inconsistent use of tabs", "tabs and spaces are mixed in the indentation", "use four spaces everywhere"),
+    (r"inconsistent use of tabs", "tabs and spaces are mixed in the indentation", _ONE_WIDTH),
     (r"unindent does not match",
      "this line's indentation matches none of the lines above it", "start it exactly below a line of the same block"),
     (r"unexpected indent",
@@ -113,6 +115,8 @@ _MESSAGES: tuple[tuple[str, ...], ...] = (
      "the file ends in the middle of something (a bracket, or a block without a body)", "complete its last lines"),
     (r"web page in a file", "the whole file is a web page, and not the script that the page shows",
      "download the script itself, by the button Raw or Download of that page, in its place"),
+    (r"XML in a file", "the whole file is XML, and its name ends with .py",
+     "write the script in its place, or give it the ending of its format (.launch, .urdf)"),
     (r"notebook in a file", "the whole file is a Jupyter notebook",
      "write the code of its cells into a script: `jupyter nbconvert --to script` does that"),
     (r"document in a file", "the whole file is a document of a word processor, or an archive",
@@ -160,6 +164,7 @@ class _RawFault(Record):
     text: str = ""
     opened: int | None = None
     mixed: bool = False
+    tab_size: int | None = None
 
 
 class _RawEntry(Record):
@@ -196,6 +201,8 @@ def _entry(line: bytes | str) -> _RawEntry | None:
 
 def _fault(file: str, raw: _RawFault) -> Fault:
     reason = reason_of(raw.message, raw.text, column=raw.column, opened=raw.opened, mixed=raw.mixed)
+    if reason.fix == _ONE_WIDTH and raw.tab_size:
+        reason = Reason(reason.why, _TAB_SIZE.format(raw.tab_size))
     kind = printable(raw.kind[:MESSAGE_CHARS_MAX])
     column = raw.column if raw.line and raw.column and 0 < raw.column <= len(raw.text) + 1 else None
     if kind in {"TabError", "IndentationError"} and raw.text.strip():
@@ -300,7 +307,7 @@ def _reason_of_block(message: str, text: str, *, mixed: bool) -> Reason | None:
     else."""
     if "unindent does not match" in message and mixed:
         why = "tabs and spaces are mixed in the indentation of this file"
-        return Reason(why, "use four spaces everywhere")
+        return Reason(why, _ONE_WIDTH)
     if "unindent does not match" in message and (lone := _EXCEPT.match(text)):
         why = f"there is no `try:` for this `{lone[1]}`"
         return Reason(why, "write `try:` above the lines that it is for")

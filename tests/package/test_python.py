@@ -67,7 +67,9 @@ CASES = {
     "no_break": ("if 1:\n\u00a0\u00a0x = 1\n", 2, "no-break space (U+00A0)"),
     "zero_width": ("x = 1\u200b\n", 1, "invisible character (U+200B)"),
     "wide": ("if x\uff1a\n  pass\n", 1, "plain `:`"),
-    "tabs": ("if 1:\n        x = 1\n\ty = 2\n", 3, "tabs and spaces are mixed"),
+    "tabs": ("if 1:\n        x = 1\n\ty = 2\n", 3, "at a tab size of 8"),
+    "tabs_of_4": ("def f():\n    x = 1\n\ty = 2\n", 3, "at a tab size of 4"),
+    "tabs_and_more": ("if 1:\n        x = 1\n\tprint 'a'\n", 3, "at a tab size of 8"),
     "tabs_unindent": ("if 1:\n\tif 2:\n\t\tx = 1\n  y = 2\n", 4, "tabs and spaces are mixed"),
     "indent_missing": ("if 1:\nx = 1\n", 2, "must be indented"),
     "indent_more": ("x = 1\n  y = 2\n", 2, "further than the one above"),
@@ -87,6 +89,7 @@ CASES = {
     "latin_text": (b"y = '\xe9'\n", 1, "not saved as UTF-8"),
     "utf16": ("x = 1\n".encode("utf-16"), None, "UTF-16"),
     "page": ("\n<!DOCTYPE html>\n<html><title>talker.py</title></html>\n", None, "is a web page"),
+    "xml": ('<?xml version="1.0"?>\n<robot name="arm"/>\n', None, "the whole file is XML"),
     "notebook": ('{"cells": [{"cell_type": "code"}], "nbformat": 4}\n', None, "is a Jupyter notebook"),
     "pointer": (
         "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 3\n",

@@ -151,6 +151,11 @@ CASES = {
         ["python-syntax"],
         "line 2 of src/talker.py: this line is indented further than the one above",
     ),
+    "many-further-in": Case(
+        {TALKER: f"{SCRIPT.split(chr(10))[0]}\n" + "".join(f" a{n} = {n}\n" for n in range(13))},
+        ["python-syntax"],
+        "start the lines of each block exactly below each other, from line 2 to 14",
+    ),
     "between-two-of-one-level": Case(
         swapped(TALKER, ("    rate = rospy", "count = 0\n    rate = rospy")),
         ["python-syntax"],

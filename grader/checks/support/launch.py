@@ -20,7 +20,13 @@ from grader.checks.support.launch_slips import (
 )
 from grader.checks.support.parameters import explain_yaml
 from grader.checks.support.processes import early_end, first_interrupt_ns, lives, observed_until_ns
-from grader.checks.support.scripts import BUILD_FIRST_HINT, paths_by_name, programs, shebang_obstacles
+from grader.checks.support.scripts import (
+    BUILD_FIRST_HINT,
+    asks_for_wrapper,
+    paths_by_name,
+    programs,
+    shebang_obstacles,
+)
 from grader.checks.support.text import INIT, near_names, shown
 from grader.evidence.run import Run
 from grader.installable import install_hint, known_packages
@@ -328,6 +334,11 @@ def not_executable(*scripts: SourceFile) -> Absence:
     return Absence(why, hint, True, tuple(FileCitation(file=path) for path in paths))
 
 
+def _unmade(script: SourceFile) -> Absence:
+    why = f"catkin_install_python makes a program of {script.path}, but the build did not make it"
+    return Absence(why, BUILD_FIRST_HINT, of_script=True, unbuilt=True)
+
+
 def not_started(*scripts: SourceFile) -> Absence:
     """Return the absence of nodes whose scripts the system cannot start by their first line."""
     obstacles = {script.path: next(shebang_obstacles(script)) for script in scripts}
@@ -383,9 +394,9 @@ def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | N
     line = next((text for text in console_lines(run) if mark in text), None)
     if line is None:
         return None
-    if (script := own_script(package, node)) and script.executable is False:
-        return not_executable(script)
-    owner = owner_of(package, node)
+    owner, script = owner_of(package, node), own_script(package, node)
+    if script is not None and script.executable is False:
+        return _unmade(script) if asks_for_wrapper(owner or package, script.path) else not_executable(script)
     if owner is not None and any(one.is_called(str(node.type)) for one in programs(owner)):
         why = f"CMakeLists.txt makes the program {node.type}, but the build did not make it"
         return Absence(why, BUILD_FIRST_HINT, of_script=True, unbuilt=True)

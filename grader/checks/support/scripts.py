@@ -189,6 +189,13 @@ def names_script(one: Installed, path: str) -> bool:
     return posixpath.normpath(posixpath.join(folder, text)) == path
 
 
+def asks_for_wrapper(package: PackageFacts, path: str) -> bool:
+    """Return whether `catkin_install_python` is to make a program of the script where `rosrun` looks: it then needs no
+    bit of its own."""
+    named = (i for i in installed(package) if i.call.name == PYTHON and i.kind == "PROGRAMS")
+    return any(names_script(i, path) and is_found(i.destination or "", package) for i in named)
+
+
 def is_bin(destination: str, package: PackageFacts) -> bool:
     """Return whether it is `${CATKIN_PACKAGE_BIN_DESTINATION}`, which CMake gives as `lib/<project>`."""
     place = "/" + posixpath.normpath(destination)

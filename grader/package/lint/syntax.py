@@ -1,10 +1,10 @@
 """Reads Python files without running them: `syntax.py ROOT FILE...`, or the files as a JSON array on stdin.
 
 Prints one JSON object a file, as soon as it is known, so that a file which crashes the interpreter can be
-told: `{"file": ..., "faults": [{"kind", "line", "column", "message", "text", "opened", "mixed"}], "slips":
-[{"line", "kind", "message"}]}`. `text` is the faulty line, `opened` the line of a bracket that is never
-closed, `mixed` whether the file indents with tabs and with spaces. Runs under ROS's own Python (3.8 and
-later), standard library only; nothing is imported from ROOT.
+told: `{"file": ..., "faults": [{"kind", "line", "column", "message", "text", "opened", "mixed", "tab_size"}],
+"slips": [{"line", "kind", "message"}]}`. `text` is the faulty line, `opened` the line of a bracket that is never
+closed, `mixed` whether the file indents with tabs and with spaces, `tab_size` the size at which its tabs fit those
+spaces. Runs under ROS's own Python (3.8 and later), standard library only; nothing is imported from ROOT.
 """
 
 import ast
@@ -52,6 +52,7 @@ NO_SCRIPTS = (
         re.compile(rb"\s*<(?:!doctype\s+html|html|head|body)\b", re.IGNORECASE),
         "a web page in a file for Python",
     ),
+    (re.compile(rb"\s*<(?:\?xml|launch|robot|package)\b"), "XML in a file for Python"),
     (re.compile(rb"\s*\{.{0,200}\"(?:cells|nbformat)\"\s*:", re.DOTALL), "a notebook in a file for Python"),
     (re.compile(rb"\{\\rtf|PK\x03\x04|\xd0\xcf\x11\xe0"), "a document in a file for Python"),
     (re.compile(rb"%PDF-"), "a PDF in a file for Python"),
@@ -211,9 +212,10 @@ def bare_except(tree, name):
     return None
 
 
-def fault(kind, line, column, message, *, text="", opened=None, mixed=False):
+def fault(kind, line, column, message, *, text="", opened=None, mixed=False, tab_size=None):
     texts = {"message": message[:MESSAGE_LIMIT], "text": text[:TEXT_LIMIT]}
-    return {"kind": kind, "line": line, "column": column, "opened": opened, "mixed": mixed, **texts}
+    place = {"line": line, "column": column, "opened": opened}
+    return {"kind": kind, **place, "mixed": mixed, "tab_size": tab_size, **texts}
 
 
 def undecodable(data):
@@ -283,7 +285,23 @@ def syntax_fault(error, data):
         text=lines[line - 1] if known else "",
         opened=never_closed(data, line) if known else None,
         mixed=len(begins) > 1,
+        tab_size=tab_size(lines) if len(begins) > 1 else None,
     )
+
+
+def tab_size(lines):
+    """Return the size of a tab at which the lines fit into blocks, as in the editor that they were written in; None
+    where no usual size does."""
+    for size in (8, 4):
+        fitted = "\n".join(blanks_of(line).expandtabs(size) + line.lstrip() for line in lines)
+        try:
+            compile(fitted, "script", "exec", dont_inherit=True)
+        except IndentationError:
+            continue
+        except (SyntaxError, ValueError, OverflowError, RecursionError, MemoryError):
+            pass
+        return size
+    return None
 
 
 def commented_head(lines, line):

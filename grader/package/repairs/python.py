@@ -308,6 +308,8 @@ def _required_indentation(before: str, after: str, first: str) -> str:
         lines.setdefault(len(new) - len(new.lstrip()), []).append(number)
     if len(changed) > INDENTED_SHOWN:
         where = f"from line {changed[0][0]} to {changed[-1][0]}"
+        if "\t" not in before:
+            return f"{first}start the lines of each block exactly below each other, {where}"
         return f"indent with spaces only, the same at each level, {where}; `grader check --fix` does it"
     named = [("line" if len(some) == 1 else "lines", spaces, some) for spaces, some in lines.items()]
     begun = [f"{what} {numbers_text(some)} with {plural(spaces, 'space')}" for what, spaces, some in named]
