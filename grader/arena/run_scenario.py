@@ -52,6 +52,21 @@ SLEEPING = re.compile(
 """One that sleeps, and no more."""
 
 
+RETRIES = re.compile(
+    rb"^([ \t]*)while(?:\s*\()?\s*" + ENDLESS + rb"\s*(?:\)\s*)?:[ \t]*(?:#[^\n]*)?\n\1([ \t]+)try:[ \t]*\n"
+    rb"\1\2[ \t]+[^\n;]*[wW]ait_?[fF]or_?[sS]erv[^\n;]*\n(?:\1\2[ \t]+(?:break|return)\b[^\n]*\n)?"
+    rb"\1\2except\b[^\n]*:[ \t]*\n(?:\1\2[ \t]+(?:(?:pass|continue)\b[^\n;]*(?:\n|\Z)|" + SLEEPS + rb"))+"
+    rb"(?:\1\2[\w.]*sleep\([^\n;]*(?:\n|\Z))?(?!\1[ \t])",
+    re.MULTILINE,
+)
+"""One that waits for a service again each time it has waited for long enough."""
+
+
+def gives_up(text: bytes) -> bool:
+    """Return whether a source waits for a service, and goes on or ends if that does not come."""
+    return GIVES_UP.search(RETRIES.sub(b"", text)) is not None
+
+
 def sleeps_elsewhere(text: bytes) -> bool:
     """Return whether a source sleeps or waits outside of such loops, too: then what calls it may go on after that."""
     return re.search(NAPS.pattern + rb"|[wW]ait_?[fF]or", SLEEPING.sub(b"", text)) is not None
@@ -167,7 +182,7 @@ def _tell_what_is_known(
     watched_s: float,
 ) -> None:
     """Set what the scenario and the package's sources say of how long anything may yet come."""
-    session.live.gives_up = place.has_line(GIVES_UP)
+    session.live.gives_up = place.has_line(gives_up)
     session.live.serves = frozenset(one.name for one in scenario.serves)
     session.live.naps = place.has_line(NAPS)
     scripts = {spec["name"]: spec["script"] for _, spec in starts if spec["script"] is not None}

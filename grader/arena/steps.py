@@ -43,12 +43,14 @@ ANSWER_S, AGAIN_S = 10.0, 2.0
 SUBSCRIBE_S = 6.0
 REFUSED_S, UNANSWERED_S = 1.0, 0.5
 """So long a node that asks for a topic of the grader's by another type may yet do something else."""
+BEHIND = "the server has not begun with it, since it still works on an earlier goal that got no result"
 CTRL_C_S = 5.0
 LAUNCH_CTRL_C_S = 20.0  # roslaunch gives its own nodes 15 s and more
 TERM_S = 2.0
 NOT_PLAYED = frozenset({"/clock", "/rosout", "/rosout_agg"})
 """Where none is named: they are the run's own."""
-GOAL_ID = "actionlib_msgs/GoalID"
+GOAL_ID, GOALS = "actionlib_msgs/GoalID", "actionlib_msgs/GoalStatusArray"
+NOT_BEGUN, BEGUN = {"PENDING", "RECALLING"}, {"ACTIVE", "PREEMPTING"}
 
 ProcessSpec: TypeAlias = dict[str, Any]
 """What the arena needs to start a process (`ProcessEnvironment.spec`)."""
@@ -71,6 +73,7 @@ class StepRunner:
         self._starts = starts
         self._results: dict[str, MessageType] = {}
         self._goals = 0
+        self._unended_s: dict[str, float] = {}
         self._cancels = cancels or {}
         self._beside = beside or Path()
         self._bags: dict[str, tuple[Channel, ...]] = {}
@@ -497,6 +500,7 @@ class StepRunner:
         try:
             find_text = self._arena.place.action_texts(action.type)
             self._results[action.type] = MessageType(f"{action.type}ActionResult", find_text)
+            self._statuses = MessageType(GOALS, self._message_text)
         except ValueError as error:
             self._note("note", action.name, f"the grader cannot use {action.type}: {error}")
             return
@@ -504,6 +508,7 @@ class StepRunner:
         self._advertise(goal, f"{action.type}ActionGoal", latched=False, find_text=find_text)
         self._advertise(cancel, GOAL_ID, latched=False)
         self._arena.watch(f"{action.name}/result")
+        self._arena.watch(f"{action.name}/status")
 
     async def _act(self, action: Action) -> None:
         goal, cancel = f"{action.name}/goal", f"{action.name}/cancel"
@@ -522,13 +527,17 @@ class StepRunner:
             return
         self._tell(f"waiting for the result of {action.name}")
         left_s, found, since = action.limit_s, None, ""
+        self._unended_s[name] = self._own_s()
         if action.cancel_after_s is not None:
             found = await self._result(action, name, action.cancel_after_s)
             if found is None:
                 self._send(cancel, {"id": name}, 0, 1, {"action": "cancel", **about})
                 left_s, since = self._patience_s(action), " after it was cancelled"
         found = found or await self._result(action, name, left_s)
-        value_, detail = found or (None, f"no result within {left_s:g} s{since}")
+        if found is not None:
+            del self._unended_s[name]
+        late = BEHIND if self._is_behind(action, name) else f"no result within {left_s:g} s{since}"
+        value_, detail = found or (None, late)
         self._arena.note(ActorEvent(action="result", actor="grader", **about, value=value_, detail=detail))
 
     def _patience_s(self, action: Action) -> float:
@@ -549,10 +558,11 @@ class StepRunner:
         topics = tuple(f"{action.name}/{part}" for part in ("result", "feedback"))
 
         def is_never() -> bool:
+            if self._is_over() or self._is_behind(action, name):
+                return True
             # A server may work on its goal in silence, for as long as the rubric gives it
             served = bool(self._live.listened.get(f"{action.name}/goal"))
-            until = self._scenario.until
-            return self._is_over() or (not served and is_silent(self._live, topics, until, time.monotonic()))
+            return not served and is_silent(self._live, topics, self._scenario.until, time.monotonic())
 
         await self._arena.wait(lambda: own() is not None or is_never(), limit_s)
         found = own()
@@ -560,6 +570,22 @@ class StepRunner:
             return None
         status = found["status"]["status"]
         return found["result"], GOAL_STATUS[status] if status < len(GOAL_STATUS) else f"status {status}"
+
+    def _own_s(self) -> float:
+        """Return the time that the run has had the machine for: others' share of a full one does not count."""
+        return time.monotonic() - self._live.lost_s
+
+    def _is_behind(self, action: Action, name: str) -> bool:
+        """Return whether the server has not begun with this goal for a while, since it still works on an earlier one
+        that got no result in its time."""
+        now_s, came = self._own_s(), self._arena.watch(f"{action.name}/status")
+        stuck = {goal for goal, sent_s in self._unended_s.items() if now_s > sent_s + ANSWER_S} - {name}
+        if not stuck or not came or now_s < self._unended_s.get(name, now_s) + AGAIN_S:
+            return False
+        seen = self._statuses.decode(came[-1]) or {"status_list": []}
+        status = {one["goal_id"]["id"]: one["status"] for one in seen["status_list"]}
+        known = {goal: GOAL_STATUS[at] for goal, at in status.items() if at < len(GOAL_STATUS)}
+        return known.get(name) in NOT_BEGUN and any(known.get(goal) in BEGUN for goal in stuck)
 
     def _answer(self, call: Call, value: object, detail: str) -> None:
         about = {"topic": call.service, "type": call.type, "value": value, "detail": detail}

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from grader.arena.process_environment import TEXT_BYTES_MAX, ProcessEnvironment
-from grader.arena.run_scenario import IDLE, NAPS, SLEEPING, set_params, sleeps_elsewhere
+from grader.arena.run_scenario import IDLE, NAPS, RETRIES, SLEEPING, gives_up, set_params, sleeps_elsewhere
 from grader.arena.scenario_inputs import FILE_BYTES_MAX, made_up, make_shots
 from grader.arena.static_recorder import (
     ATTACHED_BYTES_MAX,
@@ -189,4 +189,36 @@ def test_who_sleeps_elsewhere_too_may_go_on() -> None:
 @pytest.mark.parametrize("text", ["while{}x", "while True{}x", "while(True{}x", "while not{}x", "sleep{}x"])
 def test_blanks_without_end_are_read_in_linear_time(text: str) -> None:
     blanks = text.format(" " * 200_000).encode()
-    assert not any(pattern.search(blanks) for pattern in (SLEEPING, IDLE, NAPS))
+    assert not any(pattern.search(blanks) for pattern in (SLEEPING, IDLE, NAPS, RETRIES))
+
+
+RETRYING = """def ask():
+    while not rospy.is_shutdown():
+        try:
+            rospy.wait_for_service('/add', timeout=1)
+            break
+        except rospy.ROSException as error:
+            rospy.logwarn('not yet')  # again
+            rospy.sleep(0.5)
+
+    print('there')
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "gives"),
+    [
+        ("", "", False),
+        ("            rospy.sleep(0.5)\n", "        rate.sleep()\n", False),
+        ("            break\n", "            break\n        except KeyError:\n            pass\n", True),
+        ("rospy.sleep(0.5)", "break", True),
+        ("rospy.sleep(0.5)", "raise", True),
+        ("rospy.sleep(0.5)", "tries += 1", True),
+        ("            rospy.sleep(0.5)\n", "        if late():\n            break\n", True),
+        ("not rospy.is_shutdown()", "tries < 5", True),
+        ("    print('there')", "    rospy.wait_for_service('/sub', 5)", True),
+        (", timeout=1", "", False),
+    ],
+)
+def test_a_client_that_asks_again_without_end_does_not_give_up(old: str, new: str, gives: bool) -> None:
+    assert gives_up(RETRYING.replace(old, new, 1).encode()) is gives

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from grader.arena.steps import BEHIND
 from grader.checks.support.processes import lives, observed_until_ns
 from grader.evidence.events import NOT_OFFERED
 from grader.evidence.message_values import MessageType, action_texts
@@ -300,6 +301,33 @@ def test_the_last_goal_that_is_cancelled_is_waited_for_no_longer_than_it_is_judg
         seen = run(place, scenario, tmp_path / "run.mcap", cancels={"/count": 1.0})
     assert _did(seen, "result")[0] == ("/count", None, f"no result within {since}")
     assert len(_did(seen, "result")) == goals
+
+
+TELLS = """from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+goals, told = [], rospy.Publisher('count/status', GoalStatusArray, queue_size=10)
+def tell(_):
+    told.publish(status_list=[GoalStatus(goal_id=one, status=NEXT if n else 1) for n, one in enumerate(goals)])
+rospy.Timer(rospy.Duration(0.2), tell)
+"""
+
+
+@pytest.mark.parametrize(("status", "detail"), [(0, BEHIND), (1, "no result within 5 s")])
+def test_a_goal_behind_one_that_never_ends_is_waited_for_until_that_shows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, status: int, detail: str
+) -> None:
+    monkeypatch.setattr("grader.arena.steps.ANSWER_S", 2.0)
+    find = action_texts("lab/Count", COUNT).get
+    goal, result = (MessageType(f"lab/CountAction{part}", find).definition for part in ("Goal", "Result"))
+    server = SERVER.format(goal=goal, result=result).replace("end(m.id, 2, -1)", "None")
+    server = server.replace("def goal(message):\n", "def goal(message):\n    goals.append(message.goal_id)\n")
+    server = server.replace("rospy.Subscriber", TELLS.replace("NEXT", str(status)) + "rospy.Subscriber", 1)
+    about = {"name": "/count", "type": "lab/Count", "goal": {"target": -1}, "limit_s": 1}
+    seen = _run(
+        tmp_path,
+        {"scripts/server.py": server, "action/Count.action": COUNT},
+        [{"action": about}, {"action": {**about, "limit_s": 5}}],
+    )
+    assert [detail for _, _, detail in _did(seen, "result")] == ["no result within 1 s", detail]
 
 
 def test_an_action_that_the_package_lacks_is_noted(tmp_path: Path) -> None:
