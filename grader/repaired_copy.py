@@ -17,6 +17,7 @@ from pathlib import Path
 from grader.files import temporary_folder
 from grader.judging.repair_charges import BUILD, DONE_BEFORE_RUNS, OF_PACKAGES, is_unmade
 from grader.judging.repeats_and_repairs import (
+    OF_WAYS,
     concerns,
     is_first_line_added,
     is_used_by,
@@ -37,8 +38,6 @@ from grader.rubric.model import Rubric
 
 REPAIRED, REPEATED = "repaired-1", "repeated-1"
 STEERS_WRONG, WARPED = "steers-wrong", "warped"
-OF_WAYS = ("path", "ends-at", "stays-within")
-"""Checks of where a robot drives, which a turn to the wrong side can fail."""
 REPAIRS_MAX = 4
 """So many lines of scripts and launch files are repaired, however many mistakes are on one."""
 

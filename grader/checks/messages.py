@@ -14,20 +14,23 @@ from grader.checks.registry import check
 from grader.checks.support.clocks import ASK_AGAIN, WATCHED_S, clocks_at, time_between, wrong_growth
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.fields import (
+    MOVED,
     ROUNDING,
     FieldPath,
     Reading,
     bounds_text,
     differences,
     has_hole,
-    is_number,
     is_within,
     join_items,
+    made_of,
     no_field,
     readings,
     refuse_disorder,
     set_beside,
+    turned_wrong,
     value_text,
+    was_right,
 )
 from grader.checks.support.processes import OnTopic, early_end, is_flood, observed_until_ns, slips_of
 from grader.checks.support.text import (
@@ -453,7 +456,8 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
     elif len(wrong) == len(asked) if params.when == "any" else wrong:
         each = (differences(value, params.value, params.tolerance) for value in wrong[0].values)
         nan = any(one.nan for one in chain.from_iterable(each))
-        verdict = _other_value(wrong, found, run, params).of_value(nan=nan)
+        verdict = _other_value(wrong, found, run, params)
+        verdict = verdict if verdict.wrong else verdict.of_value(nan=nan)
     else:
         count = f"all of {plural(len(found), 'message')}" if params.when == "every" else which
         verdict = passed(f"{params.field} of {params.topic} is {params.words} in {count}")
@@ -547,43 +551,22 @@ def _other_value(
     if params.when == "last" and sent and found[-1].time_ns < min(sent.values()):
         topics = join_words(sorted(filter(None, sent)))
         message, hint = f"{message}; none came after {topics}", f"publish again in the callback of {topics}"
-    elif params.when == "last" and (number := _was_right(found, why, params)):
+    elif params.when == "last" and (number := was_right(found, why, params.value, params.tolerance)):
         message += f", and was right in message {number} of {len(found)}"
         hint = f"change {params.field} where it has to change, and keep the rest as in the message before"
-    elif params.when == "last" and (topic := _repeated(found, run, params)):
-        message += f": each value is the one that came on {topic}"
-        hint = "keep what was there before from callback to callback: `self.… = 0` in `__init__`, `+=` in the callback"
+    elif params.when == "last" and (made := made_of(found, run.channels, params)):
+        message, hint = f"{message}: {made[0]}", made[1]
     elif params.when == "first" and _waited_without_message(run, params.topic, first.time_ns):
         topics = join_words(sorted(filter(None, sent))) or "that"
         message += f", which came only after {topics}"
         hint = f"publish once on {params.topic} before you wait for any message, as soon as the publisher is made"
     verdict = failed(message, hint=hint)
-    return (
-        verdict.if_repeated() if params.when == "last" else verdict.model_copy(update={"callbacks": "before"})
-    )
-
-
-def _was_right(found: Sequence[Reading], why: str, params: FieldEqualsParams) -> int:
-    """Return the number of an earlier message that was right where a list is wrong now; 0 where none was."""
-    place = why.partition(": ")[0]
-    if not place.startswith("["):
-        return 0
-    for number, one in enumerate(found[:-1], 1):
-        places = [d.path for value in one.values for d in differences(value, params.value, params.tolerance)]
-        if places and place not in places and "" not in places:
-            return number
-    return 0
-
-
-def _repeated(found: Sequence[Reading], run: Run, params: FieldEqualsParams) -> str:
-    """Return the topic on which the grader sent the same numbers, but for their signs; "" for none."""
-    came = [abs(value) for one in found for value in one.values if is_number(value)]
-    for channel in run.channels:
-        values = (v for one in readings([channel], params.field, numbers=False) for v in one.values)
-        sent = [abs(value) for value in values if is_number(value)]
-        if channel.by_grader and channel.topic != params.topic and len(set(sent)) > 1 and sent == came:
-            return channel.topic
-    return ""
+    if params.when == "first":
+        return verdict.model_copy(update={"callbacks": "before"})
+    update: dict[str, object] = {"timing": True}
+    if since := turned_wrong(found, params.value):  # a callback that fails later did not do it
+        update |= {"wrong": "order" if MOVED in why else "place", "due": ((run.start_ns, since),)}
+    return verdict.model_copy(update=update)
 
 
 def _waited_without_message(run: Run, topic: str, before_ns: int) -> bool:

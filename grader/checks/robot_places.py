@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field, model_validator
 
@@ -41,9 +40,12 @@ from grader.checks.support.geometry import (
     circles,
     commands_of,
     length_m,
+    looks_elsewhere,
     nearest_seen,
     out_along,
     relative,
+    scan_near,
+    seen_at,
     set_off_s,
     share_inside,
     shown_walls,
@@ -52,11 +54,12 @@ from grader.checks.support.geometry import (
     turned_rad,
     turns_away,
 )
-from grader.checks.support.processes import GlobalName, named_at, observed_until_ns
+from grader.checks.support.processes import GlobalName, named_at, observed_until_ns, run_slips
 from grader.checks.support.text import subscriber
 from grader.checks.support.topics import SYSTEM_TOPICS, cite, no_message, nodes_on, topics_with
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
+from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
 from grader.model.verdict import Status, Verdict, failed, grade_again, inconclusive, passed, unjudged
 from grader.wording import join_words, plural, significant
@@ -475,7 +478,9 @@ def stays_within(package: PackageFacts, run: Run, params: StaysWithinParams) -> 
     if verdict is None and found is not None:
         path = placed(found, params)
         early = f"no position came on {params.topic} after the first {significant(params.from_s)} s"
-        verdict = tell_end(_stays(path, region, run, params), package, run) if path else grade_again(early)
+        verdict = (
+            tell_end(_stays(path, region, run, params, package), package, run) if path else grade_again(early)
+        )
         verdict = _answers_late(verdict, run)
     assert verdict is not None  # noqa: S101 - one of them always is
     share = f" for {params.share:.0%} of the time" if params.share < 1 else ""
@@ -500,7 +505,9 @@ def _no_walls(region: Region) -> Verdict | None:
     return inconclusive(message, hint="tell your instructor")
 
 
-def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinParams) -> Verdict:
+def _stays(
+    path: Sequence[Pose], region: Region, run: Run, params: StaysWithinParams, package: PackageFacts
+) -> Verdict:
     out, long_m = out_along(path, region), length_m(path)
     inside = share_inside(path, out)
     figures = f"{inside:.0%} of the time inside, {metres(max(out))} outside at most, {metres(long_m)} long"
@@ -518,9 +525,8 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
         if wrong is not None:
             verdict = verdict.explained(f"it turns to the {wrong[0]} there, {wrong[1]}", wrong[2])
             verdict = verdict.lost_by("steers-wrong", wrong[0])
-        elif isinstance(region, Band) and (seen := _seen_near(path, out, region, run)):
-            why = f"the smallest of its ranges is then {seen}"
-            verdict = verdict.explained(why, f"{verdict.hint}; {LOOK_AT}")
+        elif isinstance(region, Band) and (scan := scan_near(path, out, region, run)):
+            verdict = _with_scan(verdict, scan, run_slips(package, run, "ranges-read"))
         elif isinstance(region, Band) and (around := circles(path, out)) > 1:
             verdict = verdict.explained(f"it drives in circles there, {around:.1f} times around", CIRCLES)
     elif long_m < params.least_m:
@@ -532,16 +538,15 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
     return _excuse_nearly(verdict.about(measured=figures), run, nearly=nearly)
 
 
-def _seen_near(path: Sequence[Pose], out: Sequence[float], band: Band, run: Run) -> str:
-    """Return what its laser sees where it first comes too near to a wall; "" where it has none, or is too far away."""
-    first, to_s = next(pose for pose, far in zip(path, out, strict=True) if far), run_seconds(run)
-    scans = [
-        c for c in run.channels if "LaserScan" in c.type and c.callerid in run.grader_nodes and c.messages
-    ]
-    if not scans or to_s is None or band.nearest_m(first.point) >= (band.min_m or 0.0):
-        return ""
-    before = tuple(one for one in scans[0].messages if to_s(one.log_time_ns) <= first.time_s)[-1:]
-    return nearest_seen(replace(scans[0], messages=before).values[0], scans[0].topic) if before else ""
+def _with_scan(verdict: Verdict, scan: Mapping[str, Any], reads: Sequence[PythonSlip]) -> Verdict:
+    """Return the loss with the smallest range that the laser saw, and what a script reads that looks elsewhere."""
+    index, far_m = nearest_seen(scan) or (0, 0.0)
+    why = f"the smallest of its ranges is then ranges[{index}] of {scan['topic']}, {seen_at(scan, index)}, "
+    why += f"with {far_m:.2f} m"
+    if said := looks_elsewhere(scan, index, reads):
+        hint = f"read ranges[{index}] too, and those around it"
+        return verdict.explained(f"{why}; {join_words(said)}", hint, tuple(one.place for one in reads))
+    return verdict.explained(why, f"{verdict.hint}; {LOOK_AT}")
 
 
 def _turns_wrong(

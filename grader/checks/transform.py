@@ -33,6 +33,9 @@ from grader.wording import join_words, plural, significant
 
 ORDER_S = 0.1
 """Two topics come over two connections: so much earlier a transform may be recorded than the pose that it follows."""
+RECENT = 4
+"""Poses that a transform may be of."""
+HALVED = "`z` is the sine of half the yaw, and `w` the cosine of half of it"
 FEW = 3
 """So many transforms may be the same for the machine's sake; more were never changed."""
 
@@ -350,17 +353,21 @@ def _wrong_pose(
     params: TransformParams,
 ) -> Verdict:
     (first_ns, value), count = wrong[0], f"in {len(wrong)} of {plural(len(judged), 'message')}"
-    pose = next((p for t, p in reversed(poses) if t <= first_ns), poses[0][1])
+    recent = [p for t, p in poses if t <= first_ns][-RECENT:] or [poses[0][1]]
     hint = f"send the pose of each message on {params.pose_of} at once, in its callback"
     old = [t for t, p in poses if _fits(value, p, params) and t <= first_ns]
+    pose = recent[-1] if old else _followed(value, recent, params)
     what, says = (
         f"{params.name} is wrong {count}",
         f"it is {_text(value)} while {params.pose_of} says {_text(pose)}",
     )
     if not old:
-        if all(
-            math.isclose(a, b, abs_tol=params.tolerance_m) for a, b in zip(value.at, pose.at, strict=True)
-        ):
+        if _is_there(value, pose, params) and _is_twice(value, pose, params):
+            hint = f"halve the angle: {HALVED}"
+            return failed(f"{what}: its angle is twice that of the pose; {says}", hint=hint).of_value(
+                nan=False
+            )
+        if _is_there(value, pose, params):
             hint = "copy the whole orientation of the message, x, y, z and w: none of them is an angle"
         hint = _axes(value, pose, params)[1] or hint
         return failed(f"{what}{_why(value, pose, params)}; {says}", hint=hint)
@@ -370,6 +377,24 @@ def _wrong_pose(
         return verdict
     verdict = verdict.if_repeated()
     return excused(verdict, run, old[-1], wrong[-1][0], why_late)
+
+
+def _is_there(value: Transform, pose: Transform, params: TransformParams) -> bool:
+    return all(math.isclose(a, b, abs_tol=params.tolerance_m) for a, b in zip(value.at, pose.at, strict=True))
+
+
+def _is_twice(value: Transform, pose: Transform, params: TransformParams) -> bool:
+    """Whether it is turned twice as far, as by `z = sin(yaw)`."""
+    twice = Transform(value.at, turn_of([2 * angle for angle in pose.rpy_deg]))
+    return value.apart(twice)[1] <= params.tolerance_deg < pose.apart(twice)[1]
+
+
+def _followed(value: Transform, recent: Sequence[Transform], params: TransformParams) -> Transform:
+    """Return which of the last poses it is to be: that at its place, or at one that follows from it; else the last."""
+    newest = recent[::-1]
+    there = (pose for pose in newest if _is_there(value, pose, params))
+    turned = (pose for pose in newest if _axes(value, pose, params)[0] or _fits(value.inverse, pose, params))
+    return next(there, None) or next(turned, newest[0])
 
 
 def _too_seldom(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verdict | None:

@@ -51,6 +51,8 @@ from grader.rubric.scenario import Scenario
 REPAIRS = "repairs"
 AT_ANY_RATE = {"node-name", "node-lives", "topic-type"}
 """Checks of runs that a loop which does not sleep passes too."""
+OF_WAYS = {"path", "ends-at", "stays-within"}
+"""Checks of where a robot drives, which a turn to the wrong side can fail."""
 OF_ANY_WORDS = AT_ANY_RATE | {"rate", "connected", "launch-connects", "launch-runs"}
 """Checks of runs that a node passes whatever it says."""
 GENERATION = re.compile(
@@ -200,7 +202,10 @@ def _helped(rubric: Rubric, first: Mapping[str, Verdict], on_copy: Mapping[str, 
     """Return the criteria that pass on a copy whose logic is changed; none where another one is lost by the change."""
     judged = [c.id for c in rubric.criteria if c.check not in AT_ANY_RATE]
     worse = any(on_copy[i].status.is_lost and not first[i].status.is_lost for i in judged)
-    return set() if worse else {i for i, one in on_copy.items() if one.status is Status.PASS}
+    # a robot whose way is right for one criterion alone turns as it should by chance
+    strays = {c.scenario for c in rubric.criteria if c.check in OF_WAYS and on_copy[c.id].status.is_lost}
+    chance = {c.id for c in rubric.criteria if c.check in OF_WAYS and c.scenario in strays}
+    return set() if worse else {i for i, one in on_copy.items() if one.status is Status.PASS} - chance
 
 
 def _at_new_paths(verdict: Verdict, repairs: Iterable[Repair]) -> Verdict:

@@ -16,7 +16,7 @@ SlipKind = Literal[
     "clock-value", "queue-size", "deaf", "node-name", "no-init", "commented-out", "publisher", "publisher-type",
     "subscriber", "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes",
     "prints", "argument-text", "unused-import", "lacking-import", "unregistered", "not-started", "start-value",
-    "hides-class", "float-index",
+    "hides-class", "float-index", "ranges-read",
     "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed", "printed-in-part",
     "published-in-part", "never-published", "takes-number", "typed-text", "goes-on",
     "no-argument", "read-late",
@@ -79,7 +79,9 @@ class PythonSlip(Placed, Record):
     - `goes-on`: an `if` that ends an action's goal by the call `name`, and no `return` behind it.
     - `wrong-value`: a value that is none: a comparison with NaN, the sine of an angle in degrees, a service's answer
       that is made and not returned, or of which no field is set, a condition that all numbers fulfil, or none, or what
-      each turn of a loop adds or sets again (`name`: `nan`, `degrees`, `return`, `empty`, `bounds`, `added`).
+      each turn of a loop adds or sets again (`name`: `nan`, `degrees`, `return`, `empty`, `bounds`, `added`); a grid's
+      index that steps by its height, a cell that `int(…)` works out of a number below 0, and a quaternion of a whole
+      angle (`step`, `cut`, `half`).
 
     No slips, but what a line says, for checks that compare it with what the lab asks; `message` is a name, a number or
     a text:
@@ -96,6 +98,7 @@ class PythonSlip(Placed, Record):
     - `reset-value`, `reset-limit`: where a counter goes back, to the number `message`, or when it reaches it (`name`:
       `range`, where it is that of a loop).
     - `sets-parameter`: where it sets a parameter.
+    - `ranges-read`: which ranges of a scan it reads there (`90`, `0:45`, `-30:`); only where it reads no others.
     - `argument-text`: where an argument of the command line is kept as a text; `fix` is the line with a number in its
       place.
     - `no-argument`: where a program of C++ reads an argument, the `name`-th, whether there is one or not.

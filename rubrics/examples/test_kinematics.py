@@ -7,10 +7,10 @@ import pytest
 FILE = "src/kinematics.py"
 
 
-def hand(shoulder, elbow):
+def hand(shoulder, elbow, upper=0.5, lower=0.3):
     """Return where the hand is."""
-    x = 0.5 * cos(shoulder) + 0.3 * cos(shoulder + elbow)
-    return x, 0.5 * sin(shoulder) + 0.3 * sin(shoulder + elbow)
+    x = upper * cos(shoulder) + lower * cos(shoulder + elbow)
+    return x, upper * sin(shoulder) + lower * sin(shoulder + elbow)
 
 
 def rounded(found):
@@ -31,9 +31,10 @@ def test_forward(student, angles):
     found, right = student(FILE).forward(*angles), hand(*angles)
     call = f"forward({angles[0]:.3g}, {angles[1]:.3g})"
     taken = found == pytest.approx(hand(*map(radians, angles)), abs=1e-6)
+    swapped = found == pytest.approx(hand(*angles, 0.3, 0.5), abs=1e-6)
     assert found == pytest.approx(right, abs=1e-6), (
         f"{call} should return ({right[0]:.3f}, {right[1]:.3f}), and returned {rounded(found)}"
-        f"{': it takes its angles for degrees' if taken else ''}"
+        f"{': it takes its angles for degrees' if taken else ': the two lengths are swapped' if swapped else ''}"
     )
 
 

@@ -266,6 +266,13 @@ def test_a_callback_that_the_script_calls_itself_gets_no_message(tmp_path, call,
     ("source", "error", "hint"),
     [
         ("return str(a)", "struct.error: required argument is not an integer", "give it an int: `int(…)` of a text"),
+        ("return FitResponse(changed, result)", "struct.error: required argument is not an integer",
+         "write `return FitResponse(result, changed)`"),
+        ("return FitResponse(a != 3, self.result)", "struct.error: required argument is not an integer",
+         "write `return FitResponse(self.result, a != 3)`"),
+        ("return FitResponse(result, changed)", "struct.error: required argument is not an integer", "give it an int"),
+        ("near = min(msg.ranges[-45:45])", "ValueError: min() arg is an empty sequence",
+         "write `msg.ranges[-45:] + msg.ranges[:45]`"),
         ("s = rospy.Service('add', Add, add)", "rospy.service.ServiceException: service [/add] already registered",
          "make it once, above any loop"),
         ("return AddResponse(3)", "NameError: name 'AddResponse' is not defined",
@@ -321,6 +328,7 @@ def test_what_is_wrong_with_messages_is_told_with_their_fields(tmp_path, source,
     files = {
         "msg/Reading.msg": "int32 level\n",
         "srv/Add.srv": "int64 a\n---\nint64 sum\n",
+        "srv/Fit.srv": "float64 a\n---\nfloat64 result\nbool changed\n",
         "node.py": text.replace("x = return", "x ="),
     }
     assert hint in explained(tmp_path, files, ("node.py", 5, source), error=error).hint

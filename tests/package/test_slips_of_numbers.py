@@ -263,3 +263,81 @@ def test_an_index_that_is_a_float(line: str, fixes: list[str], tmp_path: Path) -
     (tmp_path / "a.py").write_text(f"{line}\n", encoding="utf-8")
     slips = check_syntax(tmp_path, ["a.py"]).slips
     assert [s.fix for s in slips if s.kind == "float-index"] == fixes
+
+
+GRID = """\
+import rospy
+class Mapper:
+    def __init__(self):
+        self.w = rospy.get_param('~width')
+        self.h = rospy.get_param('~height')
+    def mark(self, p):
+        column = int(p.x / 0.5)
+        row = int(p.y / 0.5)
+        if CHECK:
+            self.data[INDEX] = 100
+"""
+
+
+@pytest.mark.parametrize(
+    ("check", "index", "fixes"),
+    [
+        ("column >= 0", "row * self.h + column", ["on line 10, write `self.w` in place of `self.h`"]),
+        ("p.x >= 0 and column > 0", "self.h * row + column", ["on line 10, write `self.w` in place of `self.h`"]),
+        ("0 <= p.x and 0 <= p.y and 0 <= column", "row * self.w + column", []),
+        ("column < 9", "row * self.w + column", []),
+    ],
+)  # fmt: skip
+def test_the_index_of_a_cell(check: str, index: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(GRID.replace("CHECK", check).replace("INDEX", index), encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.fix for s in slips if s.name == "step"] == fixes
+
+
+@pytest.mark.parametrize(
+    ("check", "fixes"),
+    [
+        ("column >= 0 and row >= 0", ["on lines 7 and 8, write `math.floor(…)` in place of `int(…)`"]),
+        ("not 0 > row", ["on line 8, write `math.floor(…)` in place of `int(…)`"]),
+        ("p.x >= 0 and column >= 0", []),
+        ("column < 9", []),
+    ],
+)
+def test_int_of_a_number_just_below_0(check: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(GRID.replace("CHECK", check).replace("INDEX", "0"), encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.fix for s in slips if s.name == "cut"] == fixes
+
+
+@pytest.mark.parametrize(
+    ("lines", "read"),
+    [
+        ("a = min(msg.ranges[0:45] + msg.ranges[-45:])", ["0:45", "-45:"]),
+        ("r = msg.ranges; n = len(r); print(r[90], r[:3])", ["90", ":3"]),
+        ("print(msg.ranges[0], min(msg.ranges))", []),
+        ("print(msg.ranges[n], msg.ranges[0])", []),
+        ("r = msg.ranges; print(nearest(r), r[0])", []),
+        ("print(msg.ranges[::2])", []),
+    ],
+)
+def test_which_ranges_of_a_scan_are_read(lines: str, read: list[str], tmp_path: Path) -> None:
+    text = f"def heard(msg):\n    {lines}\n"
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.message for s in slips if s.kind == "ranges-read"] == read
+
+
+@pytest.mark.parametrize(
+    ("lines", "fixes"),
+    [
+        ("q.z = sin(yaw); q.w = cos(yaw)", ["on line 1, write `yaw / 2` in place of `yaw`"]),
+        ("q = Quaternion(0, 0, math.sin(a), math.cos(a))", ["on line 1, write `a / 2` in place of `a`"]),
+        ("q.z = sin(yaw / 2); q.w = cos(yaw / 2)", []),
+        ("half = yaw / 2; q.z = sin(half); q.w = cos(half)", []),
+        ("p.z = sin(angle); p.x = cos(angle)", []),
+    ],
+)  # fmt: skip
+def test_a_quaternion_of_a_whole_angle(lines: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"{lines}\n", encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.fix for s in slips if s.name == "half"] == fixes

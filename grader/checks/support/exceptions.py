@@ -18,6 +18,7 @@ from grader.checks.support.rospy_calls import (
     is_text,
     line_tree,
     message_operand,
+    no_items,
     rewritten,
     uncalled_proxy,
 )
@@ -27,9 +28,8 @@ from grader.model.package import PackageFacts
 from grader.syntax_fixes import parsed
 from grader.wording import join_words, plural
 
-_ADDED = re.compile(
-    r"can only concatenate str \(not \"(\w+)\"\) to str|unsupported operand type\(s\) for \+=?: '(\w+)' and '(\w+)'"
-)
+_CANNOT_ADD = r"can only concatenate str \(not \"(\w+)\"\) to str"
+_ADDED = re.compile(_CANNOT_ADD + r"|unsupported operand type\(s\) for \+=?: '(\w+)' and '(\w+)'")
 HIDDEN = (
     "str", "int", "float", "list", "dict", "len", "max", "min", "sum", "range", "input", "print", "type", "round",
 )  # fmt: skip
@@ -179,8 +179,7 @@ def _value(message: str, source: str, _marked: tuple[int, int] | None) -> Meanin
         hint = f"check how many there are before you unpack them: {NUMBER_OF_PARTS}"
         return f"{plural(int(found[2]), 'value')} are expected on the right of `=`{came}", hint
     if found := _NO_ITEMS.search(message):
-        hint = f"check first that it is not empty, or say what the result is then: `{found[1]}(…, default=…)`"
-        return f"the list that is given to {found[1]}() is empty", hint
+        return no_items(found[1], source)
     if (found := _NO_NUMBER.search(message)) and found[1].endswith(".py'"):
         return _program(source)
     if found:

@@ -12,7 +12,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
-from typing import Annotated, Any, NamedTuple, TypeGuard
+from typing import Annotated, Any, NamedTuple, Protocol, TypeGuard
 
 from pydantic import AfterValidator
 
@@ -241,6 +241,9 @@ def _in_items(
         yield from found
 
 
+MOVED = "in another order"
+
+
 def _moved(got: Sequence[object], wanted: Sequence[object]) -> str:
     """Return where the rarest of a list's numbers is, and where it should be, if each number is there as often as it
     should be; "" for any other list."""
@@ -253,11 +256,73 @@ def _moved(got: Sequence[object], wanted: Sequence[object]) -> str:
         )
         if here != there:
             by_columns = [n for n in range(2, len(wanted)) if _is_by_columns(got, wanted, n)]
-            how = f"in another order: {value_text(number)} is at {here}, not at {there}"
+            how = f"{MOVED}: {value_text(number)} is at {here}, not at {there}"
             if len(by_columns) == 1:
                 how += f", column by column: a cell's index is `row * {by_columns[0]} + column`"
             return how
     return ""
+
+
+def was_right(found: Sequence[Reading], why: str, wanted: object, tolerance: float) -> int:
+    """Return the number of an earlier message that was right where a list is wrong now, as `why` says; 0 where none
+    was."""
+    place = why.partition(": ")[0]
+    if not place.startswith("["):
+        return 0
+    for number, one in enumerate(found[:-1], 1):
+        places = [d.path for value in one.values for d in differences(value, wanted, tolerance)]
+        if places and place not in places and "" not in places:
+            return number
+    return 0
+
+
+class _Wanted(Protocol):
+    @property
+    def topic(self) -> str: ...
+    @property
+    def field(self) -> str: ...
+    def fits(self, reading: Reading) -> bool: ...
+
+
+KEEP = (
+    "keep what was there before from callback to callback: `self.… = 0` in `__init__`, `+=` in the callback"
+)
+
+
+def made_of(found: Sequence[Reading], channels: Iterable[Channel], wanted: _Wanted) -> tuple[str, str] | None:
+    """Return how the last value follows from what the grader sent, and what to do: it is the last one of that, but for
+    its sign, a sum that takes off what is negative, or a count. None where it does not."""
+    came = [abs(value) for one in found for value in one.values if is_number(value)]
+    for channel in channels:
+        values = (v for one in readings([channel], wanted.field, numbers=False) for v in one.values)
+        sent = [value for value in values if is_number(value)]
+        sizes, topic = [*map(abs, sent)], channel.topic
+        if not channel.by_grader or topic == wanted.topic or len(set(sizes)) <= 1 or not came:
+            continue
+        if sizes == came:
+            return f"each value is the one that came on {topic}", KEEP
+        ends = found[-1].values
+        if math.isclose(came[-1], sum(sent)) and wanted.fits(found[-1]._replace(values=(sum(sizes),))):
+            return (
+                f"it is the sum of what came on {topic}, less what is negative",
+                "add `abs(…)` of each value",
+            )
+        if ends == (len(sent),):
+            return f"so many messages came on {topic}", "add what is in each message, and not 1"
+    return None
+
+
+def turned_wrong(found: Sequence[Reading], wanted: object) -> int:
+    """Return when an item of a list first got a wrong value that it still has in the last message (ns); 0 where none
+    did, and was left wrong alone."""
+    lists = [one.values[0] for one in found if one.values and isinstance(one.values[0], list | tuple)]
+    if len(lists) != len(found) or not isinstance(wanted, list | tuple):
+        return 0
+    for one, now in zip(found, lists, strict=True):
+        items = zip(now, lists[0], lists[-1], wanted, strict=False)
+        if any(item == end not in (first, right) for item, first, end, right in items):
+            return one.time_ns
+    return 0
 
 
 def _is_by_columns(got: Sequence[object], wanted: Sequence[object], width: int) -> bool:

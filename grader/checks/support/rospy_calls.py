@@ -201,6 +201,19 @@ def _parameter(message: str, source: str) -> Meaning | None:
     return None
 
 
+AROUND_THE_END = re.compile(r"([\w.]+)\[(-\d+):(\d+)\]")
+
+
+def no_items(function: str, source: str) -> Meaning:
+    """Of `min(scan.ranges[-45:45])`, or of another list without items."""
+    if found := AROUND_THE_END.search(source):
+        what, low, high = found.groups()
+        why = f"`{found[0]}` is empty: a slice does not go on from the end of a list at its beginning"
+        return why, f"write `{what}[{low}:] + {what}[:{high}]`"
+    hint = f"check first that it is not empty, or say what the result is then: `{function}(…, default=…)`"
+    return f"the list that is given to {function}() is empty", hint
+
+
 def calls_in_line(source: str, *names: str) -> list[ast.Call]:
     """Return the calls in a line of source, of functions or methods with one of these names."""
     found = [n for n in ast.walk(line_tree(source)) if isinstance(n, ast.Call)]
@@ -308,6 +321,24 @@ def _constants(package: PackageFacts) -> list[str]:
     ]
 
 
+def _swapped_values(found: Traceback, package: PackageFacts) -> Meaning | None:
+    """Return the order of the fields, where `ClampResponse(changed, result)` is given one in the place of another."""
+    if "required argument is not" not in found.message and "must be" not in found.message:
+        return None
+    for call in (n for n in ast.walk(line_tree(found.innermost.source)) if isinstance(n, ast.Call)):
+        name = ast.unparse(call.func)
+        fields = fields_of(package, name.rpartition(".")[2])
+        given = {ast.unparse(one).rpartition(".")[2]: ast.unparse(one) for one in call.args}
+        rest = [text for field, text in given.items() if field not in fields]
+        if len(given) != len(fields) or call.keywords or len(rest) > 1 or len(rest) == len(given):
+            continue
+        right = [given[field] if field in given else rest[0] for field in fields]
+        if right != [ast.unparse(one) for one in call.args]:
+            fix = rewritten(found.innermost.source, (call, f"{name}({', '.join(right)})"))
+            return f"`{name}` takes its values in the order {join_words(fields)}", fix
+    return None
+
+
 def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
     """Return why a message does not take the value that is published: a text for a number, a number for a text, or the
     publisher of another topic."""
@@ -317,8 +348,9 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
         return f"`{made[1]}` is the service's type, and its response has another type", fix
     frame = found.innermost
     wants_text = "must be of type bytes or an ascii string" in found.message
-    if not wants_text and "integer type" not in found.message:
-        return None
+    swapped = _swapped_values(found, package)
+    if swapped or (not wants_text and "integer type" not in found.message):
+        return swapped
     kind, other = ("string", "numbers") if wants_text else ("whole number", "strings")
     sent = next(iter(calls_in_line(frame.source, "publish")), None)
     owner = ast.unparse(sent.func.value) if sent is not None and isinstance(sent.func, ast.Attribute) else ""

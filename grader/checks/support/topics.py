@@ -412,7 +412,10 @@ def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | 
     return next(iter(run_slips(package, run, *kinds)), None)
 
 
-SEEN_AS = {"nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": "", "added": ""}
+SEEN_AS = {
+    "nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": "", "added": "", "half": "value",
+    "step": "order", "cut": "place",
+}  # fmt: skip
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so."""
 
 

@@ -2,8 +2,9 @@
 
 What nothing calls, statements without an effect, values that are none, imports. Names are for `script_names.py`, texts
 for `script_texts.py`, objects for `script_objects.py`, callbacks for `script_callbacks.py`, loops for
-`script_loops.py`, their rates for `script_rates.py`, counters and clocks for `script_counters.py`. Nothing is
-executed. A file has to be parsed by ROS's own Python, which is to run it: Python 3.8, standard library only.
+`script_loops.py`, their rates for `script_rates.py`, indexes for `script_indexes.py`, counters and clocks for
+`script_counters.py`. Nothing is executed. A file has to be parsed by ROS's own Python, which is to run it: Python 3.8,
+standard library only.
 """
 
 import ast
@@ -15,6 +16,7 @@ import sys
 sys.path.append(os.path.dirname(os.path.abspath(__file__)))
 import script_callbacks as callbacks
 import script_counters as counters
+import script_indexes
 import script_loops as loops
 import script_names as names
 import script_objects as objects
@@ -26,7 +28,7 @@ from script_names import (
     calls_in,
     dotted,
     is_call,
-    key_of,
+    listed,
     names_in,
     parents_of,
     slip,
@@ -49,7 +51,7 @@ def slips(tree):
         objects.object_slips, said_texts, loops.deaf_loops, counters.clock_values, counters.counter_slips,
         counters.counter_starts, without_effect, names.assigned_late, objects.hidden_names, objects.subscribed_again,
         imports, objects.taken_off, objects.unstarted_servers, wrong_values, decided_conditions,
-        times_added_again, overwritten_values,
+        times_added_again, overwritten_values, script_indexes.indexes,
         callbacks.unprinted_messages, counters.values_left_out, counters.published_unchanged,
         objects.unused_publishers, loops.loops_of_numbers, finished_goals, counters.sends_no_time, without_node,
     )  # fmt: skip
@@ -151,14 +153,14 @@ def handed_over(function, tree, owner):
     return "pass it to what calls it: `rospy.Subscriber(…, %s)`" % name
 
 
+OF_QUATERNION = 4
 OF_ANGLES = ("sin", "cos", "tan")
 TO_RADIANS = ("radians", "deg2rad")
 IN_DEGREES = ("degrees", "rad2deg")
 
 
 def wrong_values(tree):
-    """Comparisons with NaN, angles in degrees of which a sine is taken, answers of services that are dropped, and an
-    index that is a float."""
+    """Comparisons with NaN, angles in degrees of which a sine is taken, answers of services that are dropped."""
     made = [n for n in all_of(tree, ast.Assign) if called_name(n.value) in IN_DEGREES]
     degrees = {dotted(target) for n in made for target in n.targets}
     own = {dotted(n.targets[0]) for n in all_of(tree, ast.Assign) if getattr(n.value, "attr", "") != "theta"}
@@ -180,10 +182,11 @@ def wrong_values(tree):
                 continue  # a name of the script's own, which may be in degrees
             fix = "on line %d, write `%s` alone, without `%s(…)`" % (line, angle, called_name(node))
             yield slip(line, "wrong-value", "`%s` is already in radians" % angle, fix, "added")
-        elif isinstance(node, ast.Subscript) and is_quotient(key_of(node)):
-            message = "`/` makes a float, also of whole numbers, and an index is a whole number"
-            fix = "on line %d, write `//` instead of `/` in the index" % line
-            yield slip(line, "float-index", message, fix, dotted(node.value))
+        elif whole_angle(node, tree):
+            angle, lines = whole_angle(node, tree)
+            message = "a quaternion is made of half the angle, and `%s` is all of it" % angle
+            fix = "on %s, write `%s / 2` in place of `%s`" % (listed(lines), angle, angle)
+            yield slip(line, "wrong-value", message, fix, "half")
         elif isinstance(node, ast.Expr) and called_name(node.value).endswith("Response"):
             name = called_name(node.value)
             message, fix = "the `%s` that is made is not returned" % name, "write `return %s(…)`" % name
@@ -195,10 +198,25 @@ def wrong_values(tree):
             yield slip(line, "wrong-value", message, fix, "empty")
 
 
-def is_quotient(node):
-    """Whether a value is divided; `folder / 'file'` is a path."""
-    texts = [n for n in ast.walk(node) if isinstance(n, ast.JoinedStr) or type(getattr(n, "value", 0)) is str]
-    return isinstance(getattr(node, "op", None), ast.Div) and not texts
+def whole_angle(node, tree):
+    """Return the angle and the lines of `q.z = sin(yaw)` and `q.w = cos(yaw)`, or of a Quaternion made of these; None
+    of all else."""
+    if called_name(node) == "Quaternion" and len(node.args) == OF_QUATERNION:
+        parts = node.args[2:]
+    elif isinstance(node, ast.Assign) and getattr(node.targets[0], "attr", "") == "z":
+        to = dotted(node.targets[0].value) + ".w"
+        others = [n.value for n in all_of(tree, ast.Assign) if dotted(n.targets[0]) == to]
+        parts = [node.value, *others[:1]]
+    else:
+        return None
+    if [called_name(one) for one in parts] != ["sin", "cos"]:
+        return None
+    angles = {dotted(one.args[0]) for one in parts if one.args} - {"..."}
+    parted = [
+        n for n in all_of(tree, ast.Assign) if isinstance(getattr(n.value, "op", None), (ast.Div, ast.Mult))
+    ]
+    angles -= {dotted(n.targets[0]) for n in parted}
+    return (angles.pop(), sorted({one.lineno for one in parts})) if len(angles) == 1 else None
 
 
 def unfilled_answer(function):

@@ -1,0 +1,124 @@
+"""Finds with which indexes a student's Python reads lists, and what is wrong with how they are worked out, for
+`slips.py`.
+
+Nothing is executed. Python 3.8, standard library only.
+"""
+
+import ast
+
+from script_names import all_of, called_name, dotted, key_of, listed, names_in, parents_of, slip, text_of
+
+SIDES = ("width", "height")
+
+
+def indexes(tree):
+    """Indexes that are floats, or step through a grid by its height; cells worked out with `int(…)`; and which ranges
+    of a scan are read."""
+    sides = grid_sides(tree)
+    for node in all_of(tree, ast.Subscript):
+        key, line = key_of(node), getattr(node, "lineno", 0)
+        if is_quotient(key):
+            message = "`/` makes a float, also of whole numbers, and an index is a whole number"
+            fix = "on line %d, write `//` instead of `/` in the index" % line
+            yield slip(line, "float-index", message, fix, dotted(node.value))
+        yield from wrong_step(node, key, sides)
+    yield from cut_to_zero(tree)
+    yield from ranges_read(tree)
+
+
+def is_quotient(node):
+    """Whether a value is divided; `folder / 'file'` is a path."""
+    texts = [n for n in ast.walk(node) if isinstance(n, ast.JoinedStr) or type(getattr(n, "value", 0)) is str]
+    return isinstance(getattr(node, "op", None), ast.Div) and not texts
+
+
+def grid_sides(tree):
+    """Return the names of a grid's sides, `width` or `height`: those of parameters of that name, and of the fields of
+    its info."""
+    found = {}
+    for node in all_of(tree, ast.Assign):
+        read = (
+            text_of(node.value.args[0]) if called_name(node.value) == "get_param" and node.value.args else ""
+        )
+        pairs = [(dotted(target), read or dotted(node.value)) for target in node.targets]
+        for name, side in pairs + [(dotted(node.value), name) for name, _ in pairs if ".info." in name]:
+            if side.endswith(SIDES):
+                found[name] = "width" if side.endswith("width") else "height"
+    for node in all_of(tree, ast.Attribute):
+        if node.attr in SIDES and ".info." in dotted(node):
+            found[dotted(node)] = node.attr
+    return {name: side for name, side in found.items() if "..." not in name}
+
+
+def wrong_step(node, key, sides):
+    """`data[row * height + column]`, where a row has as many cells as the grid is wide."""
+    parts = [key.left, key.right] if isinstance(getattr(key, "op", None), ast.Add) else []
+    steps = [part for part in parts if isinstance(getattr(part, "op", None), ast.Mult)]
+    if len(steps) != 1:
+        return
+    factors = [dotted(steps[0].left), dotted(steps[0].right)]
+    high = [name for name in factors if sides.get(name) == "height"]
+    wide = [name for name in sides if sides[name] == "width"]
+    # the one that is written as the other is: `self.width` beside `self.height`
+    wide.sort(key=lambda name: name.rpartition(".")[0] != high[0].rpartition(".")[0]) if high else None
+    if len(high) == 1 and wide:
+        message = "a row of the grid has as many cells as it is wide, and this steps by its height"
+        fix = "on line %d, write `%s` in place of `%s`" % (node.lineno, wide[0], high[0])
+        yield slip(node.lineno, "wrong-value", message, fix, "step")
+
+
+def cut_to_zero(tree):
+    """`column = int(x / size)` of which the script asks whether it is below 0: -0.5 becomes 0."""
+    for function in all_of(tree, ast.FunctionDef):
+        inside = list(ast.walk(function))
+        asked = set()
+        for test in (n for n in inside if isinstance(n, ast.Compare)):
+            sides = [test.left, *test.comparators]
+            if any(isinstance(one, ast.Constant) and one.value == 0 for one in sides):
+                asked.update(dotted(one) for one in sides if isinstance(one, (ast.Name, ast.Attribute)))
+        made = [
+            n for n in inside if isinstance(n, ast.Assign) and called_name(n.value) == "int" and n.value.args
+        ]
+        given = {n.lineno: n.value.args[0] for n in made if dotted(n.targets[0]) in asked}
+        # not where the number itself is compared with 0
+        lines = [at for at, one in given.items() if is_quotient(one) and not names_in(one) & asked]
+        if lines:
+            message = "`int(…)` cuts off towards 0, so that what is just below 0 becomes 0"
+            fix = "on %s, write `math.floor(…)` in place of `int(…)`" % listed(lines)
+            yield slip(lines[0], "wrong-value", message, fix, "cut")
+
+
+def ranges_read(tree):
+    """Which ranges of a scan a script reads (`0:45`), where each index is a number."""
+    parents, found = parents_of(tree), []
+    held = {dotted(t) for n in all_of(tree, ast.Assign) if is_ranges(n.value) for t in n.targets} - {"..."}
+    for node in all_of(tree, ast.Name, ast.Attribute):
+        if not isinstance(node.ctx, ast.Load) or not (is_ranges(node) or dotted(node) in held):
+            continue
+        around = parents[node]
+        if isinstance(around, ast.Assign) or called_name(around) == "len":
+            continue
+        index = index_text(around) if isinstance(around, ast.Subscript) and around.value is node else ""
+        if not index:
+            return  # here it may read any of them
+        found.append(slip(node.lineno, "ranges-read", index, name=dotted(node)))
+    yield from found
+
+
+def is_ranges(node):
+    return getattr(node, "attr", "") == "ranges"
+
+
+def index_text(subscript):
+    """Return what stands in the brackets, where it is a number or a slice of numbers; else ""."""
+    key = key_of(subscript)
+    parts = [key.lower, key.upper] if isinstance(key, ast.Slice) and key.step is None else [key]
+    numbers = ["" if one is None else whole_number(one) for one in parts]
+    return "" if None in numbers else ":".join(numbers)
+
+
+def whole_number(node):
+    """Return the text of a whole number; None of all else."""
+    sign = "-" if isinstance(getattr(node, "op", None), ast.USub) else ""
+    value = getattr(node.operand if sign else node, "value", None)
+    return sign + str(value) if type(value) is int and abs(value) < 1e6 else None
