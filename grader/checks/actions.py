@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -9,9 +10,9 @@ from pydantic import Field
 
 from grader.checks.registry import Refers, check
 from grader.checks.support.clocks import NEVER_LATE_S, excused, run_seconds, why_late
-from grader.checks.support.exit_causes import explain_early_end, explain_error
+from grader.checks.support.exit_causes import Ending, explain_early_end, explain_error
 from grader.checks.support.fields import differences, fields_text
-from grader.checks.support.processes import GlobalName, plain_type
+from grader.checks.support.processes import GlobalName, ends_twice, plain_type, run_slips
 from grader.checks.support.text import both, near_names, shown
 from grader.checks.support.topics import cite, no_node, nodes_on, published_topics, run_slip, topics_with
 from grader.evidence.events import ActorEvent
@@ -25,6 +26,8 @@ LISTED = 10
 """So many values of the feedback are listed."""
 GOES_ON_NS = 1_000_000_000
 """Feedback so long after a goal was cancelled says that the server goes on with it."""
+LONG_S = 1.0
+"""No turn of a loop that reports on a goal lasts longer, where the rubric does not say."""
 CANCELLED_MORE_S = 5.0
 """So much longer than `within_s`, at least, the result of a goal that is cancelled is waited for."""
 ENDS = {
@@ -170,7 +173,7 @@ def _fault(package: PackageFacts, run: Run, goal: Goal, params: ActionResultPara
         return failed(message, hint=_how_to_fill(goal.end.value, params.result, hint))
     return (
         _unlike_last_report(run, goal, params)
-        or _too_late(run, goal, params)
+        or _too_late(package, run, goal, params)
         or _no_feedback(run, goal, params)
         or _other_reports(run, goal, params)
     )
@@ -237,6 +240,8 @@ def _no_result(package: PackageFacts, run: Run, goal: Goal, params: ActionResult
         return end.verdict(failed, f"{said}: the node ended before ({end.cause})")
     if end := explain_error(package, run):
         return end.verdict(failed, f"{said}: {end.cause}")
+    if waits := _long_wait(package, run, params):
+        return waits.verdict(failed, f"{said}: {waits.cause}")
     message = f"{said}: {shown(goal.end.detail) if goal.end else ''}"
     hint = "every path through the callback must end with set_succeeded, set_aborted or set_preempted"
     verdict = failed(message, hint=hint).if_repeated()
@@ -263,14 +268,28 @@ def _other_end(package: PackageFacts, run: Run, goal: Goal, params: ActionResult
     if params.status == "PREEMPTED" and goal.cancelled_ns is None:
         told = f"{message}: it was over before it could be cancelled"
         verdict = failed(told, hint="let it take as long as the handout says")
-        return _excused(verdict.if_repeated(), run, goal)
+        # A server that ends a goal twice ends it early by itself, however late the machine is
+        return verdict if ends_twice(run) else _excused(verdict.if_repeated(), run, goal)
     unset = any("did not set the goal to a terminal status" in line.line for _, line in run.console)
     if status == "ABORTED" and unset:
         message += ": the callback returns without saying how the goal ends"
     return failed(message, hint=HINTS[params.status])
 
 
-def _too_late(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | None:
+def _long_wait(package: PackageFacts, run: Run, params: ActionResultParams) -> Ending | None:
+    """Return the line of a script that runs which makes a turn of its loop last longer than the goal may."""
+    for slip in run_slips(package, run, "rate-number"):
+        pause_s, limit_s = 1 / (float(slip.message) or math.inf), params.within_s or LONG_S
+        if pause_s > limit_s:
+            lasts = (
+                f"line {slip.line} of {slip.file} lets each turn of its loop last {significant(pause_s)} s"
+            )
+            hint = f"on line {slip.line}, wait for less time: a rate is in hertz, and a time to sleep is in seconds"
+            return Ending(lasts, hint, (slip.place,))
+    return None
+
+
+def _too_late(package: PackageFacts, run: Run, goal: Goal, params: ActionResultParams) -> Verdict | None:
     to_s, from_ns = run_seconds(run), goal.cancelled_ns or goal.at_ns
     if params.within_s is None or goal.ended_ns is None or to_s is None:
         return None
@@ -285,6 +304,8 @@ def _too_late(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | Non
         else "do not sleep longer than the handout asks"
     )
     verdict = failed(message, hint=hint)
+    if waits := _long_wait(package, run, params):
+        return waits.verdict(failed, f"{message}: {waits.cause}")
     # So much later than asked is no lateness of a machine.
     if took_s > params.within_s + NEVER_LATE_S * run.warp:
         return verdict
@@ -300,7 +321,8 @@ def _no_feedback(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | 
     publish = both("publish_feedback(feedback)", "publishFeedback(feedback)")
     verdict = failed(message, hint=f"call the action server's {publish} each time around the loop")
     # That none came at all is no matter of time.
-    return verdict if came == 0 else _excused(verdict.if_repeated(), run, goal)
+    nothing = verdict.model_copy(update={"wrong": "nothing"})
+    return nothing if came == 0 else _excused(verdict.if_repeated(), run, goal)
 
 
 def _excused(verdict: Verdict, run: Run, goal: Goal) -> Verdict:

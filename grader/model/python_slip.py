@@ -76,12 +76,12 @@ class PythonSlip(Placed, Record):
       or counts nothing.
     - `takes-number`: a loop that computes with what a topic's callback keeps of its message, or publishes it as a
       number: a slip only if that message has to be a text.
-    - `goes-on`: an `if` that ends an action's goal by the call `name`, and no `return` behind it.
+    - `goes-on`: an `if`, or a loop's first turn, that ends an action's goal by the call `name`, and goes on.
     - `wrong-value`: a value that is none: a comparison with NaN, the sine of an angle in degrees, a service's answer
-      that is made and not returned, or of which no field is set, a condition that all numbers fulfil, or none, or what
-      each turn of a loop adds or sets again (`name`: `nan`, `degrees`, `return`, `empty`, `bounds`, `added`); a grid's
-      index that steps by its height, a cell that `int(…)` works out of a number below 0, and a quaternion of a whole
-      angle (`step`, `cut`, `half`).
+      that is made and not returned, or of which no field is set, a message that is filled in and not sent, a condition
+      that all numbers fulfil, or none, or what each turn of a loop adds or sets again (`name`: `nan`, `degrees`,
+      `return`, `empty`, `unsent`, `bounds`, `added`); a grid's index that steps by its height, a cell that `int(…)`
+      works out of a number below 0, and a quaternion of a whole angle (`step`, `cut`, `half`).
 
     No slips, but what a line says, for checks that compare it with what the lab asks; `message` is a name, a number or
     a text:

@@ -176,8 +176,8 @@ class Verdict(Record):
     sought: tuple[Sought, ...] = ()
     """Names whose lines are cited."""
     wrong: Literal["", "value", "nan", "nothing", "order", "place"] = ""
-    """A value is another one, or NaN is in its place, or a service's callback returns nothing, or the items of a list
-    are in another order, or one of them is set that is not to be."""
+    """A value is another one, or NaN is in its place, or nothing came (no answer of a service, no feedback), or the
+    items of a list are in another order, or one of them is set that is not to be."""
     callbacks: Literal["", "late", "before"] = ""
     """A callback came too `late` to what was sent, or never; or it is about what came `before` any callback could keep
     the node waiting."""

@@ -209,7 +209,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("object", 5, "`stop` on line 3 is inside of `go`: begin line 3 with the same spaces or tabs as line 2")]),
         (OF_A + "m = A\nm.x = 1\n", [("object", 5, "on line 5, write `m = A()`")]),
         (OF_A + "m['a'] = A\nm[0].x = 1\n", []),
-        (OF_A + "def f():\n    m = A\n    g(m)\ndef h():\n    m = A()\n    m.x = 1\n", []),
+        (OF_A + "def f():\n    m = A\n    g(m)\ndef h():\n    m = A()\n    m.x = 1\n    g(m)\n", []),
         ("p = rospy.Publisher('a', A, 10)\n", [("queue-size", 1, "is no queue size")]),
         ("p = rospy.Publisher('a', A, Listener(), queue_size=10)\n", []),
         (node("    p.publish(1)\n" + LOOP + "        rate.sleep()\n") + CALLED,

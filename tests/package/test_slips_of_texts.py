@@ -321,8 +321,53 @@ def test_what_comes_behind_a_function_that_never_ends_is_never_reached(text, fou
         ("    if stop:\n        s.set_preempted()\n    if s.is_active():\n        s.set_succeeded()\n", []),
         ("    while not over():\n        g = s.accept_new_goal()\n        if g:\n            s.set_succeeded()\n", []),
         ("    for one in goals:\n        if near(one):\n            one.set_succeeded()\n", []),
+        ("    for i in range(g.n):\n        s.publish_feedback(f)\n        s.set_succeeded(r)\n        r.sleep()\n",
+         ["move line 4 out of the loop, below its last line, 5, with the same spaces or tabs before it as line 2 has"]),
+        ("    while i < g.n:\n        s.publish_feedback(f)\n        i = i + 1\n        s.set_succeeded(r)\n",
+         ["move line 5 out of the loop, below its last line, 5, with the same spaces or tabs before it as line 2 has"]),
+        ("    while 1:\n        s.accept_new_goal()\n        s.publish_feedback(f)\n        s.set_succeeded()\n", []),
+        ("    for one in goals:\n        one.publish_feedback(f)\n        one.set_succeeded()\n", []),
+        ("    while True:\n        s.publish_feedback(f)\n        s.set_succeeded()\n        return\n", []),
     ],
 )  # fmt: skip
 def test_callbacks_that_go_on_after_their_goal(text: str, fixes: list[str], tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(f"def do(g):\n{text}", encoding="utf-8")
     assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "goes-on"] == fixes
+
+
+HEADS = "from a.msg import Twist, Header, Reading, GoFeedback\nfrom a.srv import AddResponse\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "fixes"),
+    [
+        ("def f():\n    t = Twist()\n    t.linear.x = 1\n    pub.publish(Twist())\n",
+         ["on line 6, write `t` instead of `Twist()`"]),
+        ("def f():\n    t = Twist()\n    t.linear.x = 1\n    pub.publish(Twist)\n",
+         ["on line 6, write `t` instead of `Twist`"]),
+        ("def f():\n    m = Reading()\n    h = Header()\n    h.stamp = now()\n    pub.publish(m)\n",
+         ["below line 6, write `m.header = h`"]),
+        ("h = Header()\nh.stamp = now()\nm = Reading()\npub.publish(m)\n", ["below line 5, write `m.header = h`"]),
+        ("pub = rospy.Publisher('/v', Twist)\ndef f():\n    t = Twist()\n    t.linear.x = 1\n",
+         ["below line 6, write `pub.publish(t)`"]),
+        ("def f(q):\n    r = AddResponse()\n    r.sum = q.a\n", ["write `return r` at the end of the callback"]),
+        ("def f(q):\n    r = AddResponse()\n    r.sum = q.a\n    return AddResponse()\n",
+         ["on line 6, write `r` instead of `AddResponse()`"]),
+        ("class A:\n    b = GoFeedback()\n    def f(self, g):\n        self.b.n = 1\ns = SimpleActionServer('a')\n",
+         ["below line 6, write `s.publish_feedback(self.b)`"]),
+        ("def f():\n    t = Twist()\n    t.linear.x = 1\n", ["give `t` to the call that should send it"]),
+        ("def f():\n    t = Twist()\n    t.linear.x = 1\n    pub.publish(t)\n", []),
+        ("def f():\n    t = Twist()\n    t.linear.x = 1\n    return t\n", []),
+        ("def f():\n    t = Twist()\n    t.linear.x = 1\n    log(t.linear.x)\n", []),
+        ("def f():\n    global t\n    t = Twist()\n    t.linear.x = 1\ndef g():\n    pub.publish(t)\n", []),
+        ("def f():\n    t = Twist()\n    def g():\n        pub.publish(t)\n    t.linear.x = 1\n    g()\n", []),
+        ("t = Twist()\ndef f():\n    t.linear.x = 1\n    pub.publish(t)\n", []),
+        ("def f(a):\n    a.t = Twist()\n    a.t.linear.x = 1\ndef g(b):\n    pub.publish(b.t)\n", []),
+        ("def f():\n    t = Twist()\n    s = t.linear\n    t.linear.x = 1\n    pub.publish(Twist(linear=s))\n", []),
+        ("def f():\n    r = Reading()\n    r.cells[0] = 1\n    r.a = 1\n    pub.publish(r)\n", []),
+        ("def f():\n    unused = Twist()\n", []),
+    ],
+)  # fmt: skip
+def test_messages_that_are_filled_in_and_not_sent(text: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(HEADS + text, encoding="utf-8")
+    assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "unsent"] == fixes

@@ -184,6 +184,11 @@ def run_slips(package: PackageFacts, run: Run, *kinds: SlipKind) -> list[PythonS
     return [s for s in package.slips if s.kind in kinds and s.file in scripts]
 
 
+def ends_twice(run: Run) -> bool:
+    """Return whether actionlib says that a server tried to end a goal that was over."""
+    return any("To transition to a" in line.line for _, line in run.console)
+
+
 def copied_topic(
     package: PackageFacts, run: Run, kind: Literal["publisher", "subscriber"], topic: str = ""
 ) -> str:

@@ -13,6 +13,7 @@ from grader.checks.support.processes import (
     NO_SCRIPT_HINT,
     copied_topic,
     early_end,
+    ends_twice,
     is_written_as,
     lives,
     named_at,
@@ -414,7 +415,7 @@ def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | 
 
 SEEN_AS = {
     "nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": "", "added": "", "half": "value",
-    "step": "order", "cut": "place",
+    "step": "order", "cut": "place", "unsent": "",
 }  # fmt: skip
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so."""
 
@@ -423,18 +424,25 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
     """Return a lost mark with the line of a script that runs on which the value goes wrong, or with its conditions that
     are always or never true."""
     files = _files_that_run(package, run)
-    kinds = ["wrong-value"] if check.of_callbacks and not verdict.cause else []
-    if check.name == "action-result" and any("To transition to a" in c.line for _, c in run.console):
-        kinds.append("goes-on")  # actionlib was told to end a goal that is over
+    of_values = check.of_callbacks or check.name in OF_VALUES
+    kinds = ["wrong-value"] if of_values and not verdict.cause else []
+    if check.name == "action-result" and ends_twice(run):
+        kinds.append("goes-on")
     found = [s for s in package.slips if s.kind in kinds and s.file in files]
-    sure = [s for s in found if s.kind == "goes-on" or (verdict.wrong and SEEN_AS[s.name] == verdict.wrong)]
-    for slip in sure[:1] or [s for s in found if not SEEN_AS.get(s.name) and not verdict.wrong][:4]:
+    wrong = verdict.wrong
+    # That nothing came at all is not because a goal that is over goes on
+    over = [s for s in found if s.kind == "goes-on" and wrong != "nothing"]
+    sure = over or [s for s in found if wrong and SEEN_AS.get(s.name) == wrong]
+    maybe = [s for s in found if s.name == "unsent" or (s.name in SEEN_AS and not (wrong or SEEN_AS[s.name]))]
+    for slip in sure[:1] or maybe[:4]:
         why, hint = f"line {slip.line} of {slip.file}: {slip.message}", f"{verdict.hint}; {slip.fix}"
         cause = slip.message if sure else ""
         verdict = verdict.explained(why, slip.fix if sure else hint, (slip.place,), cause=cause)
     return verdict
 
 
+OF_VALUES = ("action-result", "stamps")
+"""Checks of what a node sends, besides those of what it does upon what it hears."""
 OF_RESULTS = ("prints", "rostest")
 """Checks of what comes of callbacks in the end."""
 

@@ -53,7 +53,8 @@ def slips(tree):
         imports, objects.taken_off, objects.unstarted_servers, wrong_values, decided_conditions,
         times_added_again, overwritten_values, script_indexes.indexes,
         callbacks.unprinted_messages, counters.values_left_out, counters.published_unchanged,
-        objects.unused_publishers, loops.loops_of_numbers, finished_goals, counters.sends_no_time, without_node,
+        objects.unused_publishers, objects.unsent_messages, loops.loops_of_numbers, finished_goals,
+        finished_in_loops, counters.sends_no_time, without_node,
     )  # fmt: skip
     found = [one for find in finders for one in find(tree)]
     # of two that say why a name is not there, the first is about the class that it belongs to
@@ -236,9 +237,6 @@ def unfilled_answer(function):
     return (variable, name, made[0].lineno) if is_alone and variable and name != "EmptyResponse" else None
 
 
-FINISHING = ("set_succeeded", "set_aborted", "set_preempted", "set_rejected")
-
-
 BELOW_LIMIT = 50
 """So many statements below the end of a goal are looked at."""
 
@@ -251,18 +249,37 @@ def finished_goals(tree):
         if node.orelse or not is_call_alone(node.body[-1]):
             continue
         call, around = node.body[-1].value, parents.get(node)
-        if called_name(call) not in FINISHING:
+        if called_name(call) not in objects.FINISHING:
             continue
         block = getattr(around, "body", [])
         at = block.index(node) + 1 if isinstance(block, list) and node in block else len(block)
         below = [one for one in block[at : at + BELOW_LIMIT] if not is_other_case(one, node)]
-        more = any(calls_in(one, *FINISHING) or isinstance(one, LOOPS) for one in below)
+        more = any(calls_in(one, *objects.FINISHING) or isinstance(one, LOOPS) for one in below)
         in_loop = isinstance(around, LOOPS)
         if more or (in_loop and not is_last_turn(around, node, call)):
             what = "loop" if in_loop else "callback"
             message = "the goal is over with `%s(…)`, and the %s goes on" % (called_name(call), what)
             fix = "below line %d, write `return`" % node.body[-1].end_lineno
             yield slip(call.lineno, "goes-on", message, fix, called_name(call))
+
+
+def finished_in_loops(tree):
+    """Where the first turn of a loop that reports on its way ends an action's goal, and the loop goes on."""
+    for loop in all_of(tree, *LOOPS):
+        alone = [one.value for one in loop.body if is_call_alone(one)]
+        ending = [one for one in alone if called_name(one) in objects.FINISHING]
+        left = any(isinstance(one, (ast.Break, ast.Return)) for one in loop.body)
+        takes = calls_in(loop, "accept_new_goal", "is_active")
+        takes = takes or {dotted(getattr(loop, "target", None))} & {dotted(one.func.value) for one in ending}
+        if ending and not left and not takes and calls_in(loop, "publish_feedback"):
+            call, end = ending[-1], loop.end_lineno
+            message = "`%s(…)` is inside of the loop on line %d, whose first turn ends the goal"
+            fix = "move line %d out of the loop, below its last line, %d, with the same spaces or tabs before it "
+            fix += "as line %d has"
+            fix %= (call.lineno, end, loop.lineno)
+            yield slip(
+                call.lineno, "goes-on", message % (called_name(call), loop.lineno), fix, called_name(call)
+            )
 
 
 def is_other_case(node, before):
