@@ -225,9 +225,11 @@ class Later:
         """Names that are not there, of which an `except` is not reached, and functions that nothing calls."""
         told: set[tuple[str, int]] = set()
         given: set[tuple[str, str, int]] = set()
+        fixes = ((s.file, s.fix) for s in self._of("callback-values"))
+        passed = {(file, name) for file, fix in fixes for name in re.findall(r"\w+(?=[,)])", fix)}
         for slip in self._of("misspelt", "undefined"):
-            caught = self._text_of(slip).lstrip().startswith("except")
-            if (one := name_slip(slip, self._package)) is not None and not caught:
+            one, is_caught = name_slip(slip, self._package), self._text_of(slip).lstrip().startswith("except")
+            if one is not None and not is_caught and (slip.file, one.name) not in passed:
                 told.add((slip.file, slip.line))
                 place = (slip.file, one.name, self._function_at(slip))
                 if place not in given:

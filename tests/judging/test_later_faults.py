@@ -366,10 +366,11 @@ def test_a_callback_that_ros_cannot_call_is_named_behind_another_mistake(
     criteria = [NODE | ROOT, HEARS | {"requires": ["node"]}]
     fix = slip("callback-values", "", 1, fix="write `def on_text(msg):`", name="on_text")
     source = f"def on_text():\n    pass\nSubscriber('hello', String, {given}\n"
-    hint = hint_of(
-        "node" if run is DIES else "hears", run, criteria, slip("subscriber", "hello"), fix, source=source
-    )
+    own = slip("undefined", "", 2, name="msg", fix="above line 2, write `msg = …`")
+    slips = (slip("subscriber", "hello"), own, fix)
+    hint = hint_of("node" if run is DIES else "hears", run, criteria, *slips, source=source)
     assert (f"on line 1 of {FILE}, write `def on_text(msg):`" in hint) is told
+    assert "msg = …" not in hint
 
 
 @pytest.mark.parametrize(("place", "told"), [("%d", True), ("%.2f", True), ("%s", False)])

@@ -114,7 +114,7 @@ _ILLEGAL_NAME = re.compile(
     r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "
 )
 _NUMBER_ASKED = re.compile(r"\b(?:int|float)\(\s*(?:raw_)?input\(")
-_ARITY = re.compile(r"([\w.]+)\(\) (?:takes|missing) ")
+_ARITY = re.compile(r"([\w.<>]+)\(\) (?:takes|missing) ")
 _NAME = re.compile(r"(?:name|local variable) '(\w+)' (?:is not defined|where it is not|referenced before)")
 _BY_PYTHON = re.compile(r"\. Did you mean: '(\w+)'\?$")
 

@@ -5,11 +5,13 @@ Nothing is executed. Python 3.8, standard library only.
 """
 
 import ast
+import builtins
 import itertools
 
 from script_names import (
     all_of,
     argument,
+    bound_names,
     callback_of,
     called_name,
     calls_in,
@@ -73,7 +75,7 @@ def callbacks(tree):
             elif own and not called and not least <= values <= most:
                 what = OTHER_VALUES.get(name, "the %s" % VALUES.get(name, "message"))
                 what += " and its `callback_args`" if name == "Subscriber" and values > 1 else ""
-                message, fix = wrong_callback(own, node, functions, isinstance(meant, ast.Attribute), values)
+                message, fix = wrong_callback(own, node, tree, isinstance(meant, ast.Attribute), values)
                 number = "1 argument" if least == 1 else "%d arguments" % least
                 message = message or "`%s` takes %s, but ROS passes it %s" % (own.name, number, what)
                 yield slip(own.lineno, "callback-values", message, fix, own.name)
@@ -115,11 +117,11 @@ def spare_callbacks(tree, functions):
         yield slip(spare[0].lineno, "callback-missing", message, fix, name)
 
 
-def wrong_callback(own, call, functions, bound, values):
+def wrong_callback(own, call, tree, bound, values):
     """Return why a function does not fit as a callback, "" where only its arguments do not, and what to write."""
     given = [one.arg for one in own.args.args]
     if any(inner is call for inner in ast.walk(own)):
-        others = [f for f in functions.values() if f is not own and takes(f, bound)[0] == values]
+        others = [f for f in functions_in(tree).values() if f is not own and takes(f, bound)[0] == values]
         message = "`%s` is the function that makes this call, not its callback" % own.name
         meant = others[0].name if len(others) == 1 else "the name of the function that prints the message"
         return message, "on line %d, write %s instead of %s" % (call.lineno, meant, own.name)
@@ -127,9 +129,20 @@ def wrong_callback(own, call, functions, bound, values):
         message = "`%s` is a method, so its first parameter has to be `self`" % own.name
         return message, "write `def %s(%s):`" % (own.name, ", ".join(["self", *given]))
     kept = [name for name in given if not bound or name != "self"]
-    spare = [VALUES.get(called_name(call), "msg"), "args"]
+    spare = [unknown_name(own, tree) or VALUES.get(called_name(call), "msg"), "args"]
     kept = ["self"] * bound + (kept + spare[len(kept) :])[:values]
     return "", "write `def %s(%s):`%s" % (own.name, ", ".join(kept), made_response(own, call, kept))
+
+
+def unknown_name(own, tree):
+    """Return the one name that a callback without an argument reads a part of, or uses as a value, and that nothing
+    in the script has; "" where there is not one."""
+    known = {n.id for n in all_of(tree, ast.Name) if not isinstance(n.ctx, ast.Load)} | set(dir(builtins))
+    known |= {n.arg for n in all_of(tree, ast.arg)} | bound_names(tree) | set(functions_in(tree))
+    called = {n.func for n in ast.walk(own) if isinstance(n, ast.Call)}
+    called |= {n.value for n in called if isinstance(n, ast.Attribute)}
+    used = {n.id for n in ast.walk(own) if isinstance(n, ast.Name) and n not in called}
+    return "".join(used - known) if len(used - known) == 1 else ""
 
 
 def made_response(own, call, kept):

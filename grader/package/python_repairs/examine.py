@@ -33,7 +33,14 @@ from grader.package.python_repairs.imports import (
     without_suffixes,
 )
 from grader.package.python_repairs.members import Known, with_members
-from grader.package.python_repairs.names import bound_in, meant_by, with_methods, with_names, with_self
+from grader.package.python_repairs.names import (
+    bound_in,
+    meant_by,
+    with_methods,
+    with_names,
+    with_parameters,
+    with_self,
+)
 from grader.package.python_repairs.syntax import (
     Step,
     as_python3,
@@ -110,6 +117,7 @@ def _steps(text: str, types: list[str], known: Known) -> Iterator[Step]:
             _with_quotes,
             with_names,
             with_methods,
+            with_parameters,
             _with_attributes,
             with_message_classes,
             with_values_called,

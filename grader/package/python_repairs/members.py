@@ -18,16 +18,10 @@ from difflib import get_close_matches
 from itertools import chain
 from typing import NamedTuple
 
-from grader.package.python_repairs.names import bound_in
+from grader.package.python_repairs.names import MEMBERS, bound_in, made_by, meant_by_use
 from grader.package.python_repairs.syntax import Step, edited, last_name, nodes_in, span_of, step_to, tree_of
 from grader.wording import is_one_edit
 
-MEMBERS = {
-    "Publisher": ("publish", "unregister", "get_num_connections"),
-    "Rate": ("sleep", "remaining"),
-    "message": ("data",),
-}
-"""By what makes the object, or a message of std_msgs: what belongs to it."""
 GIVES = {"Subscriber": "", "Service": "Request", "SimpleActionServer": "Goal"}
 """By what calls a callback: what the class of what it gets is called, behind the type's name."""
 OF_TEXTS = tuple(name for name in dir(str) if not name.startswith("_"))
@@ -153,13 +147,13 @@ def _of_self(tree: ast.Module) -> set[str]:
 def _misspelt_members(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
     """Yield `rate.slep()` and `msg.Data`."""
     tree, lines = tree_of(text), text.split("\n")
-    assigned = [n for n in nodes_in(tree) if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)]
-    kinds = {ast.unparse(n.targets[0]): last_name(getattr(n.value, "func", None)) for n in assigned}
-    own = {one.name: _members_of(one) for one in tree.body if isinstance(one, ast.ClassDef) and not one.bases}
+    kinds = {name: kind for name, kind in made_by(nodes_in(tree)).items() if kind}
+    classes = [one for one in tree.body if isinstance(one, ast.ClassDef)]
+    own = {one.name: _members_of(one) for one in classes if {*map(ast.unparse, one.bases)} <= {"object"}}
     named = [(one, getattr(one, "name", "")) for one in tree.body]
     inside = {id(n): name for one, name in named if name in own for n in nodes_in(one)}
     stored = {n.attr for n in nodes_in(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
-    fields_of = known.fields(tree)
+    fields_of, lacking = known.fields(tree), _Lacking(tree)
     messages = _messages_of_callbacks(tree, fields_of)
     for node in (n for n in nodes_in(tree) if isinstance(n, ast.Attribute)):
         members: Collection[str] = messages.get(id(node.value), ())
@@ -172,10 +166,33 @@ def _misspelt_members(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
         right = "" if known_attr else _near(node.attr, members)
         if not known_attr and not right and kind in ("Publisher", "Rate") and kind not in own:
             right = next(iter(get_close_matches(node.attr, members, 1, 0.85)), "")  # `pub.publisher(…)`
+        elif not known_attr and not right and owner == "self" and kind in own:
+            right = lacking.meant(node)
         span = span_of(lines, node)
         if right and span is not None:
             line, _, end = span
             yield ((line, end - len(node.attr), end), right), f"`{node.attr}` is called `{right}`"
+
+
+class _Lacking:
+    """Finds which attribute of an object is meant by one that nothing in the script gives a value."""
+
+    def __init__(self, tree: ast.Module) -> None:
+        parts = [n for n in nodes_in(tree) if isinstance(n, ast.Attribute)]
+        self._read = {n.attr for n in parts if isinstance(n.ctx, ast.Load)}
+        self._member = {id(n.value): n.attr for n in parts}
+        given = made_by(nodes_in(tree))
+        self._given = {name[5:]: kind for name, kind in given.items() if re.fullmatch(r"self\.\w+", name)}
+        names = {n.id for n in nodes_in(tree) if isinstance(n, ast.Name)} | {
+            n.name for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)
+        }
+        self._is_made = bool(names & {"setattr", "hasattr", "getattr", "vars", "__getattr__"})
+        """Whether attributes may come from elsewhere."""
+
+    def meant(self, node: ast.Attribute) -> str:
+        if self._is_made or not isinstance(node.ctx, ast.Load):
+            return ""
+        return meant_by_use(node.attr, self._member.get(id(node), ""), self._given, self._read)
 
 
 def _members_of(one: ast.ClassDef) -> tuple[str, ...]:

@@ -9,12 +9,12 @@ from __future__ import annotations
 import ast
 import builtins
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from string import digits
 
 from grader.package.python_repairs.syntax import Step, edited, last_name, nodes_in, span_of, step_to, tree_of
-from grader.wording import is_one_edit
+from grader.wording import is_one_edit, plural
 
 OF_PYTHON = (
     "abs", "float", "format", "input", "int", "len", "max", "min", "print", "range", "round", "sorted", "str", "sum",
@@ -26,6 +26,12 @@ OBVIOUS_NAMES = {
     **dict.fromkeys(("null", "NULL", "none", "nil", "nullptr"), "None"),
     **dict.fromkeys(("_name_", "__name", "_name", "name__"), "__name__"),
 }
+MEMBERS = {
+    "Publisher": ("publish", "unregister", "get_num_connections"),
+    "Rate": ("sleep", "remaining"),
+    "message": ("data",),
+}
+"""By what makes the object, or a message of std_msgs: what belongs to it."""
 NAME_CHARS_MIN = 4
 IDLE_MAX = 20
 """So many functions that nothing names are tried for a call."""
@@ -48,6 +54,27 @@ def bound_in(tree: ast.Module) -> set[str]:
         elif isinstance(node, ast.ExceptHandler | ast.MatchAs | ast.MatchStar):
             found.add(node.name or "")
     return found
+
+
+def meant_by_use(name: str, member: str, given: Mapping[str, str], read: Collection[str]) -> str:
+    """Return the one of the names that are `given` a value (by what makes it) and that nothing reads, which is meant
+    by another name of which a member is read: it has that member, or begins as the name does; "" where there is not
+    one."""
+    stem = name.rstrip(digits)
+    fitting = [
+        one
+        for one, kind in given.items()
+        if one not in read
+        and one.rstrip(digits) != stem  # the next of a series
+        and (member in MEMBERS[kind] if kind in MEMBERS else len(name) > 1 and one.startswith(name))
+    ]
+    return fitting[0] if len(fitting) == 1 else ""
+
+
+def made_by(nodes: Iterable[ast.AST]) -> dict[str, str]:
+    """Return what is given a value, as it is written, and the last name of what is called for it."""
+    assigned = [n for n in nodes if isinstance(n, ast.Assign)]
+    return {ast.unparse(t): last_name(getattr(n.value, "func", None)) for n in assigned for t in n.targets}
 
 
 def with_self(text: str) -> Iterator[Step]:
@@ -92,6 +119,66 @@ def with_methods(text: str) -> Iterator[Step]:
 
 OF_INIT = "Python calls the method `__init__` of a new object, and never `%s`"
 WITHOUT_SELF = "`%s` is a method, so its first parameter has to be `self`"
+
+
+PASSED = {"Subscriber": (2, "msg"), "Timer": (1, "event"), "Service": (2, "request")}
+"""Which argument of a call is the function that ROS calls with one value, and what that is called."""
+
+
+def with_parameters(text: str) -> Iterator[Step]:
+    """`def tick():` of a timer, and `def on_text(msg, topic):` of a topic, of which `topic` is not used: ROS passes one
+    value to a callback."""
+    tree, lines = tree_of(text), text.split("\n")
+    for call in (n for n in nodes_in(tree) if isinstance(n, ast.Call) and last_name(n.func) in PASSED):
+        place, usual = PASSED[last_name(call.func)]
+        words = {str(k.arg): k.value for k in call.keywords}
+        given = call.args[place] if len(call.args) > place else words.get("callback") or words.get("handler")
+        function = _only_as_callback(tree, given)
+        if function is None or "callback_args" in words or len(call.args) > place + 1:
+            continue
+        own = [one.arg for one in function.args.args]
+        kept = own[: isinstance(given, ast.Attribute)]
+        value = _name_of_value(tree, function, own[len(kept) :], usual)
+        head = re.fullmatch(r"(\s*def\s+\w+\s*\()[\w\s,]*(\).*)", lines[function.lineno - 1])
+        if head is None or not value or len(own) == len(kept) + 1 or (kept and kept != ["self"]):
+            continue
+        line = f"{head[1]}{', '.join([*kept, value])}{head[2]}"
+        after = "\n".join([*lines[: function.lineno - 1], line, *lines[function.lineno :]])
+        why = f"`{function.name}` takes {plural(len(own), 'argument')}, but ROS passes it "
+        why += f"`self` and the {usual}" if kept else f"the {usual}"
+        for step in step_to("argument", function.lineno, text, after, why.replace("msg", "message")):
+            yield step
+            yield from with_parameters(step["text"])
+            return
+
+
+def _only_as_callback(tree: ast.Module, given: ast.expr | None) -> ast.FunctionDef | None:
+    """Return the function that a call is given to call back; None where there is not one, or the script calls it."""
+    name, nodes = last_name(given), nodes_in(tree)
+    found = [n for n in nodes if isinstance(n, ast.FunctionDef) and n.name == name]
+    called = any(isinstance(n, ast.Call) and last_name(n.func) == name for n in nodes)
+    if len(found) != 1 or called or found[0].decorator_list:
+        return None
+    taken = found[0].args
+    plain = not (taken.vararg or taken.kwarg or taken.kwonlyargs or taken.defaults or taken.posonlyargs)
+    return found[0] if plain else None
+
+
+def _name_of_value(tree: ast.Module, function: ast.FunctionDef, own: Sequence[str], usual: str) -> str:
+    """Return what a callback calls the one value that it is given: of its arguments the one that it uses, else a name
+    that it reads a part of and nothing gives a value; "" where that is not plain."""
+    names = [n for n in nodes_in(function) if isinstance(n, ast.Name)]
+    used = [name for name in own if name in {n.id for n in names}]
+    if own:
+        return (used or own)[0] if len(used) < 2 else ""  # one of them is the value
+    known = bound_in(tree) | set(dir(builtins))
+    unknown = {n.id for n in names} - known
+    called = {id(n.func) for n in nodes_in(function) if isinstance(n, ast.Call)}
+    parts = (n for n in nodes_in(function) if isinstance(n, ast.Attribute) and id(n) not in called)
+    read = {n.value.id for n in parts if isinstance(n.value, ast.Name)}
+    if unknown:
+        return unknown.pop() if len(unknown) == 1 and unknown <= read else ""
+    return usual
 
 
 def _methods_of_objects(tree: ast.Module) -> Iterator[tuple[ast.FunctionDef, set[str], set[str]]]:
@@ -141,6 +228,9 @@ def with_names(text: str) -> Iterator[Step]:
         missing = [n for n in nodes_in(block) if isinstance(n, ast.Name) and n.id not in known]
         missing += _read_for_themselves(block, shared)
         stated = (n.value for n in nodes_in(block) if isinstance(n, ast.Expr))
+        parts_of = [n for n in nodes_in(block) if isinstance(n, ast.Attribute)]
+        member_of = {n.value.id: n.attr for n in parts_of if isinstance(n.value, ast.Name)}
+        given = {one: kind for one, kind in made_by(nodes_in(tree)).items() if one in own}
         values, idle = _values_in(block), _meant_calls(unread, block)
         alone = {n.id for n in stated if isinstance(n, ast.Name) and is_one_edit(n.id.lower(), "pass")}
         for name in dict.fromkeys(n.id for n in missing):
@@ -150,6 +240,7 @@ def with_names(text: str) -> Iterator[Step]:
             near = own - functions if name in values else own
             meant = meant or meant_by(name, near, near - loaded) or idle.get(name, "")
             meant = meant or ("pass" if name in alone else of_python)
+            meant = meant or meant_by_use(name, member_of.get(name, ""), given, loaded)
             spans = [span for n in missing if n.id == name and (span := span_of(lines, n))]
             if meant and spans:
                 after = edited(text, [(*span, meant) for span in spans])
