@@ -32,7 +32,8 @@ class Fault(Record):
     `kind` is the parser's own word (`XMLSyntaxError`, `TabError`). `cause` says the same in words for
     students, and is empty if the message says enough; `fix` says what to do, and is empty if that is not
     known. `unclosed` is the bracket that is opened on that line and never closed, `?` if Python does not
-    say which. `source` is the text of the line if the column is known.
+    say which. `source` is the text of the line if the column is known. `further` says how to write other lines of the
+    file that cannot be read either.
     """
 
     file: str
@@ -44,6 +45,7 @@ class Fault(Record):
     fix: str = ""
     unclosed: str = ""
     source: str = ""
+    further: tuple[str, ...] = Field(default=(), exclude_if=lambda value: not value)
 
     @property
     def explanation(self) -> str:

@@ -17,6 +17,7 @@ from grader.limited_child import ChildLimits, run_limited
 from grader.model.package import Fault
 from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
+from grader.model.repair import as_code
 from grader.package.reading import printable
 from grader.syntax_fixes import (
     BLOCK,
@@ -26,11 +27,13 @@ from grader.syntax_fixes import (
     MERGE_MARKER,
     OUT_OF_BLOCK,
     Reason,
+    corrected,
     other_quotes,
     reason_of_doubled,
     reason_of_line,
     without_texts,
 )
+from grader.wording import plural
 
 CHECK = "grader.package.lint.syntax:check_all"
 MEMORY_BYTES, CPU_S = 1 << 30, 20
@@ -183,7 +186,8 @@ def read_syntax_report(output: bytes | str) -> SyntaxReport:
         file = printable(entry.file)
         checked.append(file)
         if entry.faults:
-            faults[file] = _fault(file, entry.faults[0])
+            first = _fault(file, entry.faults[0])
+            faults[file] = first.model_copy(update={"further": tuple(_further(entry.faults))})
         for slip in entry.slips:
             words = {key: printable(getattr(slip, key)) for key in ("message", "fix", "name")}
             slips.append(slip.model_copy(update={"file": file, **words}))
@@ -197,6 +201,23 @@ def _entry(line: bytes | str) -> _RawEntry | None:
         return _RawEntry.model_validate({**entry, "slips": slips})
     except (ValueError, TypeError, KeyError, RecursionError):
         return None
+
+
+def _further(faults: Sequence[_RawFault]) -> Iterator[str]:
+    """Yield how to write the lines behind the first faulty one, as far as that is sure."""
+    last, found = 0, list[str]()
+    for raw in faults:
+        right = corrected(raw.text, raw.message, raw.column)
+        if not right or raw.line is None or raw.line <= last:
+            break
+        last = raw.line
+        found.append(f"line {raw.line}: write {as_code(printable(right.strip()))}")
+    yield from found[1:FURTHER_SHOWN]
+    if len(found) > FURTHER_SHOWN:
+        yield f"{plural(len(found) - FURTHER_SHOWN, 'more line')} in the same way"
+
+
+FURTHER_SHOWN = 5
 
 
 def _fault(file: str, raw: _RawFault) -> Fault:

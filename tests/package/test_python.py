@@ -162,6 +162,27 @@ def test_faults_have_line_and_plain_cause(tmp_path):
 @pytest.mark.full
 @pytest.mark.slow
 @pytest.mark.skipif(sys.version_info >= (3, 12), reason="this Python allows it")
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        ("print 1\nx = 2\nprint x\n", "line 1: write `print(1)`; line 3: write `print(x)`"),
+        ("def f()\n  while x\n    print 1\n  else\n    pass\n",
+         "line 1: write `def f():`; line 2: write `while x:`; line 3: write `print(1)`; line 4: write `else:`"),
+        ("print 1\n" * 7, "; line 5: write `print(1)`; 2 more lines in the same way"),
+        ("print 1, \\\n  2\nprint 3\n", "line 1: write `print(...)`"),
+        ("print 1\n  x = 2\nprint 3\n", "line 1: write `print(1)`"),
+        ("if x: print 1\nprint(2)\n", ""),
+    ],
+    ids=["print", "colon", "many", "statement of two lines", "another kind", "one line"],
+)  # fmt: skip
+def test_further_lines_of_one_kind_are_told_too(tmp_path, text, hint):
+    (tmp_path / "a.py").write_text(text)
+    fault = check_syntax(tmp_path, ["a.py"]).faults["a.py"]
+    told = syntax_hint(fault)
+    assert told.endswith(hint)
+    assert hint.startswith(";") or "line 3" in hint or "line 3" not in told
+
+
 def test_a_quote_inside_of_the_braces_ends_the_f_string(tmp_path):
     (tmp_path / "a.py").write_text("d = {}\nx = f'n: {d['a']}'\n")
     assert "the other kind of quotes" in check_syntax(tmp_path, ["a.py"]).faults["a.py"].explanation

@@ -120,7 +120,11 @@ _BY_PYTHON = re.compile(r"\. Did you mean: '(\w+)'\?$")
 
 
 def syntax_hint(fault: Fault) -> str:
-    """Return how to repair a file that Python cannot parse: the line as it has to be where that is known."""
+    """Return how to repair a file that Python cannot parse: the lines as they have to be where that is known."""
+    return "; ".join([_first_line_hint(fault), *fault.further])
+
+
+def _first_line_hint(fault: Fault) -> str:
     where = f"line {fault.line}: " if fault.line else ""
     right = corrected(fault.source, fault.message, fault.column)
     if fault.unclosed and not right:
@@ -497,13 +501,8 @@ def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
         return "a comment begins with `#` in Python", f"write `{shown(source.replace('//', '#', 1))}`"
     known = next((known for said, known in SLIPS.items() if said in found.message), None)
     known = explain_number_of_values(found.message, source) or known
-    meant = (
-        part_of_action(found)
-        or other_items(found)
-        or unfit_value(found, package)
-        or known
-        or other_name(found, package)
-    )
+    meant = part_of_action(found) or other_items(found) or unfit_value(found, package)
+    meant = meant or known or other_name(found, package)
     frame = found.innermost
     meant = meant or whole_message(found, package) or explain_formatting(found.message, source)
     return meant or explain_exception(found.kind, found.message, frame.source, frame.marked)

@@ -43,6 +43,7 @@ OUTERMOST = re.compile(r"(import|from)\s|if\s+__name__\b")
 COMMENTED = re.compile(r"\s*#[#\s]*((?:if|while|for|def|class|try|with)\b.*:)\s*$")
 """The first line of a block, commented out: Python speaks of the line below, which stands too far in."""
 REFUSED_LIMIT = 20
+FURTHER_LIMIT = 12
 OF_NAMES = ("node-name", "publisher", "publisher-type", "subscriber", "subscriber-type", "rate-number")
 MARKER = re.compile(r"(<<<<<<<|=======|>>>>>>>|\|\|\|\|\|\|\|)( |$)")
 CPP = re.compile(rb"^#include\s*[<\"].*?^(int|void)\s+\w+\s*\(", re.MULTILINE | re.DOTALL)
@@ -111,6 +112,8 @@ def check(root, name, with_slips=True):
         compile(data, os.path.basename(name), "exec", dont_inherit=True)
     except (SyntaxError, ValueError, OverflowError, RecursionError, MemoryError) as error:
         report["faults"].append(syntax_fault(error, data))
+        lines = re.split("\r\n|\r|\n", data.decode("utf-8", "replace"))
+        report["faults"] += [syntax_fault(one, data) for one in further_errors(lines, error)]
         report["slips"] = slips_of_the_rest(data.decode("utf-8", "replace")) if with_slips else []
         return report
     # what compiles can be nested too deep to be looked at
@@ -124,6 +127,40 @@ def check(root, name, with_slips=True):
         if with_slips:
             report["slips"] = [*slips(tree), *argument_texts(text), *commented_calls(text)]
     return report
+
+
+def further_errors(lines, error):
+    """Yield what Python says of the lines below the first one that it refuses, each time with another line in place of
+    those that it refused before. What spreads over several lines is told by its first one alone."""
+    for _ in range(FURTHER_LIMIT):
+        line = getattr(error, "lineno", None)
+        if line is None or not 0 < line <= len(lines):
+            return
+        lines[line - 1] = in_its_place(lines, line - 1)
+        try:
+            compile("\n".join(lines), "script", "exec", dont_inherit=True)
+        except (SyntaxError, ValueError, OverflowError, RecursionError, MemoryError) as next_one:
+            error = next_one
+        else:
+            return
+        if (getattr(error, "lineno", None) or 0) <= line:
+            return
+        yield error
+
+
+HEADS = {
+    "def": "def _():", "class": "class _:", "if": "if _:", "elif": "elif _:", "else": "else:", "while": "while _:",
+    "for": "for _ in _:", "with": "with _:", "try": "try:", "except": "except _:", "finally": "finally:",
+}  # fmt: skip
+
+
+def in_its_place(lines, at):
+    """Return a line that does nothing and that the lines around this one fit to."""
+    blanks = blanks_of(lines[at])
+    word = re.match(r"\w*", lines[at].lstrip()).group()
+    below = next((line for line in lines[at + 1 :] if line.strip()), "")
+    head = HEADS.get(word, "")
+    return blanks + (head if head and len(blanks_of(below)) > len(blanks) else "%s pass" % head).strip()
 
 
 def slips_of_the_rest(text):
