@@ -99,6 +99,7 @@ class _Habit(NamedTuple):
     rewrites: tuple[tuple[str, str], ...] = ()
 
 
+_NEWER = "is of a newer Python than the one of this ROS"
 _NEXT_NAME = r"(?!(?:as|and|from|import)\b)(?=[A-Za-z_])"
 _HABITS = (
     _Habit(MERGE_MARKER.pattern, MERGED, "keep one version"),
@@ -145,6 +146,13 @@ _HABITS = (
     _Habit(r"^\s*self\.\w+\s+(?:[A-Za-z]\w*[.(]|\"\"|-?\d)(?!.*=\s*=)",
            "`=` is missing between the name and its value", "",
            ((r"^(\s*self\.\w+)\s+(?=[A-Za-z]\w*[.(]|\"\"|-?\d)", r"\1 = "),)),
+    _Habit(r"^\s*type\s+[A-Za-z_]\w*\s*=(?!=)", f"`type` before a name {_NEWER}", "",
+           ((r"^(\s*)type\s+", r"\1"),)),
+    _Habit(r"^\s*except\s*\*\s*\w", f"`except*` {_NEWER}", "", ((r"except\s*\*\s*", "except "),)),
+    _Habit(r"^\s*(?:async\s+)?(?:def|class)\s+\w+\s*\[", f"a type in `[ ]` behind a name {_NEWER}",
+           "leave the types out"),
+    _Habit(r"^\s*match\s+(?:[\w.]+(?:\([^()]*\)|\[[^][]*\])?|\([^()]*\)):$", f"`match` {_NEWER}",
+           "write `if` and `elif` in place of `match` and `case`"),
     _Habit(r"^\s*>>>", "`>>>` is printed by Python's prompt", "leave it out", ((r">>>\s?", ""),)),
     _Habit(r"^\s*//", "a comment begins with `#` in Python", "", ((r"//+\s*", "# "),)),
     _Habit(r"^\s*/\*", "a comment begins with `#` in Python",

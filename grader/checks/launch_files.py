@@ -40,7 +40,7 @@ from grader.checks.support.scripts import CPP_SUFFIXES, RIGHT_SHEBANG, add_hint,
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
-from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile
+from grader.model.package import LAUNCH_TAGS, LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Status, Verdict, failed, joined, passed, unjudged
 from grader.wording import join_words, plural, there_is
@@ -232,6 +232,13 @@ def _in_its_place(file: LaunchFile, pkg: str, name: str) -> Iterator[tuple[FileC
     for line in (n.line for n in file.nodes if n.pkg in {name, stem} and n.type == pkg):
         fix = f'write pkg="{pkg}" type="{name}" on line {line}'
         yield line, f"on line {line}, pkg and type are swapped", fix
+    for tag, line in file.unknown_tags:
+        if tag in LAUNCH_TAGS and tag != "node":
+            yield (
+                line,
+                f"<{tag}> on line {line} starts no node",
+                f"write <node in place of <{tag} on line {line}",
+            )
     for tag, line in (u for u in file.unknown_tags if near_names("node", [u[0]]) or u[0].lower() == "node"):
         why, fix = f"roslaunch skips the tag <{tag}> on line {line}", "the tag is <node …>, in lower case"
         if tag == "node":

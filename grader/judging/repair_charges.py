@@ -69,6 +69,10 @@ def charge_repairs(
     needed = dict.fromkeys(one for repairs in needs.values() for one in repairs)
     # Names first: `misnamed` keeps other repairs from their criteria.
     for repair in sorted(needed, key=lambda one: one.kind not in NAMES):
+        if repair.kind == "ros-clock" and not any(
+            _is_simulated(c, rubric) for c in criteria if repair in needs[c.id]
+        ):
+            continue  # the clock is only fast to save time
         asking = [c for c in rubric.criteria if c.scenario is None and asks_for(first[c.id], repair)]
         if repair.kind in OF_BUILDS:  # of a file with several faults, those that speak of this line
             new = _new_words(repair)
@@ -96,6 +100,13 @@ def charge_repairs(
         charges[repair] = set((counting if named else other or counting)[:1])
         misnamed |= charges[repair] if named else set()
     return charges
+
+
+def _is_simulated(criterion: Criterion, rubric: Rubric) -> bool:
+    """Return whether a program, the simulator, runs beside the scripts: its clock is the one to go by."""
+    return criterion.scenario is not None and any(
+        s.program for s in rubric.scenarios[criterion.scenario].start
+    )
 
 
 def _may_ask_for(found: Verdict, repair: Repair) -> bool:

@@ -98,6 +98,10 @@ class Manifest(Record):
     advice: tuple[str, ...] = ()
 
 
+LAUNCH_TAGS = frozenset(
+    {"arg", "env", "group", "include", "machine", "master", "node", "param", "remap", "rosparam", "test"}
+)
+"""Below `<launch>`."""
 CMAKE_COMMANDS = (
     "add_action_files", "add_compile_options", "add_custom_target", "add_definitions", "add_dependencies",
     "add_executable", "add_library", "add_message_files", "add_rostest", "add_service_files",
@@ -377,9 +381,9 @@ class LaunchFile(Record):
     with `$(arg …)`, `$(dirname)` and namespaces resolved: `brings` (nodes), `tests` (`<test>`, which only
     rostest runs), `params`, `loads`, `include_faults` (own files that cannot be included), `unset_args`. A
     path inside the package is written as `$(find <package>)/…`. `unknown_tags` are tags that roslaunch
-    skips, with their lines; `commented` has the `type`s of nodes in comments; `switched_off` those of nodes
-    that an `if` or `unless` leaves out, with its line and text. `readable` are the nodes that can be read
-    from a file that is not well-formed.
+    skips, with their lines, and others that are written like a node; `commented` has the `type`s of nodes in
+    comments; `switched_off` those of nodes that an `if` or `unless` leaves out, with its line and text.
+    `readable` are the nodes that can be read from a file that is not well-formed.
     """
 
     path: str

@@ -45,6 +45,7 @@ def find_slip(text: str, number: int) -> LineSlip | None:
     slips = (
         *_other_comments(lines),
         *_ends_of_c(lines),
+        *_words_alone(lines),
         *(one for n in near for one in _slips_in(lines, n)),
         *doubled_and_turned(lines, near),
     )
@@ -85,6 +86,45 @@ def _ends_of_c(lines: list[str]) -> Iterator[LineSlip]:
     yield from _changed_lines(lines, ended, "no `;` comes behind a command", "delete the `;`")
 
 
+_WORDS_ALONE = re.compile(
+    rf"\s*(?!(?:{_COMMANDS})\b|[A-Z]+_[A-Z_]+\b)[A-Za-z][A-Za-z0-9'-]*(?:[:,]?\s+[A-Za-z'].*|[.:!]?\s*)$"
+)
+
+
+def _words_alone(lines: list[str]) -> Iterator[LineSlip]:
+    """Yield the text with a `#` before the words that stand outside of any command: `Declare a catkin package`. One
+    word alone goes, as nothing shows that it was a comment."""
+    changed, depth = dict[int, str](), 0
+    for number, line in enumerate(lines, 1):
+        code = line.partition("#")[0]
+        is_alone = _WORDS_ALONE.match(code) and not (_joined(code) or _begins_below(lines, number))
+        if depth == 0 and is_alone:
+            changed[number] = f"# {line.strip()}"
+        else:
+            depth += code.count("(") - code.count(")")
+    if len(changed) == 1 and len(lines[next(iter(changed)) - 1].split()) == 1:
+        (number,) = changed
+        left = "\n".join([*lines[: number - 1], *lines[number:]])
+        yield LineSlip(
+            f"`{lines[number - 1].strip()}` is not a command", number, f"delete line {number}", left
+        )
+    yield from _changed_lines(
+        lines, changed, "these words are no command: a comment begins with `#`", "write `#` before them"
+    )
+
+
+def _joined(code: str) -> str:
+    """Return the command whose name stands before the line's bracket in several words; "" where none does."""
+    words = re.split(r"[\s-]+", code.partition("(")[0].strip())
+    name = "_".join(words)
+    return name if len(words) > 1 and name.lower() in CMAKE_COMMANDS else ""
+
+
+def _begins_below(lines: list[str], number: int) -> bool:
+    """Return whether the brackets of a command begin below its name."""
+    return next((one for one in lines[number:] if one.strip()), "").lstrip().startswith("(")
+
+
 def _changed_lines(lines: list[str], changed: dict[int, str], why: str, fix: str) -> Iterator[LineSlip]:
     """Yield the slip that these lines have, by their numbers, all of which are changed at once."""
     if changed:
@@ -95,6 +135,9 @@ def _changed_lines(lines: list[str], changed: dict[int, str], why: str, fix: str
 
 def _slips_in(lines: list[str], number: int) -> Iterator[LineSlip]:
     code, sign, comment = lines[number - 1].partition("#")
+    if name := _joined(code):
+        changed = f"{name}({code.partition('(')[2]}{sign}{comment}"
+        yield changed_line(lines, number, changed, f"the command is called `{name}`")
     for pattern, new, why in _PATTERNS:
         found = re.search(pattern, code)
         if found:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from lxml import etree
 
-from grader.model.package import Fault, LaunchFile, LaunchNode
+from grader.model.package import LAUNCH_TAGS, Fault, LaunchFile, LaunchNode
 from grader.package.launch_loader import KEPT_AS_WRITTEN, Find, Scope, load, unknown_attributes, wanted
 from grader.package.reading import read_markup
 from grader.package.xml import line_of, parse_what_is_left, parse_xml
@@ -22,9 +22,6 @@ _VALUE_CHARS_MAX = 4_000
 _COMMENTED_MAX = 50
 _TYPE = re.compile(r"""\btype\s*=\s*["']([^"'\s]{1,200})["']""")
 _SUFFIXES = (".launch", ".launch.xml", ".test")
-_TAGS = frozenset(
-    {"arg", "env", "group", "include", "machine", "master", "node", "param", "remap", "rosparam", "test"}
-)
 
 Remaps = tuple[tuple[str, str], ...]
 
@@ -173,10 +170,12 @@ def _commented(root: etree._Element) -> Iterator[tuple[str, int]]:
 
 
 def _unknown(parent: etree._Element) -> Iterator[tuple[str, int]]:
-    """Yield the tags that roslaunch skips with a warning, `<Node>` for one."""
+    """Yield the tags that roslaunch skips with a warning, `<Node>` for one, and those with another meaning that are
+    written like a node: `<arg name="a" pkg="b" type="c.py"/>`."""
     for child in parent:
         if isinstance(child.tag, str):
-            if child.tag not in _TAGS:
+            is_node = bool(child.get("pkg") and child.get("type"))
+            if child.tag not in LAUNCH_TAGS or (is_node and child.tag not in {"node", "test"}):
                 yield child.tag, line_of(child) or 0
             elif child.tag == "group":
                 yield from _unknown(child)

@@ -50,7 +50,8 @@ TEXT_CHARS_MAX = SOURCE_CHARS_MAX = 300
 _VAGUE = (
     "multiple exception", "expression cannot contain assignment", "expected 'except'",
     "Function parameters cannot be parenthesized", "Lambda expression parameters cannot", "invalid syntax",
-    "expected ':'", "invalid decimal", "unexpected EOF", "cannot assign", "can't assign", "Did you mean to use 'from",
+    "expected ':'", "expected '('", "invalid decimal", "unexpected EOF", "cannot assign", "can't assign",
+    "Did you mean to use 'from",
 )  # fmt: skip
 """Messages that say less than the line itself."""
 _EMPTY_BLOCK = re.compile(r"expected an indented block after .* on line (\d+)")

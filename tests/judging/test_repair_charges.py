@@ -278,6 +278,20 @@ def test_logic_is_repaired_only_where_the_copy_passes() -> None:
     assert sorted(c.points for c in whole.values() if c.repaired is not None) == [0, 5]
 
 
+def test_the_computers_clock_costs_nothing_where_there_is_no_simulator() -> None:
+    clock = SIGN.model_copy(
+        update={"kind": "ros-clock", "before": "time.sleep(1)", "after": "rospy.sleep(1)"}
+    )
+    silent = {**GOOD_RUN, "topics": [{"topic": "/other", "count": 61}]}
+    scripts = SCENARIO["start"]
+    for start, lost in (
+        (scripts, 0),
+        ([{"name": "sim", "program": "turtlesim/turtlesim_node"}, *scripts], 1),
+    ):
+        found = judged(silent, GOOD_RUN, clock, scenarios={"talker": {**SCENARIO, "start": start}})
+        assert sum(c.points == 0 for c in found.values()) == lost
+
+
 def test_a_copy_that_helps_nothing_changes_nothing() -> None:
     runs = build_runs({"runs": {"talker": DIED}, "package": PACKAGE})
     alone = judge(rubric(*ALL), runs)

@@ -107,7 +107,7 @@ def test_included_files_of_the_package_count_and_no_others(tmp_path):
         ("project(lab1)\nset(a\n# set(b c)\nset(c d)\n", 2, "write `)` at the end of line 2", 1),
         ("project(lab1)\nset(a\n\n# and more)\nset(c d)\n", 2, "write `)` at the end of line 2", 1),
         ('project(lab1)\n\nset(a "b)\n', 3, "a quote", 1),
-        ("project(lab1)\nhello world\n", 2, "`hello` is not a command", 1),
+        ("project(lab1)\nhello world\n", 2, "these words are no command", 1),
         ("project(lab1)\nif(x)\nset(a b)\n", 2, "`if()` is never closed by `endif()`", 1),
         ("project(lab1)\nendif()\n", 2, "no `if()` before it", 1),
         ("project(lab1)\nset(a ${b)\ncatkin_package()", 2, "`${...}` is never closed", 3),
@@ -306,6 +306,16 @@ def test_a_name_that_only_cmake_knows_may_be_any(tmp_path):
             "where the comment begins, and the same on line 2",
             "  # see foo(\n# a\nproject(x)\n",
         ),
+        (
+            "project(x\n)\n Use this (if any)\nfoo()\n",
+            "before them",
+            "project(x\n)\n# Use this (if any)\nfoo()\n",
+        ),
+        ("project(x)\nInstall:\n the rest\n", "the same on line 3", "project(x)\n# Install:\n# the rest\n"),
+        ("project(x)\ns\n", "delete line 2", "project(x)\n"),
+        ("catkin package()\n", "write `catkin_package()`", "catkin_package()\n"),
+        ("project\n(x)\n", "", ""),
+        ("find_pakage catkin\n", "", ""),
     ],
 )
 def test_what_other_languages_write_is_put_right_on_all_lines(text, fix, after):

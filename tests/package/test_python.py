@@ -220,6 +220,22 @@ def test_foreign_lines_are_passed_over():
     assert report.checked == ("a.py",)
 
 
+@pytest.mark.parametrize(
+    ("line", "fix"),
+    [
+        ("type Seconds = float", "Seconds = float"),
+        ("except* ValueError as e:", ""),
+        ("def first[T](values):", ""),
+        ("    match f(x):", ""),
+    ],
+)
+def test_what_only_newer_pythons_know_is_said_to_be_newer(line, fix):
+    assert "newer Python" in reason_of("invalid syntax", line).why
+    assert not fix or corrected(line, "invalid syntax") == fix
+    assert "newer Python" not in reason_of("invalid syntax", "match (x) y:").why
+    assert "newer Python" in reason_of("expected '('", "class Box[T]:").why
+
+
 def test_a_message_that_says_enough_has_no_cause():
     assert reason_of("invalid syntax", "x = a ? b").text == ""
     assert reason_of("invalid syntax", "elif x 3:").text == ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import posixpath
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import PurePosixPath
+from pathlib import PurePosixPath, PureWindowsPath
 from typing import NamedTuple
 
 from grader.checks.support.scripts import (
@@ -324,7 +324,7 @@ def _no_program(package: PackageFacts, node: LaunchNode, of_lab: Sequence[Packag
     why = f"there is no {name} in the package{f' {package.name}' if len(of_lab) > 1 else ''}"
     if other := next((one for one in of_lab if has_program(one, name)), None):
         return _slip(node, f"{why}; it is in {other.name}", f'write pkg="{other.name}"')
-    plain = PurePosixPath(name).name
+    plain = PureWindowsPath(name).name  # of both, `/` and `\\`
     if plain != name and has_program(package, plain):
         return _slip(node, f"{why}: type is the file's name without its folder", f'write type="{plain}"')
     if found := find_script(package, f"{plain}.py"):
