@@ -282,8 +282,8 @@ def _judge_nodes(package: PackageFacts, file: LaunchFile, run: Run, params: Laun
         return _not_connected(package, file, run, wanted, params.topic)
     if params.topic and (ended := _ended_soon(run, [w.node for w in wanted], params.topic)):
         return _ended_by_itself(package, file, ended)
-    if dead := _judge_deaths(package, run, wanted, "came up, but then"):
-        return dead
+    if lost := _judge_deaths(package, run, wanted, "came up, but then") or _stopped_clock(run, file):
+        return lost
     if params.programs and params.params:
         # `_find_unnamed` has seen to it that there is one.
         program = nodes_of_program(file, params.programs[0])[0]
@@ -311,7 +311,10 @@ def _right_parts(
     ]
     topic, every = params.topic, [one for found in nodes.values() for one in found]
     connected = (
-        topic is not None and any(connected_nodes(package, run, topic)) and not _ended_soon(run, every, topic)
+        topic is not None
+        and any(connected_nodes(package, run, topic))
+        and not _ended_soon(run, every, topic)
+        and not _stopped_clock(run, file)
     )
     if not up:
         misnamed = [one for name, pkg in params.nodes.items() for one in _misnamed(file, name, pkg)]
@@ -509,6 +512,21 @@ def _judge_deaths(package: PackageFacts, run: Run, wanted: list[Wanted], when: s
             message = f"{one.node.full_name} {when} {absence.why}"
             return verdict(message, hint=absence.hint, citations=absence.citations)
     return None
+
+
+def _stopped_clock(run: Run, file: LaunchFile) -> Verdict | None:
+    """Return that no time goes by for the file's nodes: they are to take it from a simulator, and there is none."""
+    set_at = next(
+        (p for p in file.params if p.name == "/use_sim_time" and p.value in {"true", "True", "1"}), None
+    )
+    if set_at is None or run.clock == "warped" or run.student_channels("/clock"):
+        return None
+    why = "/use_sim_time is true, and nothing publishes /clock: each node waits in its first sleep for ever"
+    return failed(
+        f"{set_at.file}, line {set_at.line}: {why}",
+        hint=f"delete line {set_at.line}",
+        citations=(set_at.place,),
+    )
 
 
 def _ended_soon(run: Run, nodes: Iterable[LaunchNode], topic: str) -> list[LaunchNode]:

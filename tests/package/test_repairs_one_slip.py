@@ -259,6 +259,7 @@ SLIPS = {
         ("    rospy.loginfo", "rospy.loginfo", "the line after a `:` must be indented"),
         ("'I heard %s', msg.data", "msg.data, 'I heard %s'", "the string comes first, then its values"),
         ("I heard %s", "I heard s", "the string has no `%` in it"),
+        ("I heard %s", "I heard {}", "the string has fewer `%` than there are values after it"),
         ("msg.data", "mg.data", "mg is not defined"),
         ("%s', msg.data)", '%s", msg.data))', "a quote is opened on this line"),
         ("msg.data)", "msg.data')", "a quote is opened on this line"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -95,6 +96,21 @@ def test_lambdas_and_methods_are_read_too(tmp_path: Path) -> None:
     (tmp_path / "b.py").write_text(method, encoding="utf-8")
     kinds = [s.kind for s in check_syntax(tmp_path, ["b.py"]).slips]
     assert "not-printed" in kinds
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("m.data = m.data / 2", True),
+        ("m.data += 1", True),
+        ("m.data = 0", True),
+        ("m.data = m.data.strip()", False),
+    ],
+)
+def test_a_message_that_is_changed_before_it_is_printed(line: str, told: bool, tmp_path: Path) -> None:
+    fixes = [fix for _, _, fix in said(f"def cb(m):\n    {line}\n    print(m.data)\n", tmp_path)]
+    assert len(fixes) == told
+    assert all(re.fullmatch(r"delete line \d+", fix) for fix in fixes)
 
 
 LOOP = "pub = rospy.Publisher('n', Int8)\nn = 0\nwhile not rospy.is_shutdown():\n"

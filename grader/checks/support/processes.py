@@ -330,8 +330,12 @@ def is_other_name(names: Iterable[str], nodes: Iterable[str]) -> bool:
 
 
 def name_hint(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymous) -> str:
-    """Return what to write into `init_node`."""
+    """Return what to write into `init_node`, or which namespace to leave: no name in `init_node` has a slash."""
     there = tuple(nodes)
+    spaces = {n.removesuffix(b) for n in map(base_name, there) for b in _bases(names) if n.endswith(b)} - {""}
+    if spaces:
+        where = "`ROS_NAMESPACE` in the script or `ns` in the launch file"
+        return f"take the node out of the namespace {join_words(sorted(spaces))}: delete {where}"
     counted = [n for n in there if any(re.fullmatch(rf"{re.escape(b)}_*\d+", n) for b in _bases(names))]
     if counted and anonymous == "allowed":
         name = names[0].lstrip("/")

@@ -255,7 +255,9 @@ class Printing:
         of_message, changed = self.holds(assigned.value)
         for target in getattr(assigned, "targets", None) or [assigned.target]:
             for one in target.elts if isinstance(target, ast.Tuple) else [target]:
-                if not of_message and dotted(one) in self.known and assigned in self.body:
+                is_value, adds = dotted(one) == self.value, isinstance(assigned, ast.AugAssign)
+                lost = not of_message and (is_value or dotted(one) in self.known)
+                if assigned in self.body and (lost or (is_value and (changed or adds))):
                     self.lost = self.lost or assigned.lineno
                 if of_message and not isinstance(one, ast.Name):
                     self.shared.append(dotted(one))

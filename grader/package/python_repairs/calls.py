@@ -361,7 +361,9 @@ def _logged(call: ast.Call) -> Iterator[Argument]:
 
 
 def _with_places(text: str, count: int) -> str:
-    """Return how a string is written that has places for so many values."""
+    """Return how a string is written that has places for so many values: those of `.format(…)` become such."""
+    if text.count("{}") == count:
+        return repr(text.replace("{}", "%s"))
     if count == 1 and (right := with_place(repr(text))):
         return right
     blank = "" if not text or text[-1].isspace() else " "
