@@ -19,7 +19,7 @@ from grader.evidence.events import ActorEvent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
+from grader.model.verdict import Verdict, failed, failed_or_blocked, grade_again, passed
 from grader.wording import join_words, plural, significant, there_is
 
 LISTED = 10
@@ -235,7 +235,7 @@ def _no_result(package: PackageFacts, run: Run, goal: Goal, params: ActionResult
     asked = plain_type(goal.end.type or "") if goal.end else ""
     if kind and asked and kind != asked:
         told = f"{params.action} is of type {kind}, not {asked}"
-        return unjudged(told, hint=f"make it a server of {asked}Action")
+        return failed_or_blocked(told, hint=f"make it a server of {asked}Action")
     if end := explain_early_end(package, run):
         return end.verdict(failed, f"{said}: the node ended before ({end.cause})")
     if end := explain_error(package, run):
@@ -350,14 +350,14 @@ def _not_sent(package: PackageFacts, run: Run, goals: Sequence[Goal], params: Ac
     if notes and any(one.path.endswith(".action") for one in package.interfaces):
         why = shown(notes[0].partition(": ")[2] or notes[0])
         hint = "use the handout's names and types in the .action file, and build again"
-        return unjudged(f"{params.action} cannot be used as the handout asks: {why}", hint=hint)
+        return failed_or_blocked(f"{params.action} cannot be used as the handout asks: {why}", hint=hint)
     if notes:
         return grade_again(shown(notes[0]))
     if not nodes_on(run, f"{params.action}/goal", "subscribers"):
         return _no_server(package, run, params)
     if goals and (end := explain_early_end(package, run)):
         message = f"the node ended before goal {params.goal} of {params.action} was sent: {end.cause}"
-        return end.verdict(unjudged, message)
+        return end.verdict(failed_or_blocked, message)
     return grade_again(f"only {plural(len(goals), 'goal')} could be sent to {params.action}")
 
 
@@ -367,17 +367,17 @@ def _no_server(package: PackageFacts, run: Run, params: ActionResultParams) -> V
     servers = [t.removesuffix("/goal") or "/" for t in topics_with(run, "subscribers") if t.endswith("/goal")]
     if near := near_names(params.action, servers):
         hint = f"give SimpleActionServer(…) the name '{bare}'"
-        return unjudged(f"{what}; {there_is(near)}", hint=hint, measured=join_words(servers))
+        return failed_or_blocked(f"{what}; {there_is(near)}", hint=hint, measured=join_words(servers))
     if absent := no_node(package, run, what):
         return absent
     if end := explain_error(package, run):
         return end.verdict(failed, f"{what}: {end.cause}")
     if slip := run_slip(package, run, "not-started", "not-called"):
         why = f"{what}: {slip.message} ({slip.file}, line {slip.line})"
-        return unjudged(why, hint=slip.fix, measured="no action server", citations=(slip.place,))
+        return failed_or_blocked(why, hint=slip.fix, measured="no action server", citations=(slip.place,))
     others = f"; {there_is(servers)}" if servers else ""
     hint = f"actionlib.SimpleActionServer('{bare}', …, auto_start=False), and then start()"
-    return unjudged(f"{what}{others}", hint=hint, measured=join_words(servers) or "no action server")
+    return failed_or_blocked(f"{what}{others}", hint=hint, measured=join_words(servers) or "no action server")
 
 
 def _measured_text(run: Run, goal: Goal, params: ActionResultParams) -> str:

@@ -36,11 +36,11 @@ from grader.model.verdict import (
     Status,
     Verdict,
     failed,
+    failed_or_blocked,
     grade_again,
     inconclusive,
     machine_lacks,
     passed,
-    unjudged,
 )
 from grader.untrusted_text import without_colours
 from grader.wording import join_words, seconds, there_is
@@ -114,7 +114,7 @@ def _unseen(package: PackageFacts) -> Verdict | None:
     """Return the loss of a package that catkin does not find, or is told to pass over: it builds nothing of it."""
     if package.has_no_manifest:
         why = "catkin_make builds nothing of the package: catkin does not see one without package.xml"
-        return unjudged(why, measured="not built", hint="write package.xml, then run catkin_make")
+        return failed_or_blocked(why, measured="not built", hint="write package.xml, then run catkin_make")
     if package.file(IGNORE) is None:
         return None
     message = f"catkin_make builds nothing of the package: {IGNORE} hides it from catkin"
@@ -157,7 +157,7 @@ def explain_by_build(
     elif (
         beside and package is not None and verdict.status.is_lost and not (verdict.unjudged or verdict.cause)
     ):
-        one = _name_missing(package, build, unjudged("there is no script to run"), beside)
+        one = _name_missing(package, build, failed_or_blocked("there is no script to run"), beside)
         if one.unbuilt:
             message = f"{verdict.message}; {one.message}, which runs beside it"
             verdict = one.model_copy(update={"message": message}).about(expected=verdict.expected)
@@ -230,7 +230,7 @@ def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> V
         f"{place.file}:{place.line}: " if error and place and error.kind == "cmake" and not told_where else ""
     )
     explained = package.manifest is None or (error is not None and error.kind == "cmake")
-    kind = machine_lacks if told and told.of_machine else unjudged if explained else failed
+    kind = machine_lacks if told and told.of_machine else failed_or_blocked if explained else failed
     verdict = kind(
         f"catkin_make failed: {line}{told.why}" if told else "catkin_make failed without naming an error",
         expected=EXPECTED,
@@ -261,7 +261,7 @@ def _lost_scripts(package: PackageFacts, scripts: Sequence[str]) -> Verdict | No
     message = f"catkin_make succeeded, but there is no {join_words(lost, 'or')} to run{seen}"
     measured = f"rosrun finds no {join_words((PurePosixPath(s).name for s in lost), 'or')}"
     hint = f"add {join_words(lost)} to the package{push}"
-    return unjudged(message, expected=EXPECTED, measured=measured, hint=hint)
+    return failed_or_blocked(message, expected=EXPECTED, measured=measured, hint=hint)
 
 
 class Broken(NamedTuple):

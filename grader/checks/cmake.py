@@ -22,7 +22,7 @@ from grader.checks.support.scripts import (
 from grader.checks.support.text import near_names, shown
 from grader.model.package import CMAKE, CMakeCall, CMakeFacts, Fault, PackageFacts, meant_command
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import FileCitation, Verdict, failed, failed_or_blocked, inconclusive, passed
 from grader.wording import is_one_edit, join_words
 
 NOT_CALLED = "no catkin_install_python(…) is called"
@@ -262,7 +262,9 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
     facts = package.cmake
     if facts is None:
         message = f"{NO_FILE}, so nothing is installed"
-        absent = unjudged(message, expected=expected, measured="no file", hint="first add CMakeLists.txt")
+        absent = failed_or_blocked(
+            message, expected=expected, measured="no file", hint="first add CMakeLists.txt"
+        )
         return absent.model_copy(update={"cause": NO_FILE})
     all_named = list(installed(package))
     of_python = [one for one in all_named if one.call.name == PYTHON]
@@ -285,7 +287,7 @@ def _not_installed(facts: CMakeFacts, lacks: dict[str, Lack]) -> Verdict:
     verdict = inconclusive if any(lack.unsure for lack in lacks.values()) else failed
     follows = all(lack.follows for lack in lacks.values())
     # Where CMake itself fails, or catkin_package() is missing, this follows from another criterion's loss.
-    found = (unjudged if facts.fault or follows else verdict)(
+    found = (failed_or_blocked if facts.fault or follows else verdict)(
         f"{facts.file}: {'; '.join(_reasons(lacks))}", hint="; ".join(_fixes(lacks))
     )
     if any(lack.follows for lack in lacks.values()):

@@ -61,7 +61,7 @@ from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
+from grader.model.verdict import Verdict, failed, failed_or_blocked, grade_again, passed
 from grader.wording import join_words, plural, significant
 
 LINES_MAX, LINE_CHARS_MAX = 20_000, 1_000
@@ -204,14 +204,14 @@ def _not_printed(
         return _of_client(asked, run)(message, hint=hint)
     if failing:
         end = explain_end(one, run, package)
-        return end.verdict(unjudged, f"it ended before it printed {params.words}: {end.cause}")
+        return end.verdict(failed_or_blocked, f"it ended before it printed {params.words}: {end.cause}")
     if error := explain_error(package, run):
-        return error.verdict(unjudged, f"it never prints {params.words}: {error.cause}")
+        return error.verdict(failed_or_blocked, f"it never prints {params.words}: {error.cause}")
     # What comes after Ctrl-C says how the program stops, not what it does.
     own = [line for line in lines if one.interrupt_ns is None or line.at_ns < one.interrupt_ns]
     deaf = unheard(run, package)
     never = f"it never prints {params.words}"
-    unheard_of = unjudged(f"{never}: {deaf.message}", hint=deaf.hint) if deaf else None
+    unheard_of = failed_or_blocked(f"{never}: {deaf.message}", hint=deaf.hint) if deaf else None
     if (
         why := _unserved(asked, lacking, own, run, never)
         or unheard_of
@@ -219,7 +219,7 @@ def _not_printed(
     ):
         return why
     if not own:
-        nothing = unjudged(
+        nothing = failed_or_blocked(
             f"it prints nothing, not {params.words}", hint=f"{hint}, with flush=True"
         ).if_repeated()
         return nothing.model_copy(update={"silent": True})
@@ -233,7 +233,9 @@ def _unseen(one: Life, package: PackageFacts, run: Run, params: PrintsParams, ne
     started = {PurePosixPath(word).name for word in one.start.argv}
     refused = any("cannot launch node of type" in line.line for _, line in run.lines(one.name))
     if refused and run.graph and not nodes_of(run, one.name):
-        return unjudged(f"{never}: no node of the launch file came up", hint="read what roslaunch prints")
+        return failed_or_blocked(
+            f"{never}: no node of the launch file came up", hint="read what roslaunch prints"
+        )
     files = [file for file in package.launch_files if PurePosixPath(file.path).name in started]
     # Unless a <node> asks for the screen, roslaunch writes what it prints to a log file.
     for node in (node for file in files for node in file.brings if node.output != "screen"):
@@ -256,7 +258,7 @@ def _of_client(asked: Iterable[str], run: Run) -> Callable[..., Verdict]:
         for name, nodes in e.services.items()
         if any(map(run.is_student_node, nodes))
     }
-    return failed if of_students.isdisjoint(asked) else unjudged
+    return failed if of_students.isdisjoint(asked) else failed_or_blocked
 
 
 def _of_whole_answer(line: Line, params: PrintsParams) -> str:
@@ -288,21 +290,21 @@ def _unserved(
     if any(OTHER_DEFINITION in line.text for line in own):
         hint = "give the .srv file the handout's fields, in their order and with their types, and build again"
         why = "its call failed, as the service has another definition of that type"
-        return unjudged(f"{never}: {why}", hint=hint)
+        return failed_or_blocked(f"{never}: {why}", hint=hint)
     for said, wrong in WRONG_ANSWERS.items():
         if any(said in line.text for line in own):
             hint = "end the service's callback with `return …Response(…)`"
-            return unjudged(f"{never}: the service's callback returns {wrong}", hint=hint)
+            return failed_or_blocked(f"{never}: the service's callback returns {wrong}", hint=hint)
     offered = _offered(run)
     absent = lacking or next((n for n, is_there in asked.items() if not is_there and n not in offered), "")
     # The only service that there is will be the one that is meant, whatever its name.
     near = near_names(absent, offered) or (tuple(offered) if len(offered) == 1 else ())
     if absent and near:
         hint = f"use the name {near[0]} both where you wait for it and where you call it"
-        return unjudged(f"{never}: it asks for {absent}, and {near[0]} is offered", hint=hint)
+        return failed_or_blocked(f"{never}: it asks for {absent}, and {near[0]} is offered", hint=hint)
     if lacking:
         hint = f"offer {lacking} in a node that runs beside it, or ask for the service that is offered"
-        return unjudged(f"{never}: it asks for {lacking}, which no node offers", hint=hint)
+        return failed_or_blocked(f"{never}: it asks for {lacking}, which no node offers", hint=hint)
     asked_early = [name for name, is_there in asked.items() if not is_there]
     early = next((n for n in asked_early if any(f"service [{n}] unavailable" in one.text for one in own)), "")
     if early in offered:
@@ -374,7 +376,9 @@ def callbacks_clean(package: PackageFacts, run: Run, params: CallbacksCleanParam
     # Only the last traceback ended the process: one before it is a callback's.
     if ended is not None and (len(found) <= 1 or found[0][0] != ended):
         end = explain_end(ended, run, package)
-        verdict = end.verdict(unjudged, f"{ended.name} ended by itself after {ended.lasted}: {end.cause}")
+        verdict = end.verdict(
+            failed_or_blocked, f"{ended.name} ended by itself after {ended.lasted}: {end.cause}"
+        )
     elif found:
         end = explain_traceback(found[0][1], package)
         verdict = end.verdict(failed, f"a callback of {found[0][0].name} fails: {end.cause}")
@@ -554,7 +558,7 @@ def _nothing(
     """Nothing like it came: no process, a dead one, no node, or a node that logs other things or nothing."""
     if run.foreign:
         hint = "record /rosout too, from before the node starts: rosbag record -a"
-        return unjudged(f"nothing in {run.evidence} logs {params.text!r}", hint=hint)
+        return failed_or_blocked(f"nothing in {run.evidence} logs {params.text!r}", hint=hint)
     asked = life(run, params.process) if params.process else next(iter(lives(run)), None)
     if asked is None:
         return not_started("the node")
@@ -562,10 +566,10 @@ def _nothing(
     ended = asked if asked.ended_early else (None if params.process else early_end(run))
     if ended is not None:
         end = explain_end(ended, run, package)
-        return end.verdict(unjudged, f"the node ended before it logged {params.text!r}: {end.cause}")
+        return end.verdict(failed_or_blocked, f"the node ended before it logged {params.text!r}: {end.cause}")
     if not nodes:
         hint = f"call {INIT} before logging"
-        return unjudged("no node was registered that could log", hint=hint)
+        return failed_or_blocked("no node was registered that could log", hint=hint)
     if lines:
         log_it = f"{join_words(nodes)} {'log' if len(nodes) > 1 else 'logs'}"
         message = f"{log_it} {shown(lines[0].text)!r}, not {params.text!r}"

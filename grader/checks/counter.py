@@ -36,7 +36,7 @@ from grader.checks.support.text import LOOP
 from grader.checks.support.topics import cite, losses, no_message
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
-from grader.model.verdict import Status, Verdict, failed, grade_again, inconclusive, passed, unjudged
+from grader.model.verdict import Status, Verdict, failed, failed_or_blocked, grade_again, inconclusive, passed
 from grader.wording import join_words, plural, significant
 
 CONNECT_NS = 1_000_000_000
@@ -237,10 +237,10 @@ def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
     if losses(run, topic):
         return grade_again(f"too little was recorded on {topic}", measured="no number")
     if any(c.messages for c in run.student_channels(topic)):
-        if mixed := by_copies(package, run, topic, unjudged):
+        if mixed := by_copies(package, run, topic, failed_or_blocked):
             return mixed.about(measured="no number")
         hint = "publish the counter itself, as an Int8"
-        return unjudged(f"{topic} carries no numbers", measured="no number", hint=hint)
+        return failed_or_blocked(f"{topic} carries no numbers", measured="no number", hint=hint)
     return no_message(package, run, topic).about(measured="no message")
 
 
@@ -330,4 +330,4 @@ def _too_few(steps: int, run: Run, package: PackageFacts, params: StepParams) ->
     # What the recorder lost is not charged.
     if losses(run, params.topic):
         return grade_again(message)
-    return unjudged(message, hint=f"publish in a loop `{LOOP}`")
+    return failed_or_blocked(message, hint=f"publish in a loop `{LOOP}`")

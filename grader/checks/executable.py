@@ -30,7 +30,15 @@ from grader.model.package import CMAKE, Fault, PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.repair import as_code
 from grader.model.submission import chmod_hint
-from grader.model.verdict import FileCitation, MistakeKind, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import (
+    FileCitation,
+    MistakeKind,
+    Verdict,
+    failed,
+    failed_or_blocked,
+    inconclusive,
+    passed,
+)
 from grader.wording import is_of_other_role, join_words, there_is
 
 # a script without its first line is run by the shell, which knows no `import`
@@ -142,7 +150,7 @@ def _syntax_verdict(file: SourceFile, fault: Fault, obstacles: list[Obstacle]) -
     why = (fault.cause or fault.message) if fault.fix and fault.fix in hint else fault.explanation
     fixes = [hint, *(o.fix for o in obstacles)]
     source = f", {where}: {as_code(shown(fault.source.strip()))}" if fault.source.strip() else ""
-    return (unjudged if file.is_no_script else failed)(
+    return (failed_or_blocked if file.is_no_script else failed)(
         f"{file.path} {where}: {fault.kind}: {why}{others}",
         measured=f"{file.path}: {_mode(file)}, {_first_line(file)}{source}",
         hint="; ".join(fixes),
@@ -185,7 +193,9 @@ def _judge_unmade(why: str, path: str, build: Verdict) -> Verdict:
 def _dangling(file: SourceFile) -> Verdict:
     """Return the verdict on a link in place of the script, which leads to no file that was handed in."""
     target = f"{file.path} is a link to {shown(file.link)}; " if file.link else ""
-    verdict = unjudged(f"{target}{file.link_problem}", hint="hand in the file itself, in place of the link")
+    verdict = failed_or_blocked(
+        f"{target}{file.link_problem}", hint="hand in the file itself, in place of the link"
+    )
     return verdict.about(citations=(FileCitation(file=file.path),)).lost_by("file-missing", file.path)
 
 
@@ -209,7 +219,7 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
     if not movable and (elsewhere := package.hints_on(wanted.name)):
         where, _, hint = elsewhere[0].partition(": ")
         seen, kind = f"; {where}", "file-elsewhere"
-    return unjudged(
+    return failed_or_blocked(
         f"{path} is not in the package{seen}",
         measured=f"scripts: {join_words(sorted(scripts))}" if scripts else "no Python script in the package",
         hint=hint,

@@ -22,7 +22,7 @@ from grader.errors import EvidenceError
 from grader.evidence.run import Channel, LeftFile, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, failed_or_blocked, inconclusive, passed
 from grader.wording import first_few, join_words, plural
 
 IN_PACKAGE = re.compile(r"~/catkin_ws/src/[^/]+/")
@@ -198,7 +198,7 @@ def _not_left(files: Sequence[LeftFile], package: PackageFacts, run: Run, params
         return failed(f"{params.file} was not written; {_list_paths(near)} was", hint=hint)
     what = f"{params.file} was not written"
     if end := explain_early_end(package, run):
-        return end.verdict(unjudged, f"{what}: the program ended before ({end.cause})")
+        return end.verdict(failed_or_blocked, f"{what}: the program ended before ({end.cause})")
     hint = f"write {params.file} before the program ends"
     if paths:
         return failed(f"{what}; what it wrote is {_list_paths(paths)}", hint=hint).if_repeated()

@@ -42,7 +42,7 @@ from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import LAUNCH_TAGS, LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Status, Verdict, failed, joined, passed, unjudged
+from grader.model.verdict import FileCitation, Status, Verdict, failed, failed_or_blocked, joined, passed
 from grader.wording import join_words, plural, there_is
 
 
@@ -143,7 +143,7 @@ def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdic
     if not _exists(package, name) and not any(name in {one.target, one.name} for one in programs(package)):
         message = f"there is no {name} in the package that a <node> could start"
         hint = "; then ".join((add_hint(package, script), *later_fixes(file, name)))
-        return unjudged(message, hint=hint).lost_by("file-missing", script)
+        return failed_or_blocked(message, hint=hint).lost_by("file-missing", script)
     meant = (_slip_for(package, node, name) for node in file.brings if _is_meant(node, name))
     slip = next(filter(None, meant), None)
     built = starts_built(package, file, name)

@@ -36,7 +36,7 @@ from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchLoad, LaunchNode, PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
+from grader.model.verdict import FileCitation, Verdict, failed, failed_or_blocked, passed
 from grader.wording import join_words, on_lines, significant, there_is
 
 OUTSIDE = 'write <rosparam file="$(find {})/{}"/> outside the <node>, without ns'
@@ -189,7 +189,9 @@ def _not_loaded(
 ) -> Verdict:
     if find_script(package, params.file) is None:
         message = f"there is no {PurePosixPath(params.file).name} in the package to load"
-        return unjudged(message, hint=add_hint(package, params.file)).lost_by("file-missing", params.file)
+        return failed_or_blocked(message, hint=add_hint(package, params.file)).lost_by(
+            "file-missing", params.file
+        )
     if slip := next(refusals(package, file), None):
         return slip.verdict(quoted(run))
     if absence := refusal(run, package):
@@ -216,7 +218,7 @@ def _loaded_otherwise(
         message = f"{missing} is set only after the node has started"
         return failed(message, hint=OUTSIDE.format(package.name, params.file))
     message = f"{params.file} is loaded, but {describe_missing(found, missing)}"
-    return unjudged(message, hint=f"fix the names in {params.file}")
+    return failed_or_blocked(message, hint=f"fix the names in {params.file}")
 
 
 def _misplaced(package: PackageFacts, file: LaunchFile, params: LaunchLoadsParams) -> Slip | None:

@@ -52,7 +52,7 @@ from grader.checks.support.topics import cite, connected_nodes, nodes_on
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Status, Verdict, failed, joined, passed, unjudged
+from grader.model.verdict import FileCitation, Status, Verdict, failed, failed_or_blocked, joined, passed
 from grader.wording import is_one_edit, join_words, plural, there_is
 
 NodeName = Annotated[str, AfterValidator(absolute_name)]
@@ -508,7 +508,7 @@ def _are_connected(package: PackageFacts, run: Run, topic: str, names: list[str]
 def _judge_deaths(package: PackageFacts, run: Run, wanted: list[Wanted], when: str) -> Verdict | None:
     for one in wanted:
         if absence := why_died(package, run, one.node):
-            verdict = unjudged if one.own else failed
+            verdict = failed_or_blocked if one.own else failed
             message = f"{one.node.full_name} {when} {absence.why}"
             return verdict(message, hint=absence.hint, citations=absence.citations)
     return None

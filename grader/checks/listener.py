@@ -52,7 +52,7 @@ from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
+from grader.model.verdict import Verdict, failed, failed_or_blocked, grade_again, passed
 from grader.wording import join_words, plural, significant
 
 CALLBACK_HINT = (
@@ -203,7 +203,7 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     # A refused type is a cause of its own, whatever ended the node later.
     if end is not None and differing is None:
         message = f"the node ended before it subscribed to {topic}: {end.cause}"
-        return end.verdict(unjudged, message, measured="ended")
+        return end.verdict(failed_or_blocked, message, measured="ended")
     verdict = differing or misfit(run, topic)
     slip = run_slip(package, run, "unregistered")
     if verdict is None and slip is not None:

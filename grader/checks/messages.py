@@ -48,7 +48,15 @@ from grader.checks.support.topics import Sender, cite, losses, no_message, nothi
 from grader.evidence.run import Channel, Run
 from grader.model.message_definitions import NOT_FINITE
 from grader.model.package import PackageFacts
-from grader.model.verdict import EvidenceCitation, Status, Verdict, failed, grade_again, passed, unjudged
+from grader.model.verdict import (
+    EvidenceCitation,
+    Status,
+    Verdict,
+    failed,
+    failed_or_blocked,
+    grade_again,
+    passed,
+)
 from grader.wording import join_words, plural, significant
 
 ENOUGH = 3
@@ -110,7 +118,7 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
 def _no_text(package: PackageFacts, run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdict:
     if heard:
         message = f"{params.topic} carries {heard[0].type}, not text that could be compared"
-        return unjudged(message, hint="publish std_msgs/String", measured=heard[0].type)
+        return failed_or_blocked(message, hint="publish std_msgs/String", measured=heard[0].type)
     return no_message(package, run, params.topic)
 
 
@@ -120,12 +128,8 @@ def _misfit(
     """The first message that does not have the template's words, or no number where the time belongs."""
     # The loose one shows what stands where the time belongs.
     fits, loose = (message_pattern(params.template, value) for value in (NUMBER, ".*?"))
-    wrong = [
-        (t, text)
-        for c in heard
-        for t, text in zip(c.times_ns, c.data, strict=True)
-        if not fits.fullmatch(text)
-    ]
+    texts = (timed for c in heard for timed in zip(c.times_ns, c.data, strict=True))
+    wrong = [(at_ns, text) for at_ns, text in texts if not fits.fullmatch(text)]
     if not wrong:
         return None
     at_ns, text = wrong[0]
@@ -146,10 +150,9 @@ def _misfit(
         message = f"a message reads {in_one_line(text)!r}, not '{wanted}'"
     message += f" ({len(wrong)} of {count} are wrong)" if len(wrong) < count else ""
     cited = cite(run, params.topic, at_ns, at_ns)
-    value = TIMED if SECONDS in params.template else ""
     hint = f"publish {code_of(params.template)}"
     verdict = failed(message, hint=hint, citations=(cited,)).about(said=in_one_line(text))
-    right = value and _tells_time(package, run, heard)
+    right = SECONDS in params.template and _tells_time(package, run, heard)
     return verdict.in_part(OTHER_WORDS_SHARE, "the time") if right else verdict
 
 
@@ -162,9 +165,8 @@ def _tells_time(package: PackageFacts, run: Run, heard: Sequence[Channel]) -> bo
     """Whether each publisher's texts end with a time that grows as it should, whatever their words are. What a script
     without a clock counts grows so at one a second."""
     for channel in heard:
-        if slips_of(package, run, channel.callerid, "no-clock"):
-            return False
-        if all(map(_CLOCK_FACE.search, channel.data)):
+        is_face = all(map(_CLOCK_FACE.search, channel.data))
+        if is_face or slips_of(package, run, channel.callerid, "no-clock"):
             return False
         found = [_LAST_NUMBER.fullmatch(text[-SECONDS_CHARS_MAX:]) for text in channel.data]
         told = [float(one[1]) for one in found if one]
@@ -198,13 +200,11 @@ def _wrong_time(
         own_doing = early_end(run) is not None or _watched_ns(run, heard) >= WATCHED_S * 1e9
         # What the node itself cut short is judged by as much as there is: grading again would show no more.
         short = is_flood(run) or (own_doing and clocks[0][-1] < WATCHED_S)
-        wrong = wrong_growth(told, clocks, short=short)
-        if wrong is not None:
+        if (wrong := wrong_growth(told, clocks, short=short)) is not None:
             too_few = own_doing and wrong.status is Status.INCONCLUSIVE
             wrong = _made_once(wrong, package, run, channel) if len(set(told)) == 1 else wrong
             return _too_few(package, run, heard, params) if too_few else wrong
-        counted = _judge_counting(package, run, channel, told)
-        if counted is not None:
+        if (counted := _judge_counting(package, run, channel, told)) is not None:
             return counted
     return None
 
@@ -240,15 +240,15 @@ def _watched_ns(run: Run, heard: Sequence[Channel]) -> int:
 def _too_few(package: PackageFacts, run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdict:
     """Too little came: the node's own fault where it died, or was watched long enough."""
     few = f"only {plural(sum(len(c.messages) for c in heard), 'message')} came on {params.topic}"
+    why = "too few to see the time grow"
     # What the recorder lost is not the node's fault.
     if losses(run, params.topic):
-        return grade_again(f"{few}: too few to see the time grow")
+        return grade_again(f"{few}: {why}")
     if end := explain_early_end(package, run):
-        message = f"{few} before the node ended ({end.cause}): too few to see the time grow"
-        return end.verdict(unjudged, message)
+        return end.verdict(failed_or_blocked, f"{few} before the node ended ({end.cause}): {why}")
     if _watched_ns(run, heard) >= WATCHED_S * 1e9:
-        return unjudged(f"{few}: too few to see the time grow", hint=f"publish in the loop; {ASK_AGAIN}")
-    return grade_again(f"{few} while it was watched: too few to see the time grow")
+        return failed_or_blocked(f"{few}: {why}", hint=f"publish in the loop; {ASK_AGAIN}")
+    return grade_again(f"{few} while it was watched: {why}")
 
 
 VALUES_SHOWN = 4
@@ -487,7 +487,7 @@ def _in_order(
             message = f"{what} is never {value_text(value)}{before}: {came}"
             ending = None if found[at:] else explain_early_end(package, run)
             if ending is not None and not ending.by_itself:
-                verdict = ending.verdict(unjudged, f"{message}, as the node ended: {ending.cause}")
+                verdict = ending.verdict(failed_or_blocked, f"{message}, as the node ended: {ending.cause}")
                 break
             make = f"set {params.field} to" if found[at:] else f"publish another message, with {params.field}"
             hint = f"{make} {value_text(value)}{before}; rostopic echo {params.topic} shows what your node publishes"

@@ -39,7 +39,7 @@ from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Verdict, failed, grade_again, passed, unjudged
+from grader.model.verdict import FileCitation, Verdict, failed, failed_or_blocked, grade_again, passed
 from grader.wording import join_words, on_lines, plural, seconds
 
 IN_A_LOOP = f"loop with `{LOOP}`" + both(" and catch rospy.ROSInterruptException around it", "")
@@ -151,10 +151,10 @@ def _nameless(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdic
         slip = run_slip(package, run, "never-reached")
         if slip is not None and "init_node" in slip.message:
             message, hint = f"no node was registered: {slip.message}", slip.fix
-        return unjudged(message, measured="no node", hint=hint)
+        return failed_or_blocked(message, measured="no node", hint=hint)
     end = explain_end(one, run, package)
     message = f"{_script(one)} ended by itself after {one.lasted}, before it was a node: {end.cause}"
-    return end.verdict(unjudged, message, measured="no node")
+    return end.verdict(failed_or_blocked, message, measured="no node")
 
 
 def _fitting(nodes: tuple[str, ...], params: NodeNameParams | NodeLivesParams) -> list[str]:
@@ -212,7 +212,9 @@ def _early_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
 def _registration(one: Life, run: Run, nodes: tuple[str, ...]) -> Verdict | None:
     if not nodes:
         hint = f"call {INIT} before anything that waits"
-        return unjudged(f"{_script(one)} runs, but never registers as a node", hint=hint).if_repeated()
+        return failed_or_blocked(
+            f"{_script(one)} runs, but never registers as a node", hint=hint
+        ).if_repeated()
     # Another tool's recording does not say whose a node is: there, as many nodes as processes are right.
     if len(nodes) > (1 if are_noted(run) else max(1, len(lives(run)))):
         hint = f"one script is one node: call {INIT} once, and start no other process"

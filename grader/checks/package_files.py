@@ -13,7 +13,7 @@ from grader.checks.support.text import near_names, shown
 from grader.installable import known_packages, noetic_messages
 from grader.model.package import MANIFEST, Dependency, Manifest, PackageFacts, meant_manifest
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
+from grader.model.verdict import FileCitation, Verdict, failed, failed_or_blocked, passed
 from grader.wording import is_one_edit, is_word_of, join_words, on_lines, plural
 
 CORE = ("rospy", "roscpp", "message_generation", "message_runtime")
@@ -78,7 +78,7 @@ def layout(package: PackageFacts, params: LayoutParams) -> Verdict:
         )
         return passed(message, expected=expected, measured=measured)
     places = tuple(FileCitation(file=slip.place) for slip in slips if slip.place)
-    verdict = unjudged if all(slip.explained for slip in slips) else failed
+    verdict = failed_or_blocked if all(slip.explained for slip in slips) else failed
     lost = verdict(
         "; ".join(slip.what for slip in slips),
         expected=expected,
@@ -284,7 +284,7 @@ def dependencies(package: PackageFacts, params: DependenciesParams) -> Verdict:
     expected = f"{join_words(params.names)} at run time"
     if found is None:
         message = "package.xml cannot be read, so its dependencies are not known"
-        return unjudged(message, expected=expected, hint="first fix package.xml")
+        return failed_or_blocked(message, expected=expected, hint="first fix package.xml")
     declared = passed(f"{found.file} declares {join_words(params.names)}", measured=_declared_text(found))
     return (_lacking(found, params.names) or declared).about(expected=expected)
 
@@ -312,7 +312,9 @@ def maintainer(package: PackageFacts) -> Verdict:
     found = package.manifest
     if found is None:
         message = "package.xml cannot be read, so its maintainer is not known"
-        return unjudged(message, expected=expected, measured="not known", hint="first fix package.xml")
+        return failed_or_blocked(
+            message, expected=expected, measured="not known", hint="first fix package.xml"
+        )
     people = found.maintainers
     measured = join_words(shown(p.email) for p in people) or "no maintainer"
     left = [p for p in people if p.email.strip().casefold().endswith(LEFT_AS_MADE)]

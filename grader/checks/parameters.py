@@ -30,7 +30,7 @@ from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Verdict, failed, joined, passed, unjudged
+from grader.model.verdict import FileCitation, Verdict, failed, failed_or_blocked, joined, passed
 from grader.wording import join_words, plural, there_is
 
 EXACT = 1e-9
@@ -134,7 +134,7 @@ def _not_printed(
     if strange:
         file = params.file or "the student's file"
         message = f"{names} {_are(missing)} not printed; {join_words(strange)} {_are(strange)} not in {file}"
-        return unjudged(message, hint=f"fix the names in {file} first")
+        return failed_or_blocked(message, hint=f"fix the names in {file} first")
     lines = printed_lines(run)
     copied = (n for n in missing if any(is_printed(v, lines) for v in _in_file(build, params.file, n)))
     if (hard := next(copied, None)) is not None:
@@ -258,7 +258,7 @@ def _not_set(
             hint = f"remove `rospy.delete_param('{gone}')`: the parameters stay after the node has ended"
         return failed(f"{params.name} is no longer on the server{cause}", hint=hint)
     if end := explain_failure(package, run):
-        return end.verdict(unjudged, f"{params.name} was never set: the node ended with {end.cause}")
+        return end.verdict(failed_or_blocked, f"{params.name} was never set: the node ended with {end.cause}")
     # Without a limit, what came after Ctrl-C shows as well.
     if _is_value(params_on_server(run).get(params.name), params.value):
         message = f"{params.name} is set to {params.value} only after Ctrl-C: the node waits too long"

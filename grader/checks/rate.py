@@ -39,7 +39,7 @@ from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
-from grader.model.verdict import Status, Verdict, failed, grade_again, inconclusive, passed, unjudged
+from grader.model.verdict import Status, Verdict, failed, failed_or_blocked, grade_again, inconclusive, passed
 from grader.wording import hertz, join_words, plural, seconds, significant
 
 FLOOD_FACTOR = 5
@@ -205,7 +205,7 @@ def _without_messages(
         yield grade_again(f"{cause.words} lasted too short a time to judge the rate of {params.topic}")
     elif is_all:
         hint = f"{how_shown(run, cause)} while your node runs"
-        yield unjudged(f"{cause.words} never came in this run", hint=hint).if_repeated()
+        yield failed_or_blocked(f"{cause.words} never came in this run", hint=hint).if_repeated()
 
 
 def _excuse_lateness(
@@ -304,16 +304,16 @@ def _short(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     """Too little was seen to speak of a rate."""
     if found.span_ns >= params.min_window_s * 1e9 * (1 - ROUNDING):
         return None
-    seen = f"{plural(len(found.times_ns), 'message')} in {seconds(found.span_ns)}"
+    seen = f"only {plural(len(found.times_ns), 'message')} in {seconds(found.span_ns)} on {params.topic}"
     if end := explain_early_end(package, run):
-        verdict = end.verdict(unjudged, f"only {seen} on {params.topic}: the node ended ({end.cause})")
+        verdict = end.verdict(failed_or_blocked, f"{seen}: the node ended ({end.cause})")
         # A loop that never waits can be over before a rate shows: then the pause is the second thing to write.
         if not end.by_itself or run.foreign or _has_rate(package, run):
             return verdict
         paced = f"rate = rospy.Rate({significant(params.rate_hz)}) above the loop, rate.sleep() in it"
         hint = f"publish in a loop `{LOOP}`" if SPIN in verdict.hint else verdict.hint
         return verdict.model_copy(update={"hint": f"{hint}; then let it wait: {paced}"})
-    message = f"only {seen} on {params.topic}, a rate needs {params.min_window_s:g} s"
+    message = f"{seen}, a rate needs {params.min_window_s:g} s"
     return inconclusive(message, hint="record for longer" if run.foreign else "grade again")
 
 

@@ -42,7 +42,7 @@ from grader.evidence.events import NOT_OFFERED
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
+from grader.model.verdict import Verdict, failed, failed_or_blocked, grade_again, passed
 from grader.wording import plural, significant
 
 ORDER_S = 0.1
@@ -452,7 +452,7 @@ def _silent_without_reason(
         return grade_again(f"messages on {topic} were lost, so nobody knows whether one came")
     heard = (params.cause and refused_type(run, params.cause.topic)) or misfit(run) or unheard(run)
     if heard:
-        return unjudged(f"{what}, which shows nothing: {heard.message}", hint=heard.hint)
+        return failed_or_blocked(f"{what}, which shows nothing: {heard.message}", hint=heard.hint)
     silent_s = (
         [to_s(until_ns) - to_s(from_ns) - params.within_s for from_ns, until_ns in spans] if to_s else []
     )
@@ -474,7 +474,7 @@ def _unanswered(
         return None
     is_there = topic in offers(run) and calls
     why = no_answer(package, run, topic, calls[0]) if is_there else not_offered(package, run, topic)
-    verdict = unjudged(f"nothing can be seen after a call of {topic}: {why.message}", hint=why.hint)
+    verdict = failed_or_blocked(f"nothing can be seen after a call of {topic}: {why.message}", hint=why.hint)
     return verdict.late() if why.callbacks == "late" else verdict
 
 
@@ -488,7 +488,7 @@ def _never_caused(causes: Sequence[Reading], run: Run, params: ReactsParams) -> 
     simulated = any(c.topic == params.trigger.topic and c.callerid in run.grader_nodes for c in run.channels)
     if not causes or not simulated or any(map(params.trigger.holds, causes)):
         return None
-    return unjudged(
+    return failed_or_blocked(
         f"{params.trigger.words} never came in this run",
         measured=f"0 of {plural(len(causes), 'message')}",
         hint=f"rostopic echo {params.trigger.topic} shows what comes while your node runs",

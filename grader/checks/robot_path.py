@@ -46,7 +46,7 @@ from grader.checks.support.topics import Sender, cite, nothing_sent, topics_with
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Status, Verdict, failed, passed, unjudged
+from grader.model.verdict import Status, Verdict, failed, failed_or_blocked, passed
 from grader.wording import join_words, significant
 
 LATE_MS = 25.0
@@ -150,7 +150,7 @@ def tell_end(verdict: Verdict, package: PackageFacts, run: Run) -> Verdict:
             verdict = verdict.explained(why, hint)
     if end is None or end.by_itself or end.cause in verdict.message:
         return verdict
-    kind = unjudged if verdict.unjudged else failed
+    kind = failed_or_blocked if verdict.unjudged else failed
     if "keeps moving" in verdict.message:  # it was there before that
         verdict = verdict.model_copy(update={"citations": (*verdict.citations, *end.citations)})
         return verdict.explained(f"the node ended: {end.cause}", f"{verdict.hint}; {end.hint}")
@@ -161,7 +161,7 @@ def unreadable(found: Track, topic: str) -> Verdict | None:
     """Return the verdict where the messages tell of no path."""
     if found.misfit:
         hint = f"rostopic info {topic} shows their type"
-        return unjudged(f"the messages on {topic} {found.misfit}", measured=found.misfit, hint=hint)
+        return failed_or_blocked(f"the messages on {topic} {found.misfit}", measured=found.misfit, hint=hint)
     if found.fault:
         hint = "print what you publish: a division by zero, or a square root of a negative number?"
         return failed(f"the messages on {topic} {found.fault}", measured=found.fault, hint=hint)
@@ -206,8 +206,8 @@ def never_moves(path: Sequence[Pose], figures: str, run: Run) -> Verdict:
         hint = f"{DRIVE}: linear.x, and not only angular.z; where the script does so, its condition is never true"
         if any(one.forward for channel in run.student_channels() for _, one in commands_of(channel)):
             hint = "look at the condition under which it drives: it is hardly ever true"
-        return unjudged("it turns, and never leaves its place", measured=figures, hint=hint)
-    return why_still(unjudged("it never moves", measured=figures, hint=DRIVE), run)
+        return failed_or_blocked("it turns, and never leaves its place", measured=figures, hint=hint)
+    return why_still(failed_or_blocked("it never moves", measured=figures, hint=DRIVE), run)
 
 
 def drives_too_little(path: Sequence[Pose], region: Region, least_m: float) -> Verdict:

@@ -61,7 +61,7 @@ from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
-from grader.model.verdict import Status, Verdict, failed, grade_again, inconclusive, passed, unjudged
+from grader.model.verdict import Status, Verdict, failed, failed_or_blocked, grade_again, inconclusive, passed
 from grader.wording import join_words, plural, significant
 
 STALLED_MS = 1000.0
@@ -228,7 +228,7 @@ def _not_asked(asked: Stretch | None, run: Run, params: EndsAtParams) -> Verdict
     if nodes_on(run, params.asked_on, "subscribers"):
         return grade_again(f"message {params.number} on {params.asked_on} was not sent")
     hint = f"subscribe to it: {subscriber(params.asked_on)}"
-    return unjudged(f"no node listens to {params.asked_on}, so no goal could be sent", hint=hint)
+    return failed_or_blocked(f"no node listens to {params.asked_on}, so no goal could be sent", hint=hint)
 
 
 def _too_late(asked: Stretch, params: EndsAtParams) -> Verdict:
@@ -340,16 +340,16 @@ def _never_moves(
 ) -> Verdict:
     """Return the loss of a robot that stays where it is: it turns, is told to stop, is blocked, or is told nothing."""
     if turned_rad(judged, STILL_S) > TURNING_RAD:
-        verdict = unjudged(f"{message}, and turns on the spot", hint=_steer(run, params))
+        verdict = failed_or_blocked(f"{message}, and turns on the spot", hint=_steer(run, params))
         return _with_side(verdict, judged, asked, run, params)
     sent = _told(run, asked)
     if any(command.forward for command in sent):
-        return unjudged(f"{message}, though it is told to drive", hint=IN_ITS_WAY)
+        return failed_or_blocked(f"{message}, though it is told to drive", hint=IN_ITS_WAY)
     if not sent or any(command.speed or command.turn for command in sent):
-        return why_still(unjudged(message, hint=DRIVE), run)
+        return why_still(failed_or_blocked(message, hint=DRIVE), run)
     message += f": {plural(len(sent), 'velocity', 'velocities')} came, and {'all are' if len(sent) > 1 else 'it is'} 0"
     hint = "look at the condition that stops it: the distance is math.hypot(dx, dy), which is never below 0"
-    return unjudged(message, hint=hint)
+    return failed_or_blocked(message, hint=hint)
 
 
 def _fell_silent(
@@ -516,7 +516,9 @@ def _stays(
         own = [c for c in run.student_channels() if c.topic in hears or not hears]
         last = [one for c in own for _, one in commands_of(c)[-1:]]
         if any(one.forward > SLOW_M_S for one in last) and turned_rad(path) <= TURNING_RAD:
-            return unjudged("it never moves, though it is told to drive", measured=figures, hint=IN_ITS_WAY)
+            return failed_or_blocked(
+                "it never moves, though it is told to drive", measured=figures, hint=IN_ITS_WAY
+            )
         return never_moves(path, figures, run)
     # A pose that lasts no time at all counts as well where all has to be inside.
     if inside < params.share - ROUNDING or (params.share == 1 and any(out)):

@@ -17,7 +17,15 @@ from grader.checks.support.topics import cite, nodes_on, published_topics
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Status, Verdict, inconclusive, machine_lacks, partial, passed, unjudged
+from grader.model.verdict import (
+    Status,
+    Verdict,
+    failed_or_blocked,
+    inconclusive,
+    machine_lacks,
+    partial,
+    passed,
+)
 from grader.wording import plural, shorten, significant
 
 SHOWN, LINE_CHARS = 4, 200
@@ -194,7 +202,7 @@ def _judge_results(found: Results, run: Run, package: PackageFacts, start_ns: in
     more = f" and {len(said) - 1} more" if len(said) > 1 else ""
     message = f"{right} of {plural(total, 'testcase')} pass; {said[0]}{more}" if total > 1 else said[0]
     hint = "; ".join(said[:SHOWN])
-    verdict = partial(right / total, message, hint=hint) if right else unjudged(message, hint=hint)
+    verdict = partial(right / total, message, hint=hint) if right else failed_or_blocked(message, hint=hint)
     dead = next((one for one in lives(run) if one.ended_early and one.end and one.end.exit_code != 0), None)
     if dead is not None:
         verdict = _with_cause(verdict, dead, run, package)

@@ -19,7 +19,7 @@ from grader.evidence.events import MISFIT, OTHER_TYPE, ActorEvent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, passed, unjudged
+from grader.model.verdict import Verdict, failed, failed_or_blocked, passed
 from grader.wording import join_words, plural, significant
 
 CALLS_SHOWN = 8
@@ -260,17 +260,17 @@ def _never(package: PackageFacts, run: Run, params: CallsParams) -> Verdict:
         return refused
     if near and service not in looked:
         hint = f"use the name {service} both where you wait for it and where you call it"
-        return unjudged(f"{what}: {looked[near[0]]} asks for {near[0]}", hint=hint)
+        return failed_or_blocked(f"{what}: {looked[near[0]]} asks for {near[0]}", hint=hint)
     if end := explain_error(package, run):
-        return end.verdict(unjudged, f"{what}: {end.cause}")
+        return end.verdict(failed_or_blocked, f"{what}: {end.cause}")
     if service in looked:
         hint = f"waiting for it is not enough: {_call(run, service)} calls it"
-        verdict = unjudged(f"{looked[service]} looks {service} up, but never calls it", hint=hint)
+        verdict = failed_or_blocked(f"{looked[service]} looks {service} up, but never calls it", hint=hint)
         return _waits_for_another(run, asked, what) or _unless_over(verdict, run)
     if absent := no_node(package, run, what):
         return absent
     others = f"; it asks for {join_words(looked)}" if looked else ""
-    verdict = unjudged(f"{what}{others}", hint=f"{_call(run, service)} calls it")
+    verdict = failed_or_blocked(f"{what}{others}", hint=f"{_call(run, service)} calls it")
     return verdict if any(e.detail for e in asked) else _unless_over(verdict, run)
 
 
@@ -284,7 +284,7 @@ def _waits_for_another(run: Run, asked: Sequence[ActorEvent], what: str) -> Verd
     hint = f"delete the line that waits for {name}, or offer it yourself"
     if right := near_names(name, sorted(offered)):
         hint = f"write {right[0]} instead of {name}"
-    return unjudged(f"{what}: {asked[-1].actor} waits for {name}, which nothing offers", hint=hint)
+    return failed_or_blocked(f"{what}: {asked[-1].actor} waits for {name}, which nothing offers", hint=hint)
 
 
 def _clients(run: Run) -> dict[str, str]:
@@ -312,7 +312,9 @@ def _judge_refusal(run: Run, service: str) -> Verdict | None:
         if note.detail.startswith(MISFIT):
             kind = (note.type or "").partition("/")[2]
             hint = f"give srv/{kind}.srv the names and types of the handout, and build again"
-            return unjudged(f"{service} cannot be offered as the lab asks: {shown(note.detail)}", hint=hint)
+            return failed_or_blocked(
+                f"{service} cannot be offered as the lab asks: {shown(note.detail)}", hint=hint
+            )
         if note.detail.startswith(OTHER_TYPE) and run.is_student_node(note.actor):
             theirs, why = note.type or "another type", note.detail.partition(": ")[2]
             hint = "call it with the handout's type"
@@ -320,7 +322,7 @@ def _judge_refusal(run: Run, service: str) -> Verdict | None:
                 theirs = f"another definition of {note.type}" + (f" ({shown(why)})" if why else "")
                 hint = "give its definition the handout's fields, in their order and with their types, and build again"
             message = f"{note.actor} calls {service} with {theirs}; the server has {note.value}"
-            return unjudged(message, hint=hint)
+            return failed_or_blocked(message, hint=hint)
     return None
 
 

@@ -30,10 +30,10 @@ from grader.model.verdict import (
     FileCitation,
     Verdict,
     failed,
+    failed_or_blocked,
     grade_again,
     inconclusive,
     passed,
-    unjudged,
 )
 from grader.wording import join_words, plural
 
@@ -142,7 +142,7 @@ def _judge_service(offer: Offer, package: PackageFacts, run: Run, params: Servic
     if one is not None and one.ended_early:
         end = explain_end(one, run, package)
         message = f"{offer.node} offered {params.service}, but {one.name} ended: {end.cause}"
-        return end.verdict(unjudged, message)
+        return end.verdict(failed_or_blocked, message)
     if back := _taken_back(run, params.service, offer.node):
         return back
     if not offer.type:
@@ -161,7 +161,9 @@ def _taken_back(run: Run, service: str, node: str) -> Verdict | None:
     if not any(node in event.nodes and node not in event.services.get(service, ()) for event in last):
         return None
     hint = "keep what offers it in a variable that lives as long as the node does: in C++, none within inner braces"
-    return unjudged(f"{node} offers {service} for a moment, and takes it back while it runs on", hint=hint)
+    return failed_or_blocked(
+        f"{node} offers {service} for a moment, and takes it back while it runs on", hint=hint
+    )
 
 
 def _fault(
@@ -198,7 +200,9 @@ def _judge_uncalled(
     one = life_of(run, offer.node)
     if one is not None and one.ended_early:
         end = explain_end(one, run, package)
-        return end.verdict(unjudged, f"{one.name} ended before {params.service} could be called: {end.cause}")
+        return end.verdict(
+            failed_or_blocked, f"{one.name} ended before {params.service} could be called: {end.cause}"
+        )
     if back := _taken_back(run, params.service, offer.node):
         return back
     return grade_again(f"{params.service} was called {plural(len(made), 'time')} of {len(params.expect)}")
@@ -365,4 +369,4 @@ def other_type(run: Run, service: str, one: Exchange) -> Verdict | None:
     if not kind or not one.type or kind == one.type:
         return None
     message = f"{service} cannot be called as {one.type}: it is of type {kind}"
-    return unjudged(message, hint=f"give {service_call(service)} the type {one.type}")
+    return failed_or_blocked(message, hint=f"give {service_call(service)} the type {one.type}")

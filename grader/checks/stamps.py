@@ -17,7 +17,7 @@ from grader.checks.support.topics import cite, no_message
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, passed, unjudged
+from grader.model.verdict import Verdict, failed, failed_or_blocked, passed
 from grader.wording import join_words, plural, significant
 
 THREADS_S = 0.005
@@ -156,7 +156,7 @@ def _nothing_to_judge(
         return no_field(read[0], channels)
     kinds = join_words({channel.type for channel in channels})
     message = f"{params.field} of {params.topic} ({kinds}) is neither a header nor a time"
-    return unjudged(message, hint=f"make {params.field} a std_msgs/Header, or a time")
+    return failed_or_blocked(message, hint=f"make {params.field} a std_msgs/Header, or a time")
 
 
 def _zero(found: Sequence[Stamp], params: StampsParams) -> Verdict | None:

@@ -35,7 +35,15 @@ from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, grade_again, machine_lacks, partial, passed, unjudged
+from grader.model.verdict import (
+    Verdict,
+    failed,
+    failed_or_blocked,
+    grade_again,
+    machine_lacks,
+    partial,
+    passed,
+)
 from grader.wording import join_words, plural, seconds
 
 SAME_NAME = "new node registered with same name"
@@ -124,7 +132,9 @@ def _trio(package: PackageFacts, run: Run, params: CopiesParams) -> Trio | Verdi
         return _not_started(package, run, params).about(measured=f"started: {started}")
     if listener is None:
         message = f"{params.listener} was not started, so it cannot be told whose messages arrive"
-        return unjudged(message, measured="no listener", hint="add the listener's script, and push it")
+        return failed_or_blocked(
+            message, measured="no listener", hint="add the listener's script, and push it"
+        )
     return Trio(first, second, listener, run.student_nodes(first.name), run.student_nodes(second.name))
 
 
@@ -134,13 +144,15 @@ def _not_started(package: PackageFacts, run: Run, params: CopiesParams) -> Verdi
     for one in waited_for:
         if one.ended_early:
             end = explain_end(one, run, package)
-            return end.verdict(unjudged, f"{one.name} ended before the copies were started: {end.cause}")
+            return end.verdict(
+                failed_or_blocked, f"{one.name} ended before the copies were started: {end.cause}"
+            )
         if not nodes_of(run, one.name):
             message = f"{one.name} never registers as a node, so what waits for it was not started"
-            return unjudged(message, hint=f"call {INIT} before anything that waits").if_repeated()
+            return failed_or_blocked(message, hint=f"call {INIT} before anything that waits").if_repeated()
     if any(one.name in {params.first, params.second} for one in waited_for):
         return grade_again("only one copy was started")
-    return unjudged("no copy was started: there is no script to run", hint=NO_SCRIPT_HINT)
+    return failed_or_blocked("no copy was started: there is no script to run", hint=NO_SCRIPT_HINT)
 
 
 def _taken_over(package: PackageFacts, run: Run, trio: Trio, params: CopiesParams) -> Verdict | None:
@@ -171,7 +183,9 @@ def _not_both_alive(package: PackageFacts, run: Run, trio: Trio) -> Verdict | No
     cited = end.citations or (cite(run, "/grader/process", one.start_ns, one.end_ns),)
     if len(gone) > 1:
         message = f"both copies ended by themselves: {end.cause}"
-        return (machine_lacks if end.of_machine else unjudged)(message, hint=end.hint, citations=cited)
+        return (machine_lacks if end.of_machine else failed_or_blocked)(
+            message, hint=end.hint, citations=cited
+        )
     message = f"the {word} copy ended by itself after {one.lasted}, while the other kept running: {end.cause}"
     if word == "second":
         hint = (
@@ -180,7 +194,7 @@ def _not_both_alive(package: PackageFacts, run: Run, trio: Trio) -> Verdict | No
             else "it runs when alone: remove whatever ends it when another copy is running"
         )
         return failed(message, hint=hint, citations=cited)
-    return unjudged(message, hint=end.hint, citations=cited)  # the first would have ended alone too
+    return failed_or_blocked(message, hint=end.hint, citations=cited)  # the first would have ended alone too
 
 
 def _judge_unknown_nodes(run: Run, trio: Trio) -> Verdict | None:
@@ -191,7 +205,7 @@ def _judge_unknown_nodes(run: Run, trio: Trio) -> Verdict | None:
     which = "second" if trio.first_nodes else "first" if trio.second_nodes else ""
     if not which:
         message = "neither copy registers as a node"
-        return unjudged(message, hint=f"call {INIT} before anything that waits").if_repeated()
+        return failed_or_blocked(message, hint=f"call {INIT} before anything that waits").if_repeated()
     message = f"the {which} copy never registers as a node beside the other"
     return failed(message, hint=f"call {init('…', anonymous=True)} before anything that waits")
 
@@ -201,7 +215,7 @@ def _listener_gone(package: PackageFacts, run: Run, trio: Trio) -> Verdict | Non
         return None
     end = explain_end(trio.listener, run, package)
     message = f"both copies run, but {trio.listener.name} ended before it could hear both: {end.cause}"
-    return end.verdict(unjudged, message)
+    return end.verdict(failed_or_blocked, message)
 
 
 def _judge_heard(package: PackageFacts, run: Run, trio: Trio, params: CopiesParams) -> Verdict:
@@ -211,7 +225,9 @@ def _judge_heard(package: PackageFacts, run: Run, trio: Trio, params: CopiesPara
     if from_ns is None:
         silent = next(nodes for nodes in copies if not sent_by(run, params.topic, nodes))
         message = f"both copies run, but {join_words(silent)} sends no text on {params.topic}"
-        return unjudged(message, hint=f"publish on {params.topic} in the loop, as a single copy does")
+        return failed_or_blocked(
+            message, hint=f"publish on {params.topic} in the loop, as a single copy does"
+        )
     first, second = (sent_by(run, params.topic, nodes, from_ns) for nodes in copies)
     if first.total() + second.total() > LOOKED_AT:  # the listener lags behind a flood
         first, second = (sent_by(run, params.topic, nodes) for nodes in copies)
@@ -228,7 +244,7 @@ def _judge_heard(package: PackageFacts, run: Run, trio: Trio, params: CopiesPara
 def _other_words(params: CopiesParams) -> Verdict:
     wanted = in_words(params.template)
     message = f"{params.listener} prints what both copies send, but not as '{wanted}'"
-    return unjudged(message, hint=f"print '{wanted}', {IN_OWN_WORDS}")
+    return failed_or_blocked(message, hint=f"print '{wanted}', {IN_OWN_WORDS}")
 
 
 def _judge_both(
@@ -259,17 +275,19 @@ def _unheard(
         message = (
             f"both copies run, but one sends {plural(fewest, 'message')} in {seconds(trio.watched_ns(run))}"
         )
-        return unjudged(message, hint=f"publish on {params.topic} in the loop `{LOOP}`, again and again")
+        return failed_or_blocked(
+            message, hint=f"publish on {params.topic} in the loop `{LOOP}`, again and again"
+        )
     if fewest < FEW:
         return grade_again("the two copies were watched too briefly to see their messages printed")
     if not printed:
         message = f"both copies run, but {params.listener} prints nothing of what they send"
-        return unjudged(message, hint="first make the listener print what it hears")
+        return failed_or_blocked(message, hint="first make the listener print what it hears")
     counts = heard_of(first, second, printed), heard_of(second, first, printed)
     if not any(counts):
         message = f"{names[0]} and {names[1]} send the same texts, and not all of them are printed twice"
-        return unjudged(message, hint=f"put the time into each message: {GET_TIME}")
+        return failed_or_blocked(message, hint=f"put the time into each message: {GET_TIME}")
     lost = names[0] if counts[1] else names[1]
     message = f"{names[0]} and {names[1]} run together, but {params.listener} prints nothing of {lost}"
     hint = f"subscribe with a callback and {SPIN}; a subscriber hears every publisher of its topic"
-    return unjudged(message, hint=hint)
+    return failed_or_blocked(message, hint=hint)

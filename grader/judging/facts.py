@@ -26,7 +26,7 @@ from grader.evidence.run import Run
 from grader.model.package import LaunchFile, PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, machine_lacks, unjudged
+from grader.model.verdict import Verdict, failed, failed_or_blocked, inconclusive, machine_lacks
 from grader.rubric.message_fields import said_types
 from grader.rubric.model import Criterion, Rubric
 from grader.rubric.scenario import Scenario, Start
@@ -96,7 +96,9 @@ class Facts:
         found = join_words(one.name for one in known if one is not None)
         message = f"package {name} is missing; packages found: {found}"
         hint = f"hand in {name} too, beside {self.rubric.package}: its folder, with the package.xml that names it"
-        return unjudged(message, expected=f"a package {name}", measured=f"no package {name}", hint=hint)
+        return failed_or_blocked(
+            message, expected=f"a package {name}", measured=f"no package {name}", hint=hint
+        )
 
     def _no_package(self) -> Verdict:
         if not any(run.foreign for run in self.runs.values()):
@@ -188,7 +190,7 @@ class Facts:
         if check.name in OF_BUILDS and not self.runs[PACKAGE_RUN].processes:
             file = None if self._judges(OF_BUILD_FILES) else unreadable_file(package)
             cited = (file.place,) if file and file.place else ()
-            return unjudged(file.why, hint=file.hint, citations=cited) if file else None
+            return failed_or_blocked(file.why, hint=file.hint, citations=cited) if file else None
         return self.unreadable_launch(scenario) or self._unparsed_scripts(criterion)
 
     def _judges(self, checks: Collection[str], file: str = "") -> bool:
@@ -212,7 +214,7 @@ class Facts:
         if first is None or self._judges({"executable"}, PurePosixPath(first.file).name):
             return None
         why = f"{first.file} line {first.line}: {first.kind}: {first.explanation}"
-        return unjudged(why, hint=syntax_hint(first), citations=(first.place,))
+        return failed_or_blocked(why, hint=syntax_hint(first), citations=(first.place,))
 
     def unreadable_launch(self, scenario: str) -> Verdict | None:
         """Return why roslaunch cannot read what the scenario launches: that shows without a run."""
@@ -324,7 +326,7 @@ def unread_recording(run: Run) -> Verdict | None:
         pattern = run.metadata[RECORDING_MISSING]
         message = f"no recording {pattern} is in the submission"
         hint = "record with `rosbag record`, end it with Ctrl-C, and hand the file in"
-        return unjudged(message, measured="no recording", hint=hint)
+        return failed_or_blocked(message, measured="no recording", hint=hint)
     if RECORDING_PROBLEM in run.metadata:
         fix = "hand in one recording that `rosbag info` can read"
         return inconclusive(run.metadata[RECORDING_PROBLEM], hint=fix)

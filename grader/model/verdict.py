@@ -305,7 +305,7 @@ def failed(message: str, **details: Unpack[Details]) -> Verdict:
     return Verdict(status=Status.FAIL, score=0.0, message=message, **details)
 
 
-def unjudged(message: str, **details: Unpack[Details]) -> Verdict:
+def failed_or_blocked(message: str, **details: Unpack[Details]) -> Verdict:
     """Return the verdict that there is nothing to judge: a fail, or `blocked` where a required criterion
     explains it."""
     return Verdict(status=Status.FAIL, score=0.0, message=message, unjudged=True, **details)

@@ -19,7 +19,7 @@ from grader.evidence.run import Channel, Run, once_for_each_run
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.record import Record
-from grader.model.verdict import Status, Verdict, failed, grade_again, inconclusive, passed, unjudged
+from grader.model.verdict import Status, Verdict, failed, failed_or_blocked, grade_again, inconclusive, passed
 from grader.wording import plural, significant
 
 FLOOD_FACTOR, FLOOD_HZ = 3, 500
@@ -318,7 +318,7 @@ def _is_bad(step: Step, params: WrapParams) -> bool:
 def judge_flood(topic: str, drops: str, rate_hz: float) -> Verdict:
     """Return that there is nothing to judge where the publisher itself drops values."""
     hint = f"first publish at {significant(rate_hz)} Hz, then look at the counter again"
-    return unjudged(f"{topic} is flooded, so its publisher {drops}", hint=hint)
+    return failed_or_blocked(f"{topic} is flooded, so its publisher {drops}", hint=hint)
 
 
 def _bad_turn(step: Step, turns: list[Step], count: Count, run: Run, params: WrapParams) -> Verdict:
@@ -416,7 +416,7 @@ def _judge_death(count: Count, run: Run, package: PackageFacts, params: WrapPara
     came = f"after {plural(len(count.values), 'message')}, at {significant(last)}"
     message = f"the node ended {came}, before the counter could reset twice: {end.cause}"
     of_its_own = end.by_itself and len(count.values) > params.maximum
-    return (failed if of_its_own else unjudged)(message, hint=end.hint, citations=end.citations)
+    return (failed if of_its_own else failed_or_blocked)(message, hint=end.hint, citations=end.citations)
 
 
 def _stuck(count: Count, params: WrapParams) -> Verdict | None:
@@ -425,7 +425,7 @@ def _stuck(count: Count, params: WrapParams) -> Verdict | None:
     last = significant(count.values[-1])
     message = f"the counter stays at {last} ({plural(count.stuck, 'time')} at the end)"
     at_top = count.values[-1] >= params.maximum - 1
-    return (failed if at_top else unjudged)(message, hint=params.reset_hint)
+    return (failed if at_top else failed_or_blocked)(message, hint=params.reset_hint)
 
 
 def _silent(count: Count, run: Run, package: PackageFacts, params: WrapParams) -> Verdict | None:
@@ -438,7 +438,7 @@ def _silent(count: Count, run: Run, package: PackageFacts, params: WrapParams) -
     found = [t for one in lives(run) for t in process_tracebacks(run, one.name)]
     cause = f": {explain_traceback(found[-1], package).cause}" if found else ""
     message = f"the node stops publishing after {significant(count.values[-1])}, but keeps running{cause}"
-    verdict = failed(message, hint=params.reset_hint) if len(count.values) > 1 else unjudged(message)
+    verdict = failed(message, hint=params.reset_hint) if len(count.values) > 1 else failed_or_blocked(message)
     # Without a traceback, the silence may be the machine's.
     return verdict if found else verdict.if_repeated()
 
@@ -454,11 +454,11 @@ def _too_few(count: Count, good: list[Step], run: Run, params: WrapParams) -> Ve
         return passed(told)
     if count.is_flood(run, params.rate_hz) or wrong:
         message = f"{params.wraps} resets were not seen: {seen}, which do not count up one by one"
-        return unjudged(message, hint="first make the counter go up by one at its rate")
+        return failed_or_blocked(message, hint="first make the counter go up by one at its rate")
     # Half the rate is another criterion's matter, which says more about it.
     if len(count.steps) < params.rate_hz * span_s / 2:
         message = f"{params.topic} is too slow to see {params.wraps} resets: {seen}"
-        return unjudged(message, hint=f"use {loop_rate(significant(params.rate_hz))}")
+        return failed_or_blocked(message, hint=f"use {loop_rate(significant(params.rate_hz))}")
     end = {"timeout": "the run's time was over", "host": "the grading machine failed"}.get(
         outcome or "", "the run ended"
     )

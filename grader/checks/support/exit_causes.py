@@ -155,7 +155,7 @@ class Ending(NamedTuple):
     """What it needs is made by the build alone."""
 
     def verdict(self, kind: Callable[..., Verdict], message: str, measured: str = "") -> Verdict:
-        """Return a verdict of this kind (`failed`, `unjudged`) with the ending's hint and citations, or
+        """Return a verdict of this kind (`failed`, `failed_or_blocked`) with the ending's hint and citations, or
         `inconclusive` where the machine is at fault."""
         kind = machine_lacks if self.of_machine else kind
         verdict = kind(message, measured=measured, hint=self.hint, citations=self.citations)

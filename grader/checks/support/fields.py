@@ -20,7 +20,7 @@ from grader.checks.support.processes import plain_type
 from grader.checks.support.text import shown
 from grader.evidence.run import Channel
 from grader.model.message_definitions import NOT_FINITE
-from grader.model.verdict import Verdict, grade_again, unjudged
+from grader.model.verdict import Verdict, failed_or_blocked, grade_again
 from grader.wording import join_words, plural, significant
 
 ROUNDING = 1e-6
@@ -136,7 +136,7 @@ def no_field(missing: Reading, channels: Iterable[Channel]) -> Verdict:
     if all(value is None for value in channel.values):
         return grade_again(f"{what} cannot be read")
     hint = f"rostopic echo {channel.topic} shows the fields"
-    return unjudged(f"{what} do not fit: {missing.fault}", measured=missing.fault, hint=hint)
+    return failed_or_blocked(f"{what} do not fit: {missing.fault}", measured=missing.fault, hint=hint)
 
 
 def bounds_text(low: float | None, high: float | None) -> str:

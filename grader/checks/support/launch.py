@@ -32,7 +32,15 @@ from grader.evidence.run import Run
 from grader.installable import install_hint, known_packages
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.submission import chmod_hint
-from grader.model.verdict import FileCitation, Verdict, failed, grade_again, joined, machine_lacks, unjudged
+from grader.model.verdict import (
+    FileCitation,
+    Verdict,
+    failed,
+    failed_or_blocked,
+    grade_again,
+    joined,
+    machine_lacks,
+)
 from grader.untrusted_text import without_colours
 from grader.wording import join_words, on_lines
 
@@ -141,7 +149,13 @@ class Absence(NamedTuple):
 
     def verdict(self, message: str, *, judged: bool = False) -> Verdict:
         """Return the verdict: unjudged where the machine is at fault, or a script that is not `judged` too."""
-        kind = machine_lacks if self.of_machine else unjudged if self.of_script and not judged else failed
+        kind = (
+            machine_lacks
+            if self.of_machine
+            else failed_or_blocked
+            if self.of_script and not judged
+            else failed
+        )
         verdict = kind(message, hint=self.hint, citations=self.citations)
         verdict = verdict.model_copy(update={"unbuilt": self.unbuilt})
         return verdict.seeking("package", self.about) if self.refused == NO_PACKAGE else verdict

@@ -23,7 +23,7 @@ from grader.checks.support.scripts import (
 )
 from grader.checks.support.text import near_names, shown
 from grader.model.package import Executable, LaunchFile, LaunchNode, PackageFacts, SourceFile
-from grader.model.verdict import FileCitation, MistakeKind, Verdict, failed, unjudged
+from grader.model.verdict import FileCitation, MistakeKind, Verdict, failed, failed_or_blocked
 from grader.wording import join_words, on_lines, there_is
 
 OTHER_ATTRIBUTES = {"package": "pkg", "exec": "type", "executable": "type", "script": "type"}
@@ -54,7 +54,9 @@ class Slip(NamedTuple):
     def verdict(self, said: str = "") -> Verdict:
         """Return the verdict with what roslaunch said (`said`) at the end."""
         message = f"{self.file}, line {self.line}: {self.why}{said}"
-        return (unjudged if self.of_manifest else failed)(message, hint=self.fix, citations=(self.place,))
+        return (failed_or_blocked if self.of_manifest else failed)(
+            message, hint=self.fix, citations=(self.place,)
+        )
 
 
 PROGRAMS_OF = {

@@ -21,7 +21,7 @@ from grader.evidence.run import Run, once_for_each_run
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Verdict, unjudged
+from grader.model.verdict import FileCitation, Verdict, failed_or_blocked
 from grader.wording import join_words, on_lines, seconds, shorten
 
 NO_SCRIPT_HINT = "add the script to the package, and push it"
@@ -77,7 +77,7 @@ def signal_name(number: int) -> str:
 
 def not_started(who: str) -> Verdict:
     """Return the verdict where there was no script to start."""
-    return unjudged(f"{who} was not started: there is no script to run", hint=NO_SCRIPT_HINT)
+    return failed_or_blocked(f"{who} was not started: there is no script to run", hint=NO_SCRIPT_HINT)
 
 
 @once_for_each_run

@@ -46,9 +46,9 @@ from grader.model.verdict import (
     Status,
     Verdict,
     failed,
+    failed_or_blocked,
     grade_again,
     inconclusive,
-    unjudged,
 )
 from grader.wording import NOTHING_TO_DO, join_words, plural
 
@@ -108,17 +108,21 @@ def published_topics(run: Run) -> dict[str, str]:
 def no_node(package: PackageFacts, run: Run, what: str) -> Verdict | None:
     """Return why `what` is missing (`no message came on /x`) if no node was there; None if one was."""
     if run.foreign:
-        return unjudged(f"{what} in this recording", hint="record it too, with rosbag record -a")
+        return failed_or_blocked(f"{what} in this recording", hint="record it too, with rosbag record -a")
     if not lives(run) and not run.student_nodes():
-        return unjudged(f"{what}: there was nothing to run", measured="not started", hint=NO_SCRIPT_HINT)
+        return failed_or_blocked(
+            f"{what}: there was nothing to run", measured="not started", hint=NO_SCRIPT_HINT
+        )
     if ended := early_end(run):
         end = explain_end(ended, run, package)
         if end.by_itself and (error := explain_error(package, run)):  # it may have to end, but not to fail
-            return error.verdict(unjudged, f"{what}: {error.cause}", measured="ended")
-        return end.verdict(unjudged, f"{what}: {ended.name} ended before ({end.cause})", measured="ended")
+            return error.verdict(failed_or_blocked, f"{what}: {error.cause}", measured="ended")
+        return end.verdict(
+            failed_or_blocked, f"{what}: {ended.name} ended before ({end.cause})", measured="ended"
+        )
     if not run.student_nodes():
         hint = f"call {INIT}, and run the node"
-        return unjudged(f"{what}: no node was registered", measured="no node", hint=hint)
+        return failed_or_blocked(f"{what}: no node was registered", measured="no node", hint=hint)
     return None
 
 
@@ -126,7 +130,7 @@ def no_message(
     package: PackageFacts,
     run: Run,
     topic: str,
-    of_node: Callable[..., Verdict] = unjudged,
+    of_node: Callable[..., Verdict] = failed_or_blocked,
     kind: str = "",
 ) -> Verdict:
     """Return why no message came on a topic. `of_node` makes the verdict where the node itself is the reason; `kind` is
@@ -140,7 +144,7 @@ def no_message(
     if run.foreign:
         seen = f"; {join_words(near)} is" if near else ""
         hint = f"publish on {topic} while you record, and record it: rosbag record {topic}, or -a for all"
-        return unjudged(f"{topic} is not in {run.evidence}{seen}", measured=measured, hint=hint)
+        return failed_or_blocked(f"{topic} is not in {run.evidence}{seen}", measured=measured, hint=hint)
     if found := _judge_uncancelled(run, topic) or _judge_misnamed(package, run, topic, of_node):
         return found
     if absent := no_node(package, run, what) or _judge_refused(run, topic) or misfit(run):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 
-from grader.checks import EvidenceCitation, Record, Run, Verdict, check, partial, passed, unjudged
+from grader.checks import EvidenceCitation, Record, Run, Verdict, check, failed_or_blocked, partial, passed
 
 
 class InStepParams(Record):
@@ -36,7 +36,7 @@ def in_step(run: Run, params: InStepParams) -> Verdict:
     """
     firsts, seconds = times(run, params.first), times(run, params.second)
     if not firsts or not seconds:
-        return unjudged(f"no message came on {params.second if firsts else params.first}")
+        return failed_or_blocked(f"no message came on {params.second if firsts else params.first}")
     alone = [t for t in firsts if not has_near(t, seconds, params.within_s * 1e9)]
     if not alone:
         return passed(f"all {len(firsts)} messages on {params.first} have one on {params.second} beside them")
