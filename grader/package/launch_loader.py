@@ -83,6 +83,7 @@ def node_of(element: etree._Element, scope: Scope, remapping: Sequence[etree._El
     """Return one `<node>` as it stands in this scope, with its own `<remap>`s."""
     below = scope.below(scope.get(element, "ns"), element)
     words = (word.partition(":=") for word in (scope.get(element, "args") or "").split())
+    # `_name:=value` sets a parameter of the node's own, and renames nothing.
     renamed = [(old, new) for old, _, new in words if old and new and not old.startswith("_")]
     by_args = [_line(element, scope, old).model_copy(update={"tag": "args"}) for old, _ in renamed]
     remaps = (*scope.remaps, *(_remap(one, scope) for one in remapping), *renamed)
@@ -171,6 +172,7 @@ class _Loader:
         own = [c for c in element if isinstance(c.tag, str) and wanted(c, scope)]
         node = node_of(element, scope, [c for c in own if c.tag == "remap"])
         self.loaded.nodes.append(node)
+        # A `<param>` or `<rosparam>` in a `<node>` is private: it goes below the node's name.
         inside = scope.model_copy(update={"namespace": f"{node.full_name}/"})
         for child in own:
             self._note_unset(child, scope)
@@ -270,6 +272,7 @@ def _is_slip(asked: str, name: str) -> bool:
 def _with_arg(element: etree._Element, scope: Scope) -> Scope:
     name = scope.get(element, "name") or ""
     value, default = scope.get(element, "value"), scope.get(element, "default")
+    # What is given from outside goes before the file's own default.
     if value is None and (default is None or name in scope.args):
         return scope
     return scope.model_copy(update={"args": {**scope.args, name: value if value is not None else default}})

@@ -49,7 +49,9 @@ def first_version(text: str) -> str:
     kept, part = [], ""
     for line in text.split("\n"):
         marker = MERGE_MARKER.match(line)
+        # A line of `=======` alone is no marker: only `<<<<<<<` begins one of git's conflicts.
         part = marker[1][0] if marker and (part or line[0] == "<") else part
+        # Each line stays, be it empty, so that those below it keep their numbers.
         kept.append("" if part and (marker or part in "|=") else line)
         part = "" if part == ">" else part
     return "\n".join(kept)

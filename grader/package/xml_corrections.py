@@ -58,6 +58,7 @@ def slips_of(line: str, root: str) -> Iterator[Slip]:
     """Yield what can be wrong with the tags of a line, one slip each, the likeliest first."""
     if len(line) > _LINE_CHARS_MAX:
         return
+    # The longest first: `env` is also the beginning of `env-loader`.
     names = "|".join(sorted(map(re.escape, TAGS.get(root, (root,))), key=len, reverse=True))
     for pattern, new, why in _PATTERNS:
         found = re.search(pattern.replace("NAMES", names), line)

@@ -16,16 +16,19 @@ def loop_rates(tree):
     bound, looped = {}, set()
     for node in walk(tree):
         if isinstance(node, ast.Assign) and len(node.targets) == 1:
+            # A name is written down here in the form in which it is read later.
             bound.setdefault(ast.dump(node.targets[0]).replace("Store()", "Load()"), []).append(node.value)
         elif isinstance(node, LOOPS):
             looped.update(map(id, calls_in(node, "sleep")))
 
     def given(node):
         values = bound.get(ast.dump(node), [node])
+        # Which of several values counts, only a run can tell.
         return values[0] if len(values) == 1 else node
 
     for node in calls_in(tree, "Rate", "sleep", "Timer"):
         timed = node.func.attr
+        # A pause outside of a loop, such as one at the start, makes no rate.
         if not node.args or (timed == "sleep" and id(node) not in looped):
             continue
         value = given(node.args[0])
@@ -53,6 +56,7 @@ def loop_rate(call, timed, value, number, pause):
 def nanoseconds_apart(call):
     """Return how many seconds `Duration(0, 100)` is, of whole seconds and of nanoseconds; None of any other call."""
     parts = [getattr(one, "value", None) for one in call.args]
+    # `type`, as True is an int as well; ROS keeps each of the two in 32 bits.
     if len(parts) != 2 or not all(type(one) is int and 0 <= one < 1 << 31 for one in parts) or not parts[1]:
         return None
     return parts[0] + parts[1] * 1e-9

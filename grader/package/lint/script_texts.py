@@ -34,6 +34,7 @@ def said_texts(tree):
     for node in walk(tree):
         if isinstance(node, (ast.Assign, ast.AugAssign)):
             for target in getattr(node, "targets", None) or [node.target]:
+                # What `+=` adds to is more than that one text.
                 plain = node.value if isinstance(node, ast.Assign) else None
                 given.setdefault(dotted(target), []).append(plain)
         if isinstance(node, FUNCTIONS):
@@ -65,6 +66,7 @@ def moves_to_run(tree):
     """Return for calls that stand behind a `spin()`, or in an `if`, where to move them so that they run anyway."""
     found = {}
     for node in walk(tree):
+        # `if __name__ == '__main__':` holds whenever the script is run, `if not rospy.is_shutdown():` until its end.
         asks = isinstance(node, ast.If) and "__name__" not in map(dotted, ast.walk(node.test))
         for call in calls_below(node.body) if asks and not calls_in(node.test, "is_shutdown") else ():
             found[call] = "move line %d out of the `if` on line %d" % (call.lineno, node.lineno)
@@ -100,6 +102,7 @@ class Texts:
 
     def printed(self, call):
         texts = [self.of(arg) for arg in call.args]
+        # `print` writes all that it is given; the functions of logging put the rest into the first.
         if called_name(call) == "print":
             return " ".join(texts)
         return self.filled(texts[0], call.args[1:]) if len(texts) > 1 else texts[0]
@@ -107,6 +110,7 @@ class Texts:
     def of(self, node, depth=DEPTH):
         """Return the text of an expression; what only a run can tell is `{}`."""
         if isinstance(node, ast.Constant):
+            # Braces mean a value in the texts that are told.
             return str(node.value).replace("{", "(").replace("}", ")")
         if isinstance(node, ast.JoinedStr):
             return "".join(self.of(part, depth) for part in node.values)
@@ -132,6 +136,7 @@ class Texts:
         """Return the text of `a + b`, `a % b` or `a.format(b)`."""
         operator = getattr(node, "op", None)
         if isinstance(operator, ast.Add):
+            # `1 + n` is a sum, and no text.
             number = any(isinstance(getattr(n, "value", ""), (int, float)) for n in (node.left, node.right))
             return VALUE if number else self.of(node.left, depth) + self.of(node.right, depth)
         if isinstance(operator, ast.Mod) and isinstance(node.left, ast.Constant):

@@ -71,6 +71,7 @@ def with_values_called(text: str) -> Iterator[Step]:
 def with_calls(text: str) -> Iterator[Step]:
     tree, lines = tree_of(text), text.split("\n")
     functions = [n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)]
+    # A property is read without brackets, and only its decorator tells.
     own = {n.name for n in functions} - {n.name for n in functions if n.decorator_list}
     named = [n for node in nodes_in(tree) for n in _uncalled_expressions(node) if _is_callable(n, own)]
     alone = (n.value for n in nodes_in(tree) if isinstance(n, ast.Expr))
@@ -131,6 +132,7 @@ def with_callbacks(text: str) -> Iterator[Step]:
 def _is_callback(function: ast.FunctionDef) -> bool:
     returns = (n.value for n in nodes_in(function) if isinstance(n, ast.Return | ast.Yield))
     given = [a for a in function.args.args if a.arg != "self"]
+    # One that needs nothing and gives something back may make the callback.
     return len(given) > len(function.args.defaults) or not any(returns)
 
 
@@ -170,6 +172,7 @@ def with_lines_turned(text: str) -> Iterator[Step]:
         blocks = [n.body for n in nodes_in(function) if isinstance(n, ast.FunctionDef | ast.While | ast.For)]
         for first, second in chain.from_iterable(map(pairwise, blocks)):
             given, read = _names_in(second, ast.Store), _names_in(first, ast.Load)
+            # With a second value from elsewhere, the line above may rightly read that one.
             late = {name for name in given & read - known if stored.count(name) == 1}
             ends = (first.lineno, first.end_lineno, second.end_lineno)
             alone = ends == (first.lineno, second.lineno - 1, second.lineno)

@@ -79,6 +79,7 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     renames = find_renames(package, wanted)
     scripts = _scripts(files, package, wanted, renames)
     repair_files(files, scripts)
+    # Renamed first: whatever follows looks for a file where it will be.
     rename_files(files, renames)
     sources = (f.path for f in scripts if f.python and f.link is None and not f.is_no_script)
     paths = [renames.get(path, path) for path in sources]
@@ -87,6 +88,7 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     repair_cmake(files, package, name, wanted, [f.path for f in scripts])
     rename_package(files, package, wanted)
     files_now = [renames.get(f.path, f.path) for f in package.files if is_own(f.path)]
+    # A file's names can be read once it is well-formed, as what the inner call returns is.
     repair_launch_names(files, repair_launch_files(files, package), files_now, wanted)
     wanted = wanted.model_copy(update={"remapped": (*wanted.remapped, *names_remapped(package))})
     for path in (f.path for f in package.files if f.path.endswith(CPP) and is_own(f.path)):
@@ -146,6 +148,7 @@ def apply_repair(folder: Path, repair: Repair) -> None:
         if data is None:
             raise NotRepairable(f"{repair.file} is not a file that can be repaired")
         write_data(folder, repair.file, _repair_bytes(data, repair))
+        # The build files and launch files name the package as well.
         if repair.kind == "package-name" and repair.file == MANIFEST:
             _rename_package(folder, repair)
 

@@ -33,6 +33,7 @@ def words_of(command: Command) -> list[Token]:
 
 
 def has_call(files: Files, package: PackageFacts, name: str) -> bool:
+    # These are also of the files that it includes.
     told = package.cmake.calls if package.cmake is not None else ()
     return bool(calls_of(files, name)) or any(call.name == name for call in told)
 
@@ -61,6 +62,7 @@ def all_words(files: Files) -> Iterator[Token]:
 def values_behind(call: Command, keyword: str) -> list[str]:
     words = [token.value for token in words_of(call)]
     behind = words[words.index(keyword) + 1 :] if keyword in words else []
+    # The next keyword ends the list; CMake writes keywords in capitals.
     return list(takewhile(lambda word: not word.isupper(), behind))
 
 
@@ -70,6 +72,7 @@ def add_call(files: Files, what: str, line: str, below: Sequence[str], names: Se
     text = cmake_text(files)
     lines = text.split("\n")
     name, _, first = line.partition("(")
+    # catkin_create_pkg leaves calls of find_package(…) for other packages than catkin in comments too.
     commented = find_commented(
         text, rf"{name}\s*\(" + (r"\s*catkin\b" if first.startswith("catkin ") else "")
     )
@@ -78,6 +81,7 @@ def add_call(files: Files, what: str, line: str, below: Sequence[str], names: Se
         at, call = commented
         places = lines_text(at, at + len(call) - 1)
         fix, new = f"remove the `#` on {places}", call
+        # Those that it leaves in comments name files that nobody has, such as Message1.msg.
         if not set(names) <= set(re.findall(r"[^\s()]+", "\n".join(call))):
             fix, new = f"in place of {places} write {line}", [line]
         changed = "\n".join([*lines[:at], *new, *lines[at + len(call) :]])

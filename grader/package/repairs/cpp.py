@@ -44,6 +44,7 @@ def _keep_locals(files: Files, path: str) -> None:
     for found in _LOCAL.finditer(code):
         function = _function_around(code, found.start())
         body = code[found.end() : end_of_block(code, found.end())]
+        # A function that waits itself keeps its variables for as long.
         used = re.search(rf"\b{found['name']}\b|\b(?:spin|ok|while|waitForShutdown)\b", body)
         if function in ("", "main") or used:
             continue
@@ -76,6 +77,7 @@ def _keep_subscribers(files: Files, path: str) -> None:
     lines = text.split("\n")
     for number, line in enumerate(lines):
         found = _DROPPED.fullmatch(line)
+        # What the line above begins may keep it: `sub =`, or another call's brackets.
         before = _COMMENT.sub("", lines[number - 1]).rstrip() if number else ""
         if found is None or (before and not before.endswith((";", "{", "}"))):
             continue
@@ -99,6 +101,7 @@ def _repair_spin(files: Files, path: str) -> None:
     at, end = next(
         ((n, end) for n, line in reversed([*enumerate(lines)]) if (end := _END.fullmatch(line))), (0, None)
     )
+    # Below `return 0;` nothing is reached.
     above = _END.fullmatch(lines[at - 1]) if end is not None and end["brace"] else None
     if above is not None and not above["brace"]:
         at, end = at - 1, above

@@ -21,6 +21,7 @@ NO_SCRIPTS = (".launch", ".xml", ".txt", ".yaml", ".yml", ".md", ".test")
 
 def repair_launch_files(files: Files, package: PackageFacts) -> PackageFacts:
     """Find the edits that make launch files well-formed, and return the package as it is with them."""
+    # `|` and not `or`: a file may need both.
     launches = [
         parse_launch((files.text(launch.path) or "").encode(), launch.path)
         if (launch.fault is None or launch.fault.kind == "XMLSyntaxError")
@@ -47,6 +48,7 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
     for launch, node in nodes:
         pkg, kind = node.pkg or "", node.type or ""
         runs_own = bool({kind, f"{kind}.py"} & (scripts if pkg in ours else programs))
+        # Which package `$(arg …)` is, only the call of roslaunch decides.
         if (
             pkg != own
             and "$(" not in pkg
@@ -76,6 +78,7 @@ def _complete_node(files: Files, file: str, node: LaunchNode, own: str, scripts:
     if len(lacking) != 1 or kind not in scripts or not 0 < node.line <= len(lines):
         return
     value = {"pkg": own, "type": kind, "name": PurePosixPath(kind).stem}[lacking[0]]
+    # `name=""` is there, and XML refuses the same attribute twice.
     is_empty = re.search(rf"\s{lacking[0]}\s*=", lines[node.line - 1])
     after = re.sub(r"<node\b", f'<node {lacking[0]}="{value}"', lines[node.line - 1], count=1)
     if not is_empty and after != lines[node.line - 1]:
@@ -151,5 +154,6 @@ def _set_attribute(
             message = f'line {number + 1} of {file}: {attribute}="{old}" should be {attribute}="{new}"'
             files.change(kind, file, "\n".join(lines), message, fix)
             return
+        # Another tag begins, so that the rest of the lines is not of this one.
         if number >= line and "<" in lines[number].replace("<!--", ""):
             return
