@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 
 from grader.checks.support.exit_causes import syntax_hint
+from grader.package.line_corrections import first_version
+from grader.package.lint import syntax
 from grader.package.python import check_syntax, read_syntax_report, reason_of
 from grader.syntax_fixes import corrected, other_quotes, parsed
 
@@ -442,3 +444,16 @@ def test_threads_that_parse_at_the_same_time() -> None:
 )
 def test_quotes_in_the_braces_of_an_f_string_become_the_others(line, right):
     assert other_quotes(line) == right
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a\n<<<<<<< HEAD\nb\n=======\nc\n>>>>>>> other\nd",
+        "<<<<<<< HEAD\nb\n||||||| base\na\n=======\nc\n>>>>>>> other",
+        "a heading\n=======\nb\n>>>>>>> c",
+        "<<<<<<< HEAD\nb",
+    ],
+)
+def test_both_sides_keep_the_same_version_of_a_merge(text):
+    assert "\n".join(syntax.first_version(text.split("\n"))) == first_version(text)
