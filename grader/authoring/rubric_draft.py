@@ -235,6 +235,7 @@ def _connected_topics(run: Run) -> tuple[str, ...]:
 
 def _logged_texts(run: Run) -> tuple[str, ...]:
     values = (v for c in run.student_channels("/rosout") for v in c.values if isinstance(v, dict))
+    # A text with a made-up value is another one in the next run.
     made_up = {str(e.value) for _, e in run.actors if e.action == "param"}
     texts = [str(v.get("msg", "")).strip() for v in values if v.get("level") == INFO]
     plain = (t for t in texts if t and not re.search(r"\d", t) and not any(m in t for m in made_up))
@@ -273,6 +274,7 @@ class _Dumper(yaml.SafeDumper):
     """Short lists and maps on one line, long ones not."""
 
     def ignore_aliases(self, _data: object) -> bool:
+        # PyYAML writes `&id001` and `*id001` where two entries are the same object.
         return True
 
     def increase_indent(self, flow: bool = False, indentless: bool = False) -> None:  # noqa: ARG002 - PyYAML's own

@@ -89,6 +89,7 @@ def _repair_words(repairs: list[Repair], criteria: list[CriterionResult]) -> str
 
 
 def _is_decided(criterion: CriterionResult) -> bool:
+    # What is blocked or open was not judged on the copy either.
     return not criterion.blocked_by and not criterion.status.is_open
 
 
@@ -199,6 +200,7 @@ def look_again(override: AppliedOverride, criterion: CriterionResult) -> str:
 
 
 def _automatic_text(automatic: Automatic, criterion: CriterionResult) -> str:
+    # Of what its group leaves out, `points_of` would say that it is not counted.
     points = points_of(criterion.model_copy(update={"points": automatic.points, "left_out": None}))
     return f"{points} ({STATES[automatic.status]})"
 

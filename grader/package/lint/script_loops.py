@@ -6,6 +6,7 @@ Nothing is executed. Python 3.8, standard library only.
 
 import ast
 from collections import Counter
+from itertools import islice
 
 from script_names import (
     FUNCTIONS,
@@ -362,28 +363,37 @@ def waiting_callbacks(tree):
         given = argument(node, 2, CALLED_BACK[kind]) if kind in CALLED_BACK else []
         own = functions.get(dotted(given[0]).rpartition(".")[2]) if given else None
         inside = list(ast.walk(own)) if own is not None else []
-        for inner in inside if node not in inside else ():
-            if isinstance(inner, ast.While) and is_endless(inner, own):
-                message, fix = "the loop in the callback `%s`, line %d, never ends", "take the loop out of it"
-            elif is_call(inner, "spin"):
-                message, fix = "the callback `%s` calls spin() on line %d", "move line %d out of it"
-            elif called_name(inner) == "sleep" and not is_short(inner):
-                message, fix = "the callback `%s` sleeps on line %d", "delete line %d"
-                slept = {n.lineno for n in inside if called_name(n) == "sleep" and not is_short(n)}
-                slept = sorted(slept - {inner.lineno})[:SLEEPS_SHOWN]
-                if slept:
-                    fix = "delete lines %s and %d" % (
-                        ", ".join(map(str, [inner.lineno, *slept[:-1]])),
-                        slept[-1],
-                    )
-                    message += " and again on line%s" % (
-                        " %d" % slept[0] if len(slept) == 1 else "s " + fix.partition(", ")[2]
-                    )
-            else:
-                continue
-            fix, message = fix % inner.lineno if "%" in fix else fix, message % (own.name, inner.lineno)
-            yield slip(inner.lineno, "callback-waits", message, fix, own.name)
-            break
+        if node not in inside:
+            yield from islice(waits_in(own, inside), 1)
+
+
+def waits_in(callback, inside):
+    """Yield what keeps a callback from its end; `inside` is all that is in it."""
+    for one in inside:
+        line, message, fix = getattr(one, "lineno", 0), "", ""
+        if isinstance(one, ast.While) and is_endless(one, callback):
+            message = "the loop in the callback `%s`, line %d, never ends" % (callback.name, line)
+            fix = "take the loop out of it"
+        elif is_call(one, "spin"):
+            message = "the callback `%s` calls spin() on line %d" % (callback.name, line)
+            fix = "move line %d out of it" % line
+        elif is_long_sleep(one):
+            again = sorted({n.lineno for n in inside if is_long_sleep(n)} - {line})[:SLEEPS_SHOWN]
+            message = "the callback `%s` sleeps on line %d" % (callback.name, line)
+            message += " and again on %s" % lines_said(again) if again else ""
+            fix = "delete %s" % lines_said([line, *again])
+        if message:
+            yield slip(line, "callback-waits", message, fix, callback.name)
+
+
+def is_long_sleep(node):
+    return called_name(node) == "sleep" and not is_short(node)
+
+
+def lines_said(numbers):
+    """Return `line 3` or `lines 3, 5 and 8`."""
+    *first, last = map(str, numbers)
+    return "lines %s and %s" % (", ".join(first), last) if first else "line " + last
 
 
 def loops_of_numbers(tree):

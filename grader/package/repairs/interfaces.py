@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import PurePosixPath
 
 from cmake_parser.ast import Command
@@ -207,28 +207,34 @@ def define_as_asked(files: Files, package: PackageFacts, wanted: Wanted) -> None
             continue
         if own.fault is not None:
             _divide(files, own, fields, text)
-            continue
-        if places := exchanged_parts(own.fields, fields):
-            order = PARTS[PurePosixPath(path).suffix]
-            parts = [part.strip("\n") for part in DIVIDER.split(text)]
-            changed = "\n---\n".join(parts[order.index(places.get(part, part))] for part in order)
-            moved = join_words(part for part, other in places.items() if part != other)
-            fix = f"the order of the parts is {join_words(order)}, with `---` between them"
-            files.change("build-line", path, f"{changed}\n", f"{path}: {moved} have changed places", fix)
-            continue
-        types = {(one.part, one.name): one.type for one in fields}
-        for one in own.fields:
-            asked = types.get((one.part, one.name), "")
-            if one.value is None and asked and _cannot_stand_for(one.type, asked, path, package.name or ""):
-                now = files.text(path) or ""
-                lines = now.split("\n")
-                kind = rf"^(\s*){re.escape(one.type)}(?=\s)"
-                lines[one.line - 1] = re.sub(kind, rf"\g<1>{asked}", lines[one.line - 1])
-                if "\n".join(lines) == now:
-                    continue  # put right already
-                why = f"{one.path} is {one.type}, but the handout asks for {asked}"
-                message, fix = f"line {one.line} of {path}: {why}", f"write `{asked} {one.name}`"
-                files.change("build-line", path, "\n".join(lines), message, fix)
+        elif places := exchanged_parts(own.fields, fields):
+            _move_parts(files, path, text, places)
+        else:
+            _change_types(files, own, fields, package.name or "")
+
+
+def _move_parts(files: Files, path: str, text: str, places: Mapping[str, str]) -> None:
+    """Write each part where it belongs; `places` tell where it is now."""
+    order = PARTS[PurePosixPath(path).suffix]
+    parts = [part.strip("\n") for part in DIVIDER.split(text)]
+    changed = "\n---\n".join(parts[order.index(places.get(part, part))] for part in order)
+    moved = join_words(part for part, other in places.items() if part != other)
+    fix = f"the order of the parts is {join_words(order)}, with `---` between them"
+    files.change("build-line", path, f"{changed}\n", f"{path}: {moved} have changed places", fix)
+
+
+def _change_types(files: Files, own: Interface, fields: Sequence[InterfaceField], package: str) -> None:
+    """Give the fields the types of the handout's `fields` where theirs cannot stand for these."""
+    types = {(one.part, one.name): one.type for one in fields}
+    for one in own.fields:
+        asked = types.get((one.part, one.name), "")
+        if one.value is None and asked and _cannot_stand_for(one.type, asked, own.path, package):
+            lines = (files.text(own.path) or "").split("\n")
+            kind = rf"^(\s*){re.escape(one.type)}(?=\s)"
+            lines[one.line - 1] = re.sub(kind, rf"\g<1>{asked}", lines[one.line - 1])
+            why = f"{one.path} is {one.type}, but the handout asks for {asked}"
+            message, fix = f"line {one.line} of {own.path}: {why}", f"write `{asked} {one.name}`"
+            files.change("build-line", own.path, "\n".join(lines), message, fix)
 
 
 def _cannot_stand_for(kind: str, asked: str, path: str, package: str) -> bool:
