@@ -196,9 +196,12 @@ def missing_files(loss: Loss) -> list[MissingFile]:
 
 
 def write_files_hint(files: Sequence[MissingFile]) -> str:
-    """Return what to do about several missing files: what follows the first one's path goes for all."""
-    _, _, then = files[0].criterion.hint.partition(files[0].path)
-    return f"write these files{then.replace(' it', ' them')}"
+    """Return what to do about several missing files: what follows the first one's path goes for all. What comes next
+    is told of each."""
+    _, _, push = files[0].criterion.hint.partition(files[0].path)
+    later = [file.criterion.hint.partition("; then ")[2] for file in files]
+    push = push.partition("; then ")[0].replace(" it", " them")
+    return "; then ".join(dict.fromkeys([f"write these files{push}", *filter(None, later)]))
 
 
 def _fold(

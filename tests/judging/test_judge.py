@@ -69,6 +69,23 @@ def test_a_missing_script_blocks_everything_that_needs_it(recorded: bool) -> Non
     )
 
 
+def test_an_empty_script_is_told_once() -> None:
+    file = {
+        "path": EXECUTABLE["with"]["path"],
+        "shebang_problem": "the file is empty",
+        "shebang_fault": "empty-file",
+    }
+    named = {**NODE, "check": "node-name", "with": {"names": ["talker"], "process": "talker"}}
+    run = {
+        "processes": [{"name": "talker", "script": file["path"], "exit_s": 0.2, "exit_code": 0}],
+        "outcome": "ended",
+    }
+    found = judge(
+        rubric(EXECUTABLE, named), build_runs({"runs": {"talker": run}, "package": {"files": [file]}})
+    )
+    assert [c.status.value for c in found] == ["fail", "blocked"]
+
+
 def test_what_can_be_judged_is_judged_though_a_requirement_failed() -> None:
     package = {
         "files": [{"path": "src/numeric_talker.py", "executable": False, "shebang": "#!/usr/bin/python3"}]

@@ -218,7 +218,7 @@ def test_files_that_are_missing_are_all_named_in_markdown():
             5,
             message=f"{path.rpartition('/')[2]} is not in the package; there is other.txt",
             expected=f"{path}, with a node",
-            hint=f"write {path}",
+            hint=f"write {path}, and push it; then add msg/A.msg",
             mistake=Mistake(kind="file-missing", name=path),
         )
         for name, path in paths.items()
@@ -227,7 +227,7 @@ def test_files_that_are_missing_are_all_named_in_markdown():
     assert "to fix: 2 files are not in the package: `src/a.py` and `launch/a.launch`" in text
     for name, path in paths.items():
         assert f"- `{path}` (`{name}` 0/5): with a node; there is `other.txt`" in text
-    assert "- Hint: write these files" in text
+    assert "- Hint: write these files, and push them; then add `msg/A.msg`\n" in text
     assert "The same holds for" not in text
 
 

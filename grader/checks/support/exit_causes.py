@@ -236,7 +236,8 @@ def _not_run(life: Life, run: Run, package: PackageFacts) -> Ending | None:
         cause = f"its script ran to the end: it makes no node, but {other}, which has the same name, does"
         return Ending(cause, without_git(move_hint(package, other, script.path), package), by_itself=True)
     if script is not None and script.shebang_fault == "empty-file":
-        return Ending("its file is empty", f"write the node in {script.path}", by_itself=True)
+        cited = (FileCitation(file=script.path, line=1),)
+        return Ending("its file is empty", f"write the node in {script.path}", cited, by_itself=True)
     kinds = ("main-guard", "not-called", "never-called", "loop-left", "commented-out", "no-init")
     own = [s for s in package.slips if s.file == life.start.script and s.kind in kinds]
     slips = [
