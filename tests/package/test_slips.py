@@ -487,7 +487,7 @@ def test_a_script_that_is_no_node(tmp_path, text, told):
     [
         ("while True:\n    time.sleep(1)\n", "the loop on line 1 never checks"),
         ("while not rospy.is_shutdown():\n    time.sleep(1)\n", ""),
-        ("while True:\n    rate.sleep()\n", "the loop on line 1 never checks"),
+        ("while n < 9:\n    for i in range(9):\n        pub.publish(i)\nrate.sleep()\n", "on lines 1 and 2 never"),
         ("while True:\n    rospy.wait_for_message('a', A)\n", ""),
         ("while True:\n  try:\n    rospy.wait_for_message('a', A)\n  except rospy.ROSException:\n    pass\n",
          "the `except` on line 4 catches what Ctrl-C raises, and the loop on line 1 goes on"),

@@ -512,7 +512,9 @@ def deaf_loops(tree):
                 endless.append(slip(loop.lineno, "deaf", message, ASKS))
         elif is_while or is_endless_for(loop):
             known = endless if not is_while or isinstance(loop.test, ast.Constant) else others
-            known.append(deaf(loop, [n for n in inside if n is not loop and sleeps(n)]))
+            known.append(
+                deaf(loop, [n for n in inside if n is not loop and (sleeps(n) or is_to_sleep(n, loop, tree))])
+            )
         else:
             counted.append(deaf(loop, []))
     for node in walk(tree):
@@ -553,6 +555,16 @@ def is_endless_for(loop):
 def sleeps(loop):
     """Whether it is a `for` that sleeps in each of its turns, so that it can take long."""
     return isinstance(loop, ast.For) and bool(calls_in(loop, "sleep"))
+
+
+def is_to_sleep(one, loop, tree):
+    """Whether it is a `for` that will sleep once `sleep()`, which stands below both loops, is moved into it."""
+    publishes = isinstance(one, ast.For) and calls_in(one, "publish")
+    return (
+        publishes
+        and not calls_in(loop, "sleep")
+        and any(n.lineno > loop.lineno for n in calls_in(tree, "sleep"))
+    )
 
 
 def goes_on(handler):
