@@ -22,6 +22,7 @@ from grader.checks.support.launch import (
     why_not_up,
 )
 from grader.checks.support.launch_slips import (
+    OF_SOURCE,
     Slip,
     built_fixes,
     find_launch,
@@ -195,9 +196,9 @@ def _slip_for(package: PackageFacts, node: LaunchNode, name: str) -> Slip | None
         why = f'pkg="{node.pkg}" is not the package of {name}'
         return Slip(node.file, node.line, why, f'write pkg="{package.name}"')
     written = PurePosixPath(node.type or "")
-    if slip is None and written.suffix in CPP_SUFFIXES and written.stem == PurePosixPath(name).stem:
-        why = f'type="{written}" is a C++ source file, which cannot be started'
-        return Slip(node.file, node.line, why, f'write type="{name}"')
+    if slip is not None and node.pkg == package.name and written.suffix in CPP_SUFFIXES:
+        same = written.stem == PurePosixPath(name).stem
+        return slip._replace(why=OF_SOURCE.format(written), fix=f'write type="{name}"') if same else slip
     return slip
 
 

@@ -147,6 +147,12 @@ CASES = {
     "include": Case(swapped(CMAKELISTS, ("catkin_package()", "catkin_package(\n  INCLUDE_DIRS include\n)")),
                 ["build-line"], "line 4 of CMakeLists.txt: catkin_package(…) names the folder include/"),
     "type": Case(swapped(LAUNCHED, ("talker.py", "talker")), ["launch-type"], 'type="talker" should be'),
+    "type-source": Case(
+        {"src/talker.cpp": "int main() {}\n",
+         CMAKELISTS: f"{CMAKE}add_executable(talker src/talker.cpp)\ntarget_link_libraries(talker x)\n",
+         **swapped(LAUNCHED, ("talker.py", "talker.cpp"))}, ["launch-type"],
+        'type="talker.cpp" should be type="talker"', wanted=asking(scripts=("talker",)),
+    ),
     "tag-open": Case(swapped(LAUNCHED, ("/>", ">")), ["launch-syntax"], "is still open where"),
     "no-quotes": Case(swapped(LAUNCHED, ('"talker.py"', "talker.py")), ["launch-syntax"], "has no quotes around it"),
     "tag-open-and-type": Case(swapped(LAUNCHED, ("/>", ">"), ("talker.py", "talker")),

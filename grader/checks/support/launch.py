@@ -16,6 +16,7 @@ from grader.checks.support.launch_slips import (
     node_slip,
     own_script,
     owner_of,
+    program_of_source,
     programs_hint,
 )
 from grader.checks.support.parameters import explain_yaml
@@ -419,14 +420,11 @@ def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | N
         return Absence(f"there is no package {node.pkg}", "check how pkg is spelt, and that it is installed")
     why = f"roslaunch finds no program {node.type} in the package {node.pkg}"
     hint = "type is the file's name, with .py for a script, and the file needs chmod +x"
-    sources = {
-        one.name: [PurePosixPath(s).name for s in one.call.args[1:]] for one in programs(owner or package)
-    }
     if near := near_names(str(node.type), PROGRAMS_OF.get(str(node.pkg), ())):
         why, hint = f"{why}; it has {near[0]}", f'write type="{near[0]}"'
     elif owner is None:
         hint = programs_hint(str(node.pkg))
-    elif made := next((name for name, named in sources.items() if node.type in named), ""):
+    elif made := program_of_source(owner, str(node.type)):
         why, hint = (
             f"{why}: {node.type} is its source",
             f'write type="{made}", as in `add_executable({made} …)`',

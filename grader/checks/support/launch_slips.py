@@ -191,10 +191,21 @@ def _parts_started(started: Mapping[str, set[str]]) -> dict[str, str]:
 
 
 def has_program(package: PackageFacts, name: str) -> bool:
-    """Return whether there is a file of that name, or a program that CMake builds under it."""
-    if "/" not in name and find_script(package, name) is not None:
+    """Return whether there is a file of that name, but no source of C++, or a program that CMake builds under it."""
+    if "/" not in name and not name.endswith(CPP_SUFFIXES) and find_script(package, name) is not None:
         return True
     return any(one.is_called(name) and not is_elsewhere(one, package) for one in programs(package))
+
+
+OF_SOURCE = 'type="{}" is a C++ source file, which cannot be started'
+
+
+def program_of_source(package: PackageFacts, name: str) -> str:
+    """Return what CMake calls the program that it makes of a source of that name; "" where it makes none."""
+    made = (
+        one for one in programs(package) if name in {PurePosixPath(path).name for path in one.call.args[1:]}
+    )
+    return next((one.name for one in made if name.endswith(CPP_SUFFIXES)), "")
 
 
 def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip | None:
@@ -329,6 +340,8 @@ def _no_program(package: PackageFacts, node: LaunchNode, of_lab: Sequence[Packag
     plain = PureWindowsPath(name).name  # of both, `/` and `\\`
     if plain != name and has_program(package, plain):
         return _slip(node, f"{why}: type is the file's name without its folder", f'write type="{plain}"')
+    if program := program_of_source(package, plain):
+        return _slip(node, OF_SOURCE.format(plain), f'write type="{program}"')
     if found := find_script(package, f"{plain}.py"):
         return _slip(node, f'{why}: type="{name}" lacks the .py of {found.path}', f'write type="{plain}.py"')
     if made := next((one for one in programs(package) if name in {one.target, one.name}), None):

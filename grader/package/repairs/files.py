@@ -159,6 +159,8 @@ def find_renames(package: PackageFacts, wanted: Wanted) -> dict[str, str]:
     present = [f.path for f in package.files if is_own(f.path) and f.link is None]
     names = {PurePosixPath(path).name for path in present}
     right = {PurePosixPath(path).name: path for path in _wanted_files(wanted)}
+    programs = package.cmake.executables if package.cmake is not None else ()
+    names |= {name for name in right if any(one.is_called(name) for one in programs)}
     renames: dict[str, str] = {}
     for name, path in right.items():
         free = [p for p in present if p not in renames and PurePosixPath(p).name not in right]

@@ -12,11 +12,11 @@ from grader.model.repair import RepairKind
 from grader.package.launch import parse_launch
 from grader.package.manifest import parse_manifest
 from grader.package.repairs.editing import Files, keep_first_version, repair_xml
-from grader.package.repairs.names import Wanted, is_near
+from grader.package.repairs.names import CPP, Wanted, is_near
 from grader.wording import the_same_on
 
 TAG_LINES_MAX = 20
-NO_SCRIPTS = (".launch", ".xml", ".txt", ".yaml", ".yml", ".md", ".test")
+NO_SCRIPTS = (".launch", ".xml", ".txt", ".yaml", ".yml", ".md", ".test", *CPP)
 
 
 def repair_launch_files(files: Files, package: PackageFacts) -> PackageFacts:
@@ -40,7 +40,8 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
     own = _own_name(files, given)
     ours = {own, given, PurePosixPath(package.path).name}
     scripts = {name for path in names if not (name := PurePosixPath(path).name).endswith(NO_SCRIPTS)}
-    programs = scripts | _programs(package)
+    made = {one.name: one.call.args[1:] for one in package.cmake.executables} if package.cmake else {}
+    programs = scripts | set(made)
     nodes = [(launch, node) for launch in package.launch_files for node in launch.nodes]
     for launch, node in nodes:
         _complete_node(files, launch.path, node, own, scripts)
@@ -62,6 +63,7 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
         if kind and kind not in programs and (node.pkg in ours or is_near(node.pkg or "", own)):
             plain = PurePosixPath(kind).name
             there = [one for one in (f"{kind}.py", plain, f"{plain}.py") if one in scripts]
+            there = there or [one for one, sources in made.items() if _is_among(plain, sources)]
             near = there or [s for s in sorted(scripts) if is_near(kind, s)]
             for right in near[:1]:
                 _set_attribute(files, launch.path, node.line, ("type", kind, right), kind="launch-type")
@@ -113,8 +115,9 @@ def _repair_params(files: Files, launch: LaunchFile, wanted: Wanted) -> None:
             _set_attribute(files, launch.path, param.line, ("name", old, new), kind="parameter-name")
 
 
-def _programs(package: PackageFacts) -> set[str]:
-    return {one.name for one in package.cmake.executables} if package.cmake is not None else set()
+def _is_among(source: str, paths: Sequence[str]) -> bool:
+    """Return whether a program is made of that source of C++."""
+    return source.endswith(CPP) and source in {PurePosixPath(path).name for path in paths}
 
 
 def _repair_nodes(files: Files, package: PackageFacts, wanted: Wanted) -> None:
