@@ -147,6 +147,9 @@ CASES = {
     "include": Case(swapped(CMAKELISTS, ("catkin_package()", "catkin_package(\n  INCLUDE_DIRS include\n)")),
                 ["build-line"], "line 4 of CMakeLists.txt: catkin_package(…) names the folder include/"),
     "type": Case(swapped(LAUNCHED, ("talker.py", "talker")), ["launch-type"], 'type="talker" should be'),
+    "node-in-cpp-beside-the-labs": Case(
+        {"src/a.cpp": CPP_NODE.replace('"a"', '"talkr"').replace("  return 0", "  ros::spin()")}, []
+    ),
     "type-source": Case(
         {"src/talker.cpp": "int main() {}\n",
          CMAKELISTS: f"{CMAKE}add_executable(talker src/talker.cpp)\ntarget_link_libraries(talker x)\n",

@@ -17,7 +17,7 @@ One more line of Python for a kind that is there is a correction in `syntax_fixe
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 from grader.model.package import MANIFEST, PackageFacts, SourceFile
@@ -95,9 +95,12 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
         repair_cpp(files, path)
         names[path] = names_in_cpp(files.text(path) or "")
     links = _links_of_others(files, names, wanted)
+    of_lab = _of_lab(names, wanted)
+    taken = {one.value.strip("/") for script in of_lab for one in names[script] if one.role == "node"}
+    left = wanted.model_copy(update={"nodes": tuple(n for n in wanted.nodes if n.strip("/") not in taken)})
     for script in names:
         own = [name for name in names[script] if name not in links.get(script, ())]
-        repair_script_names(files, script, own, wanted)
+        repair_script_names(files, script, own, wanted if script in of_lab else left)
     repair_yaml_files(files, package, wanted)
     repair_yaml_names(files, package, names, wanted)
     for script in names:
@@ -105,14 +108,19 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     return tuple(sorted(files.repairs, key=lambda repair: KINDS.index(repair.kind)))
 
 
+def _of_lab(names: Iterable[str], wanted: Wanted) -> list[str]:
+    """Return which of the scripts have the name of one of the lab's."""
+    asked = {PurePosixPath(script).name for script in wanted.scripts}
+    return [script for script in names if PurePosixPath(script).name in asked]
+
+
 def _links_of_others(
     files: Files, names: Mapping[str, Sequence[Name]], wanted: Wanted
 ) -> dict[str, list[Name]]:
     """Return the topics that scripts beside those of the lab share with another script, at its other end: where each of
     the lab's scripts is there, such a topic is no slip of the lab's."""
-    asked = {PurePosixPath(script).name for script in wanted.scripts}
-    of_lab = [script for script in names if PurePosixPath(script).name in asked]
-    if len(of_lab) < len(asked):
+    of_lab = _of_lab(names, wanted)
+    if len(of_lab) < len({PurePosixPath(script).name for script in wanted.scripts}):
         return {}
     imported = {
         word.rpartition(".")[2] for script in of_lab for word in IMPORTED.findall(files.text(script) or "")
