@@ -244,7 +244,8 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
     if near_names(package.name, [pkg]) or f"[{pkg}/{name}]" in said or _folder(package) == pkg:
         fix = f'write pkg="{package.name}"'
         then = "" if has_program(package, name) else _no_program(package, node, (package,)).fix
-        fix += f" and {then.removeprefix('write ')}" if then.startswith("write type=") else ""
+        of_type = then.startswith("write type=")
+        fix += f" and {then.removeprefix('write ')}" if of_type else f"; then {then}" if then else ""
         slip = _slip(node, f"there is no {name} in a package {pkg}", fix)
         # Where the launch file has the name of the folder or of project(…), the manifest is at fault.
         return slip._replace(of_manifest=pkg in {_folder(package), *_projects(package)}, lacks=name)
