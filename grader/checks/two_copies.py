@@ -71,6 +71,8 @@ class CopiesParams(Record):
     def _are_two(self) -> CopiesParams:
         if self.first == self.second:
             raise ValueError("second: is the first, too: name the other process of the script")
+        if self.listener in {self.first, self.second}:
+            raise ValueError("listener: is one of the two, too: name the process that prints what both send")
         return self
 
 

@@ -136,6 +136,15 @@ def until_next_s(topic: object, number: object, scenario: dict[str, Any]) -> flo
     return steps_s({"steps": passed}) if is_known else None
 
 
+def _until_last_s(topic: object, number: object, scenario: dict[str, Any]) -> float | None:
+    """Return how long after the last message on a topic, if that is its number, the steps and the run end."""
+    steps = as_maps(scenario.get("steps"))
+    sent = [n for n, step in steps if as_map(step.get("publish")).get("topic") == topic]
+    if "until" in scenario or not sent or number != len(sent):
+        return None
+    return steps_s({"steps": scenario["steps"][sent[-1] :]})
+
+
 def often_faults(about: WrittenCriterion) -> Iterator[Fault]:
     """Yield rows and feedback of which more are asked for than come in that time, however fast a node is."""
     goal, most_s = _goal(about), longest_s(about.scenario) if about.check == "file-left" else None
@@ -181,6 +190,16 @@ def within_faults(about: WrittenCriterion) -> Iterator[Fault]:
                 f"the step gives the goal up {left_s:g} s after it has cancelled it (limit_s: {limit_s:g})"
             )
             yield at, f"{fault}: give it a longer limit_s"
+    topic, number = about.given.get("asked_on"), about.given.get("number", 1)
+    left_s = until_next_s(topic, number, about.scenario) or _until_last_s(topic, number, about.scenario)
+    if (
+        about.check == "ends-at"
+        and topic is not None
+        and left_s is not None
+        and left_s < within_s <= (most_s or 0)
+    ):
+        fault = f"{about.run} waits {left_s:g} s after message {number} on {topic}"
+        yield at, f"{fault}: let the step after it wait for longer"
     if about.check in {"reacts", "ends-at"} and most_s is not None and within_s >= most_s:
         yield at, f"{about.run} lasts {most_s:g} s at most: what comes later is not seen"
 

@@ -204,6 +204,8 @@ def _plain_number(key: str, text: str) -> str:
     """Return how a number is written that has its unit, or its exponent, behind it."""
     if re.fullmatch(r"[-+]?\d+(?:\.\d*)?[eE][-+]?\d{1,2}", text):
         return f": YAML takes this for text, write {float(text):.15g}"
+    if re.fullmatch(r"\d[\d.]*[Oo][\dOo.]*", text):
+        return f": write {text.upper().replace('O', '0')}, with the digit 0 in place of the letter O"
     number = _NUMBER_AND_UNIT.fullmatch(text)
     if not number:
         return ""

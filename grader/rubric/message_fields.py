@@ -37,6 +37,7 @@ from grader.rubric.yaml_lines import (
     KeyPath,
     WrittenCriterion,
     WrittenRubric,
+    as_list,
     as_map,
     as_maps,
     items_in,
@@ -65,6 +66,25 @@ POSES = (
     "turtlesim/Pose",
 )
 """Types of which a pose can be read, odometry before all others."""
+RANGES = {
+    ("sensor_msgs/BatteryState", "percentage"): (0, 1),
+    ("sensor_msgs/BatteryState", "power_supply_status"): (0, 4),
+    ("sensor_msgs/BatteryState", "power_supply_health"): (0, 8),
+    ("sensor_msgs/BatteryState", "power_supply_technology"): (0, 6),
+    ("sensor_msgs/RelativeHumidity", "relative_humidity"): (0, 1),
+    ("sensor_msgs/NavSatFix", "latitude"): (-90, 90),
+    ("sensor_msgs/NavSatFix", "longitude"): (-180, 180),
+    ("sensor_msgs/NavSatStatus", "status"): (-1, 2),
+    ("sensor_msgs/Range", "radiation_type"): (0, 1),
+    ("visualization_msgs/Marker", "type"): (0, 11),
+    ("visualization_msgs/Marker", "action"): (0, 3),
+    ("std_msgs/ColorRGBA", "r"): (0, 1),
+    ("std_msgs/ColorRGBA", "g"): (0, 1),
+    ("std_msgs/ColorRGBA", "b"): (0, 1),
+    ("std_msgs/ColorRGBA", "a"): (0, 1),
+}
+"""Between which values a field is, by the comments and the constants in its message's definition."""
+SHARE = (0, 1)
 VELOCITIES = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")
 PLACES = frozenset({"ends-at", "path", "stays-within"})
 """Checks of where a robot is."""
@@ -95,6 +115,37 @@ def field_faults(rubric: WrittenRubric, known: Definitions) -> Iterator[Fault]:
         yield from _other_definitions(criterion, known, rubric)
     for name, scenario in rubric.scenarios.items():
         yield from ((("scenarios", name, *at), fault) for at, fault in _sent_fields(scenario, known))
+
+
+def range_warnings(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield values that a field's type would allow, and that its definition gives no meaning."""
+    given: list[tuple[KeyPath, set[str], str, object]] = []
+    for criterion in rubric.criteria:
+        for at, asked in criterion.conditions:
+            types = set(map(str, types_of(str(asked.get("topic")), rubric, criterion.scenario)))
+            field = str(asked.get("field"))
+            given += [((*at, key), types, field, asked.get(key)) for key in ("value", "min", "max")]
+            given += [
+                ((*at, "values", n), types, field, v) for n, v in enumerate(as_list(asked.get("values")))
+            ]
+    for name, scenario in rubric.scenarios.items():
+        for at, kind, one in parts_of(scenario):
+            sent = [("value", one.get("value")), *(("values", v) for v in as_list(one.get("values")))]
+            for key, value in sent if kind == "publish" else ():
+                at_value = ("scenarios", name, *at, key)
+                given += [
+                    ((*at_value, f), {str(one.get("type"))}, str(f), v) for f, v in as_map(value).items()
+                ]
+    for path, types, field, value in given:
+        limits = [RANGES.get((kind, field)) for kind in types]
+        if is_number(value) and len(limits) == 1 and limits[0] and not limits[0][0] <= value <= limits[0][1]:
+            yield path, f"{field} of {min(types)} is {_in_range(limits[0], value)}"
+
+
+def _in_range(limits: tuple[int, int], value: float) -> str:
+    words = f"{limits[0]} to {limits[1]}, and never {value:g}"
+    is_percent = limits == SHARE and SHARE[1] < value <= 100
+    return f"{words}: write {value / 100:g} for {value:g} %" if is_percent else words
 
 
 def _no_types(rubric: WrittenRubric, known: Definitions) -> Iterator[Fault]:

@@ -150,7 +150,18 @@ def _file_fault(file: str, rubric: WrittenRubric) -> str:
     if path.suffix == ".py" and source and path.name not in rubric.handout:
         return f"the handout has {source[0]}: write the name of its program, {path.stem}"
     whole = _with_ending(file, rubric)
-    return f"the rubric names {whole} elsewhere: write it with its ending" if whole else ""
+    told = f"the rubric names {whole} elsewhere: write it with its ending" if whole else ""
+    return told or _in_other_folder(path, rubric)
+
+
+def _in_other_folder(path: PurePosixPath, rubric: WrittenRubric) -> str:
+    """Return that the rubric names such a script in another folder; empty where it names this one, or none."""
+    texts = [rubric.handout, *(text for at, text in rubric.texts if at[0] == "criteria")]
+    with_folder = re.compile(rf"(?<![\w./-])(?:[\w-]+/)+{re.escape(path.name)}(?!\w)")
+    named = sorted({one for text in texts for one in with_folder.findall(text)})
+    is_named = any(f"/{one}".endswith(f"/{path}") for one in named) and len(path.parts) > 1
+    is_python = path.suffix == ".py" and bool(named)
+    return f"the rubric names {named[0]} elsewhere: write it so" if is_python and not is_named else ""
 
 
 def _with_ending(file: str, rubric: WrittenRubric) -> str:

@@ -14,6 +14,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.support.fields import is_number
+from grader.rubric.message_fields import range_warnings
 from grader.rubric.prose_warnings import prose_warnings
 from grader.rubric.simulators import TRUE_POSE, robot_of, topics_of_programs
 from grader.rubric.started import argument_warnings
@@ -55,6 +56,7 @@ CLOSE_DEG = 0.5
 CLOSE_M = 0.02
 """No student's robot stops as near to its goal as this."""
 EMPTY = "std_srvs/Empty"
+SIDEWAYS = frozenset({"linear.y", "linear.z", "angular.x", "angular.y"})
 
 
 def warnings(rubric: WrittenRubric) -> Iterator[Fault]:
@@ -82,6 +84,7 @@ def warnings(rubric: WrittenRubric) -> Iterator[Fault]:
         yield from _repeated(criterion)
         if criterion.check == "connected":
             yield from _process_for_node(criterion, rubric)
+    yield from range_warnings(rubric)
     yield from prose_warnings(rubric)
     yield from argument_warnings(rubric)
     for criterion in rubric.criteria:
@@ -91,6 +94,32 @@ def warnings(rubric: WrittenRubric) -> Iterator[Fault]:
         yield from _cancelled_goal(criterion)
         yield from _set_otherwise(criterion)
         yield from _other_run(criterion, rubric)
+        yield from _not_driven(criterion)
+        yield from _swapped_params(criterion)
+
+
+def _swapped_params(criterion: WrittenCriterion) -> Iterator[Fault]:
+    """Yield values of a field that are the value of another parameter of the run, beside one with the field's name."""
+    value, name = criterion.given.get("value"), str(criterion.given.get("field")).rpartition(".")[2]
+    params = {
+        str(one.get("name")).rpartition("/")[2]: one.get("value") for _, one in set_in(criterion.scenario)
+    }
+    others = [key for key, one in params.items() if one == value and key != name]
+    if criterion.check == "field-equals" and is_number(value) and params.get(name, value) != value and others:
+        fault = f"is {others[0]} in {criterion.run}, and {name} is {json.dumps(params[name])} there: is it that one?"
+        yield (*criterion.at, "value"), fault
+
+
+def _not_driven(criterion: WrittenCriterion) -> Iterator[Fault]:
+    """Yield parts of a velocity that a robot with two wheels cannot have, and that are to be other than 0."""
+    for at, asked in criterion.conditions if robot_of(criterion.scenario) else ():
+        field, bounds = asked.get("field"), (asked.get("value"), asked.get("min"), asked.get("max"))
+        low, high = asked.get("min", -math.inf), asked.get("max", math.inf)
+        moves = any(map(is_number, bounds)) and not (
+            asked["value"] == 0 if is_number(asked.get("value")) else low <= 0 <= high
+        )
+        if asked.get("topic") == "/cmd_vel" and field in SIDEWAYS and moves:
+            yield (*at, "field"), f"the robot cannot move by {field}: it has linear.x and angular.z alone"
 
 
 def _short_times(rubric: WrittenRubric) -> Iterator[Fault]:

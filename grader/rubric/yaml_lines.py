@@ -18,6 +18,7 @@ import yaml
 from yaml.composer import Composer
 
 from grader.errors import RubricError
+from grader.wording import plural
 
 # No rubric is nested so deeply: what is would come to the end of Python's stack.
 MAX_DEPTH = 50
@@ -337,12 +338,22 @@ def _yaml_fault(error: yaml.YAMLError, text: str, name: str) -> str:
         if words.startswith(AT_BEGINNING):
             mark = begun
         problem = words.removeprefix(AT_BEGINNING).format(line=begun.line + 1 if begun else 1)
+        if "does not belong" in problem and mark:
+            problem += _other_indent(text.splitlines()[: mark.line + 1], mark.column)
         if "but got ':'" in str(error) and begun and mark and begun.line == mark.line:
             problem = "text with a colon needs quotes; else a comma is missing"
         lines = text.splitlines()[begun.line : mark.line + 1] if begun and mark else []
         if "is not closed" in problem and any(re.search(r"[^\s#].*\s#", one) for one in lines):
             problem += "; what comes after a blank and # is a comment: text with # needs quotes"
     return f"{name}:{mark.line + 1 if mark else 1}: {problem}"
+
+
+def _other_indent(lines: list[str], column: int) -> str:
+    """Return how the last of these lines is indented, where what is wrong is its beginning, and the one before it."""
+    blanks = [len(line) - len(line.lstrip(" ")) for line in lines if line.strip()]
+    if blanks[-1:] != [column] or blanks[-2:-1] in ([], [column]):
+        return ""
+    return f" (the line above has {plural(blanks[-2], 'blank')} before it, this one {column})"
 
 
 class _Reader:
