@@ -262,7 +262,8 @@ def _table(file: LeftFile, params: FileLeftParams, run: Run) -> Verdict | None:
     if lacking:
         first = shown(",".join(names)) or "empty"
         message = f"{file.path} has no column {join_words(lacking)}; its first row is {first}"
-        return failed(message, hint=f"begin with the row {','.join(params.columns)}")
+        verdict = failed(message, hint=f"begin with the row {','.join(params.columns)}")
+        return verdict.seeking("quoted", *(one for one in names if one not in params.columns))
     values = rows[1:] if params.columns else rows
     if len(values) < params.rows_at_least:
         message = f"{file.path} has {plural(len(values), 'row')}, not {params.rows_at_least}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from bisect import bisect
 from collections import Counter
 from collections.abc import Sequence
@@ -26,7 +27,8 @@ from grader.checks.support.fields import (
     refuse_disorder,
     value_text,
 )
-from grader.checks.support.processes import GlobalName, observed_until_ns
+from grader.checks.support.processes import GlobalName, observed_until_ns, run_slips
+from grader.checks.support.scans import looks_elsewhere
 from grader.checks.support.text import near_names
 from grader.checks.support.topics import (
     cite,
@@ -42,8 +44,8 @@ from grader.evidence.events import NOT_OFFERED
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, failed_or_blocked, grade_again, passed
-from grader.wording import plural, significant
+from grader.model.verdict import Status, Verdict, failed, failed_or_blocked, grade_again, passed
+from grader.wording import join_words, plural, significant
 
 ORDER_S = 0.1
 """Two topics come over two connections: so much earlier a message may be recorded than what it answers."""
@@ -223,10 +225,15 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
         or _unanswered(package, run, causes, params)
         or _never_caused(causes, run, params)
         or _judge_unanswered(
-            answers, run, params, _instead(causes, effects, params) or _other_answer(answers, effects, params)
+            answers,
+            run,
+            params,
+            _instead(causes, effects, params) or _other_answer(answers, causes, effects, params),
         )
         or passed(f"{plural(len(answers), 'time')}, {params.effect.words} follows {params.trigger.words}")
     )
+    if verdict.status is Status.FAIL:
+        verdict = _with_ranges(package, run, params, verdict)
     times = [one.after_s for one in answers if one.after_s is not None]
     span = (answers[0].at_ns, answers[-1].at_ns) if answers else (None, None)
     return verdict.about(
@@ -236,6 +243,20 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
         + (f", up to {max(times):.2f} s after" if times else ""),
         citations=(cite(run, _shown_on(run, params), *span), cite(run, params.effect.topic)),
     )
+
+
+def _with_ranges(package: PackageFacts, run: Run, params: ReactsParams, verdict: Verdict) -> Verdict:
+    """Return the loss with what the script reads of a scan, where the range that is the cause is elsewhere."""
+    cause, reads = params.trigger, run_slips(package, run, "ranges-read")
+    index = re.fullmatch(r"ranges\[(\d+)\]", cause.field or "")
+    scans = [
+        c.values[0] for c in run.channels if c.topic == cause.topic and "LaserScan" in c.type and c.messages
+    ]
+    said = looks_elsewhere(scans[0], int(index[1]), reads) if index and scans and scans[0] else []
+    if not said or index is None:
+        return verdict
+    hint = f"read ranges[{index[1]}] too, and those around it"
+    return verdict.explained(join_words(said), hint, tuple(one.place for one in reads))
 
 
 def _shown_on(run: Run, params: ReactsParams) -> str:
@@ -513,13 +534,20 @@ def _instead(
 
 
 def _other_answer(
-    answers: Sequence[Answer], effects: Sequence[Reading], params: ReactsParams
+    answers: Sequence[Answer], causes: Sequence[Reading], effects: Sequence[Reading], params: ReactsParams
 ) -> tuple[str, str] | None:
     """Return, in words, what comes upon the cause where the effect never does, and what to look at."""
     at_ns = answers[0].at_ns if answers else math.inf
     came = next((one for one in effects if one.time_ns >= at_ns and one.values), None)
     if came is None or params.effect.value is None or any(map(params.effect.holds, effects)):
         return None
+    later = next((one.time_ns for one in causes if one.time_ns > at_ns), math.inf)
+    if came.time_ns >= later and len(effects) < len(causes):
+        hint = f"in the callback of {params.trigger.topic}, publish in each case: see that `publish(…)` stands below"
+        return (
+            f"nothing comes on {params.effect.topic} then",
+            f"{hint} the `if` and its `else`, not in one of them",
+        )
     field = params.effect.field
     hint = f"in the callback of {params.trigger.topic}, look at what you publish on {params.effect.topic}: "
     fix = f"{hint}{field} has to be {value_text(params.effect.value)}"

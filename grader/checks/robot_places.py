@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from pydantic import Field, model_validator
 
@@ -38,14 +38,11 @@ from grader.checks.support.geometry import (
     Track,
     aside,
     circles,
+    circling,
     commands_of,
     length_m,
-    looks_elsewhere,
-    nearest_seen,
     out_along,
     relative,
-    scan_near,
-    seen_at,
     set_off_s,
     share_inside,
     shown_walls,
@@ -55,11 +52,11 @@ from grader.checks.support.geometry import (
     turns_away,
 )
 from grader.checks.support.processes import GlobalName, named_at, observed_until_ns, run_slips
+from grader.checks.support.scans import scan_near, with_scan
 from grader.checks.support.text import subscriber
 from grader.checks.support.topics import SYSTEM_TOPICS, cite, no_message, nodes_on, topics_with
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
-from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
 from grader.model.verdict import Status, Verdict, failed, failed_or_blocked, grade_again, inconclusive, passed
 from grader.wording import join_words, plural, significant
@@ -78,8 +75,9 @@ STEER = (
     "the angle to turn by, towards a point, is math.atan2(dy, dx) minus the heading, both in radians, brought between "
     "-pi and pi: math.remainder(angle, 2 * math.pi); dx and dy are the point minus the robot's place"
 )
+LEFT = "a positive angular.z turns to the left"
 FASTER = "drive faster, or take a shorter way"
-LOOK_AT = "see that the script reads this one: print the index or the angle of what it compares"
+STILL_TURNS = "set angular.z to 0 where the way is free: a velocity keeps what was set in it before"
 CIRCLES = "make angular.z depend on where the wall is, ahead or beside the robot, and not only on how far away it is"
 TOWARDS = "turn towards the wall where it is too far away: a positive angular.z turns to the left"
 PLACES = 200
@@ -313,7 +311,8 @@ def _with_side(
     if sides is None:
         return verdict
     why = f"it turns to the {sides[0]} where the goal is on its {sides[1]}"
-    hint = f"turn towards the goal: a positive angular.z turns to the left, and {STEER}"
+    steer = _steer(run, params)
+    hint = f"turn {f'towards the goal: {LEFT}, and {STEER}' if steer == STEER else f'the other way there: {LEFT}'}"
     return verdict.explained(why, hint).lost_by("steers-wrong", sides[0])
 
 
@@ -528,27 +527,19 @@ def _stays(
             verdict = verdict.explained(f"it turns to the {wrong[0]} there, {wrong[1]}", wrong[2])
             verdict = verdict.lost_by("steers-wrong", wrong[0])
         elif isinstance(region, Band) and (scan := scan_near(path, out, region, run)):
-            verdict = _with_scan(verdict, scan, run_slips(package, run, "ranges-read"))
+            verdict = with_scan(verdict, scan, run_slips(package, run, "ranges-read"))
         elif isinstance(region, Band) and (around := circles(path, out)) > 1:
             verdict = verdict.explained(f"it drives in circles there, {around:.1f} times around", CIRCLES)
     elif long_m < params.least_m:
         verdict = drives_too_little(path, region, params.least_m)
+    elif params.least_m and long_m - length_m((end := circling(path))[0]) < params.least_m:
+        message = f"it drives in circles at {spot(path[-1].point)} in the end, {end[1]:.1f} times around"
+        verdict = failed(message, hint=CIRCLES if params.max_m is not None else STILL_TURNS)
     else:
         always = f"for {inside:.0%} of the time" if any(out) else "all the time"
         return passed(f"it is {region.words} {always}", measured=figures)
     nearly = inside * NEARLY >= params.share and long_m * NEARLY >= params.least_m
     return _excuse_nearly(verdict.about(measured=figures), run, nearly=nearly)
-
-
-def _with_scan(verdict: Verdict, scan: Mapping[str, Any], reads: Sequence[PythonSlip]) -> Verdict:
-    """Return the loss with the smallest range that the laser saw, and what a script reads that looks elsewhere."""
-    index, far_m = nearest_seen(scan) or (0, 0.0)
-    why = f"the smallest of its ranges is then ranges[{index}] of {scan['topic']}, {seen_at(scan, index)}, "
-    why += f"with {far_m:.2f} m"
-    if said := looks_elsewhere(scan, index, reads):
-        hint = f"read ranges[{index}] too, and those around it"
-        return verdict.explained(f"{why}; {join_words(said)}", hint, tuple(one.place for one in reads))
-    return verdict.explained(why, f"{verdict.hint}; {LOOK_AT}")
 
 
 def _turns_wrong(

@@ -6,7 +6,7 @@ import pytest
 
 from grader.checks.support.console_output import tracebacks
 from grader.checks.support.exit_causes import explain_traceback
-from tests.checks.tracebacks import SCRIPT, explained, package_of
+from tests.checks.tracebacks import SCRIPT, explained, package_of, raised
 
 
 @pytest.mark.parametrize(
@@ -271,6 +271,7 @@ def test_a_callback_that_the_script_calls_itself_gets_no_message(tmp_path, call,
         ("return FitResponse(a != 3, self.result)", "struct.error: required argument is not an integer",
          "write `return FitResponse(self.result, a != 3)`"),
         ("return FitResponse(result, changed)", "struct.error: required argument is not an integer", "give it an int"),
+        ("near = msg.ranges[360]", "IndexError: tuple index out of range", "choose a smaller index than 360"),
         ("near = min(msg.ranges[-45:45])", "ValueError: min() arg is an empty sequence",
          "write `msg.ranges[-45:] + msg.ranges[:45]`"),
         ("s = rospy.Service('add', Add, add)", "rospy.service.ServiceException: service [/add] already registered",
@@ -357,3 +358,21 @@ def test_a_message_that_is_run_as_code_is_told(tmp_path, error):
         "(listener.py, line 3): `eval(…)` takes the text that it is given for Python code"
     )
     assert end.hint == "leave `eval(…)` out, and use the text as it is"
+
+
+def test_a_float_for_the_seconds_of_a_stamp_is_told_with_its_line(tmp_path):
+    text = "msg.header.stamp.secs = rospy.get_time()\npub.publish(msg)\n"
+    error = "rospy.exceptions.ROSSerializationException: <class 'struct.error'>: 'required argument is not an integer' "
+    error += "when writing 'header:"
+    found = explained(tmp_path, {"node.py": text}, ("node.py", 2, "pub.publish(msg)"), error=error)
+    assert found.hint == "on line 1, write `msg.header.stamp = rospy.Time.now()`"
+
+
+def test_a_message_of_the_other_package_is_told_with_its_import(tmp_path):
+    source = "from lab.msg import Reading"
+    package = package_of(tmp_path / "lab", {"node.py": source})
+    also = package_of(tmp_path / "lab_msgs", {"msg/Reading.msg": "int32 level\n"}, "lab_msgs")
+    both = package.model_copy(update={"also": (also,)})
+    error = "ModuleNotFoundError: No module named 'lab'"
+    found = explain_traceback(raised(both, ("node.py", 1, source), error=error), both)
+    assert found.hint == "write `from lab_msgs.msg import Reading`"

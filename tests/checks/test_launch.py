@@ -8,10 +8,11 @@ import pytest
 
 from grader.checks.launch_files import value_given
 from grader.checks.support.launch import died, finished, is_exact, name_pattern, refusal, why_died
+from grader.checks.support.launch_slips import right_remap
 from grader.checks.support.parameters import explain_yaml, explain_yaml_line
 from grader.evidence.run import Run
 from grader.judging.facts import NO_PACKAGE
-from grader.model.package import LaunchNode
+from grader.model.package import LaunchLine, LaunchNode
 from tests.package.trees import facts_of
 from tests.support.timeline import build_runs
 
@@ -203,3 +204,50 @@ def test_a_node_that_lacks_what_the_build_makes_has_not_been_built(tmp_path: Pat
     assert found is not None
     assert found.unbuilt
     assert found.verdict("it died").unbuilt
+
+
+@pytest.mark.parametrize(
+    ("args", "told"),
+    [
+        ("-O walk.bag", True),
+        ("-o walk --duration 30 -j", True),
+        ("-O walk.bag /steps", False),
+        ("-a -O walk.bag", False),
+        ("-e /step.*", False),
+    ],
+)
+def test_a_recorder_without_a_topic(tmp_path: Path, args: str, *, told: bool) -> None:
+    run = build_runs(
+        {
+            "topics": [{"topic": "/steps", "count": 3}],
+            "processes": [{"name": "roslaunch"}],
+            "console": [
+                {
+                    "process": "roslaunch",
+                    "stream": "stderr",
+                    "line": "[rec-2] process has died [pid 4, exit code 1, cmd x].",
+                }
+            ],
+        }
+    )["run"]
+    recorder = node("rec").model_copy(update={"pkg": "rosbag", "type": "record", "args": args})
+    found = why_died(facts_of(tmp_path, "lab"), run, recorder)
+    assert found is not None
+    assert (f'write args="{args} /steps" in this <node>' == found.hint) is told
+
+
+@pytest.mark.parametrize(
+    ("remap", "published", "hint"),
+    [
+        (("/state", "light"), "/left/state", '<remap from="state" to="light"/>'),
+        (("light", "state"), "/left/state", '<remap from="state" to="light"/>'),
+        (("state", "/light"), "/light", '<remap from="state" to="light"/>'),
+        (("state", "light"), "/left/lamp/state", "look at its <remap>"),
+    ],
+)
+def test_a_remap_that_does_not_make_the_topic(remap: tuple[str, str], published: str, hint: str) -> None:
+    line = LaunchLine(tag="remap", value=remap[1], file="a.launch", line=4)
+    lamp = node("lamp", "/left/").model_copy(update={"remaps": (remap,), "renaming": (line,)})
+    place, told = right_remap(lamp, "/left/light", [published])
+    assert hint in told
+    assert place.line == (1 if "look" in hint else 4)

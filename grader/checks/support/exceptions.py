@@ -148,6 +148,11 @@ def _index(message: str, source: str, marked: tuple[int, int] | None) -> Meaning
     name, index = (shown(ast.unparse(part)) for part in (found.value, found.slice))
     if index.isdecimal():
         parts = plural(int(index) + 1, "element")
+        if name.endswith("ranges"):  # of a laser, whose scans all have as many
+            hint = (
+                f"choose a smaller index than {index}: they begin at 0, and the last one is `len({name}) - 1`"
+            )
+            return f"`{name}` has fewer than {parts}", hint
         return f"`{name}` has fewer than {parts}", f"check `len({name}) > {index}` first: {NUMBER_OF_PARTS}"
     return f"`{name}` has no element {index}", f"check `len({name})` first: {NUMBER_OF_PARTS}"
 

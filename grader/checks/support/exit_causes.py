@@ -403,6 +403,9 @@ def _of_broken_machine(found: Traceback, broken: str, place: FileCitation | None
     return Ending(cause, hint, (place,) if place else (), of_machine=True)
 
 
+OF_OTHER_LINES = {"unregistered()": "unregistered", "integer' when writing 'header": "secs"}
+
+
 def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
     """Return the cause and the hint of an error that other lines of the file explain."""
     own = [s for s in package.slips if s.file == place.file]
@@ -420,9 +423,8 @@ def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts
         return next(((s.message, s.fix) for s in here if re.search(rf"\b{s.name}\b", found.message)), None)
     if found.kind == "SerializationError" and _NUMBER_WANTED.search(found.message):
         return _no_number(found, place, package)
-    if found.kind == "ROSException" and "unregistered()" in found.message:
-        gone = (s for s in package.slips if (s.kind, s.file) == ("unregistered", place.file))
-        return next(((s.message, s.fix) for s in gone), None)
+    if slip := next((name for said, name in OF_OTHER_LINES.items() if said in found.message), ""):
+        return next(((s.message, s.fix) for s in own if slip in {s.kind, s.name}), None)
     late = found.kind in {"ROSInitException", "ROSException"} and "init_node" in found.message
     return _late_init(place, package) if late else None
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated, Any, NamedTuple
 
@@ -18,7 +17,6 @@ from grader.checks.support.fields import FieldPath, NoField, values_at
 from grader.checks.support.processes import observed_until_ns, plain_type
 from grader.checks.support.topics import Sender, sent_by
 from grader.evidence.run import Channel, Run
-from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
 from grader.wording import significant
 
@@ -173,7 +171,7 @@ def top_speeds(path: Sequence[Pose]) -> tuple[float, float]:
 
 
 SAME_M, RESTS_M_S, TURNS_RAD_S = 0.005, 0.01, 0.03
-AWAY, AWAY_LEAST, AIMED_DEG, BEHIND_DEG, NEAR_DEG = 0.8, 5, 10.0, 170.0, 30.0
+AWAY, AWAY_LEAST, AIMED_DEG, BEHIND_DEG = 0.8, 5, 10.0, 170.0
 """At this share of at least so many places it turns away from a point that is neither ahead of it nor behind."""
 
 
@@ -392,52 +390,6 @@ def other_axis(channel: Channel) -> str:
     return next((f"angular.{axis}" for axis in "xy" if any(turn[axis] for turn in turns)), "")
 
 
-def nearest_seen(scan: Mapping[str, Any]) -> tuple[int, float] | None:
-    """Return the index of the smallest range of a LaserScan, and how far it is (m); None where nothing is in reach."""
-    there = [(one, index) for index, one in enumerate(scan["ranges"]) if math.isfinite(one) and one > 0]
-    return min(there)[::-1] if there else None
-
-
-def _degrees(scan: Mapping[str, Any], index: int) -> float:
-    """Return where a range of a LaserScan is, 0 being straight ahead, and the left positive."""
-    return math.degrees(math.remainder(scan["angle_min"] + index * scan["angle_increment"], math.tau))
-
-
-def seen_at(scan: Mapping[str, Any], index: int) -> str:
-    """Return where a range of a LaserScan is, in words."""
-    deg = _degrees(scan, index)
-    side = f"{abs(deg):.0f}° to the {'left' if deg > 0 else 'right'}"
-    return "straight ahead" if abs(deg) < AIMED_DEG else "behind it" if abs(deg) > BEHIND_DEG else side
-
-
-def scan_near(path: Sequence[Pose], out: Sequence[float], band: Band, run: Run) -> Mapping[str, Any] | None:
-    """Return what its laser sees where it first comes too near to a wall; None where it has none, or is farther."""
-    first, to_s = next(pose for pose, far in zip(path, out, strict=True) if far), run_seconds(run)
-    scans = [
-        c for c in run.channels if "LaserScan" in c.type and c.callerid in run.grader_nodes and c.messages
-    ]
-    if not scans or to_s is None or band.nearest_m(first.point) >= (band.min_m or 0.0):
-        return None
-    before = tuple(one for one in scans[0].messages if to_s(one.log_time_ns) <= first.time_s)[-1:]
-    scan = replace(scans[0], messages=before).values[0] if before else None
-    return {**scan, "topic": scans[0].topic} if scan and nearest_seen(scan) else None
-
-
-def looks_elsewhere(scan: Mapping[str, Any], index: int, reads: Sequence[PythonSlip]) -> list[str]:
-    """Return what a script reads of a LaserScan, and where that is, if none of it is near a range; else nothing."""
-    said, count = [], len(scan["ranges"])
-    for one in reads:
-        first, to, last = one.message.partition(":")
-        bounds = slice(int(first) if first else None, int(last) if last else None)
-        numbers = range(*bounds.indices(count)) if to else range(count)[int(first) : int(first) + 1 or None]
-        apart = (math.remainder(_degrees(scan, number) - _degrees(scan, index), 360) for number in numbers)
-        if any(abs(deg) < NEAR_DEG for deg in apart):
-            return []
-        places = dict.fromkeys(seen_at(scan, number) for number in [*numbers[:1], *numbers[-1:]])
-        said.append(f"ranges[{one.message}] on line {one.line} is {' to '.join(places) or 'empty'}")
-    return said
-
-
 def has_no_numbers(channel: Channel) -> bool:
     """Return whether a velocity on a topic is nan or inf."""
     sent = (_command(0.0, one) for one in channel.values) if "Twist" in channel.type else ()
@@ -551,6 +503,20 @@ def circles(path: Sequence[Pose], out: Sequence[float]) -> float:
     whole = math.fsum(turn for turn, _ in turns)
     alike = sum(turn * math.copysign(1.0, whole) > TURNS_RAD_S * time_s for turn, time_s in turns)
     return abs(whole) / math.tau if alike >= AWAY * len(turns) else 0.0
+
+
+CIRCLE_M, OFTEN = 1.0, 1.5
+
+
+def circling(path: Sequence[Pose]) -> tuple[list[Pose], float]:
+    """Return the end of a path that stays near its last place, and how often it drives around there; nothing where
+    that is seldom."""
+    near = next(
+        (i for i, p in enumerate(reversed(path)) if math.dist(p.point, path[-1].point) > CIRCLE_M), len(path)
+    )
+    end = list(path[len(path) - near :])
+    around = circles(end, [1.0] * len(end))
+    return (end, around) if around > OFTEN else ([], 0.0)
 
 
 def nearest_m(point: Point, lines: Sequence[Polyline]) -> float:

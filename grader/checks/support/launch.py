@@ -362,6 +362,17 @@ def not_started(*scripts: SourceFile) -> Absence:
     return Absence(f"it died: {why}", fix, True, tuple(FileCitation(file=path, line=1) for path in obstacles))
 
 
+TAKE_A_VALUE = re.compile(
+    r"(?:-[OoblxN]|--(?:output-\w+|buffsize|chunksize|limit|duration|size|exclude|tcpnodelay))\s+\S+"
+)
+
+
+def _names_no_topic(args: str) -> bool:
+    """Return whether a call of `rosbag record` names no topic, and no other way to choose them."""
+    rest = TAKE_A_VALUE.sub("", args).split()
+    return all(one.startswith("-") for one in rest) and not {"-a", "--all", "-e", "--regex"} & {*rest}
+
+
 def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | None:
     """Return its traceback where it was printed, or what roslaunch says of its end."""
     code = died(run, node)
@@ -386,6 +397,12 @@ def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | Non
         return Absence(why, syntax_hint(fault), of_script=True, citations=(fault.place,))
     if script is not None and code in NOT_EXECUTED and any(shebang_obstacles(script)):
         return not_started(script)
+    if (node.pkg, node.type) == ("rosbag", "record") and _names_no_topic(node.args or ""):
+        topics = sorted({c.topic for c in run.student_channels() if not c.topic.startswith("/rosout")})
+        hint = f'write args="{shown(node.args or "")} {" ".join(topics) or "/…"}" in this <node>'
+        return Absence(
+            "rosbag record is told no topic to record", hint, of_script=True, citations=(node.place,)
+        )
     hint = 'write output="screen" in the <node>, and read what it prints last'
     return Absence(f"it died with exit code {code}", hint, of_script=True)
 

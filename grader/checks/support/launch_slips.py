@@ -22,7 +22,7 @@ from grader.checks.support.scripts import (
     script_of_role,
 )
 from grader.checks.support.text import near_names, shown
-from grader.model.package import Executable, LaunchFile, LaunchNode, PackageFacts, SourceFile
+from grader.model.package import Executable, LaunchFile, LaunchLine, LaunchNode, PackageFacts, SourceFile
 from grader.model.verdict import FileCitation, MistakeKind, Verdict, failed, failed_or_blocked
 from grader.wording import join_words, on_lines, there_is
 
@@ -440,3 +440,20 @@ def unfound_program(printed: Sequence[str], package: PackageFacts) -> tuple[str,
         hint = "write the name of the package that has the program as pkg"
         return f"roslaunch finds no package {shown(found[1])}", hint
     return None
+
+
+def right_remap(
+    node: LaunchNode, topic: str, published: Sequence[str]
+) -> tuple[LaunchLine | LaunchNode, str]:
+    """Return the line of a node's only `<remap>`, with what to write there; else the node's, with where to look."""
+    lines = [one for one in node.renaming if one.tag == "remap"]
+    names = [name for name in published if name.rpartition("/")[0] in {node.namespace.rstrip("/"), ""}]
+    if len(lines) != 1 or len(names) != 1:
+        return node, "look at its <remap>: `from` is the name in the script, `to` the new one"
+    name, to = names[0].rpartition("/")[2], topic.removeprefix(node.namespace)
+    if not names[0].startswith(node.namespace):  # its `to` begins with a slash: `from` is right
+        name = next((first for first, second in node.remaps if second == names[0]), name)
+    return lines[0], (
+        f'write `<remap from="{name}" to="{to}"/>` there: `from` is the name in the script, and a slash in front of a '
+        "name takes it out of its namespace"
+    )

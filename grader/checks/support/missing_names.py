@@ -231,6 +231,10 @@ def _undefined(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
     if kind is None or package.interfaces or f"'{package.name}" not in found.message:
         return None
     folder = module.rpartition(".")[2]
+    for other in package.also:  # the one of the submission's packages that it comes from
+        if any(set(names) & {*one.classes} for one in other.interfaces if one.module == folder):
+            line = found.innermost.source.replace(str(package.name), str(other.name), 1)
+            return f"{other.name} makes this {kind}", f"write `{shown(line)}`"
     name = re.sub(r"(Request|Response)$", "", names[0]) if folder == "srv" else names[0]
     file = f"{folder}/{name}.{folder}" if name != "*" else f"the definition in {folder}/"
     hint = f"write {file}, list it in add_{kind}_files(…), and call generate_messages(…) in {CMAKE}"

@@ -9,6 +9,7 @@ from typing import Literal
 from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_end, explain_error
 from grader.checks.support.frames import unknown_frame
+from grader.checks.support.launch_slips import right_remap
 from grader.checks.support.processes import (
     NO_SCRIPT_HINT,
     copied_topic,
@@ -145,7 +146,7 @@ def no_message(
         seen = f"; {join_words(near)} is" if near else ""
         hint = f"publish on {topic} while you record, and record it: rosbag record {topic}, or -a for all"
         return failed_or_blocked(f"{topic} is not in {run.evidence}{seen}", measured=measured, hint=hint)
-    if found := _judge_uncancelled(run, topic) or _judge_misnamed(package, run, topic, of_node):
+    if found := _sent_otherwise(run, topic) or _judge_misnamed(package, run, topic, of_node):
         return found
     if absent := no_node(package, run, what) or _judge_refused(run, topic) or misfit(run):
         return absent if topic in published else _with_others(absent, published)
@@ -154,9 +155,14 @@ def no_message(
     return _not_advertised(package, run, topic, of_node, kind)
 
 
-def _judge_uncancelled(run: Run, topic: str) -> Verdict | None:
-    """Return the verdict where a goal is sent to the action of this topic, `/dock/cancel`, and not cancelled."""
+def _sent_otherwise(run: Run, topic: str) -> Verdict | None:
+    """Return the verdict where transforms are sent as static ones, or a goal is sent to the action of this topic,
+    `/dock/cancel`, and not cancelled."""
     action, _, part = topic.rpartition("/")
+    if topic == "/tf" and any(c.messages for c in run.student_channels("/tf_static")):
+        hint = "send what changes with a tf2_ros.TransformBroadcaster: a static one sends on /tf_static"
+        message = "no message came on /tf; what is sent goes to /tf_static"
+        return failed_or_blocked(message, measured="no message", hint=hint)
     if part != "cancel" or not any(c.messages for c in run.student_channels(f"{action}/goal")):
         return None
     message = f"the goal that is sent to {action} is never cancelled"
@@ -172,10 +178,10 @@ def _judge_misnamed(
         return None
     near, measured = near_names(topic, published), join_words(published)
     if node := _namespaced_node(package, run, topic):
-        here = [name for name in published if name.startswith(node.namespace)] or near or published
-        hint = "look at its <remap>: `from` is the name in the script, `to` the new one"
-        verdict = of_node(f"{what}; the node publishes on {join_words(here)}", measured=measured, hint=hint)
-        return verdict.about(citations=(node.place,))
+        own = [name for name in published if name.startswith(node.namespace)]
+        message = f"{what}; the node publishes on {join_words(own or near or published)}"
+        line, hint = right_remap(node, topic, own or [*published])
+        return of_node(message, measured=measured, hint=hint).about(citations=(line.place,))
     if not near:
         return None
     hint = f"name the topic {topic} in {PUBLISHER}"
@@ -418,8 +424,8 @@ def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | 
 
 
 SEEN_AS = {
-    "nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": "", "added": "", "half": "value",
-    "step": "order", "cut": "place", "unsent": "",
+    "nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": "", "added": "",
+    "step": "order", "cut": "place", "half": "value", "unsent": "", "secs": "never",
 }  # fmt: skip
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so."""
 

@@ -1,4 +1,4 @@
-"""Finds with which indexes a student's Python reads lists, and what is wrong with how they are worked out, for
+"""Finds with which indexes a student's Python reads lists, and wrong arithmetic of indexes, angles and times, for
 `slips.py`.
 
 Nothing is executed. Python 3.8, standard library only.
@@ -23,6 +23,8 @@ def indexes(tree):
             yield slip(line, "float-index", message, fix, dotted(node.value))
         yield from wrong_step(node, key, sides)
     yield from cut_to_zero(tree)
+    yield from whole_angles(tree)
+    yield from float_seconds(tree)
     yield from ranges_read(tree)
 
 
@@ -86,6 +88,50 @@ def cut_to_zero(tree):
             message = "`int(…)` cuts off towards 0, so that what is just below 0 becomes 0"
             fix = "on %s, write `math.floor(…)` in place of `int(…)`" % listed(lines)
             yield slip(lines[0], "wrong-value", message, fix, "cut")
+
+
+def float_seconds(tree):
+    """`stamp.secs = rospy.get_time()`: both parts of a time are whole numbers."""
+    for node in all_of(tree, ast.Assign):
+        target, name = dotted(node.targets[0]), called_name(node.value)
+        if target.endswith((".secs", ".nsecs")) and name in ("get_time", "time", "to_sec"):
+            message = "`%s` takes a whole number, and `%s()` is a float" % (target, name)
+            fix = "on line %d, write `%s = rospy.Time.now()`" % (node.lineno, target.rpartition(".")[0])
+            yield slip(node.lineno, "wrong-value", message, fix, "secs")
+
+
+OF_QUATERNION = 4
+
+
+def whole_angles(tree):
+    """Quaternions of the sine and cosine of a whole angle."""
+    for node in all_of(tree, ast.Assign, ast.Call):
+        angle, lines = whole_angle(node, tree) or ("", [])
+        if angle:
+            message = "a quaternion is made of half the angle, and `%s` is all of it" % angle
+            fix = "on %s, write `%s / 2` in place of `%s`" % (listed(lines), angle, angle)
+            yield slip(node.lineno, "wrong-value", message, fix, "half")
+
+
+def whole_angle(node, tree):
+    """Return the angle and the lines of `q.z = sin(yaw)` and `q.w = cos(yaw)`, or of a Quaternion made of these; None
+    of all else."""
+    if called_name(node) == "Quaternion" and len(node.args) == OF_QUATERNION:
+        parts = node.args[2:]
+    elif isinstance(node, ast.Assign) and getattr(node.targets[0], "attr", "") == "z":
+        to = dotted(node.targets[0].value) + ".w"
+        others = [n.value for n in all_of(tree, ast.Assign) if dotted(n.targets[0]) == to]
+        parts = [node.value, *others[:1]]
+    else:
+        return None
+    if [called_name(one) for one in parts] != ["sin", "cos"]:
+        return None
+    angles = {dotted(one.args[0]) for one in parts if one.args} - {"..."}
+    parted = [
+        n for n in all_of(tree, ast.Assign) if isinstance(getattr(n.value, "op", None), (ast.Div, ast.Mult))
+    ]
+    angles -= {dotted(n.targets[0]) for n in parted}
+    return (angles.pop(), sorted({one.lineno for one in parts})) if len(angles) == 1 else None
 
 
 def ranges_read(tree):

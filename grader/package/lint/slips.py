@@ -28,7 +28,6 @@ from script_names import (
     calls_in,
     dotted,
     is_call,
-    listed,
     names_in,
     parents_of,
     slip,
@@ -154,7 +153,6 @@ def handed_over(function, tree, owner):
     return "pass it to what calls it: `rospy.Subscriber(…, %s)`" % name
 
 
-OF_QUATERNION = 4
 OF_ANGLES = ("sin", "cos", "tan")
 TO_RADIANS = ("radians", "deg2rad")
 IN_DEGREES = ("degrees", "rad2deg")
@@ -183,11 +181,6 @@ def wrong_values(tree):
                 continue  # a name of the script's own, which may be in degrees
             fix = "on line %d, write `%s` alone, without `%s(…)`" % (line, angle, called_name(node))
             yield slip(line, "wrong-value", "`%s` is already in radians" % angle, fix, "added")
-        elif whole_angle(node, tree):
-            angle, lines = whole_angle(node, tree)
-            message = "a quaternion is made of half the angle, and `%s` is all of it" % angle
-            fix = "on %s, write `%s / 2` in place of `%s`" % (listed(lines), angle, angle)
-            yield slip(line, "wrong-value", message, fix, "half")
         elif isinstance(node, ast.Expr) and called_name(node.value).endswith("Response"):
             name = called_name(node.value)
             message, fix = "the `%s` that is made is not returned" % name, "write `return %s(…)`" % name
@@ -197,27 +190,6 @@ def wrong_values(tree):
             message = "no field of the `%s` that is returned is ever set" % name
             fix = "set it above the `return`: `%s.<field> = …`" % variable
             yield slip(line, "wrong-value", message, fix, "empty")
-
-
-def whole_angle(node, tree):
-    """Return the angle and the lines of `q.z = sin(yaw)` and `q.w = cos(yaw)`, or of a Quaternion made of these; None
-    of all else."""
-    if called_name(node) == "Quaternion" and len(node.args) == OF_QUATERNION:
-        parts = node.args[2:]
-    elif isinstance(node, ast.Assign) and getattr(node.targets[0], "attr", "") == "z":
-        to = dotted(node.targets[0].value) + ".w"
-        others = [n.value for n in all_of(tree, ast.Assign) if dotted(n.targets[0]) == to]
-        parts = [node.value, *others[:1]]
-    else:
-        return None
-    if [called_name(one) for one in parts] != ["sin", "cos"]:
-        return None
-    angles = {dotted(one.args[0]) for one in parts if one.args} - {"..."}
-    parted = [
-        n for n in all_of(tree, ast.Assign) if isinstance(getattr(n.value, "op", None), (ast.Div, ast.Mult))
-    ]
-    angles -= {dotted(n.targets[0]) for n in parted}
-    return (angles.pop(), sorted({one.lineno for one in parts})) if len(angles) == 1 else None
 
 
 def unfilled_answer(function):
