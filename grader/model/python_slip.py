@@ -81,8 +81,8 @@ class PythonSlip(Placed, Record):
       that is made and not returned, or of which no field is set, a message that is filled in and not sent, a condition
       that all numbers fulfil, or none, or what each turn of a loop adds or sets again (`name`: `nan`, `degrees`,
       `return`, `empty`, `unsent`, `bounds`, `added`); a grid's index that steps by its height, a cell that `int(…)`
-      works out of a number below 0, a quaternion of a whole angle, and a float for the seconds of a time (`step`,
-      `cut`, `half`, `secs`).
+      works out of a number below 0, a quaternion of a whole angle, a float for the seconds of a time, and the mean of a
+      scan's ranges (`step`, `cut`, `half`, `secs`, `mean`).
 
     No slips, but what a line says, for checks that compare it with what the lab asks; `message` is a name, a number or
     a text:

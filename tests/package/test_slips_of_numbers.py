@@ -334,6 +334,8 @@ def test_which_ranges_of_a_scan_are_read(lines: str, read: list[str], tmp_path: 
         ("q = Quaternion(0, 0, math.sin(a), math.cos(a))", ["on line 1, write `a / 2` in place of `a`"]),
         ("q.z = sin(yaw / 2); q.w = cos(yaw / 2)", []),
         ("half = yaw / 2; q.z = sin(half); q.w = cos(half)", []),
+        ("half = 0.5 * yaw; q.z = sin(half); q.w = cos(half)", []),
+        ("yaw = 2 * a; q.z = sin(yaw); q.w = cos(yaw)", ["on line 1, write `yaw / 2` in place of `yaw`"]),
         ("p.z = sin(angle); p.x = cos(angle)", []),
     ],
 )  # fmt: skip
@@ -341,3 +343,35 @@ def test_a_quaternion_of_a_whole_angle(lines: str, fixes: list[str], tmp_path: P
     (tmp_path / "a.py").write_text(f"{lines}\n", encoding="utf-8")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
     assert [s.fix for s in slips if s.name == "half"] == fixes
+
+
+@pytest.mark.parametrize(
+    ("lines", "fixes"),
+    [
+        ("far = sum(near) / len(near)", ["on line 2, write `min(near)` in its place"]),
+        ("far = sum(near) / len(near)\nfirst = min(near)", []),
+    ],
+)
+def test_the_mean_of_ranges(lines: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"near = msg.ranges[:9]\n{lines}\n", encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.fix for s in slips if s.name == "mean"] == fixes
+
+
+@pytest.mark.parametrize(
+    ("last", "fixes"),
+    [
+        (
+            "elif req.a < 0:\n        return FitResponse(0)",
+            ["below line 6, and as far in as line 3, write `return FitResponse(…)`"],
+        ),
+        ("else:\n        return FitResponse(0)", []),
+        ("return FitResponse(0)", []),
+        ("raise ValueError", []),
+    ],
+)
+def test_a_service_that_answers_in_some_cases(last: str, fixes: list[str], tmp_path: Path) -> None:
+    text = f"def fit(req):\n    print(req)\n    if req.a > 9:\n        return FitResponse(9)\n    {last}\n"
+    (tmp_path / "a.py").write_text(f"{text}rospy.Service('fit', Fit, fit)\n", encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.fix for s in slips] == fixes

@@ -39,11 +39,34 @@ VALUES = {"Service": "request", "SimpleActionServer": "goal", "Timer": "event"}
 OTHER_VALUES = {"on_shutdown": "nothing", "signal": "the signal's number and a frame"}
 
 
+def answers_in_some_cases(tree):
+    """A service's callback that returns an answer where an `if` or its `elif` holds, and nothing where none does."""
+    functions = functions_in(tree)
+    given = (
+        argument(node, 2, "handler") for node in all_of(tree, ast.Call) if called_name(node) == "Service"
+    )
+    for name in {dotted(one[0]).rpartition(".")[2] for one in given if one}:
+        last = functions[name].body[-1] if name in functions else None
+        ends, answer = [last], ""
+        while isinstance(ends[-1], ast.If):
+            answer = called_name(getattr(ends[-1].body[-1], "value", None)) or answer
+            ends.append(ends[-1].orelse[-1] if ends[-1].orelse else None)
+        if ends[-1] is None and answer.endswith("Response"):
+            message = "`%s` returns nothing where no condition of its last `if` holds" % name
+            fix = "below line %d, and as far in as line %d, write `return %s(…)`" % (
+                last.end_lineno,
+                last.lineno,
+                answer,
+            )
+            yield slip(last.lineno, "wrong-value", message, fix, "return")
+
+
 def callbacks(tree):
     """Functions that ROS calls with another number of values than they take, and those that are called where the
     function itself is meant.
     """
     yield from ending_callbacks(tree)
+    yield from answers_in_some_cases(tree)
     functions = functions_in(tree)
     yield from spare_callbacks(tree, functions)
     yield from own_callbacks(tree, functions)

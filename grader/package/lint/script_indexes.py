@@ -25,6 +25,7 @@ def indexes(tree):
     yield from cut_to_zero(tree)
     yield from whole_angles(tree)
     yield from float_seconds(tree)
+    yield from means_of_ranges(tree)
     yield from ranges_read(tree)
 
 
@@ -55,7 +56,7 @@ def grid_sides(tree):
 def wrong_step(node, key, sides):
     """`data[row * height + column]`, where a row has as many cells as the grid is wide."""
     parts = [key.left, key.right] if isinstance(getattr(key, "op", None), ast.Add) else []
-    steps = [part for part in parts if isinstance(getattr(part, "op", None), ast.Mult)]
+    steps = [part for part in parts if is_product(part)]
     if len(steps) != 1:
         return
     factors = [dotted(steps[0].left), dotted(steps[0].right)]
@@ -100,6 +101,27 @@ def float_seconds(tree):
             yield slip(node.lineno, "wrong-value", message, fix, "secs")
 
 
+def means_of_ranges(tree):
+    """`sum(front) / len(front)` in a script that reads a scan and looks for no smallest range."""
+    reads = any(is_ranges(n) for n in all_of(tree, ast.Attribute))
+    calls = {called_name(n) for n in all_of(tree, ast.Call)}
+    for node in all_of(tree, ast.BinOp) if reads and "min" not in calls else ():
+        total, count = called_name(node.left), called_name(node.right)
+        if (
+            isinstance(node.op, ast.Div)
+            and (total, count) == ("sum", "len")
+            and node.left.args
+            and node.right.args
+        ):
+            name = dotted(node.right.args[0])
+            message = "the mean of many ranges is large even where one of them is small"
+            fix = "on line %d, write `min(%s)` in its place" % (
+                node.lineno,
+                name if "..." not in name else "…",
+            )
+            yield slip(node.lineno, "wrong-value", message, fix, "mean")
+
+
 OF_QUATERNION = 4
 
 
@@ -111,6 +133,18 @@ def whole_angles(tree):
             message = "a quaternion is made of half the angle, and `%s` is all of it" % angle
             fix = "on %s, write `%s / 2` in place of `%s`" % (listed(lines), angle, angle)
             yield slip(node.lineno, "wrong-value", message, fix, "half")
+
+
+def is_part(node):
+    """Whether a value is divided, or multiplied by a number below 1."""
+    sides = (
+        [getattr(node.left, "value", None), getattr(node.right, "value", None)] if is_product(node) else []
+    )
+    return is_quotient(node) or any(isinstance(one, float) and 0 < one < 1 for one in sides)
+
+
+def is_product(node):
+    return isinstance(getattr(node, "op", None), ast.Mult)
 
 
 def whole_angle(node, tree):
@@ -127,10 +161,7 @@ def whole_angle(node, tree):
     if [called_name(one) for one in parts] != ["sin", "cos"]:
         return None
     angles = {dotted(one.args[0]) for one in parts if one.args} - {"..."}
-    parted = [
-        n for n in all_of(tree, ast.Assign) if isinstance(getattr(n.value, "op", None), (ast.Div, ast.Mult))
-    ]
-    angles -= {dotted(n.targets[0]) for n in parted}
+    angles -= {dotted(n.targets[0]) for n in all_of(tree, ast.Assign) if is_part(n.value)}
     return (angles.pop(), sorted({one.lineno for one in parts})) if len(angles) == 1 else None
 
 
