@@ -562,7 +562,8 @@ def _other_value(
         hint = f"publish once on {params.topic} before you wait for any message, as soon as the publisher is made"
     verdict = failed(message, hint=hint)
     if params.when == "first":
-        return verdict.model_copy(update={"callbacks": "before"})
+        # What fails after the first message does not make it what it is
+        return verdict.model_copy(update={"callbacks": "before", "due": ((run.start_ns, first.time_ns),)})
     update: dict[str, object] = {"timing": True}
     if since := turned_wrong(found, params.value):  # a callback that fails later did not do it
         update |= {"wrong": "order" if MOVED in why else "place", "due": ((run.start_ns, since),)}

@@ -12,7 +12,7 @@ from pydantic import Field, ValidationError
 from grader.checks.registry import Refers, check
 from grader.checks.support.clocks import Lateness, excused, why_late
 from grader.checks.support.exit_causes import Ending, explain_end, explain_error
-from grader.checks.support.processes import Life, lives, not_started
+from grader.checks.support.processes import TYPES_HINT, Life, disputed_types, lives, not_started
 from grader.checks.support.topics import cite, nodes_on, published_topics
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
@@ -214,20 +214,13 @@ def _judge_results(found: Results, run: Run, package: PackageFacts, start_ns: in
     return excused(verdict.if_repeated(), run, start_ns, run.end_ns, _why_late)
 
 
-TYPES_HINT = "give the topic the handout's type where it is advertised, and where it is subscribed to"
-_WANTS_TYPE = re.compile(
-    r"wants topic (\S+) to have datatype/md5sum \[([\w/]+)/\w+\], but our version has \[([\w/]+)/\w+\]"
-)
-
-
 def _error_behind(verdict: Verdict, package: PackageFacts, run: Run) -> Ending | None:
-    """Return the error in a callback of a node that publishes on a topic which the testcase that failed first names."""
+    """Return the types of a topic that do not fit, or the error in a callback of a node that publishes on a topic which
+    the testcase that failed first names."""
+    if disputed := disputed_types(run):
+        return Ending(disputed, TYPES_HINT)
     topics = [topic for topic in published_topics(run) if re.search(rf"{topic}(?![\w/])", verdict.message)]
     nodes = {node for topic in topics for node in nodes_on(run, topic, "publishers")}
-    for line in (c.line for one in lives(run) for _, c in run.lines(one.name)):
-        if (wanted := _WANTS_TYPE.search(line)) and wanted[1] in topics:
-            topic, theirs, own = wanted.groups()
-            return Ending(f"{topic} is advertised as {own}, and a node hears it as {theirs}", TYPES_HINT)
     processes = {event.processes.get(node, "") for _, event in run.graph for node in nodes} - {""}
     return explain_error(package, run, only=processes) if processes else None
 

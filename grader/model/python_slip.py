@@ -25,7 +25,7 @@ SlipKind = Literal[
 
 class PythonSlip(Placed, Record):
     """What is remarkable in a Python file. For a file that does not compile, only names, types and rates are known; for
-    one of C++, only `callback-waits`, `degrees`, `no-argument` and `deaf` (`name`: for how long it sleeps at a time).
+    one of C++, only `callback-waits`, `wrong-value`, `no-argument` and `deaf` (`name`: how long it sleeps at a time).
 
     `fix` says what to do where that is always the same. Slips, of which most show only when the node runs; `message`
     says what is wrong on that line, and `name` is the function or variable that both are about:
@@ -59,7 +59,7 @@ class PythonSlip(Placed, Record):
     - `deaf`: why the node goes on after Ctrl-C.
     - `callback-called`, `callback-values`, `callback-missing`: a callback that is called where it should only be named,
       that takes another number of values than ROS passes, or that does not exist.
-    - `callback-waits`: a topic's or service's callback that sleeps, or never ends, or makes its publisher itself.
+    - `callback-waits`: a callback that sleeps, never ends or makes its publisher itself, or that ROS never calls.
     - `not-printed`: why a topic's callback prints nothing of any message; `name` is the topic as it is written there.
     - `printed-in-part`: why it prints some messages only, or something else than their values; `name` as above.
     - `subscribed-again`: a `Subscriber(…)` that a loop makes in each turn.

@@ -53,6 +53,12 @@ _LONG = re.compile(
 )
 LONG_S = 2.0
 """A node that sleeps for longer at a time may be too late after Ctrl-C."""
+_THROWN_AWAY = re.compile(r"[;{}]\s*\w+(?:\.|->)(?P<call>subscribe|advertiseService)\s*(?:<[^;()]*>)?\s*\(")
+_OF_FLOATS, _OF_WHOLES = (
+    re.compile(r"\bstd_msgs::Float(?:32|64)\b"),
+    re.compile(r"\bstd_msgs::U?Int\d+\b|<\s*int\s*>"),
+)
+_WHOLE_SUM = re.compile(r"\b(?:int|long)\s+(?P<name>\w+)\s*=\s*0\s*;|\baccumulate\s*\([^;{}]*,\s*0\s*\)")
 _ARGUMENT = re.compile(r"\bargv\s*\[\s*(?P<n>[1-9])\s*\]")
 _COUNTED = re.compile(
     r"\bargc\s*(?:<|!=|==|>(?!=|\s*0)|>=(?!\s*[01]\b))|[<>=]\s*argc\b|\bswitch\s*\(\s*argc\b"
@@ -97,6 +103,43 @@ def slips_of(path: str, text: str) -> Iterator[PythonSlip]:
         yield from _endless(path, code)
         yield from _asleep(path, code)
     yield from _unasked_argument(path, code)
+    yield from _unkept(path, code)
+    yield from _whole_numbers(path, text, code)
+
+
+def _unkept(path: str, code: str) -> Iterator[PythonSlip]:
+    """Yield each `subscribe(…)` whose Subscriber is thrown away, with which the subscription ends at once."""
+    for number, call in enumerate(_THROWN_AWAY.finditer(code), 1):
+        # of message_filters, `subscribe(nh, "topic", 1)` is told the topic in second place, and keeps it itself
+        start, end = next(_arguments(code, call.end()))
+        if start == end or code[start:end].strip():
+            continue
+        line = code.count("\n", 0, call.start("call")) + 1
+        kind = "ServiceServer" if call["call"] == "advertiseService" else "Subscriber"
+        message = f"nothing keeps the {kind} of line {line}, so that ROS never calls its callback"
+        fix = f"in `main`, write `ros::{kind} kept{number} = ` at the beginning of line {line}"
+        fix += ", and in a class make it a member"
+        yield PythonSlip(file=path, line=line, kind="callback-waits", message=message, fix=fix)
+
+
+def _whole_numbers(path: str, text: str, code: str) -> Iterator[PythonSlip]:
+    """Yield the sums in a source with messages of floats, and of no whole numbers, that drop what is behind the decimal
+    point."""
+    if not _OF_FLOATS.search(text) or _OF_WHOLES.search(text):
+        return
+    for match in _WHOLE_SUM.finditer(code):
+        line, name = code.count("\n", 0, match.start()) + 1, match["name"]
+        added = rf"\b{name}\s*(?:\+=|=\s*{name}\s*\+)(?!\s*1\s*;)"
+        if name and not (re.search(added, code) and re.search(rf"=[^;=]*\b{name}\s*/", code)):
+            continue
+        message, fix = f"`{name}` is an int", f"write `double {name}` on line {line}"
+        if not name:
+            message, fix = (
+                "`accumulate` begins with an int",
+                f"write `0.0` in place of the `0` on line {line}",
+            )
+        message += ", which drops what is behind the decimal point"
+        yield PythonSlip(file=path, line=line, kind="wrong-value", message=message, fix=fix, name="bounds")
 
 
 def _waiting(path: str, code: str) -> Iterator[PythonSlip]:

@@ -375,3 +375,31 @@ def test_a_service_that_answers_in_some_cases(last: str, fixes: list[str], tmp_p
     (tmp_path / "a.py").write_text(f"{text}rospy.Service('fit', Fit, fit)\n", encoding="utf-8")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
     assert [s.fix for s in slips] == fixes
+KEPT = (
+    "cmd = Twist()\ndef f(scan):\n    if s:\n        cmd.angular.z = 1\n    else:\n        cmd.linear.x = 2\n"
+)
+SENT = "    pub.publish(cmd)\n"
+EACH = "def f(scan):\n    for i in range(90):\n        if scan.ranges[i] < 1:\n            v.x = 0\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "fixes"),
+    [
+        (KEPT + SENT, ["above line 4, write `cmd.angular.z = 0`", "above line 4, write `cmd.linear.x = 0`"]),
+        (KEPT.replace("linear.x", "angular.z") + SENT, []),
+        (KEPT.replace("2\n", "2\n        cmd.angular.z = 0\n") + SENT, ["above line 4, write `cmd.linear.x = 0`"]),
+        (KEPT.replace("    if", "    cmd = Twist()\n    if") + SENT, []),
+        (KEPT + "    cmd.angular.z = cmd.linear.x = 0\n" + SENT, []),
+        (KEPT, []),
+        (KEPT.replace("def f(scan)", "while ok()") + SENT,
+         ["above line 4, write `cmd.angular.z = 0`", "above line 4, write `cmd.linear.x = 0`"]),
+        (EACH + "        else:\n            v.x = 1\n        pub.publish(v)\n",
+         ["work out the smallest of the ranges first, and write the `if` of line 4 and the `publish(…)` of line 8"]),
+        (EACH + "        else:\n            v.x = 1\n    pub.publish(v)\n", []),
+        (EACH + "            break\n        else:\n            v.x = 1\n        pub.publish(v)\n", []),
+    ],
+)  # fmt: skip
+def test_velocities_of_another_turn(text: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text("import rospy\n" + text, encoding="utf-8")
+    found = [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "added"]
+    assert [one.partition(" below")[0] for one in found if "set `v.x`" not in one] == fixes

@@ -146,6 +146,9 @@ def _index(message: str, source: str, marked: tuple[int, int] | None) -> Meaning
             f"check the length before you access an element: {NUMBER_OF_PARTS}",
         )
     name, index = (shown(ast.unparse(part)) for part in (found.value, found.slice))
+    if "assignment" in message:  # to what the script makes itself, and not to what comes in a message
+        fix = f"make `{name}` as long as it has to be where it gets its value: an assignment adds no element"
+        return f"`{name}` has no element {index}", fix
     if index.isdecimal():
         parts = plural(int(index) + 1, "element")
         if name.endswith("ranges"):  # of a laser, whose scans all have as many

@@ -225,7 +225,9 @@ def _in_items(
     got: object, wanted: list[object] | tuple[object, ...], tolerance: float, path: str
 ) -> Iterator[Difference]:
     if not isinstance(got, list | tuple) or len(got) != len(wanted):
-        yield Difference(path, f"{value_text(got)}, not {value_text(wanted)}")
+        came = len(got) if isinstance(got, list | tuple) and len(wanted) >= MOVED_MIN else None
+        count = "" if came is None else f" ({plural(came, 'value')}, not {len(wanted)})"
+        yield Difference(path, f"{value_text(got)}, not {value_text(wanted)}{count}")
         return
     each = (
         differences(one, value, tolerance, f"{path}[{index}]")

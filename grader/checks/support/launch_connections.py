@@ -14,7 +14,7 @@ from typing import NamedTuple
 from grader.checks.registry import Check
 from grader.checks.support.launch import nodes_up
 from grader.checks.support.launch_slips import own_script
-from grader.checks.support.processes import run_scripts
+from grader.checks.support.processes import TYPES_HINT, disputed_types, run_scripts
 from grader.checks.support.topics import End, nodes_on, topics_with
 from grader.evidence.events import GraphEvent
 from grader.evidence.run import Run
@@ -174,6 +174,8 @@ def over_another_topic(run: Run, topic: str, said: str = "") -> Verdict:
         message = (
             f"{join_words(publishers)} and {join_words(subscribers)} are both on {topic}, but not connected"
         )
+        if disputed := disputed_types(run, topic):
+            return failed(f"{message}{said}: {disputed}", hint=TYPES_HINT)
         return failed(message + said, hint="do both use the same message type?").if_repeated()
     lacking = "publishes on" if not publishers else "subscribes to"
     seen = topics_with(run, "subscribers" if publishers else "publishers")

@@ -184,6 +184,20 @@ def run_slips(package: PackageFacts, run: Run, *kinds: SlipKind) -> list[PythonS
     return [s for s in package.slips if s.kind in kinds and s.file in scripts]
 
 
+TYPES_HINT = "give the topic the handout's type where it is advertised, and where it is subscribed to"
+_WANTS_TYPE = re.compile(
+    r"\[(\S+)\] wants topic (\S+) to have datatype/md5sum \[([\w/]+)/\w+\], but our version has \[([\w/]+)/\w+\]"
+)
+
+
+def disputed_types(run: Run, topic: str = "") -> str:
+    """Return how the types of a topic, or of any, do not fit, as a node of roscpp says that publishes on it."""
+    for _, console in run.console:
+        if (found := _WANTS_TYPE.search(console.line)) and topic in {"", found[2]}:
+            return f"{found[2]} is advertised as {found[4]}, and {found[1]} hears it as {found[3]}"
+    return ""
+
+
 def ends_twice(run: Run) -> bool:
     """Return whether actionlib says that a server tried to end a goal that was over."""
     return any("To transition to a" in line.line for _, line in run.console)

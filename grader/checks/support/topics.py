@@ -451,7 +451,7 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
     return verdict
 
 
-OF_VALUES = ("action-result", "stamps")
+OF_VALUES = ("action-result", "rostest", "stamps")
 """Checks of what a node sends, besides those of what it does upon what it hears."""
 OF_RESULTS = ("prints", "rostest")
 """Checks of what comes of callbacks in the end."""

@@ -358,6 +358,48 @@ def unsent_messages(tree):
             yield slip(last, "wrong-value", message, fix, "unsent")
 
 
+def kept_velocities(tree):
+    """Yield each `if` of which not all branches set a speed of a Twist that is kept from turn to turn, or from call to
+    call, and is published below it."""
+    made = {dotted(n.targets[0]): n for n in all_of(tree, ast.Assign) if called_name(n.value) == "Twist"}
+    every = [dotted(n) for n in stored_in([tree])]
+    for block in all_of(tree, ast.FunctionDef, ast.While)[:USES_LIMIT]:
+        inside = set(ast.walk(block))
+        kept = [name for name, node in made.items() if node not in inside and name not in set_in(block)]
+        for choice in (n for n in block.body if isinstance(n, ast.If)):
+            below = [n for one in block.body if one.lineno > choice.lineno for n in calls_in(one, "publish")]
+            sent = {
+                dotted(n.args[0]) for n in below if n.args and isinstance(block, (ast.FunctionDef, ast.While))
+            }
+            stored = [dotted(n) for n in stored_in([choice])]
+            fields = [one for name in kept if name in sent for one in moving(choice, name)]
+            for field in dict.fromkeys(fields):
+                sides = [[dotted(n) for n in stored_in(one)] for one in branches_of(choice)]
+                if every.count(field) == stored.count(field) and any(field not in one for one in sides):
+                    line, (name, part, axis) = choice.lineno, field.rsplit(".", 2)
+                    message = "`%s` keeps its last %s.%s where the `if` on line %d does not set it"
+                    fix = "above line %d, write `%s = 0`" % (line, field)
+                    yield slip(line, "wrong-value", message % (name, part, axis, line), fix, "added")
+
+
+def branches_of(choice):
+    """Return the blocks of an `if` with its `elif`s and its `else`, an empty one where it has none."""
+    last = choice.orelse[0] if len(choice.orelse) == 1 else None
+    return [choice.body, *(branches_of(last) if isinstance(last, ast.If) else [choice.orelse])]
+
+
+def stored_in(block):
+    every = [n for one in block for n in ast.walk(one) if isinstance(n, ast.Attribute)]
+    return [n for n in every if isinstance(n.ctx, ast.Store)]
+
+
+def moving(choice, name):
+    """Return the fields of a Twist that an `if` gives another value than 0."""
+    given = [n for n in ast.walk(choice) if isinstance(n, ast.Assign) and getattr(n.value, "value", 1) != 0]
+    fields = [target for n in given for target in n.targets]
+    return [one for one in map(dotted, fields) if one.startswith((name + ".linear.", name + ".angular."))]
+
+
 def is_of_messages(module):
     return ".%s" % (module or "").rpartition(".")[2] in (".msg", ".srv")
 

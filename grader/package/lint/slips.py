@@ -50,7 +50,7 @@ def slips(tree):
         objects.object_slips, said_texts, loops.deaf_loops, counters.clock_values, counters.counter_slips,
         counters.counter_starts, without_effect, names.assigned_late, objects.hidden_names, objects.subscribed_again,
         imports, objects.taken_off, objects.unstarted_servers, wrong_values, decided_conditions,
-        times_added_again, overwritten_values, script_indexes.indexes,
+        times_added_again, overwritten_values, script_indexes.indexes, published_in_turn, objects.kept_velocities,
         callbacks.unprinted_messages, counters.values_left_out, counters.published_unchanged,
         objects.unused_publishers, objects.unsent_messages, loops.loops_of_numbers, finished_goals,
         finished_in_loops, counters.sends_no_time, without_node,
@@ -358,6 +358,27 @@ def times_added_again(tree):
                     yield slip(node.lineno, "wrong-value", message, fix, "added")
 
 
+def published_in_turn(tree):
+    """An `if` with an `else` about each item of a list, and a `publish(…)` of what both set, all in one `for` loop."""
+    for loop in all_of(tree, ast.For):
+        published = [
+            one.value for one in loop.body if is_call_alone(one) and called_name(one.value) == "publish"
+        ]
+        choices = [one for one in loop.body if isinstance(one, ast.If) and one.orelse]
+        seen = {n.id for n in ast.walk(loop.target) if isinstance(n, ast.Name)}
+        if not published or not choices or acts(ast.Module(loop.body, []), "publish"):
+            continue
+        about = [one for one in choices if seen & names_in(one.test) and "ranges" in ast.dump(loop)]
+        if about and len(published) == 1:
+            line = published[0].lineno
+            message = (
+                "the loop on line %d publishes once for each range, and the last one decides" % loop.lineno
+            )
+            fix = "work out the smallest of the ranges first, and write the `if` of line %d and the `publish(…)` of "
+            fix += "line %d below the loop, for that one"
+            yield slip(line, "wrong-value", message, fix % (about[0].lineno, line), "added")
+
+
 def overwritten_values(tree):
     """An `if` with an `else`, alone in a `for` loop, both of which give one name a fixed value, so that what the loop
     saw before its last turn is forgotten.
@@ -374,11 +395,11 @@ HARMLESS = {
 """Calls that change nothing outside the loop that a student may see."""
 
 
-def acts(node):
+def acts(node, *spared):
     """Whether something leaves a loop, or happens in its turns beyond what is computed and printed."""
     calls = {called_name(n) or "" for n in ast.walk(node) if isinstance(n, ast.Call)}
     leaving = (ast.Break, ast.Return, ast.Raise, ast.Yield)
-    return not calls <= HARMLESS or any(isinstance(n, leaving) for n in ast.walk(node))
+    return not calls <= HARMLESS.union(spared) or any(isinstance(n, leaving) for n in ast.walk(node))
 
 
 def overwritten(loop, choice):
