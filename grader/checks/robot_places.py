@@ -180,7 +180,8 @@ def ends_at(package: PackageFacts, run: Run, params: EndsAtParams) -> Verdict:
         heading, brought between -pi and pi. Publish a zero velocity once you are there.
     """
     found, asked = track(run, params.topic, params.hold_s, params.fields), stretch_to_judge(run, params)
-    verdict = _unreadable(found, package, run, params) or _not_asked(asked, run, params)
+    verdict = _unreadable(found, package, run, params)
+    verdict = verdict or (None if asked else _not_asked(package, run, params))
     if verdict is None and found is not None and asked is not None:
         judged = path_to_judge(found, asked, params)
         verdict = _judge_arrival(judged, asked, run, params) if judged else _too_late(asked, params)
@@ -220,11 +221,13 @@ def _unreadable(found: Track | None, package: PackageFacts, run: Run, params: Pl
     return unreadable(found, params.topic)
 
 
-def _not_asked(asked: Stretch | None, run: Run, params: EndsAtParams) -> Verdict | None:
-    if asked is not None or params.asked_on is None:
+def _not_asked(package: PackageFacts, run: Run, params: EndsAtParams) -> Verdict | None:
+    if params.asked_on is None:
         return None
     if nodes_on(run, params.asked_on, "subscribers"):
-        return grade_again(f"message {params.number} on {params.asked_on} was not sent")
+        missed = f"message {params.number} on {params.asked_on} was not sent"
+        end = explain_early_end(package, run)
+        return end.verdict(failed_or_blocked, f"{missed}: {end.cause}") if end else grade_again(missed)
     hint = f"subscribe to it: {subscriber(params.asked_on)}"
     return failed_or_blocked(f"no node listens to {params.asked_on}, so no goal could be sent", hint=hint)
 

@@ -59,7 +59,7 @@ class PythonSlip(Placed, Record):
     - `deaf`: why the node goes on after Ctrl-C.
     - `callback-called`, `callback-values`, `callback-missing`: a callback that is called where it should only be named,
       that takes another number of values than ROS passes, or that does not exist.
-    - `callback-waits`: a callback that sleeps, never ends or makes its publisher itself, or that ROS never calls.
+    - `callback-waits`: a topic's or service's callback that sleeps, or never ends, or makes its publisher itself.
     - `not-printed`: why a topic's callback prints nothing of any message; `name` is the topic as it is written there.
     - `printed-in-part`: why it prints some messages only, or something else than their values; `name` as above.
     - `subscribed-again`: a `Subscriber(…)` that a loop makes in each turn.

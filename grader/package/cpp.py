@@ -53,7 +53,6 @@ _LONG = re.compile(
 )
 LONG_S = 2.0
 """A node that sleeps for longer at a time may be too late after Ctrl-C."""
-_THROWN_AWAY = re.compile(r"[;{}]\s*\w+(?:\.|->)(?P<call>subscribe|advertiseService)\s*(?:<[^;()]*>)?\s*\(")
 _OF_FLOATS, _OF_WHOLES = (
     re.compile(r"\bstd_msgs::Float(?:32|64)\b"),
     re.compile(r"\bstd_msgs::U?Int\d+\b|<\s*int\s*>"),
@@ -103,23 +102,7 @@ def slips_of(path: str, text: str) -> Iterator[PythonSlip]:
         yield from _endless(path, code)
         yield from _asleep(path, code)
     yield from _unasked_argument(path, code)
-    yield from _unkept(path, code)
     yield from _whole_numbers(path, text, code)
-
-
-def _unkept(path: str, code: str) -> Iterator[PythonSlip]:
-    """Yield each `subscribe(…)` whose Subscriber is thrown away, with which the subscription ends at once."""
-    for number, call in enumerate(_THROWN_AWAY.finditer(code), 1):
-        # of message_filters, `subscribe(nh, "topic", 1)` is told the topic in second place, and keeps it itself
-        start, end = next(_arguments(code, call.end()))
-        if start == end or code[start:end].strip():
-            continue
-        line = code.count("\n", 0, call.start("call")) + 1
-        kind = "ServiceServer" if call["call"] == "advertiseService" else "Subscriber"
-        message = f"nothing keeps the {kind} of line {line}, so that ROS never calls its callback"
-        fix = f"in `main`, write `ros::{kind} kept{number} = ` at the beginning of line {line}"
-        fix += ", and in a class make it a member"
-        yield PythonSlip(file=path, line=line, kind="callback-waits", message=message, fix=fix)
 
 
 def _whole_numbers(path: str, text: str, code: str) -> Iterator[PythonSlip]:

@@ -387,3 +387,13 @@ HEADS = "from a.msg import Twist, Header, Reading, GoFeedback\nfrom a.srv import
 def test_messages_that_are_filled_in_and_not_sent(text: str, fixes: list[str], tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(HEADS + text, encoding="utf-8")
     assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "unsent"] == fixes
+
+
+def test_fields_of_an_attribute_that_is_always_none(tmp_path: Path) -> None:
+    head = "class A:\n def __init__(self):\n  self.p = None\n  Subscriber('/p', Pose, self.f)\n def f(self, m):\n"
+    (tmp_path / "a.py").write_text(f"{head}  self.p.x = m.x\n", encoding="utf-8")
+    (tmp_path / "b.py").write_text(f"{head}  self.p = m\n  self.p.x = 1\n", encoding="utf-8")
+    found = [s for s in check_syntax(tmp_path, ["a.py", "b.py"]).slips if s.kind == "object"]
+    assert [(s.file, s.line, s.fix, s.name) for s in found] == [
+        ("a.py", 6, "on line 3, write `self.p = Pose()`", "x")
+    ]

@@ -16,6 +16,7 @@ from script_names import (
     all_of,
     argument,
     bound_names,
+    callback_of,
     called_name,
     calls_in,
     dotted,
@@ -42,6 +43,7 @@ def object_slips(tree):
         if all(dotted(base) == "object" for base in one.bases):
             yield from lacking_attributes(Members(one, tree))
     yield from methods_inside(tree)
+    yield from fields_of_none(tree)
     yield from classes_as_objects({one.name: one for one in classes}, tree)
 
 
@@ -109,6 +111,25 @@ def lacking_attributes(own):
         else:
             continue
         yield slip(node.lineno, "object", message, fix, name)
+
+
+def fields_of_none(tree):
+    """Yield where a callback sets fields of an attribute that never gets another value than None."""
+    callbacks = {}
+    for call in (n for n in all_of(tree, ast.Call) if called_name(n) == "Subscriber"):
+        callbacks.setdefault(callback_of(call, functions_in(tree)), published_type(call))
+    given = {}
+    for n in all_of(tree, ast.Assign):
+        for target in n.targets:
+            given.setdefault(dotted(target), []).append(n)
+    for function, kind in callbacks.items():
+        for n in stored_in([function] if function and kind else []):
+            values = given.get(dotted(n.value), []) if dotted(n.value).startswith("self.") else []
+            if values and all(getattr(one.value, "value", 0) is None for one in values):
+                name, line = dotted(n.value), values[0].lineno
+                message = "nothing gives `%s` another value than None, and None has no fields" % name
+                fix = "on line %d, write `%s = %s()`" % (line, name, kind)
+                yield slip(n.lineno, "object", message, fix, n.attr)
 
 
 def methods_inside(tree):
