@@ -78,11 +78,12 @@ class PythonSlip(Placed, Record):
       number: a slip only if that message has to be a text.
     - `goes-on`: an `if`, or a loop's first turn, that ends an action's goal by the call `name`, and goes on.
     - `wrong-value`: a value that is none: a comparison with NaN, the sine of an angle in degrees, a service's answer
-      that is made and not returned, or of which no field is set, a message that is filled in and not sent, a condition
+      that is made and not returned, or of which no field is set, a message that is filled in and not sent, a speed that
+      a Twist keeps from the turn before, nanoseconds in place of seconds, a condition
       that all numbers fulfil, or none, or what each turn of a loop adds or sets again (`name`: `nan`, `degrees`,
-      `return`, `empty`, `unsent`, `bounds`, `added`); a grid's index that steps by its height, a cell that `int(…)`
-      works out of a number below 0, a quaternion of a whole angle, a float for the seconds of a time, and the mean of a
-      scan's ranges (`step`, `cut`, `half`, `secs`, `mean`).
+      `return`, `empty`, `unsent`, `kept`, `nanoseconds`, `bounds`, `added`); a grid's index that steps by its height, a
+      cell that `int(…)` works out of a number below 0, a quaternion of a whole angle, a float for the seconds of a
+      time, and the mean of a scan's ranges (`step`, `cut`, `half`, `secs`, `mean`).
 
     No slips, but what a line says, for checks that compare it with what the lab asks; `message` is a name, a number or
     a text:

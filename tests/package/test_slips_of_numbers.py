@@ -401,5 +401,21 @@ EACH = "def f(scan):\n    for i in range(90):\n        if scan.ranges[i] < 1:\n 
 )  # fmt: skip
 def test_velocities_of_another_turn(text: str, fixes: list[str], tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text("import rospy\n" + text, encoding="utf-8")
-    found = [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "added"]
+    found = [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name in {"added", "kept"}]
     assert [one.partition(" below")[0] for one in found if "set `v.x`" not in one] == fixes
+
+
+@pytest.mark.parametrize(
+    ("text", "fixes"),
+    [
+        (
+            "t = rospy.Time(now().to_nsec())\n",
+            ["on line 1, write `rospy.Time(0, ` in place of `rospy.Time(`"],
+        ),
+        ("t = rospy.Time(0, now().to_nsec())\n", []),
+        ("t = rospy.Time(now().to_sec())\n", []),
+    ],
+)
+def test_nanoseconds_for_seconds(text: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "nanoseconds"] == fixes

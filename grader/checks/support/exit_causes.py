@@ -411,9 +411,10 @@ def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts
     own = [s for s in package.slips if s.file == place.file]
     said = f"{found.message} {found.innermost.source}"
     hidden = [s for s in own if s.kind == "hides-class" and re.search(rf"\b{s.name}\b", said)]
+    hidden += [s for s in own if s.name == "nanoseconds" and "format requires" in found.message]
     if found.kind == "TypeError":
         hidden += [s for s in own if (s.kind, s.line) == ("defined-twice", place.line)]
-    if hidden and found.kind in {"TypeError", "UnboundLocalError", "ValueError"}:
+    if hidden and found.kind in {"TypeError", "UnboundLocalError", "ValueError", "ROSSerializationException"}:
         return hidden[0].message, hidden[0].fix
     if found.kind in {"NameError", "UnboundLocalError"}:
         return _misspelt(found, place, package)

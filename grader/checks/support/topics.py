@@ -425,9 +425,9 @@ def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | 
 
 SEEN_AS = {
     "nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": "", "added": "",
-    "step": "order", "cut": "place", "half": "value", "unsent": "", "secs": "never", "mean": "",
+    "step": "order", "cut": "place", "half": "value", "secs": "never", "mean": "",
 }  # fmt: skip
-"""How a verdict says that a value is `wrong`, by the name of the slip that makes it so."""
+"""How a verdict says that a value is `wrong`, by the name of the slip that makes it so; others always show."""
 
 
 def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
@@ -436,14 +436,12 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
     files = _files_that_run(package, run)
     of_values = check.of_callbacks or check.name in OF_VALUES
     kinds = ["wrong-value"] if of_values and not verdict.cause else []
-    if check.name == "action-result" and ends_twice(run):
+    if check.name == "action-result" and verdict.wrong != "nothing" and ends_twice(run):
         kinds.append("goes-on")
     found = [s for s in package.slips if s.kind in kinds and s.file in files]
     wrong = verdict.wrong
-    # That nothing came at all is not because a goal that is over goes on
-    over = [s for s in found if s.kind == "goes-on" and wrong != "nothing"]
-    sure = over or [s for s in found if wrong and SEEN_AS.get(s.name) == wrong]
-    maybe = [s for s in found if s.name == "unsent" or (s.name in SEEN_AS and not (wrong or SEEN_AS[s.name]))]
+    sure = [s for s in found if s.kind == "goes-on" or (wrong and SEEN_AS.get(s.name) == wrong)]
+    maybe = [s for s in found if not (SEEN_AS.get(s.name) or (wrong and s.name in SEEN_AS))]
     for slip in sure[:1] or maybe[:4]:
         why, hint = f"line {slip.line} of {slip.file}: {slip.message}", f"{verdict.hint}; {slip.fix}"
         cause = slip.message if sure else ""

@@ -400,7 +400,7 @@ def kept_velocities(tree):
                     line, (name, part, axis) = choice.lineno, field.rsplit(".", 2)
                     message = "`%s` keeps its last %s.%s where the `if` on line %d does not set it"
                     fix = "above line %d, write `%s = 0`" % (line, field)
-                    yield slip(line, "wrong-value", message % (name, part, axis, line), fix, "added")
+                    yield slip(line, "wrong-value", message % (name, part, axis, line), fix, "kept")
 
 
 def branches_of(choice):

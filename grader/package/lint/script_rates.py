@@ -5,7 +5,20 @@ Nothing is executed. Python 3.8, standard library only.
 
 import ast
 
-from script_names import LOOPS, calls_in, dotted, is_call, slip, text_of, walk
+from script_names import LOOPS, all_of, calls_in, dotted, is_call, slip, text_of, walk
+
+
+def nanoseconds(tree):
+    """Times that are given nanoseconds in place of seconds."""
+    for node in all_of(tree, ast.Call):
+        first = node.args[0] if len(node.args) == 1 and not node.keywords else None
+        if dotted(node.func) in ("rospy.Time", "rospy.Duration") and is_call(first, "to_nsec"):
+            what = dotted(node.func)
+            message, fix = (
+                "`%s(…)` takes seconds, and gets nanoseconds" % what,
+                "on line %d, write `%s(0, ` in place of `%s(`",
+            )
+            yield slip(node.lineno, "wrong-value", message, fix % (node.lineno, what, what), "nanoseconds")
 
 
 def loop_rates(tree):
