@@ -234,6 +234,7 @@ SLIPS = {
         ("publish(text)", "publish()", "there is nothing to publish in the brackets"),
         ("publish(text)", "publish(hello_str)", "nothing gives `hello_str` a value"),
         ("pub.publish(text)", "publisher.publish(text)", "publisher is not defined"),
+        ("'hello world %s' %", "'hello world' %", "the string has no `%` in it"),
         ("publish(text)", "publish() = text", "`publish` gets its values in its brackets"),
         ("publish(text)", "publishtext)", "its opening bracket is missing"),
         ("def talk():", "def talk:", "the brackets `()` behind the name of the function are missing"),
@@ -326,6 +327,7 @@ if __name__ == '__main__':
         ("self.pub =", "self,pub =", "a dot belongs between `self` and `pub`"),
         ("self.rate.sleep", "self.arte.sleep", "`arte` is called `rate`"),
         ("self.pub.publish", "self.publisher.publish", "`publisher` is called `pub`"),
+        ("self.rate =", "rate =", "a value is given to `rate`, not to `self.rate`"),
         ("self.rate.sleep", "self.r.sleep", "`r` is called `rate`"),
         ("def hear(self, message)", "def hear(self)", "passes it `self` and the message"),
         ("self.rate.sleep", "self.rate,sleep", "a dot belongs between `rate` and `sleep`"),
@@ -389,6 +391,25 @@ def test_a_slip_within_a_value_is_named_and_undone(right: str, wrong: str, says:
     found = repair_all(folder, WANTED)
     assert says in "; ".join(one.message for one in found)
     assert (folder / TALKER).read_text() == FILES[TALKER].replace(given, right)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "right"),
+    [
+        ("'I heard %s', msg.data)", "'I heard {}').format(msg.data)", "'I heard {}'.format(msg.data))"),
+        ("'I heard %s', msg.data)", "'I heard %s') % msg.data", "'I heard %s' % msg.data)"),
+        ("'I heard %s', msg.data)", "'I heard {msg.data}')", "f'I heard {msg.data}')"),
+        ("'I heard %s', msg.data)", "'I heard {}' % msg.data)", "'I heard {}'.format(msg.data))"),
+        ("'I heard %s', msg.data)", "'I heard {n}' % msg.data)", None),
+        ("'I heard %s', msg.data)", "'I heard {name}')", None),
+        ("'I heard %s', msg.data)", "('I heard {msg}').replace('{msg}', msg.data))", None),
+        ("'I heard %s', msg.data)", "f'I heard {{msg}} {msg.data}')", None),
+    ],
+)
+def test_values_are_put_into_the_string(old: str, new: str, right: str | None, tmp_path: Path) -> None:
+    folder = package(tmp_path, {**FILES, LISTENER: FILES[LISTENER].replace(old, new)})
+    repair_all(folder, WANTED)
+    assert (folder / LISTENER).read_text() == FILES[LISTENER].replace(old, new if right is None else right)
 
 
 def test_an_argument_beside_self_stays_one(tmp_path: Path) -> None:

@@ -275,6 +275,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         ("def f():\n    pass\nrospy.Subscriber('a', A, callback=f)\n",
          [("callback-values", 1, "`f` takes 0 arguments")]),
         ("def f():\n    print(d)\nrospy.Subscriber('a', A, f)\n", [("callback-values", 1, "write `def f(d):`")]),
+        ("class T:\n    def f(self):\n        self.get_logger().info('of ROS 2')\nT().f()\n", []),
         ("def f(m):\n    pass\nrospy.Subscriber('a', A, f)\n", []),
         ("def f(m):\n    pass\nrospy.Subscriber('a', A, f, 10)\n",
          [("callback-values", 1, "takes 1 argument, but ROS passes it the message and its `callback_args`")]),

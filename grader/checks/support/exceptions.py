@@ -380,6 +380,9 @@ def _operands(left: str, right: str, source: str) -> Meaning | None:
 def _none(source: str) -> Meaning:
     if found := re.search(r"([\w.]+)\.get_result\(\)", source):
         return "the action has no result yet", f"above that line, write `{found[1]}.wait_for_result()`"
+    if found := re.search(r"\b(print|publish|log[a-z]+)\(.*\)\s*(\.format|%)", source):
+        sign, where = found[2].replace("format", "format(…)"), f"the brackets of `{found[1]}(…)`"
+        return f"`{sign}` belongs to the string, in {where}", f"write `{sign}` behind the string, in {where}"
     cause = "it is None here: nothing has given it a value yet, or a function without `return` did"
     return cause, "check `is not None` before that line"
 

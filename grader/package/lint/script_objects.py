@@ -95,7 +95,7 @@ def lacking_attributes(own):
     for node, method in own.reads:
         name, stores = node.attr, own.stores.get(node.attr, [])
         givers = [m.name if m is not None else "__init__" for _, m in stores]
-        if name in own.fixed or node in inside:
+        if name in own.fixed or node in inside or (name in OF_ROS_2 and not stores):
             continue
         if stores and inside.issuperset(n for n, _ in stores):
             message, fix = astray[1:]
@@ -130,6 +130,13 @@ def fields_of_none(tree):
                 message = "nothing gives `%s` another value than None, and None has no fields" % name
                 fix = "on line %d, write `%s = %s()`" % (line, name, kind)
                 yield slip(n.lineno, "object", message, fix, n.attr)
+
+
+OF_ROS_2 = (
+    "create_publisher", "create_subscription", "create_timer", "create_service", "create_client", "create_rate",
+    "get_logger", "get_clock", "declare_parameter", "get_parameter", "destroy_node",
+)  # fmt: skip
+"""What a node of ROS 2 has: that it is lacking here is no slip of a name."""
 
 
 def methods_inside(tree):

@@ -58,7 +58,15 @@ class Known(NamedTuple):
 
 def with_members(text: str, known: Known) -> Iterator[Step]:
     """Yield the steps after which names of objects and of what belongs to them are as they are meant."""
-    for find in (_dots, _misspelt_members, _misspelt_keywords, _lost_values, _lost_places):
+    for find in (
+        _dots,
+        _misspelt_members,
+        _misspelt_keywords,
+        _lost_values,
+        _lost_places,
+        _values_behind,
+        _lost_f,
+    ):
         for edit, why in find(text, known):
             (line, _, _), _ = edit
             for step in step_to("argument", line + 1, text, edited(text, [(*edit[0], edit[1])]), why):
@@ -168,6 +176,13 @@ def _misspelt_members(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
             right = next(iter(get_close_matches(node.attr, members, 1, 0.85)), "")  # `pub.publisher(…)`
         elif not known_attr and not right and owner == "self" and kind in own:
             right = lacking.meant(node)
+            local = None if right else lacking.local(node.attr)
+            place = span_of(lines, local) if local is not None else None
+            if place is not None:
+                yield (
+                    (place, f"self.{node.attr}"),
+                    f"a value is given to `{node.attr}`, not to `self.{node.attr}`",
+                )
         span = span_of(lines, node)
         if right and span is not None:
             line, _, end = span
@@ -188,6 +203,21 @@ class _Lacking:
         }
         self._is_made = bool(names & {"setattr", "hasattr", "getattr", "vars", "__getattr__"})
         """Whether attributes may come from elsewhere."""
+
+        self._methods = [
+            m
+            for one in nodes_in(tree)
+            if isinstance(one, ast.ClassDef)
+            for m in one.body
+            if isinstance(m, ast.FunctionDef) and [a.arg for a in m.args.args[:1]] == ["self"]
+        ]
+
+    def local(self, name: str) -> ast.Name | None:
+        """Return where a method gives its own variable of that name a value, and does nothing with it; None where there
+        is not one such place."""
+        uses = [n for m in self._methods for n in nodes_in(m) if isinstance(n, ast.Name) and n.id == name]
+        is_only = len(uses) == 1 and isinstance(uses[0].ctx, ast.Store) and not self._is_made
+        return uses[0] if is_only else None
 
     def meant(self, node: ast.Attribute) -> str:
         if self._is_made or not isinstance(node.ctx, ast.Load):
@@ -295,6 +325,64 @@ def _lost_places(text: str, _known: Known) -> Iterator[tuple[Edit, str]]:
             yield (span, source.replace("%%", "%")), "`%%` is a plain `%`, and no place for a value"
         if source and "%" not in left.value and (right := with_place(source)):
             yield (span, right), "the string has no `%` in it"
+        elif source and plain and "{}" in left.value and (end_of := span_of(lines, node)) is not None:
+            right = f"{source}.format({ast.unparse(node.right)})"
+            yield (
+                (end_of, right),
+                "the values of a string with `{}` are given by `.format(…)`, and not by `%`",
+            )
+        elif source and plain and "%" not in left.value and "{" not in left.value:
+            yield (span, f"{source[:-1].rstrip()} %s{source[-1]}"), "the string has no `%` in it"
+
+
+def _values_behind(text: str, _known: Known) -> Iterator[tuple[Edit, str]]:
+    """Yield `rospy.loginfo("heard {}").format(x)`, and `pub.publish("heard %s") % x`."""
+    tree, lines = tree_of(text), text.split("\n")
+    for node in nodes_in(tree):
+        called: ast.expr | None = None
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "format":
+            called, sign = node.func.value, ".format(…)"
+        elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
+            called, sign = node.left, "%"
+        if not isinstance(node, ast.expr) or not isinstance(called, ast.Call) or called.keywords:
+            continue
+        name, spans = last_name(called.func), [span_of(lines, n) for n in (node, called, *called.args)]
+        places = [one for one in spans if one is not None]
+        if not TAKES_TEXT.fullmatch(name) or len(called.args) != 1 or len(places) != len(spans):
+            continue
+        (line, start, end), (_, _, inner), (_, _, first) = places
+        code = lines[line]
+        right = f"{code[start:first]}{code[inner:end]}{code[first:inner]}"
+        yield ((line, start, end), right), f"`{sign}` belongs to the string, in the brackets of `{name}(…)`"
+
+
+TAKES_TEXT = re.compile(r"print|publish|log(debug|info|warn|err|fatal)")
+
+
+def _lost_f(text: str, _known: Known) -> Iterator[tuple[Edit, str]]:
+    """Yield `"heard {msg.data}"`, in whose brackets stand values that the script has."""
+    tree, lines = tree_of(text), text.split("\n")
+    nodes = nodes_in(tree)
+    if any(last_name(n) in ("format", "format_map", "Template", "replace") for n in nodes):
+        return
+    known = bound_in(tree)
+    inside = {
+        id(part) for n in nodes if isinstance(n, ast.JoinedStr | ast.Expr) for part in ast.iter_child_nodes(n)
+    }
+    for node in (n for n in nodes if isinstance(n, ast.Constant)):
+        span = span_of(lines, node) if id(node) not in inside else None
+        places = re.findall(r"\{([^{}]*)\}", node.value) if isinstance(node.value, str) else []
+        if (
+            span is None
+            or not places
+            or not all(re.fullmatch(r"[A-Za-z_][\w.()\[\]]*", one) for one in places)
+        ):
+            continue
+        line, start, end = span
+        source = lines[line][start:end]
+        is_plain = source[:1] in "'\"" and all(re.split(r"\W", one)[0] in known for one in places)
+        if is_plain:
+            yield (span, f"f{source}"), "the `f` in front of the string is missing"
 
 
 def with_place(source: str) -> str:
