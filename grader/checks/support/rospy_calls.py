@@ -339,6 +339,24 @@ def _swapped_values(found: Traceback, package: PackageFacts) -> Meaning | None:
     return None
 
 
+_WIDTH = re.compile(r"exceeds specified width \[(u?)int(\d+)\]|unsigned integer type (u)int(\d+)$")
+_BOUNDS = re.compile(r"format requires (-?\d+) <= number <= (\d+)$")
+
+
+def _out_of_range(message: str) -> Meaning | None:
+    """Return which numbers a field takes, where one is too large or below 0; `message` may end with the type of an
+    unsigned one."""
+    width, told = _WIDTH.search(message), _BOUNDS.search(message)
+    bounds = f"{told[1]} to {told[2]}" if told is not None else ""
+    if width is not None:
+        bits, is_unsigned = int(width[2] or width[4]), bool(width[1] or width[3])
+        bounds = f"0 to {2**bits - 1}" if is_unsigned else f"{-(2 ** (bits - 1))} to {2 ** (bits - 1) - 1}"
+    if not bounds:
+        return None
+    why = f"the message takes whole numbers from {bounds}, and this value is none"
+    return why, f"publish only whole numbers from {bounds}: a counter has to start again in time"
+
+
 def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
     """Return why a message does not take the value that is published: a text for a number, a number for a text, or the
     publisher of another topic."""
@@ -350,7 +368,7 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
     wants_text = "must be of type bytes or an ascii string" in found.message
     swapped = _swapped_values(found, package)
     if swapped or (not wants_text and "integer type" not in found.message):
-        return swapped
+        return swapped or _out_of_range(found.message)
     kind, other = ("string", "numbers") if wants_text else ("whole number", "strings")
     sent = next(iter(calls_in_line(frame.source, "publish")), None)
     owner = ast.unparse(sent.func.value) if sent is not None and isinstance(sent.func, ast.Attribute) else ""
@@ -365,11 +383,12 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
     if point is not None:
         return point[0], rewritten(frame.source, (sent.args[0], point[1])) if sent is not None else ""
     here = owners.get(owner)
+    bounds = _out_of_range(f"{found.message} {types[here.line].lower()}") if here is not None else None
     others = [
         s for s in owners.values() if types[s.line].startswith(NUMBER_TYPES if wants_text else "String")
     ]
     # where no text is published at all, the other one does not get what belongs here
-    is_swap = not wants_text or any(s.kind == "publishes" for s in slips)
+    is_swap = (not wants_text or any(s.kind == "publishes" for s in slips)) and bounds is None
     if here is not None and here not in others and len(others) == 1 and is_swap:
         why = f"`{owner}` publishes {types[here.line]} on {here.message} (line {here.line})"
         lines = sorted((here.line, others[0].line))
@@ -382,7 +401,7 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
     field, constants = re.search(r"field (\w+) must", found.message), _constants(package)
     if field and constants and not wants_text:
         hint = f"give its field {field[1]} one of the type's constants: {join_words(constants, 'or')}"
-    return f"the message takes a {kind} but gets something else", hint
+    return bounds or (f"the message takes a {kind} but gets something else", hint)
 
 
 def without_message(found: Traceback) -> tuple[str, str] | None:
