@@ -366,7 +366,7 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
     hint = f"publish in a loop `{LOOP}`, not a fixed number of times"
     if others:
         message += f" and goes on publishing on {others}"
-        hint = f"publish on {params.topic} in the loop that publishes on {others} too"
+        hint = f"publish on {params.topic} in the loop that publishes on {others} too, and nowhere else"
     return failed(message, hint=hint).if_repeated()
 
 

@@ -35,7 +35,8 @@ class PythonSlip(Placed, Record):
     - `undefined`: why a name has no value where it is read.
     - `object`: why an object of a class lacks an attribute where it is read, or that the class is used in its place.
     - `outside-method`: a call in a class, but outside its methods, that uses an unknown name.
-    - `defined-twice`: a callback that a second function of its name hides, or an imported name that a class hides.
+    - `defined-twice`: a callback that a second function of its name hides or that another one is
+      given for, or an imported name that a class hides.
     - `float-index`: an index is worked out with `/`, which makes a float.
     - `hides-class`: a message is given the name of its class: `String = String()`.
     - `no-effect`, `compared`: a statement such as `++i`, or `i == 0`; or a loop that publishes what only a line above

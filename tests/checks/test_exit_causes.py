@@ -384,3 +384,15 @@ def test_a_message_of_the_other_package_is_told_with_its_import(tmp_path):
     error = "ModuleNotFoundError: No module named 'lab'"
     found = explain_traceback(raised(both, ("node.py", 1, source), error=error), both)
     assert found.hint == "write `from lab_msgs.msg import Reading`"
+
+
+@pytest.mark.parametrize("encoding", ["iso-8859-1", "utf-8"])
+def test_a_script_in_an_old_encoding_is_not_read_by_what_the_build_makes_of_it(tmp_path, encoding) -> None:
+    files = {"talker.py": f"# coding: {encoding}\n# é\n".encode(encoding)}
+    error = (
+        "UnicodeDecodeError: 'utf-8' codec can't decode byte 0xe9 in position 60: invalid continuation byte"
+    )
+    wrapper = "/home/student/catkin_ws/devel/lib/lab/talker.py"
+    frame = (wrapper, 15, "exec(compile(fh.read(), python_script, 'exec'), context)")
+    end = explained(tmp_path, files, frame, error=error)
+    assert ("as UTF-8 in your editor" in end.hint) == (encoding != "utf-8")

@@ -119,6 +119,7 @@ def node(body: str) -> str:
 LOOP = "    while not rospy.is_shutdown():\n"
 SERVER = "    s = SimpleActionServer('a', A, f, auto_start=False)\n"
 OF_A = "try:\n    from a.msg import A\nfinally:\n    pass\n"
+UNHEARD = "def hear(msg):\n    print(msg.data)\ndef other(msg):\n    print(msg.data)\n"
 CALLED = "if __name__ == '__main__':\n    main()\n"
 
 
@@ -555,6 +556,11 @@ def test_a_condition_is_joined_with_another_where_that_changes_nothing_in_it(
             {"defined-twice"},
         ),
         ("def hear(msg):\n    pass\ndef other(msg):\n    pass\nrospy.Subscriber('a', Int8, hear)\n", set()),
+        (
+            f"{UNHEARD}rospy.Subscriber('a', Int8, hear)\nrospy.Subscriber('b', String, hear)\n",
+            {"defined-twice"},
+        ),
+        (f"{UNHEARD}rospy.Subscriber('a', Int8, hear)\nrospy.Subscriber('b', Int8, hear)\n", set()),
         (
             "from rospy import Subscriber\nclass Subscriber:\n    pass\nSubscriber('a', Int8, print)\n",
             {"defined-twice"},

@@ -375,6 +375,8 @@ def test_a_service_that_answers_in_some_cases(last: str, fixes: list[str], tmp_p
     (tmp_path / "a.py").write_text(f"{text}rospy.Service('fit', Fit, fit)\n", encoding="utf-8")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
     assert [s.fix for s in slips] == fixes
+
+
 KEPT = (
     "cmd = Twist()\ndef f(scan):\n    if s:\n        cmd.angular.z = 1\n    else:\n        cmd.linear.x = 2\n"
 )

@@ -49,6 +49,7 @@ from grader.checks.support.scripts import (
     argument_not_given,
     copies_of,
     move_hint,
+    old_encoding,
     path_in_package,
     without_git,
 )
@@ -362,13 +363,13 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
 
 
 def _known_meaning(found: Traceback, place: FileCitation | None, package: PackageFacts) -> tuple[str, str]:
-    """Return the cause and the hint, by the first that knows it: a call in which something stands in the wrong place,
-    a known slip, a question; else what the type of the exception says."""
+    """Return the cause and the hint, by the first that knows it; else what the type of the exception says."""
     return (
         _misplaced(found)
         or without_message(found)
         or _slip(found, package)
         or _asks_for_input(found, place, package)
+        or old_encoding(package, found.kind, {one.file for one in found.frames})
         or CAUSES.get(found.kind, ("", "look at that line: the last words say what Python cannot do there"))
     )
 

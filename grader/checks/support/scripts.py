@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
@@ -109,6 +109,18 @@ def can_be_moved(path: str, wanted: str) -> bool:
         or (other == ".launch" and (one.startswith(other) or one == ".xml"))
         or PurePosixPath(path).name == f"{PurePosixPath(wanted).name}.txt"
     )
+
+
+def old_encoding(package: PackageFacts, error: str, files: Collection[str]) -> tuple[str, str] | None:
+    """Return why one of these files, a script that names its old encoding, is not read, and what to do: Python would
+    read it, but not the program that the build makes of it."""
+    names = {PurePosixPath(file).name for file in files}
+    own = (f for f in package.files if f.python and PurePosixPath(f.path).name in names)
+    file = next((f for f in own if f.encoding not in {"utf-8", "utf-8-sig"}), None)
+    if file is None or error != "UnicodeDecodeError":
+        return None
+    why = f"{file.path} is saved as {file.encoding}, and what catkin_install_python makes of it is read as UTF-8"
+    return why, f"save {file.path} as UTF-8 in your editor, and write utf-8 for {file.encoding} at its top"
 
 
 def add_hint(package: PackageFacts, path: str) -> str:

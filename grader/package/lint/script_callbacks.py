@@ -127,17 +127,26 @@ def own_callbacks(tree, functions):
 
 
 def spare_callbacks(tree, functions):
-    """The only function that reads a message and that nothing names, in a script without a Subscriber."""
-    if calls_in(tree, "Subscriber"):
-        return
+    """The only function that reads a message and that nothing names, in a script without a Subscriber, or one in which
+    two Subscribers of different types are given one function."""
     read = {getattr(n, "attr", getattr(n, "id", "")) for n in walk(tree)}
     data = {dotted(n.value) for n in all_of(tree, ast.Attribute) if n.attr == "data"}
     spare = [f for name, f in functions.items() if name not in read and takes(f, "self" in read) == (1, 1)]
     spare = [f for f in spare if [a for a in f.args.args[-1:] if a.arg in data]]
-    if len(spare) == 1:
-        name = ("self." if len(spare[0].args.args) > 1 else "") + spare[0].name
+    if len(spare) != 1:
+        return
+    name = ("self." if len(spare[0].args.args) > 1 else "") + spare[0].name
+    calls = calls_in(tree, "Subscriber")
+    if not calls:
         message, fix = "no Subscriber is given `%s`" % name, "pass it: `rospy.Subscriber(…, %s)`" % name
         yield slip(spare[0].lineno, "callback-missing", message, fix, name)
+    given = [ast.dump(one.args[2]) for one in calls if len(one.args) > 2]
+    kinds = {dotted(one.args[1]) for one in calls if len(one.args) > 2}
+    if len(calls) == len(given) == len(kinds) == 2 and len(set(given)) == 1:
+        lines, one = sorted(one.lineno for one in calls), dotted(calls[0].args[2])
+        message = "%s give both Subscribers `%s`, and nothing calls `%s`" % (listed(lines), one, name)
+        fix = "write `%s` in place of `%s` on the line of the topic that it is for" % (name, one)
+        yield slip(spare[0].lineno, "defined-twice", message, fix, name)
 
 
 def wrong_callback(own, call, tree, bound, values):

@@ -142,7 +142,9 @@ def with_classes(text: str, types: list[str]) -> Iterator[Step]:
                 continue  # the import of what is used is missing
             spans = [span_of(lines, place) for place in (alias, *used)]  # type: ignore[arg-type] # it has a place too
             edits = [(*span, meant) for span in spans if span is not None]
-            yield from step_to("name", alias.lineno, text, edited(text, edits), alias.name)
+            for step in step_to("name", alias.lineno, text, edited(text, edits), alias.name):
+                yield step
+                yield from with_classes(step["text"], types)
             return
 
 
