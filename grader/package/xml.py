@@ -339,6 +339,7 @@ def _slips_near(at: int, message: str, text: str, root: str) -> Iterator[LineSli
     for number in near:
         yield from _slips_in(lines, number, root)
     yield from _declarations(lines, root)
+    yield from _second_roots(lines, root)
     yield from doubled_and_turned(lines, near)
 
 
@@ -356,6 +357,24 @@ def _declarations(lines: list[str], root: str) -> Iterator[LineSlip]:
     if re.search(r"xml|version|1\.0", lines[0]) and f"<{root}" not in lines[0]:
         whole = "\n".join([DECLARATION, *lines[1:]])
         yield LineSlip("the first line has a slip", 1, f"write `{DECLARATION}`", whole)
+
+
+def _second_roots(lines: list[str], root: str) -> Iterator[LineSlip]:
+    """Yield the lines with what two blocks hold in one, if that is not the same twice."""
+    said = [(number, line.strip()) for number, line in enumerate(lines, 1) if line.strip()]
+    ends = [
+        i for i, (_, line) in enumerate(said[:-1]) if line == f"</{root}>" and said[i + 1][1] == f"<{root}>"
+    ]
+    if len(ends) == 1:
+        at, (end, begin) = ends[0], (said[ends[0]][0], said[ends[0] + 1][0])
+        blocks = [
+            [line for _, line in part if not line.startswith("<?")]
+            for part in (said[: at + 1], said[at + 1 :])
+        ]
+        left = "\n".join(line for number, line in enumerate(lines, 1) if number not in {end, begin})
+        if blocks[0] != blocks[1]:
+            fix = f"delete lines {end} and {begin}, `</{root}>` and `<{root}>`"
+            yield LineSlip(f"only one `<{root}>` is allowed, and another one begins here", begin, fix, left)
 
 
 def _strange_things(root: etree._Element, name: str) -> int:

@@ -54,6 +54,8 @@ from tests.checks.tracebacks import SCRIPT, explained, package_of, raised
          "write `rospy.Rate(10)`"),
         (6, "r = rospy.Rate(0)", "ZeroDivisionError: float division by zero",
          "write how many times a second the loop runs, as in `rospy.Rate(10)`"),
+        (6, "r = rospy.Rate(1 // 10)", "ZeroDivisionError: float division by zero",
+         "write how many times a second the loop runs, as in `rospy.Rate(10)`"),
         (6, "rospy.init_node()", "TypeError: init_node() missing 1 required positional argument: 'name'",
          "write the node's name in the brackets, as a string"),
         (6, "pub.publish(String)", "TypeError: String.serialize() missing 1 required positional argument: 'buff'",

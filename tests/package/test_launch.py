@@ -90,7 +90,16 @@ def test_attributes_that_are_not_there_are_none():
             3,
             "move that `</launch>` to the end",
         ),
-        ("<launch>\n</launch>\n<launch>\n<node/>\n</launch>", 3, "only one `<launch>`"),
+        (
+            "<launch>\n</launch>\n<launch>\n<node/>\n</launch>",
+            3,
+            "delete lines 2 and 3, `</launch>` and `<launch>`",
+        ),
+        (
+            "<launch>\n<arg/>\n</launch>\n<launch>\n<arg/>\n</launch>",
+            4,
+            "text comes after the first block: delete it",
+        ),
         ("<Launch></Launch>", 1, "`<Launch>`; roslaunch wants `<launch>` in lower case"),
         ("<robot/>", 1, "`<robot>`; roslaunch wants `<launch>`"),
         ("<launch>\n<launch/></launch>", 2, "a second `<launch>`"),

@@ -566,6 +566,11 @@ def test_a_condition_is_joined_with_another_where_that_changes_nothing_in_it(
             {"defined-twice"},
         ),
         ("while rospy.is_shutdown():\n    pub.publish(1)\n", {"loop-left"}),
+        ("over = True\nwhile not over:\n    pub.publish(1)\n", {"loop-left"}),
+        ("self.go = False\nwhile self.go:\n    pub.publish(1)\n", {"loop-left"}),
+        ("over = True\nover = False\nwhile not over:\n    pub.publish(1)\n", set()),
+        ("over = True\ndef stop(over):\n    while not over:\n        pub.publish(1)\n", set()),
+        ("over, n = True, 1\nwhile not over:\n    pub.publish(1)\n", set()),
         (
             "while not rospy.is_shutdown():\n    pub.publish(1)\n    if n:\n        rate.sleep()\n",
             {"sleep-outside"},

@@ -35,6 +35,8 @@ def test_a_rate_that_is_a_parameter_is_known(tmp_path, rate, found):
     ("code", "found"),
     [
         ("r = rospy.Rate(5)", [("5", 2)]),
+        ("r = rospy.Rate(hz=1 / 10)", [("0.1", 2)]),
+        ("rospy.Timer(callback=tell, period=rospy.Duration(2))", [("0.5", 2)]),
         ("r = rospy.Rate(HZ)", [("7.5", 2)]),
         ("r = rospy.Rate(1 / 0.4)", [("2.5", 2)]),
         ("while True:\n    rospy.sleep(0.2)", [("5", 3)]),

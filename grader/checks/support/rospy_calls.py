@@ -281,8 +281,11 @@ def rewritten(source: str, *changes: tuple[ast.expr, ast.expr | str], span_to: a
 
 
 def explain_rate(call: ast.Call) -> Meaning | None:
-    """Of `rospy.Rate(…)` with a text, or with 0."""
+    """Of `rospy.Rate(…)` with a text, with 0, or with what `//` makes 0."""
     value = call.args[0].value if call.args and isinstance(call.args[0], ast.Constant) else None
+    if call.args and isinstance(call.args[0], ast.BinOp) and isinstance(call.args[0].op, ast.FloorDiv):
+        why = f"`{ast.unparse(call.args[0])}` is a whole number, 0, and 0 Hz is not a rate"
+        return why, "write how many times a second the loop runs, as in `rospy.Rate(10)`"
     if isinstance(value, str):
         number = re.match(r"\s*(\d+(?:\.\d+)?)", value)
         hint = f"write `rospy.Rate({number[1]})`" if number else "write how many times a second the loop runs"

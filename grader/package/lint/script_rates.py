@@ -5,20 +5,21 @@ Nothing is executed. Python 3.8, standard library only.
 
 import ast
 
-from script_names import LOOPS, all_of, calls_in, dotted, is_call, slip, text_of, walk
+from script_names import LOOPS, all_of, argument, calls_in, dotted, is_call, slip, text_of, walk
+
+VALUES = {"Rate": "hz", "sleep": "duration", "Timer": "period"}
+"""What says how often, by its name."""
 
 
 def nanoseconds(tree):
     """Times that are given nanoseconds in place of seconds."""
     for node in all_of(tree, ast.Call):
         first = node.args[0] if len(node.args) == 1 and not node.keywords else None
-        if dotted(node.func) in ("rospy.Time", "rospy.Duration") and is_call(first, "to_nsec"):
-            what = dotted(node.func)
-            message, fix = (
-                "`%s(…)` takes seconds, and gets nanoseconds" % what,
-                "on line %d, write `%s(0, ` in place of `%s(`",
-            )
-            yield slip(node.lineno, "wrong-value", message, fix % (node.lineno, what, what), "nanoseconds")
+        what = dotted(node.func)
+        if what in ("rospy.Time", "rospy.Duration") and is_call(first, "to_nsec"):
+            message = "`%s(…)` takes seconds, and gets nanoseconds" % what
+            fix = "on line %d, write `%s(0, ` in place of `%s(`" % (node.lineno, what, what)
+            yield slip(node.lineno, "wrong-value", message, fix, "nanoseconds")
 
 
 def loop_rates(tree):
@@ -39,12 +40,13 @@ def loop_rates(tree):
         # Which of several values counts, only a run can tell.
         return values[0] if len(values) == 1 else node
 
-    for node in calls_in(tree, "Rate", "sleep", "Timer"):
+    for node in calls_in(tree, *VALUES):
         timed = node.func.attr
+        values = argument(node, 0, VALUES[timed])
         # A pause outside of a loop, such as one at the start, makes no rate.
-        if not node.args or (timed == "sleep" and id(node) not in looped):
+        if not values or (timed == "sleep" and id(node) not in looped):
             continue
-        value = given(node.args[0])
+        value = given(values[0])
         whole = nanoseconds_apart(value) if is_call(value, "Duration") else None
         pause = dotted(node.func) if timed == "sleep" else ""
         if is_call(value, "Duration") and value.args and not whole:
