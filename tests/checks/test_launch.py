@@ -79,6 +79,10 @@ def node(name: str, namespace: str = "/") -> LaunchNode:
         ),
         (["RLException: ERROR: unknown machine [raspi]"], "no <machine> of the name raspi"),
         (["RLException: multiple files named [a.launch] in package [p]:"], "two launch files"),
+        (
+            ["RLException: Unknown substitution command [param hz]. Valid commands are"],
+            "only the values of an <arg>",
+        ),
         (["RLException: Unknown substitution command [findpkg p]. Valid commands are"], "findpkg p"),
         (["RLException: Invalid roslaunch XML syntax: mismatched tag: line 3, column 2"], "not well-formed"),
     ],

@@ -392,6 +392,7 @@ CASES = {
     ),
     "topic": Case(swapped(TALKER, ("numeric_chatter", "numeric_chater")), ["topic-name"], "should be /numeric_chatter"),
     "node": Case(swapped(TALKER, ("'talker'", "'Talker'")), ["node-name"], "the node Talker should be talker"),
+    "slash": Case(swapped(TALKER, ("'talker'", "'/talker'")), ["node-name"], "the node /talker should be talker"),
     "param": Case(swapped(TALKER, ("'~rate'", "'~rat'")), ["parameter-name"],
         "the parameter ~rat should be ~rate"),
     "script-name": Case({TALKER: None, "src/talkr.py": SCRIPT}, ["file-name"], "should be called talker.py"),

@@ -212,7 +212,9 @@ def _called(name: Name, lines: Sequence[str]) -> str:
 
 def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: Wanted) -> None:
     """Find the literals of a script that are slips of what the lab asks for, where it asks for nothing else there."""
-    node = next((name.value for name in names if name.role == "node"), "") or _name_node(files, file, wanted)
+    node = next((name.value.strip("/") for name in names if name.role == "node"), "") or _name_node(
+        files, file, wanted
+    )
     names = [name for name in names if not _repair_slash(files, file, name, wanted)]
     wanted = wanted.model_copy(update={"params": (*wanted.params, *(f"/{node}/{p}" for p in wanted.private))})
     asked_of = {
@@ -383,7 +385,7 @@ def _bare(name: str, role: str) -> str:
 def _resolve(name: Name, node: str) -> str:
     """Return the whole name, as ROS resolves it for a node in the root namespace."""
     if name.role == "node":
-        return name.value.strip("/")
+        return name.value  # with a slash, it is no name
     if name.value.startswith("~"):
         return f"/{node}/{name.value[1:].lstrip('/')}"
     return f"/{name.value.lstrip('/')}"
