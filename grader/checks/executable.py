@@ -216,7 +216,7 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
         plain = len(movable) == 1 or PurePosixPath(meant[0]).name == wanted.name
         hint = f"{moved}{named}" if plain else f"{hint}, or {moved} if that is meant to be it{named}"
     kind: MistakeKind = "file-elsewhere" if meant else "file-missing"
-    if not movable and (elsewhere := package.hints_on(wanted.name)):
+    if not movable and (elsewhere := (*package.hints_on(wanted.name), *package.hints_on(str(wanted.parent)))):
         where, _, hint = elsewhere[0].partition(": ")
         seen, kind = f"; {where}", "file-elsewhere"
     return failed_or_blocked(

@@ -277,6 +277,12 @@ def _windows(folder: Path, names: list[str]) -> str:
     return f"; {listing(crlf)} cannot be started, because of Windows' line ends (CRLF): dos2unix {them} first"
 
 
+POINTER = (
+    "is only a pointer to another repository, and its files are not in this one: "
+    "delete {0}/.git, `git rm --cached {0}`, `git add {0}`, commit and push"
+)
+
+
 def _where_it_went(root: Path, wanted: str, git_links: tuple[str, ...]) -> str:
     """Return what students do to a package so that it is there and cannot be seen."""
     links = [path for path in git_links if path.rpartition("/")[2].casefold() == wanted.casefold()]
@@ -285,10 +291,7 @@ def _where_it_went(root: Path, wanted: str, git_links: tuple[str, ...]) -> str:
         links = list(git_links)
     if links:
         path = printable(links[0])
-        return (
-            f"{path} is only a pointer to another repository: its files are not in this one: "
-            f"delete {path}/.git, `git rm --cached {path}`, `git add {path}`, commit and push."
-        )
+        return f"{path} {POINTER.format(path)}."
     for folder in walk(root, tolerant=True):
         files = {entry.name for entry in folder.others}
         if MANIFEST in files and manifest_name(root / folder.path, root=root) == wanted:

@@ -18,6 +18,7 @@ from typing import NamedTuple, TypeVar
 from grader.errors import GraderError, OutputError, SubmissionError
 from grader.intake.archive import unpack
 from grader.intake.choose import (
+    POINTER,
     Candidate,
     Choice,
     WantedPackage,
@@ -48,6 +49,7 @@ from grader.intake.tree import Entry, file_digest, is_there, list_entries, tree_
 from grader.model.submission import RecordedSubmission, SourcePackage, Submission
 
 _OTHERS_AT_MOST = 200
+_LINKS_SHOWN = 5
 GIT_S = 120.0
 _SUFFIX = re.compile(r"\.(bag|bag\.active|bag\.orig|mcap|db3)$", re.IGNORECASE)
 _MAGIC = (b"#ROSBAG V", b"\x89MCAP0\r\n", b"SQLite format 3\0")
@@ -324,8 +326,18 @@ def _read(opened: Opened, choice: Choice, repositories: Repositories, limits: In
         hints=(
             *(*choice.hints, *modes.hints, *content.hints),
             *remarks(chosen.folder, content.entries, content.left_out),
+            *(
+                f"{printable(path)} {POINTER.format(printable(path))}"
+                for path in _links_below(opened, chosen)
+            ),
         ),
     )
+
+
+def _links_below(opened: Opened, chosen: Candidate) -> list[str]:
+    """Return the folders of the package of which the repository has only a commit's name."""
+    prefix = "" if chosen.path == "." else f"{chosen.path}/"
+    return [path.removeprefix(prefix) for path in opened.git_links if path.startswith(prefix)][:_LINKS_SHOWN]
 
 
 def _digest_of_all(digest: str, also: Mapping[str, _Read]) -> str:

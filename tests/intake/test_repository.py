@@ -182,6 +182,10 @@ def test_git_links_without_gitmodules_are_harmless(repo, tmp_path):
     for source in (repo, repo.as_uri()):
         submission = opened(source, tmp_path)
         assert set(submission.package.executable) == {"CMakeLists.txt", "package.xml", "src/node.py", "step"}
+    (hint,) = (one for one in submission.hints if "pointer" in one)
+    assert hint.startswith(
+        "src/third is only a pointer to another repository, and its files are not in this one: delete"
+    )
 
 
 @pytest.mark.parametrize("name", ["lab1", "workspace"])
