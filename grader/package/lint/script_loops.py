@@ -26,6 +26,7 @@ from script_names import (
     published_type,
     set_in,
     slip,
+    statements_of,
     walk,
 )
 from script_rates import constant
@@ -65,26 +66,25 @@ def never_reached(tree):
             known[function] = None if left else holding(function.body), set(map(word, nodes))
         return known[function]
 
-    for node in walk(tree):
-        for block in (getattr(node, "body", None), getattr(node, "orelse", None)):
-            for index, one in enumerate(block if isinstance(block, list) else ()):
-                called = run_by(getattr(one, "value", None))
-                loop, within = held(called) if called else (holding([one]), None)
-                if loop is None:
-                    continue
-                within = set(map(word, ast.walk(loop))) if within is None else within
-                yield from read_late(block[index + 1 :], loop)
-                rest = [n for later in block[index + 1 :] for n in ast.walk(later)]
-                behind = [n for n in rest if word(n) and word(n) not in within]
-                if behind and ("publish" not in within or word(behind[0]) in own):
-                    message = "the %s on line %d never ends, so the %s(…) on line %d is never reached"
-                    what = "loop" if isinstance(loop, ast.While) else "spin()"
-                    message %= (what, loop.lineno, word(behind[0]), behind[0].lineno)
-                    runs = (held(run_by(n))[0] for n in rest if isinstance(n, ast.Call))
-                    later = next(filter(None, runs), None)
-                    fix = unreached_fix(one, loop, behind[0], later, called)
-                    yield slip(loop.lineno, "never-reached", message, fix)
-                break  # nothing behind it in the block runs
+    for block in (statements_of(node, part) for node in walk(tree) for part in ("body", "orelse")):
+        for index, one in enumerate(block):
+            called = run_by(getattr(one, "value", None))
+            loop, within = held(called) if called else (holding([one]), None)
+            if loop is None:
+                continue
+            within = set(map(word, ast.walk(loop))) if within is None else within
+            yield from read_late(block[index + 1 :], loop)
+            rest = [n for later in block[index + 1 :] for n in ast.walk(later)]
+            behind = [n for n in rest if word(n) and word(n) not in within]
+            if behind and ("publish" not in within or word(behind[0]) in own):
+                message = "the %s on line %d never ends, so the %s(…) on line %d is never reached"
+                what = "loop" if isinstance(loop, ast.While) else "spin()"
+                message %= (what, loop.lineno, word(behind[0]), behind[0].lineno)
+                runs = (held(run_by(n))[0] for n in rest if isinstance(n, ast.Call))
+                later = next(filter(None, runs), None)
+                fix = unreached_fix(one, loop, behind[0], later, called)
+                yield slip(loop.lineno, "never-reached", message, fix)
+            break  # nothing behind it in the block runs
 
 
 def read_late(rest, loop):
@@ -237,8 +237,8 @@ def run_after(loop, tree):
     """Return the statements that are run once a loop is over, up to the end of its function."""
     parents, one, found = parents_of(tree), loop, []
     while one in parents and not isinstance(one, (ast.FunctionDef, ast.AsyncFunctionDef)):
-        blocks = (getattr(parents[one], key, None) for key in ("body", "orelse", "finalbody"))
-        block = next((block for block in blocks if isinstance(block, list) and one in block), [one])
+        blocks = (statements_of(parents[one], part) for part in ("body", "orelse", "finalbody"))
+        block = next((block for block in blocks if one in block), [one])
         found += block[block.index(one) + 1 :]
         one = parents[one]
     return [one for one in found if not isinstance(one, (ast.FunctionDef, ast.ClassDef))]
@@ -249,7 +249,7 @@ def published_before(tree):
     published = calls_in(tree, "publish")
     for node in walk(tree) if len(published) == 1 else ():
         above = None
-        for one in node.body if isinstance(getattr(node, "body", None), list) else ():
+        for one in statements_of(node):
             called = {called_name(n) for n in ast.walk(one) if isinstance(n, ast.Call)}
             waits = isinstance(one, ast.While) and is_endless(one) and "sleep" in called
             if isinstance(one, ast.Expr) and one.value is published[0]:

@@ -94,6 +94,12 @@ def dotted(node):
     return ".".join(reversed(parts))[:TEXT_LIMIT]
 
 
+def statements_of(node, part="body"):
+    """Return the statements of a node's block; none where its body is an expression, as a lambda's is."""
+    block = getattr(node, part, None)
+    return block if isinstance(block, list) else []
+
+
 def names_in(node):
     """Return the names in a node, as `dotted` writes them."""
     return {dotted(n) for n in ast.walk(node) if isinstance(n, (ast.Name, ast.Attribute))}
@@ -396,7 +402,7 @@ def bound_names(scope):
     names, foreign = set(), set()
     given = getattr(scope, "args", None)
     left = [*ast.iter_child_nodes(given)] if isinstance(scope, FUNCTIONS) else []
-    left += scope.body if isinstance(getattr(scope, "body", None), list) else []
+    left += statements_of(scope)
     while left:
         node = left.pop()
         if isinstance(node, ast.arg):

@@ -17,6 +17,7 @@ from script_names import (
     dotted,
     is_call,
     slip,
+    statements_of,
     walk,
 )
 
@@ -70,7 +71,7 @@ def moves_to_run(tree):
         asks = isinstance(node, ast.If) and "__name__" not in map(dotted, ast.walk(node.test))
         for call in calls_below(node.body) if asks and not calls_in(node.test, "is_shutdown") else ():
             found[call] = "move line %d out of the `if` on line %d" % (call.lineno, node.lineno)
-        body = node.body if isinstance(getattr(node, "body", None), list) else []
+        body = statements_of(node)
         spins = [i for i, one in enumerate(body) if isinstance(one, ast.Expr) and is_call(one.value, "spin")]
         for call in calls_below(body[spins[0] + 1 :]) if spins else ():
             found[call] = "move line %d above line %d" % (call.lineno, body[spins[0]].lineno)

@@ -31,6 +31,7 @@ from script_names import (
     names_in,
     parents_of,
     slip,
+    statements_of,
     targets_of,
     walk,
     walk_own,
@@ -224,8 +225,8 @@ def finished_goals(tree):
         call, around = node.body[-1].value, parents.get(node)
         if called_name(call) not in objects.FINISHING:
             continue
-        block = getattr(around, "body", [])
-        at = block.index(node) + 1 if isinstance(block, list) and node in block else len(block)
+        block = statements_of(around)
+        at = block.index(node) + 1 if node in block else len(block)
         below = [one for one in block[at : at + BELOW_LIMIT] if not is_other_case(one, node)]
         more = any(calls_in(one, *objects.FINISHING) or isinstance(one, LOOPS) for one in below)
         in_loop = isinstance(around, LOOPS)
@@ -509,8 +510,8 @@ def decided_by(node, tree):
     while node in parents and not isinstance(node, ast.stmt):
         node = parents[node]
     given = {dotted(t) for t in getattr(node, "targets", [])}
-    block = getattr(parents.get(node), "body", [])
-    below = block[block.index(node) + 1 :] if isinstance(block, list) and node in block else []
+    block = statements_of(parents.get(node))
+    below = block[block.index(node) + 1 :] if node in block else []
     deciding = [one for one in below if isinstance(one, ast.If) and given & names_in(one.test)]
     sent = [n for one in below for n in calls_in(one, "publish")]
     if not deciding or not sent or any(calls_in(one, "publish") for one in below if one not in deciding):
