@@ -523,3 +523,14 @@ def test_a_type_of_another_topic_in_the_same_sentence_is_not_the_first_ones() ->
     assert list(said_types("/level", HANDOUT)) == ["std_msgs/Float32"]
     assert list(said_types("/level", CONVERTS)) == []
     assert list(said_types("/percent", CONVERTS)) == ["std_msgs/Float64"]
+
+
+def test_a_build_that_also_runs_is_blocked_by_the_manifest_too() -> None:
+    named = {"id": "manifest", "check": "manifest", "with": {"name": "lab1"}}
+    built = {"id": "build", "check": "build-and-run", "scenario": "talker", "requires": ["manifest"]}
+    made = {"processes": [{"name": "catkin_make", "role": "build", "exit_code": 0, "exit_s": 2}]}
+    runs = {"talker": {}, "package": made}
+    found = judge(
+        rubric(named, built), build_runs({"runs": runs, "package": {"files": [{"path": "CMakeLists.txt"}]}})
+    )
+    assert [c.status.value for c in found] == ["fail", "blocked"]
