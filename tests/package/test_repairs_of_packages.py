@@ -147,6 +147,11 @@ CASES = {
     "include": Case(swapped(CMAKELISTS, ("catkin_package()", "catkin_package(\n  INCLUDE_DIRS include\n)")),
                 ["build-line"], "line 4 of CMakeLists.txt: catkin_package(…) names the folder include/"),
     "type": Case(swapped(LAUNCHED, ("talker.py", "talker")), ["launch-type"], 'type="talker" should be'),
+    "definitions-that-nothing-uses": Case(
+        {CMAKELISTS: OWN_CMAKE + "generate_messages(DEPENDENCIES std_msgs)\n"},
+        ["build-line"], "add_message_files(…) needs the folder msg/, which is not there",
+        after={CMAKELISTS: "message_generation rospy)\n\ncatkin_package"},
+    ),
     "node-in-cpp-beside-the-labs": Case(
         {"src/a.cpp": CPP_NODE.replace('"a"', '"talkr"').replace("  return 0", "  ros::spin()")}, []
     ),

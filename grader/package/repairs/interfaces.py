@@ -55,9 +55,9 @@ def make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Col
 
     One that only other scripts than those that are run would use is not added to those that the file names already.
     """
-    _delete_empty(files, package)
     code = [f.path for f in package.files if is_own(f.path) and (f.python or f.path.endswith(CPP))]
     used = _used_kinds(files, package, name, code)
+    _delete_empty(files, package, used)
     made = {
         c: _definitions(files, package, folder) for c, folder in INTERFACE_FOLDERS.items() if folder in used
     }
@@ -98,14 +98,19 @@ def _delete_generation(files: Files, package: PackageFacts) -> None:
     _delete(files, calls[0], f"{GENERATE}(…) is called, and there are no messages to make")
 
 
-def _delete_empty(files: Files, package: PackageFacts) -> None:
-    """Delete calls that name no file and ask for a folder that is not there."""
+def _delete_empty(files: Files, package: PackageFacts, used: Collection[str]) -> None:
+    """Delete calls that ask for a folder that is not there, where they name no file, or only what was not handed in and
+    no code uses."""
+    paths = [file.path for file in package.files]
     for name, folder in INTERFACE_FOLDERS.items():
-        there = any(file.path.startswith(f"{folder}/") for file in package.files)
+        there = any(path.startswith(f"{folder}/") for path in paths)
+        unused = folder not in used and not any(path.endswith(f".{folder}") for path in paths)
         for call in reversed(calls_of(files, name)) if not there else ():
             if [token.value for token in words_of(call)] in ([], ["FILES"]):
                 why = f"{name}(…) names no file, and needs the folder {folder}/, which is not there"
                 _delete(files, call, why)
+            elif unused:
+                _delete(files, call, f"{name}(…) needs the folder {folder}/, which is not there")
 
 
 def _delete(files: Files, call: Command, why: str) -> None:
