@@ -24,7 +24,7 @@ from grader.checks.support.scripts import (
 from grader.checks.support.text import near_names, shown
 from grader.model.package import Executable, LaunchFile, LaunchLine, LaunchNode, PackageFacts, SourceFile
 from grader.model.verdict import FileCitation, MistakeKind, Verdict, failed, failed_or_blocked
-from grader.wording import join_words, on_lines, there_is
+from grader.wording import has_role_of, join_words, on_lines, there_is
 
 OTHER_ATTRIBUTES = {"package": "pkg", "exec": "type", "executable": "type", "script": "type"}
 """What ROS 2, or plain English, calls them."""
@@ -361,6 +361,9 @@ def _nothing_like_it(package: PackageFacts, node: LaunchNode, why: str) -> Slip:
     near = near_names(plain, names) or [n for n in names if suffix and suffix != ".py" and n.endswith(suffix)]
     if near:
         return _slip(node, f"{why}; {there_is(near)}", f'write type="{near[0]}"')
+    if alike := [n for n in names if has_role_of(n, plain)]:
+        fix = f'write type="{alike[0]}"' if len(alike) == 1 else "write the one that is meant as type"
+        return _slip(node, f"{why}; {there_is(alike)}", fix)
     if known := next((pkg for pkg, named in PROGRAMS_OF.items() if node.type in named), None):
         return _slip(node, f"{why}; ROS has one in {known}", f'write pkg="{known}"')
     fix = "type is the script's whole file name, with its ending"
