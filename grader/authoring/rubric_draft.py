@@ -292,6 +292,15 @@ def _quote_text(dumper: _Dumper, text: str) -> yaml.ScalarNode:
 _Dumper.add_representer(str, _quote_text)
 
 
+def title_of(package: str) -> str:
+    """Return the title of a draft, with the package's name in words: `Lab: battery monitor`.
+
+    No capitals are added: a name that differs in one letter is taken for a slip.
+    """
+    words = re.sub(r"[\W_]+", " ", package).strip()
+    return f"Lab: {words or package}"
+
+
 def rubric_text(
     package: str,
     rubric_id: str,
@@ -303,7 +312,7 @@ def rubric_text(
     about = {
         "schema": "grader.rubric/1",
         "id": rubric_id,
-        "title": f"The lab {rubric_id}",
+        "title": title_of(package),
         "version": "1",
         "package": package,
     }

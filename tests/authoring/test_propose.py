@@ -22,6 +22,7 @@ from grader.authoring.rubric_draft import (
     rubric_text,
     second_look,
     step_for,
+    title_of,
     wraps_of,
 )
 from grader.evidence.reader import package_facts
@@ -124,6 +125,19 @@ def test_a_node_that_failed_is_named_in_a_note(tmp_path):
     path.write_text(text)
     assert "# NOTE: src/node.py was not observed" in text
     assert load_rubric(str(path)).rubric.max_points == 100
+
+
+@pytest.mark.parametrize(
+    ("package", "title"),
+    [
+        ("battery_monitor", "Lab: battery monitor"),
+        ("pick-and-place", "Lab: pick and place"),
+        ("lab3", "Lab: lab3"),
+        ("__", "Lab: __"),
+    ],
+)
+def test_a_drafts_title_is_the_packages_name_in_words(package: str, title: str) -> None:
+    assert title_of(package) == title
 
 
 def test_a_script_with_its_packages_name_is_noted() -> None:
@@ -346,6 +360,7 @@ def test_a_proposed_rubric_reads_back(name, text, notes):
     made = rubric_text(name, "sample", scenarios, criteria, notes)
     read = yaml.safe_load(made)
     assert read["package"] == name
+    assert read["title"]
     assert read["scenarios"] == scenarios
     assert read["criteria"] == criteria
     assert set(read) == {"schema", "id", "title", "version", "package", "scenarios", "criteria"}
