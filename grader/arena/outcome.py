@@ -32,7 +32,7 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
     """
     given, until = until, _patient(live, until)
     still_starting = bool(starting(live, until, now_s))
-    enough = (not still_starting, *_enough(live, until, now_s))
+    enough = (not still_starting, *_enough(live, until, now_s, given))
     if live.ended and not live.running:
         return "complete" if until.ended and all(enough) else "ended", ""
     # Where nothing ends the run before its limit, the limit is its end and no failure.
@@ -52,14 +52,15 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
     return None
 
 
-def _enough(live: RunState, until: Until, now_s: float) -> tuple[bool, ...]:
+def _enough(live: RunState, until: Until, now_s: float, given: Until | None = None) -> tuple[bool, ...]:
+    """`given` is `until` as the rubric has it."""
     return (
         _window(live, until, now_s),
         _messages(live, until),
         _are_connected(live, until, now_s),
         _has_heard(live, until, now_s),
         _nodes(live, until, now_s),
-        _quiet(live, until, now_s),
+        _quiet(live, until, given or until, now_s),
     )
 
 
@@ -185,7 +186,7 @@ def _lived_s(live: RunState, alive_s: float) -> float:
     return max(live.first_node_s + alive_s, live.registered_s + alive_s / 2) if live.nodes else math.inf
 
 
-def _quiet(live: RunState, until: Until, now_s: float) -> bool:
+def _quiet(live: RunState, until: Until, given: Until, now_s: float) -> bool:
     if until.quiet_s is None:
         return True
     if any(publisher not in live.helper_nodes for _, publisher in live.unrecorded):
@@ -194,7 +195,7 @@ def _quiet(live: RunState, until: Until, now_s: float) -> bool:
     own = {topic: nodes - live.helper_nodes for topic, nodes in live.published.items() if topic != ROSOUT}
     silent = tuple(topic for topic, nodes in own.items() if nodes)
     talks = any(nodes & live.talking.keys() for nodes in own.values())
-    if silent and not talks and not is_silent(live, silent, until, now_s):
+    if silent and not talks and not is_silent(live, silent, given, now_s):
         quiet_at_s = max(quiet_at_s, _began_s(live) + until.first_message_s)  # it has yet to begin
     return live.activity_s > 0 and now_s >= quiet_at_s
 
@@ -256,7 +257,7 @@ def _never(live: RunState, until: Until, given: Until, now_s: float) -> str:
         "nodes": min(until.nodes, len(live.nodes)),
         "ended": tuple(process for process in until.ended if not goes_on(live, process, now_s)),
     }
-    if all(_enough(live, until.model_copy(update=possible), now_s)):
+    if all(_enough(live, until.model_copy(update=possible), now_s, given)):
         missing = min(absent, default="")
         return f"the graph has settled, without {missing}" if missing else "the graph has settled"
     return ""

@@ -104,6 +104,17 @@ def test_what_never_comes_ends_the_wait_once_the_graph_has_settled(
     assert find_outcome(live, until, 5.0) == (outcome and ("silent", outcome))
 
 
+@pytest.mark.parametrize(("first_message_s", "ends"), [(20, True), (30, False)])
+def test_a_full_machine_makes_no_silent_node_one_that_the_rubric_waits_long_for(
+    first_message_s: float, ends: bool
+) -> None:
+    live, until = _resting(node=("spins", 1)), Until(quiet_s=1, first_message_s=first_message_s)
+    live.published = {"/a": {"/node"}}
+    live.lost_s = 5.0
+    assert find_outcome(live, until, 3.0) is None
+    assert find_outcome(live, until, 8.0) == (("complete", "") if ends else None)
+
+
 @pytest.mark.parametrize(
     ("connected", "programs", "ends"),
     [
