@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from typing_extensions import Self
 
-from grader.arena.outcome import is_settled, is_silent, starting, starts_until_s
+from grader.arena.outcome import LATE_MOST, is_settled, is_silent, starting, starts_until_s
 from grader.arena.scenario_inputs import make_shots
 from grader.arena.served import ServedAction, ServedServices, call_functions
 from grader.arena.session import NS, ArenaSession
@@ -73,7 +73,7 @@ class StepRunner:
         self._starts = starts
         self._results: dict[str, MessageType] = {}
         self._goals = 0
-        self._unended_s: dict[str, float] = {}
+        self._unended: dict[str, tuple[float, float]] = {}
         self._cancels = cancels or {}
         self._beside = beside or Path()
         self._bags: dict[str, tuple[Channel, ...]] = {}
@@ -527,7 +527,7 @@ class StepRunner:
             return
         self._tell(f"waiting for the result of {action.name}")
         left_s, found, since = action.limit_s, None, ""
-        self._unended_s[name] = self._own_s()
+        self._unended[name] = time.monotonic(), self._live.lost_s
         if action.cancel_after_s is not None:
             found = await self._result(action, name, action.cancel_after_s)
             if found is None:
@@ -535,7 +535,7 @@ class StepRunner:
                 left_s, since = self._patience_s(action), " after it was cancelled"
         found = found or await self._result(action, name, left_s)
         if found is not None:
-            del self._unended_s[name]
+            del self._unended[name]
         late = BEHIND if self._is_behind(action, name) else f"no result within {left_s:g} s{since}"
         value_, detail = found or (None, late)
         self._arena.note(ActorEvent(action="result", actor="grader", **about, value=value_, detail=detail))
@@ -571,16 +571,20 @@ class StepRunner:
         status = found["status"]["status"]
         return found["result"], GOAL_STATUS[status] if status < len(GOAL_STATUS) else f"status {status}"
 
-    def _own_s(self) -> float:
-        """Return the time that the run has had the machine for: others' share of a full one does not count."""
-        return time.monotonic() - self._live.lost_s
+    def _is_older(self, goal: str, patience_s: float) -> bool:
+        """Return whether a goal without its result was sent so long ago; longer, where others fill the machine."""
+        sent_s, lost_before_s = self._unended[goal]
+        lost_s = self._live.lost_s - lost_before_s
+        if self._live.running <= self._live.at_rest.keys():
+            lost_s = min(lost_s, LATE_MOST * patience_s)
+        return time.monotonic() > sent_s + patience_s + lost_s
 
     def _is_behind(self, action: Action, name: str) -> bool:
         """Return whether the server has not begun with this goal for a while, since it still works on an earlier one
         that got no result in its time."""
-        now_s, came = self._own_s(), self._arena.watch(f"{action.name}/status")
-        stuck = {goal for goal, sent_s in self._unended_s.items() if now_s > sent_s + ANSWER_S} - {name}
-        if not stuck or not came or now_s < self._unended_s.get(name, now_s) + AGAIN_S:
+        stuck = {goal for goal in self._unended if goal != name and self._is_older(goal, ANSWER_S)}
+        came = self._arena.watch(f"{action.name}/status")
+        if not stuck or not came or name not in self._unended or not self._is_older(name, AGAIN_S):
             return False
         seen = self._statuses.decode(came[-1]) or {"status_list": []}
         status = {one["goal_id"]["id"]: one["status"] for one in seen["status_list"]}
