@@ -215,7 +215,8 @@ def _recording(file: LeftFile, topics: dict[str, TopicLeft], run: Run) -> Verdic
     except EvidenceError as error:
         return failed(error.message, hint=error.hint or "close the recording: end rosbag record with Ctrl-C")
     for topic, wanted in topics.items():
-        found = [channel for channel in channels if channel.topic == topic]
+        # rosbag writes a name as it was given: `rosbag record steps`, which is played back on /steps
+        found = [channel for channel in channels if channel.topic in {topic, topic.lstrip("/")}]
         if wrong := _wrong_topic(file.path, topic, wanted, found, run):
             seen = list(dict.fromkeys(channel.topic for channel in channels if channel.messages))
             return wrong.about(measured=_list_paths(seen) or "no topic")

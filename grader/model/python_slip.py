@@ -84,7 +84,8 @@ class PythonSlip(Placed, Record):
       that all numbers fulfil, or none, or what each turn of a loop adds or sets again (`name`: `nan`, `degrees`,
       `return`, `empty`, `unsent`, `kept`, `nanoseconds`, `bounds`, `added`); a grid's index that steps by its height, a
       cell that `int(…)` works out of a number below 0, a quaternion of a whole angle, a float for the seconds of a
-      time, and the mean of a scan's ranges (`step`, `cut`, `half`, `secs`, `mean`).
+      time, the mean of a scan's ranges, and a parameter that is read where it is not set (`step`, `cut`, `half`,
+      `secs`, `mean`, `unset`).
 
     No slips, but what a line says, for checks that compare it with what the lab asks; `message` is a name, a number or
     a text:

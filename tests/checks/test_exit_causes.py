@@ -398,3 +398,10 @@ def test_a_script_in_an_old_encoding_is_not_read_by_what_the_build_makes_of_it(t
     frame = (wrapper, 15, "exec(compile(fh.read(), python_script, 'exec'), context)")
     end = explained(tmp_path, files, frame, error=error)
     assert ("as UTF-8 in your editor" in end.hint) == (encoding != "utf-8")
+
+
+def test_a_parameter_that_is_read_where_it_is_not_set_is_told_with_its_condition(tmp_path):
+    text = "import rospy\nif not rospy.has_param('~a'):\n    a = rospy.get_param('~a')\n"
+    frame = ("node.py", 3, "a = rospy.get_param('~a')")
+    found = explained(tmp_path, {"node.py": text}, frame, error="KeyError: '~a'")
+    assert found.hint == "on line 2, write the condition without its `not`"

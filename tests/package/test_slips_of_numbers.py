@@ -352,6 +352,9 @@ def test_a_quaternion_of_a_whole_angle(lines: str, fixes: list[str], tmp_path: P
     [
         ("far = sum(near) / len(near)", ["on line 2, write `min(near)` in its place"]),
         ("far = sum(near) / len(near)\nfirst = min(near)", []),
+        ("if max(msg.ranges) < 0.5: stop()", ["on line 2, write `min` for `max`"]),
+        ("far = max(msg.ranges[:9])\nif far < 0.5: stop()", ["on line 2, write `min` for `max`"]),
+        ("if max(msg.ranges) > 3: go()", []),
     ],
 )
 def test_the_mean_of_ranges(lines: str, fixes: list[str], tmp_path: Path) -> None:
@@ -423,3 +426,20 @@ def test_velocities_of_another_turn(text: str, fixes: list[str], tmp_path: Path)
 def test_nanoseconds_for_seconds(text: str, fixes: list[str], tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(text, encoding="utf-8")
     assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "nanoseconds"] == fixes
+
+
+@pytest.mark.parametrize(
+    ("condition", "fixes"),
+    [
+        ("not rospy.has_param('~a')", ["on line 2, write the condition without its `not`"]),
+        ("rospy.has_param('~a')", []),
+        ("not rospy.has_param('~b')", []),
+    ],
+)
+def test_a_parameter_that_is_read_only_where_it_is_not_set(
+    condition: str, fixes: list[str], tmp_path: Path
+) -> None:
+    text = f"import rospy\nif {condition}:\n    a = rospy.get_param('~a')\nelse:\n    a = 1\n"
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.fix for s in slips] == fixes

@@ -53,11 +53,8 @@ def answers_in_some_cases(tree):
             ends.append(ends[-1].orelse[-1] if ends[-1].orelse else None)
         if ends[-1] is None and answer.endswith("Response"):
             message = "`%s` returns nothing where no condition of its last `if` holds" % name
-            fix = "below line %d, and as far in as line %d, write `return %s(…)`" % (
-                last.end_lineno,
-                last.lineno,
-                answer,
-            )
+            fix = "below line %d, and as far in as line %d, write `return %s(…)`"
+            fix %= (last.end_lineno, last.lineno, answer)
             yield slip(last.lineno, "wrong-value", message, fix, "return")
 
 

@@ -25,7 +25,7 @@ def indexes(tree):
     yield from cut_to_zero(tree)
     yield from whole_angles(tree)
     yield from float_seconds(tree)
-    yield from means_of_ranges(tree)
+    yield from not_the_smallest(tree)
     yield from ranges_read(tree)
 
 
@@ -101,11 +101,12 @@ def float_seconds(tree):
             yield slip(node.lineno, "wrong-value", message, fix, "secs")
 
 
-def means_of_ranges(tree):
-    """`sum(front) / len(front)` in a script that reads a scan and looks for no smallest range."""
+def not_the_smallest(tree):
+    """`sum(front) / len(front)`, or `max(front) < 0.5`, in a script that reads a scan and looks for no smallest one."""
     reads = any(is_ranges(n) for n in all_of(tree, ast.Attribute))
-    calls = {called_name(n) for n in all_of(tree, ast.Call)}
-    for node in all_of(tree, ast.BinOp) if reads and "min" not in calls else ():
+    if not reads or any(called_name(n) == "min" for n in all_of(tree, ast.Call)):
+        return
+    for node in all_of(tree, ast.BinOp):
         total, count = called_name(node.left), called_name(node.right)
         if (
             isinstance(node.op, ast.Div)
@@ -120,6 +121,14 @@ def means_of_ranges(tree):
                 name if "..." not in name else "…",
             )
             yield slip(node.lineno, "wrong-value", message, fix, "mean")
+    made = {dotted(n.targets[0]): n.value for n in all_of(tree, ast.Assign) if called_name(n.value) == "max"}
+    tests = [n for n in all_of(tree, ast.Compare) if isinstance(n.ops[0], (ast.Lt, ast.LtE))]
+    for call in (made.get(dotted(n.left), n.left) for n in tests):
+        if called_name(call) == "max" and any(is_ranges(n) for n in ast.walk(call)):
+            message = "the largest of these ranges is small only where all of them are"
+            yield slip(
+                call.lineno, "wrong-value", message, "on line %d, write `min` for `max`" % call.lineno, "mean"
+            )
 
 
 OF_QUATERNION = 4

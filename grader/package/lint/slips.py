@@ -33,6 +33,7 @@ from script_names import (
     slip,
     statements_of,
     targets_of,
+    text_of,
     walk,
     walk_own,
 )
@@ -52,7 +53,8 @@ def slips(tree):
         objects.object_slips, said_texts, loops.deaf_loops, counters.clock_values, counters.counter_slips,
         counters.counter_starts, without_effect, names.assigned_late, objects.hidden_names, objects.subscribed_again,
         imports, objects.taken_off, objects.unstarted_servers, wrong_values, decided_conditions,
-        times_added_again, overwritten_values, script_indexes.indexes, published_in_turn, objects.kept_velocities,
+        times_added_again, params_read_unset, overwritten_values, script_indexes.indexes, published_in_turn,
+        objects.kept_velocities,
         callbacks.unprinted_messages, counters.values_left_out, counters.published_unchanged,
         objects.unused_publishers, objects.unsent_messages, loops.loops_of_numbers, finished_goals,
         finished_in_loops, counters.sends_no_time, without_node,
@@ -322,6 +324,24 @@ def decided_by_values(condition, kind):
             fix = "on line %d, write `%s` in place of `%s`" % (condition.lineno, other, word)
             message = "`%s` is true for %s value" % (pair, holds)
             yield slip(condition.lineno, "wrong-value", message, fix, "bounds")
+
+
+def params_read_unset(tree):
+    """`if not rospy.has_param('~a'): a = rospy.get_param('~a')`, which reads it only where nobody sets it."""
+    for node in all_of(tree, ast.If):
+        is_not = isinstance(node.test, ast.UnaryOp) and isinstance(node.test.op, ast.Not)
+        asked = node.test.operand if is_not else node.test
+        name = text_of(asked.args[0]) if called_name(asked) == "has_param" and asked.args else ""
+        unset, is_set = (node.body, node.orelse) if is_not else (node.orelse, node.body)
+        reads = [
+            [c for n in block for c in calls_in(n, "get_param") if c.args and text_of(c.args[0]) == name]
+            for block in (unset, is_set)
+        ]
+        if name and reads[0] and not reads[1] and all(len(c.args) == 1 and not c.keywords for c in reads[0]):
+            message = "this reads the parameter %s only where it is not set" % name
+            right = "without its `not`" if is_not else "with a `not`"
+            fix = "on line %d, write the condition %s" % (node.lineno, right)
+            yield slip(node.lineno, "wrong-value", message, fix, "unset")
 
 
 CLOCKS = ("now", "get_time", "time", "get_rostime", "to_sec", "toSec")
