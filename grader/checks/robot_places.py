@@ -535,9 +535,10 @@ def _stays(
             verdict = verdict.explained(f"it drives in circles there, {around:.1f} times around", CIRCLES)
     elif long_m < params.least_m:
         verdict = drives_too_little(path, region, params.least_m)
-    elif params.least_m and long_m - length_m((end := circling(path))[0]) < params.least_m:
+    elif params.least_m and (way_m := long_m - length_m((end := circling(path))[0])) < params.least_m:
         message = f"it drives in circles at {spot(path[-1].point)} in the end, {end[1]:.1f} times around"
         verdict = failed(message, hint=CIRCLES if params.max_m is not None else STILL_TURNS)
+        long_m = way_m
     else:
         always = f"for {inside:.0%} of the time" if any(out) else "all the time"
         return passed(f"it is {region.words} {always}", measured=figures)
