@@ -563,11 +563,25 @@ def _other_value(
     verdict = failed(message, hint=hint)
     if params.when == "first":
         # What fails after the first message does not make it what it is
-        return verdict.model_copy(update={"callbacks": "before", "due": ((run.start_ns, first.time_ns),)})
+        due = ((run.start_ns, first.time_ns),)
+        verdict = _of_one_branch(verdict, found, run, params)
+        return verdict.model_copy(update={"callbacks": "before", "due": due})
     update: dict[str, object] = {"timing": True}
     if since := turned_wrong(found, params.value):  # a callback that fails later did not do it
         update |= {"wrong": "order" if MOVED in why else "place", "due": ((run.start_ns, since),)}
     return verdict.model_copy(update=update)
+
+
+def _of_one_branch(
+    verdict: Verdict, found: Sequence[Reading], run: Run, params: FieldEqualsParams
+) -> Verdict:
+    """Return the loss with how many messages came on the only topic on which the grader sent, if those are more."""
+    sent = [c for c in run.channels if c.by_grader and c.messages and not c.topic.startswith("/grader")]
+    if len(sent) != 1 or sent[0].topic == params.topic or len(sent[0].messages) <= len(found):
+        return verdict
+    topic, count = sent[0].topic, plural(len(sent[0].messages), "message")
+    hint = f"publish for each message on {topic}: in the callback, below the `if` and not in it"
+    return verdict.explained(f"{count} came on {topic}, and {len(found)} on {params.topic}", hint)
 
 
 def _waited_without_message(run: Run, topic: str, before_ns: int) -> bool:

@@ -192,6 +192,8 @@ from tests.checks.tracebacks import SCRIPT, explained, package_of, raised
         (6, "a = int(sys.argv[0]) + int(sys.argv[1])",
          "ValueError: invalid literal for int() with base 10: '/ws/lab/talker.py'",
          "write `a = int(sys.argv[1]) + int(sys.argv[2])`"),
+        (6, "a = int(sys.argv[0])", "ValueError: invalid literal for int() with base 10: '/w/add.py'",
+         "write `a = int(sys.argv[1])`, and read each argument behind it one place further on too"),
         (6, "a = int(args[0])", "ValueError: invalid literal for int() with base 10: 'talker.py'",
          "begin at `sys.argv[1]`"),
         (6, "self.publisher.publish(self.grid)",

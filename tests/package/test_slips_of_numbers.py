@@ -443,3 +443,12 @@ def test_a_parameter_that_is_read_only_where_it_is_not_set(
     (tmp_path / "a.py").write_text(text, encoding="utf-8")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
     assert [s.fix for s in slips] == fixes
+
+
+def test_a_listener_that_each_turn_makes_again(tmp_path: Path) -> None:
+    text = (
+        "while not rospy.is_shutdown():\n    b = tf2_ros.Buffer()\n    ear = tf2_ros.TransformListener(b)\n"
+    )
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.fix for s in slips] == ["move lines 2 and 3 above line 1"]

@@ -141,10 +141,8 @@ def _index(message: str, source: str, marked: tuple[int, int] | None) -> Meaning
         return "the text has more `{}` in it than `format(…)` has values", fix
     found = _subscript(source, marked)
     if found is None:
-        return (
-            "the index is beyond the end",
-            f"check the length before you access an element: {NUMBER_OF_PARTS}",
-        )
+        hint = f"check the length before you access an element: {NUMBER_OF_PARTS}"
+        return "the index is beyond the end", hint
     name, index = (shown(ast.unparse(part)) for part in (found.value, found.slice))
     if "assignment" in message:  # to what the script makes itself, and not to what comes in a message
         fix = f"make `{name}` as long as it has to be where it gets its value: an assignment adds no element"
@@ -215,9 +213,8 @@ def _not_finite(message: str, source: str) -> Meaning | None:
 def _program(source: str) -> Meaning:
     """Of `float(sys.argv[0])`: the first argument is the program's own path."""
     cause = "the first of `sys.argv` is the path of the script itself, and its arguments begin at 1"
-    parts = [
-        n for n in ast.walk(line_tree(source)) if isinstance(n, ast.Subscript) and "argv" in ast.unparse(n)
-    ]
+    every = (n for n in ast.walk(line_tree(source)) if isinstance(n, ast.Subscript))
+    parts = [n for n in every if "argv" in ast.unparse(n)]
     places = [n.slice for n in parts if not isinstance(n.slice, ast.Slice)]
     slices = [n.slice for n in parts if isinstance(n.slice, ast.Slice)]
     places += [one for s in slices for one in (s.lower, s.upper) if one is not None]
@@ -225,7 +222,11 @@ def _program(source: str) -> Meaning:
     numbers = {p: p.value + 1 for p in places if isinstance(p, ast.Constant) and isinstance(p.value, int)}
     if not parts or begins or len(numbers) < len(places):
         return cause, "begin at `sys.argv[1]`"
-    return cause, rewritten(source, *((place, str(number)) for place, number in numbers.items()))
+    fix = rewritten(source, *((place, str(number)) for place, number in numbers.items()))
+    behind = (
+        "" if slices or len(numbers) > 1 else ", and read each argument behind it one place further on too"
+    )
+    return cause, f"{fix}{behind}"
 
 
 def _place_in_list(message: str, source: str) -> Meaning | None:

@@ -335,6 +335,12 @@ def subscribed_again(tree):
                 fix = "move line %d above line %d, and write `rospy.spin()` in place of the loop if that is all it does"
                 lines = (made.lineno, loop.lineno)
                 yield slip(made.lineno, "subscribed-again", message % lines[::-1], fix % lines)
+        made = [n for n in ast.walk(loop) if called_name(n) in ("Buffer", "TransformListener")]
+        if any(called_name(n) == "TransformListener" for n in made) and calls_in(loop.test, "is_shutdown"):
+            lines = listed(sorted({n.lineno for n in made}))
+            message = "each turn of the loop makes another TransformListener, which has heard nothing yet"
+            fix = "move %s above line %d" % (lines, loop.lineno)
+            yield slip(made[0].lineno, "wrong-value", message, fix, "added")
 
 
 def taken_off(tree):
