@@ -391,9 +391,12 @@ def test_messages_that_are_filled_in_and_not_sent(text: str, fixes: list[str], t
 
 def test_fields_of_an_attribute_that_is_always_none(tmp_path: Path) -> None:
     head = "class A:\n def __init__(self):\n  self.p = None\n  Subscriber('/p', Pose, self.f)\n def f(self, m):\n"
-    (tmp_path / "a.py").write_text(f"{head}  self.p.x = m.x\n", encoding="utf-8")
+    (tmp_path / "a.py").write_text(
+        f"{head}  self.p.x = m.x\n def h(self):\n  print(self.p.y)\n", encoding="utf-8"
+    )
     (tmp_path / "b.py").write_text(f"{head}  self.p = m\n  self.p.x = 1\n", encoding="utf-8")
     found = [s for s in check_syntax(tmp_path, ["a.py", "b.py"]).slips if s.kind == "object"]
     assert [(s.file, s.line, s.fix, s.name) for s in found] == [
-        ("a.py", 6, "on line 3, write `self.p = Pose()`", "x")
+        ("a.py", 6, "on line 3, write `self.p = Pose()`", "x"),
+        ("a.py", 8, "on line 3, write `self.p = Pose()`", "y"),
     ]

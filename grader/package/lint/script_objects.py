@@ -122,14 +122,19 @@ def fields_of_none(tree):
     for n in all_of(tree, ast.Assign):
         for target in n.targets:
             given.setdefault(dotted(target), []).append(n)
+    found = {}
     for function, kind in callbacks.items():
         for n in stored_in([function] if function and kind else []):
             values = given.get(dotted(n.value), []) if dotted(n.value).startswith("self.") else []
             if values and all(getattr(one.value, "value", 0) is None for one in values):
-                name, line = dotted(n.value), values[0].lineno
-                message = "nothing gives `%s` another value than None, and None has no fields" % name
-                fix = "on line %d, write `%s = %s()`" % (line, name, kind)
-                yield slip(n.lineno, "object", message, fix, n.attr)
+                found[dotted(n.value)] = values[0].lineno, kind
+    # It fails where a field is set, and where one is read.
+    for n in all_of(tree, ast.Attribute):
+        name = dotted(n.value)
+        if name in found:
+            message = "nothing gives `%s` another value than None, and None has no fields" % name
+            fix = "on line %d, write `%s = %s()`" % (found[name][0], name, found[name][1])
+            yield slip(n.lineno, "object", message, fix, n.attr)
 
 
 OF_ROS_2 = (
