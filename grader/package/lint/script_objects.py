@@ -405,7 +405,8 @@ def kept_velocities(tree):
     for block in all_of(tree, ast.FunctionDef, ast.While)[:USES_LIMIT]:
         inside = set(ast.walk(block))
         kept = [name for name, node in made.items() if node not in inside and name not in set_in(block)]
-        for choice in (n for n in block.body if isinstance(n, ast.If)):
+        choices = [n for n in block.body if isinstance(n, ast.If)] if kept else []
+        for choice in choices[:USES_LIMIT]:
             below = [n for one in block.body if one.lineno > choice.lineno for n in calls_in(one, "publish")]
             sent = {
                 dotted(n.args[0]) for n in below if n.args and isinstance(block, (ast.FunctionDef, ast.While))
