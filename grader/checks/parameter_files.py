@@ -166,10 +166,34 @@ def _missing(
     root = name.split("/")[1]
     if all(one.removeprefix(f"/{root}") in found for one in missing):
         hint = f"write `{root}:` above them, and indent them all by two more spaces"
+    elif nested := _levels(missing, found):
+        flat = ["_".join(one.split("/")[1:]) for one in missing]
+        sources = [text_of(build, file.path) for file in package.files if file.python]
+        is_read = any(f"{quote}{one}" in text for text in sources for one in flat for quote in "'\"/")
+        hint = f"{nested}; then read them there in the script too" if is_read else nested
     elif shallow in found:
         readers = join_words(_readers(package, build, shallow, above))
         hint = f"{moved}; then read it there in {readers} too" if readers else moved
     return failed(f"{path} loads, but {describe_missing(found, name)}{more}", hint=hint)
+
+
+def _levels(missing: list[str], found: dict[str, object]) -> str:
+    """Return how to nest keys that the file has flat, as `details_name_first` or `first`; "" where it is one block, or
+    the lab asks for other levels than three."""
+    below: dict[str, list[str]] = {}
+    for name in missing:
+        _, *parts = name.split("/")
+        flat = {sign.join(parts[first:]) for sign in "_.-" for first in range(len(parts))}
+        root = {f"{parts[0]}/{parts[-1]}"}
+        if len(parts) != 3 or not any(
+            f"/{one}" in found for one in flat | root
+        ):  # a root, its blocks, their keys
+            return ""
+        below.setdefault(parts[1], []).append(f"`{parts[2]}:`")
+    blocks = [f"`{block}:` with {join_words(keys)} below it" for block, keys in below.items()]
+    above = missing[0].split("/")[1]
+    told = f"write the keys in levels, each two spaces further in than the one above: `{above}:`, below it "
+    return told + join_words(blocks) if len(blocks) > 1 else ""
 
 
 def _readers(package: PackageFacts, build: Run, name: str, not_below: str) -> Iterator[str]:
