@@ -161,10 +161,11 @@ def advice_on(repairs: Iterable[Repair]) -> list[str]:
     the same line are told as one, by what it was and will be."""
     joined: list[Repair] = []
     for repair in repairs:
-        if joined and _is_rewritten(joined[-1], repair):
-            before = joined.pop().before
+        earlier = next((at for at, one in enumerate(joined) if _is_rewritten(one, repair)), None)
+        if earlier is not None:
+            before = joined[earlier].before
             fix = added_lines(before, repair.after)
-            joined.append(repair.model_copy(update={"before": before, "fix": fix}))
+            joined[earlier] = repair.model_copy(update={"before": before, "fix": fix})
         else:
             joined.append(repair)
     each = map(_where_and_how, joined)

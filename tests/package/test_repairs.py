@@ -9,7 +9,7 @@ import pytest
 
 from grader.model.message_definitions import parse_definition
 from grader.model.python_slip import PythonSlip, SlipKind
-from grader.model.repair import BY_HAND, DEFAULT_SHARES, KINDS, Repair
+from grader.model.repair import BY_HAND, DEFAULT_SHARES, KINDS, Repair, advice_on
 from grader.model.submission import chmod_hint
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs
 from grader.package.repairs.editing import changed_lines
@@ -183,6 +183,13 @@ def test_a_repair_whose_lines_are_gone_is_refused(tmp_path: Path) -> None:
     with pytest.raises(NotRepairable, match="is not as it was"):
         apply_repair(folder, found)
     assert (folder / TALKER).read_text() == "import rospy\n"
+
+
+def test_a_line_that_is_repaired_twice_is_told_once() -> None:
+    lines = [(2, "a", "b"), (3, "x", "y"), (2, "b", "c")]
+    known = {"kind": "missing-call", "file": "a.py", "message": "wrong"}
+    repairs = [Repair(**known, line=n, before=old, after=new, fix=new) for n, old, new in lines]
+    assert advice_on(repairs) == ["a.py line 2: write `c`", "a.py line 3: write `y`"]
 
 
 def test_every_kind_has_a_share_and_words() -> None:
