@@ -129,6 +129,7 @@ def with_classes(text: str, types: list[str]) -> Iterator[Step]:
             continue
         of_lab = {name for own, _, name in (t.partition("/") for t in types) if own == package}
         same = {name.lower(): name for name in {*MESSAGES.get(package, "").split(), *of_lab}}
+        places: list[tuple[ast.AST, str]] = []
         for alias in (one for one in node.names if one.name not in known and one.asname is None):
             used = [n for n in uses if n.id == alias.name]
             other_letters = [name for name in sorted(unbound) if name.lower() == alias.name.lower()]
@@ -140,11 +141,12 @@ def with_classes(text: str, types: list[str]) -> Iterator[Step]:
             meant = next(iter(right or near), same.get(alias.name.lower(), ""))
             if not meant or (not right and meant in unbound):
                 continue  # the import of what is used is missing
-            spans = [span_of(lines, place) for place in (alias, *used)]  # type: ignore[arg-type] # it has a place too
-            edits = [(*span, meant) for span in spans if span is not None]
-            for step in step_to("name", alias.lineno, text, edited(text, edits), alias.name):
-                yield step
-                yield from with_classes(step["text"], types)
+            places += [(place, meant) for place in (alias, *used)]
+        if places:
+            spans = [(span_of(lines, place), meant) for place, meant in places]  # type: ignore[arg-type] # it has a place
+            edits = [(*span, meant) for span, meant in spans if span is not None]
+            first = next(one for one in node.names if one is places[0][0])
+            yield from step_to("name", first.lineno, text, edited(text, edits), first.name)
             return
 
 
