@@ -371,7 +371,7 @@ def _second_roots(lines: list[str], root: str) -> Iterator[LineSlip]:
             [line for _, line in part if not line.startswith("<?")]
             for part in (said[: at + 1], said[at + 1 :])
         ]
-        left = "\n".join(line for number, line in enumerate(lines, 1) if number not in {end, begin})
+        left = "\n".join("" if number in {end, begin} else line for number, line in enumerate(lines, 1))
         if blocks[0] != blocks[1]:
             fix = f"delete lines {end} and {begin}, `</{root}>` and `<{root}>`"
             yield LineSlip(f"only one `<{root}>` is allowed, and another one begins here", begin, fix, left)

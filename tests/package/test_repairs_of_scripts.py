@@ -482,7 +482,8 @@ CASES = {
                 ("'numeric_chatter'", "'numeric_chattr'")), ["topic-name"], "numeric_chattr should be /numeric_chatter",
         wanted=asking(does=(("src/talker.py", "publisher", "/numeric_chatter"),))),
     "two-classes-of-an-import": Case(
-        swapped(TALKER, ("import Int8\n", "import int8, string\n"), (", Int8, ", ", int8, "), ("rate =", "x = string\n    rate =")),
+        swapped(TALKER, ("import Int8\n", "import int8, string\n"), (", Int8, ", ", int8, "),
+                ("rate =", "x = string\n    rate =")),
         ["missing-call"], "", after={TALKER: "from std_msgs.msg import Int8, String"},
     ),
     "two-on-one-line": Case(
