@@ -81,7 +81,7 @@ def node(name: str, namespace: str = "/") -> LaunchNode:
         (["RLException: multiple files named [a.launch] in package [p]:"], "two launch files"),
         (
             ["RLException: Unknown substitution command [param hz]. Valid commands are"],
-            "only the values of an <arg>",
+            "can read its <arg>s, and no parameters",
         ),
         (["RLException: Unknown substitution command [findpkg p]. Valid commands are"], "findpkg p"),
         (["RLException: Invalid roslaunch XML syntax: mismatched tag: line 3, column 2"], "not well-formed"),

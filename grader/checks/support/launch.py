@@ -88,7 +88,7 @@ _REFUSALS = (
     (NOT_STARTED, "the system cannot start the script of {0}",
      "its first line has to be #!/usr/bin/env python3, or #!/bin/bash for a shell script"),
     (r"Unknown substitution command \[(?:param|rosparam|var|args|Arg|argument) ([^\[\]\n]+)\]",
-     "roslaunch puts only the values of an <arg> in their places",
+     "a launch file can read its <arg>s, and no parameters",
      'write $(arg {0}), with <arg name="{0}" default="…"/>'),
     (r"Unknown substitution command \[([^\[\]\n]+)\]", "roslaunch does not know $({0})",
      "write $(find <package>)/…"),
