@@ -80,12 +80,12 @@ class PythonSlip(Placed, Record):
     - `goes-on`: an `if`, or a loop's first turn, that ends an action's goal by the call `name`, and goes on.
     - `wrong-value`: a value that is none: a comparison with NaN, the sine of an angle in degrees, a service's answer
       that is made and not returned, or of which no field is set, a message that is filled in and not sent, a speed that
-      a Twist keeps from the turn before, nanoseconds in place of seconds, a condition
-      that all numbers fulfil, or none, or what each turn of a loop adds or sets again (`name`: `nan`, `degrees`,
-      `return`, `empty`, `unsent`, `kept`, `nanoseconds`, `bounds`, `added`); a grid's index that steps by its height, a
-      cell that `int(…)` works out of a number below 0, a quaternion of a whole angle, a float for the seconds of a
-      time, the mean of a scan's ranges, and a parameter that is read where it is not set (`step`, `cut`, `half`,
-      `secs`, `mean`, `unset`).
+      a Twist keeps from the turn before, nanoseconds in place of seconds, a condition that all numbers fulfil, or none,
+      or what each turn of a loop adds or sets again (`name`: `nan`, `degrees`, `return`, `empty`, `unsent`, `kept`,
+      `nanoseconds`, `bounds`, `added`); a grid's index that steps by its height, a cell that `int(…)` works out of a
+      number below 0, a quaternion of a whole angle, a float for the seconds of a time, the mean of a scan's ranges, a
+      distance without its square root, and a parameter that is read where it is not set (`step`, `cut`, `half`,
+      `secs`, `mean`, `rootless`, `unset`).
 
     No slips, but what a line says, for checks that compare it with what the lab asks; `message` is a name, a number or
     a text:

@@ -452,3 +452,20 @@ def test_a_listener_that_each_turn_makes_again(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(text, encoding="utf-8")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
     assert [s.fix for s in slips] == ["move lines 2 and 3 above line 1"]
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        ("distance = (a - b) ** 2 + (c - d) ** 2\n", [1]),
+        ("def dist(a, b):\n    return pow(a, 2) + pow(b, 2)\n", [2]),
+        ("distance = ((a - b) ** 2 + (c - d) ** 2) ** 0.5\n", []),
+        ("distance = sqrt((a - b) ** 2 + (c - d) ** 2)\n", []),
+        ("dist_sq = (a - b) ** 2 + (c - d) ** 2\n", []),
+        ("d2 = (a - b) ** 2 + (c - d) ** 2\n", []),
+        ("distance = a + b\n", []),
+    ],
+)
+def test_distances_without_a_root(text: str, lines: list[int], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    assert [s.line for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "rootless"] == lines

@@ -395,7 +395,8 @@ def test_fields_of_an_attribute_that_is_always_none(tmp_path: Path) -> None:
         f"{head}  self.p.x = m.x\n def h(self):\n  print(self.p.y)\n", encoding="utf-8"
     )
     (tmp_path / "b.py").write_text(f"{head}  self.p = m\n  self.p.x = 1\n", encoding="utf-8")
-    found = [s for s in check_syntax(tmp_path, ["a.py", "b.py"]).slips if s.kind == "object"]
+    (tmp_path / "c.py").write_text(f"{head}  self.p, self.q = m, 1\n  self.p.x = 1\n", encoding="utf-8")
+    found = [s for s in check_syntax(tmp_path, ["a.py", "b.py", "c.py"]).slips if s.kind == "object"]
     assert [(s.file, s.line, s.fix, s.name) for s in found] == [
         ("a.py", 6, "on line 3, write `self.p = Pose()`", "x"),
         ("a.py", 8, "on line 3, write `self.p = Pose()`", "y"),

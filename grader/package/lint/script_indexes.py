@@ -27,6 +27,7 @@ def indexes(tree):
     yield from float_seconds(tree)
     yield from not_the_smallest(tree)
     yield from ranges_read(tree)
+    yield from without_root(tree)
 
 
 def is_quotient(node):
@@ -129,6 +130,31 @@ def not_the_smallest(tree):
             yield slip(
                 call.lineno, "wrong-value", message, "on line %d, write `min` for `max`" % call.lineno, "mean"
             )
+
+
+def without_root(tree):
+    """`distance = dx ** 2 + dy ** 2`: a sum of two squares that is called a distance."""
+    named = [(dotted(n.targets[0]), n.value) for n in all_of(tree, ast.Assign)]
+    for function in all_of(tree, ast.FunctionDef):
+        named += [(function.name, n.value) for n in function.body if isinstance(n, ast.Return)]
+    for name, value in named:
+        word = name.rpartition(".")[2].lower()
+        is_sum = (
+            isinstance(getattr(value, "op", None), ast.Add)
+            and is_square(value.left)
+            and is_square(value.right)
+        )
+        if is_sum and "dist" in word and "sq" not in word and "2" not in word:
+            message = "`%s` is the square of a distance, as without a square root" % name
+            fix = "on line %d, write `(… + …) ** 0.5`, with brackets around the whole sum" % value.lineno
+            yield slip(value.lineno, "wrong-value", message, fix, "rootless")
+
+
+def is_square(node):
+    """Whether a value is `x ** 2` or `pow(x, 2)`."""
+    power = node.right if isinstance(getattr(node, "op", None), ast.Pow) else None
+    last = node.args[1] if called_name(node) == "pow" and len(node.args) > 1 else power
+    return getattr(last, "value", None) == 2
 
 
 OF_QUATERNION = 4

@@ -8,6 +8,7 @@ Nothing is executed. Python 3.8, standard library only.
 import ast
 import builtins
 import difflib
+from collections import Counter
 
 from script_names import (
     CALL_BACK,
@@ -115,19 +116,22 @@ def lacking_attributes(own):
 
 def fields_of_none(tree):
     """Yield where a callback sets fields of an attribute that never gets another value than None."""
-    callbacks = {}
+    functions, callbacks = functions_in(tree), {}
     for call in (n for n in all_of(tree, ast.Call) if called_name(n) == "Subscriber"):
-        callbacks.setdefault(callback_of(call, functions_in(tree)), published_type(call))
-    given = {}
+        callbacks.setdefault(callback_of(call, functions), published_type(call))
+    empty = {}
     for n in all_of(tree, ast.Assign):
-        for target in n.targets:
-            given.setdefault(dotted(target), []).append(n)
+        for target in n.targets if getattr(n.value, "value", 0) is None else []:
+            empty.setdefault(dotted(target), []).append(n.lineno)
+    # as in `self.x, self.y = …`, too
+    every = Counter(dotted(n) for n in stored_in([tree]))
+    filled = {name for name, count in every.items() if count > len(empty.get(name, []))}
     found = {}
     for function, kind in callbacks.items():
         for n in stored_in([function] if function and kind else []):
-            values = given.get(dotted(n.value), []) if dotted(n.value).startswith("self.") else []
-            if values and all(getattr(one.value, "value", 0) is None for one in values):
-                found[dotted(n.value)] = values[0].lineno, kind
+            name = dotted(n.value)
+            if name.startswith("self.") and name in empty and name not in filled:
+                found[name] = empty[name][0], kind
     # It fails where a field is set, and where one is read.
     for n in all_of(tree, ast.Attribute):
         name = dotted(n.value)
