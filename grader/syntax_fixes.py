@@ -34,9 +34,8 @@ _BLOCK = re.compile(rf"\s*{BLOCK}")
 _BRACE = rf"(?:\}}\s*)?{BLOCK}(?:.*[\w\])\"])?\s*\{{$"
 _TEXT = re.compile(r"""("(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')|#.*""")
 _UNITS = r"[kM]?[hH][zZ]|msec|ms|secs?|seconds?|s|min|cm|mm|km|m|rad|deg|degrees"
-_SHELL = (
-    r"\$|(?:sudo|rosrun|roslaunch|rostopic|cd|chmod|source|python3?|catkin_make)\s+[-+~./\w]+|catkin_make$"
-)
+_COMMANDS = "sudo|rosrun|roslaunch|rostopic|cd|chmod|source|python3?|catkin_make"
+_SHELL = rf"\$|(?:{_COMMANDS})\s+[-+~./\w]+|catkin_make$"
 _NUMBERS = r"int|float|double|long|short|char|bool|byte|unsigned|size_t"
 _FOR = (
     r"^(\s*)for\s*\(\s*(?:\w+\s+)?(\w+)\s*=\s*(\w+)\s*;\s*\2\s*<\s*([\w.()]+)\s*;"
@@ -103,8 +102,7 @@ _NEWER = "is of a newer Python than the one of this ROS"
 _NEXT_NAME = r"(?!(?:as|and|from|import)\b)(?=[A-Za-z_])"
 _HABITS = (
     _Habit(MERGE_MARKER.pattern, MERGED, "keep one version"),
-    _Habit(rf"^\s*(?:{_SHELL})",
-           "this is a command for the terminal, not Python", DELETE_LINE),
+    _Habit(rf"^\s*(?:{_SHELL})", "this is a command for the terminal, not Python", DELETE_LINE),
     _Habit(rf"\)\s*(?:{_SHELL}).*$", "a command for the terminal comes after the code", "delete it",
            ((rf"\)\s*(?:{_SHELL}).*$", ")"),)),
     _Habit(r"^\s*(using\s+namespace\b|#\s*include\b)", "this is C++, not Python", DELETE_LINE),

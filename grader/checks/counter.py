@@ -32,8 +32,12 @@ from grader.checks.support.processes import (
     is_written_as,
     slips_of,
 )
+from grader.checks.support.recorder_losses import losses
 from grader.checks.support.text import LOOP
-from grader.checks.support.topics import cite, losses, no_message
+from grader.checks.support.topics import (
+    cite,
+    no_message,
+)
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.verdict import Status, Verdict, failed, failed_or_blocked, grade_again, inconclusive, passed

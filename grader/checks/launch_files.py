@@ -238,7 +238,7 @@ def _in_its_place(file: LaunchFile, pkg: str, name: str) -> Iterator[tuple[FileC
             yield (
                 line,
                 f"<{tag}> on line {line} starts no node",
-                f"write <node in place of <{tag} on line {line}",
+                f"write `<node` in place of `<{tag}` on line {line}",
             )
     for tag, line in (u for u in file.unknown_tags if near_names("node", [u[0]]) or u[0].lower() == "node"):
         why, fix = f"roslaunch skips the tag <{tag}> on line {line}", "the tag is <node …>, in lower case"

@@ -33,6 +33,7 @@ from grader.checks.support.fields import (
     was_right,
 )
 from grader.checks.support.processes import OnTopic, early_end, is_flood, observed_until_ns, slips_of
+from grader.checks.support.recorder_losses import losses
 from grader.checks.support.text import (
     NUMBER,
     OTHER_WORDS_SHARE,
@@ -44,7 +45,7 @@ from grader.checks.support.text import (
     refuse_others,
     shown,
 )
-from grader.checks.support.topics import Sender, cite, losses, no_message, nothing_sent, sent_by
+from grader.checks.support.topics import Sender, cite, no_message, nothing_sent, sent_by
 from grader.evidence.run import Channel, Run
 from grader.model.message_definitions import NOT_FINITE
 from grader.model.package import PackageFacts
@@ -537,10 +538,9 @@ def _other_value(
         seen = f"{seen}; {beside} is {value_text(params.value)}"
         hint += f": is {beside} set in its place?"
     if params.when == "any":
-        message = (
-            f"{params.field} of {params.topic} is {params.words} in none of {plural(len(found), 'message')}"
-        )
-        return failed(f"{message}: at first {seen}", hint=hint).if_repeated()
+        none = f"in none of {plural(len(found), 'message')}: at first {seen}"
+        message = f"{params.field} of {params.topic} is {params.words} {none}"
+        return failed(message, hint=hint).if_repeated()
     if params.when == "every":
         after = time_between(run, found[0].time_ns, first.time_ns)
         where = f"in {len(wrong)} of {plural(len(found), 'message')}: {seen}, {after} after the first"

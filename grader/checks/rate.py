@@ -25,6 +25,7 @@ from grader.checks.support.processes import (
     run_scripts,
     slips_of,
 )
+from grader.checks.support.recorder_losses import whole_until_ns
 from grader.checks.support.text import LOOP, SPIN, both, loop_rate
 from grader.checks.support.topics import (
     SYSTEM_TOPICS,
@@ -33,7 +34,6 @@ from grader.checks.support.topics import (
     cite,
     nothing_sent,
     sent_by,
-    whole_until_ns,
 )
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm

@@ -28,11 +28,11 @@ from grader.checks.support.fields import (
     value_text,
 )
 from grader.checks.support.processes import GlobalName, observed_until_ns, run_slips
+from grader.checks.support.recorder_losses import losses
 from grader.checks.support.scans import looks_elsewhere
 from grader.checks.support.text import near_names
 from grader.checks.support.topics import (
     cite,
-    losses,
     misfit,
     no_message,
     no_node,
@@ -218,29 +218,24 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
     own = run.student_channels(params.effect.topic)
     effects = params.effect.read(own)
     answers = _answers(run, causes, effects, params)
+    instead = _instead(causes, effects, params) or _other_answer(answers, causes, effects, params)
     verdict = (
         # Whether an answer is missing can be said only where effects and causes were there to be seen.
         _nothing_to_judge(package, run, effects, own, params)
         or _early(causes, effects, run, params)
         or _unanswered(package, run, causes, params)
         or _never_caused(causes, run, params)
-        or _judge_unanswered(
-            answers,
-            run,
-            params,
-            _instead(causes, effects, params) or _other_answer(answers, causes, effects, params),
-        )
+        or _judge_unanswered(answers, run, params, instead)
         or passed(f"{plural(len(answers), 'time')}, {params.effect.words} follows {params.trigger.words}")
     )
     if verdict.status is Status.FAIL:
         verdict = _with_ranges(package, run, params, verdict)
     times = [one.after_s for one in answers if one.after_s is not None]
+    answered = f"{len(times)} of {plural(len(answers), 'answer')}"
     span = (answers[0].at_ns, answers[-1].at_ns) if answers else (None, None)
     return verdict.about(
         expected=f"{params.effect.words}, {significant(params.within_s)} s at most after {params.trigger.words}",
-        measured=verdict.measured
-        or f"{len(times)} of {plural(len(answers), 'answer')}"
-        + (f", up to {max(times):.2f} s after" if times else ""),
+        measured=verdict.measured or answered + (f", up to {max(times):.2f} s after" if times else ""),
         citations=(cite(run, _shown_on(run, params), *span), cite(run, params.effect.topic)),
     )
 

@@ -25,11 +25,11 @@ from grader.checks.support.parameters import (
     explain_by_unread_parameter,
 )
 from grader.checks.support.processes import plain_type
+from grader.checks.support.recorder_losses import account_for_losses
 from grader.checks.support.scripts import without_git
 from grader.checks.support.text import near_names, texts_in
 from grader.checks.support.topics import (
     SYSTEM_TOPICS,
-    account_for_losses,
     explain_by_unheard_topic,
     explain_by_waiting_callback,
     explain_by_wrong_value,

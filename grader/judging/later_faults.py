@@ -197,9 +197,8 @@ class Later:
         }  # fmt: skip
         if not self._ran:
             yield from self._names()
-        readable = not any(
-            one is not None and one.is_no_script for one in map(self._package.file, self._paths)
-        )
+        there = filter(None, map(self._package.file, self._paths))
+        readable = not any(one.is_no_script for one in there)
         yield from by_check[self._criterion.check]() if self._criterion.check in by_check and readable else ()
 
     def _of(self, *kinds: str) -> list[PythonSlip]:

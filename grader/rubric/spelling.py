@@ -9,7 +9,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from grader.checks.registry import Check
-from grader.checks.support.topics import READ_TOO, SYSTEM_TOPICS
+from grader.checks.support.recorder_losses import READ_TOO
+from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.installable import noetic_messages
 from grader.rubric.message_fields import type_judged, types_of
 from grader.rubric.simulators import TRUE_POSE

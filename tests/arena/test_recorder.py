@@ -19,7 +19,7 @@ from grader.arena.limits import RunLimits
 from grader.arena.ros.wire import Frame, FrameReader
 from grader.arena.session import ARENA
 from grader.checks import CHECKS
-from grader.checks.support.topics import account_for_losses, losses
+from grader.checks.support.recorder_losses import account_for_losses, losses
 from grader.judging.facts import NO_PACKAGE as PACKAGE
 from tests.arena.support import printed, run_script
 

@@ -14,8 +14,8 @@ from typing import Any
 import yaml
 
 from grader.checks import CHECKS
+from grader.checks.support.recorder_losses import account_for_losses
 from grader.checks.support.text import in_language
-from grader.checks.support.topics import account_for_losses
 from grader.evidence.run import Run
 from grader.judging.judge import explain_loss
 from grader.model.message_definitions import parse_interface

@@ -81,14 +81,9 @@ def judgement_of(
     package = {**PACKAGE, "slips": list(slips)}
     runs = {"talker": run, "package": {"attachments": {FILE: source}}}
     twice = any(criterion["check"] == "copies" for criterion in criteria)
-    started = [*SCENARIO["start"], *([{"name": "other", "script": FILE}] if twice else [])]
-    scenarios = {
-        "talker": {
-            **SCENARIO,
-            "start": started,
-            "probes": [{"topic": "/chatter", "type": "std_msgs/String", "text": 2}],
-        }
-    }
+    more = [{"name": "other", "script": FILE}, {"name": "ear", "script": "src/ear.py"}] if twice else []
+    probes = [{"topic": "/chatter", "type": "std_msgs/String", "text": 2}]
+    scenarios = {"talker": {**SCENARIO, "start": [*SCENARIO["start"], *more], "probes": probes}}
     recorded = build_runs({"runs": runs, "package": package})
     return judge_all_runs(rubric(*criteria, scenarios=scenarios), recorded)
 
@@ -97,7 +92,7 @@ TALKER = [NODE | ROOT, CHATTER, RATE, MESSAGE]
 COPIES = {
     "id": "copies",
     "check": "copies",
-    "with": {"first": "talker", "second": "other", "listener": "talker", "topic": "/chatter"},
+    "with": {"first": "talker", "second": "other", "listener": "ear", "topic": "/chatter"},
     "scenario": "talker",
     "requires": ["node"],
 }

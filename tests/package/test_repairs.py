@@ -362,3 +362,27 @@ def test_what_to_write_for_the_clock_of_ros_is_right_on_each_line(tmp_path: Path
     assert found is not None
     assert found.message.startswith("line 3 of drive.py: time.sleep and time.time() keep to")
     assert found.fix.startswith("on line 3, write `from rospy import sleep`; on line 4, measure time")
+
+
+@pytest.mark.parametrize(
+    ("headers", "targets"),
+    [
+        (["lab_msgs/Num.h"], "${catkin_EXPORTED_TARGETS}"),
+        (["lab/Own.h"], "${${PROJECT_NAME}_EXPORTED_TARGETS}"),
+        (["lab/Own.h", "lab_msgs/Num.h"], "${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS}"),
+    ],
+)
+def test_a_program_waits_for_the_headers_that_it_includes(
+    headers: list[str], targets: str, tmp_path: Path
+) -> None:
+    node = "".join(f"#include <{one}>\n" for one in headers)
+    cmake = CMAKE.replace("catkin_p", "add_message_files(FILES Own.msg)\ngenerate_messages()\ncatkin_p")
+    cmake += "add_executable()\nadd_executable(a src/a.cpp)\n"
+    folder = package(tmp_path, {"src/a.cpp": node, "msg/Own.msg": "int8 a\n", CMAKELISTS: cmake})
+    (tmp_path / "lab_msgs" / "msg").mkdir(parents=True)
+    (tmp_path / "lab_msgs" / "msg" / "Num.msg").write_text("int8 a\n")
+    (tmp_path / "lab_msgs" / "package.xml").write_text("<package><name>lab_msgs</name></package>")
+    beside = facts_of(tmp_path / "lab_msgs", "lab_msgs")
+    facts = facts_of(folder, "lab").model_copy(update={"also": (beside,)})
+    found = [one for one in find_repairs(folder, facts, WANTED) if "headers" in one.message]
+    assert [one.fix.partition(", write ")[2] for one in found] == [f"add_dependencies(a {targets})"]

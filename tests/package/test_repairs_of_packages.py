@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from grader.model.message_definitions import parse_definition
-from grader.package.repairs import Wanted, find_repairs
+from grader.package.repairs import Wanted
 from tests.package.repairing import (
     CMAKE,
     CMAKELISTS,
@@ -17,15 +17,12 @@ from tests.package.repairing import (
     MANIFEST,
     SCRIPT,
     TALKER,
-    WANTED,
     XML,
     Case,
     asking,
     check,
-    package,
     swapped,
 )
-from tests.package.trees import facts_of
 
 pytestmark = pytest.mark.usefixtures("without_processes")
 
@@ -585,27 +582,3 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_a_mistake_in_a_package_is_found_and_repaired(name: str, tmp_path: Path) -> None:
     check(CASES[name], tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("headers", "targets"),
-    [
-        (["lab_msgs/Num.h"], "${catkin_EXPORTED_TARGETS}"),
-        (["lab/Own.h"], "${${PROJECT_NAME}_EXPORTED_TARGETS}"),
-        (["lab/Own.h", "lab_msgs/Num.h"], "${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS}"),
-    ],
-)
-def test_a_program_waits_for_the_headers_that_it_includes(
-    headers: list[str], targets: str, tmp_path: Path
-) -> None:
-    node = "".join(f"#include <{one}>\n" for one in headers)
-    cmake = CMAKE.replace("catkin_p", "add_message_files(FILES Own.msg)\ngenerate_messages()\ncatkin_p")
-    cmake += "add_executable()\nadd_executable(a src/a.cpp)\n"
-    folder = package(tmp_path, {"src/a.cpp": node, "msg/Own.msg": "int8 a\n", CMAKELISTS: cmake})
-    (tmp_path / "lab_msgs" / "msg").mkdir(parents=True)
-    (tmp_path / "lab_msgs" / "msg" / "Num.msg").write_text("int8 a\n")
-    (tmp_path / "lab_msgs" / "package.xml").write_text("<package><name>lab_msgs</name></package>")
-    beside = facts_of(tmp_path / "lab_msgs", "lab_msgs")
-    facts = facts_of(folder, "lab").model_copy(update={"also": (beside,)})
-    found = [one for one in find_repairs(folder, facts, WANTED) if "headers" in one.message]
-    assert [one.fix.partition(", write ")[2] for one in found] == [f"add_dependencies(a {targets})"]

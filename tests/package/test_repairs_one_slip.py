@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from grader.package.repairs import Wanted
+from grader.package.repairs.python import turn_sign
 from tests.package.repairing import CMAKE, CMAKELISTS, LAUNCH, LAUNCHED, MANIFEST, XML, package, repair_all
 from tests.package.trees import plain
 
@@ -492,3 +493,42 @@ def test_a_slip_of_a_call_is_named_and_undone(right: str, wrong: str, tmp_path: 
     folder = package(tmp_path, {**FILES, LISTENER: FILES[LISTENER].replace(old, wrong)})
     assert [repair.line for repair in repair_all(folder, WANTED)] == [7]
     assert (folder / LISTENER).read_text() == FILES[LISTENER].replace(old, right)
+
+
+STEERS = """\
+import rospy
+def scanned(scan):
+    twist = Twist()
+    if near(scan):
+        twist.angular.z = {near}
+    else:
+        twist.angular.z = {far}
+    if twist.angular.z > MOST:
+        twist.angular.z = MOST
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "side", "line"),
+    [
+        (STEERS.format(near="0.5", far="0"), "left", "twist.angular.z = -0.5"),
+        (STEERS.format(near="0.5", far="0"), "right", ""),  # no line turns it to that side
+        (STEERS.format(near="-0.5", far="0.5"), "right", "twist.angular.z = 0.5"),
+        (STEERS.format(near="0.0", far="-K * error"), "left", "twist.angular.z = K * error"),
+        (STEERS.format(near="0", far="K * error - D * change"), "right", "twist.angular.z = -(K * error - D * change)"),
+        (STEERS.format(near="-math.pi / 4", far="0"), "right", "twist.angular.z = math.pi / 4"),
+        (STEERS.format(near="0.5", far="K * error"), "left", ""),  # either of them
+        (STEERS.format(near="0.5", far="K * error"), "", "twist.angular.z = -K * error"),
+        (STEERS.format(near="0.5", far="0"), "", ""),
+        (STEERS.format(near="turn", far="turn"), "left", ""),  # no line of this file sets it
+        ("turn = 0\nif near:\n    turn = 0.3\ntwist.angular.z = turn\n", "left", "turn = -0.3"),
+        ("p.publish(Twist(angular=Vector3(0, 0, 0.4)))\n", "left", "Vector3(0, 0, -0.4)"),
+        ("twist.angular.x = 0.4\n", "left", ""),
+        ("twist.angular.z = (\n", "left", ""),
+    ],
+)  # fmt: skip
+def test_the_only_turn_to_a_side_gets_the_other_sign(tmp_path: Path, text: str, side: str, line: str) -> None:
+    (tmp_path / "drive.py").write_text(text)
+    found = turn_sign(tmp_path, "drive.py", side)
+    assert (found is None) == (not line)
+    assert found is None or line in found.after

@@ -384,3 +384,24 @@ def test_a_message_with_the_name_of_its_class(text: str, fixes: list[str], tmp_p
     slips = check_syntax(tmp_path, ["a.py"]).slips
     assert [s.fix for s in slips if s.kind == "hides-class"] == fixes
     assert not fixes or "unused-import" not in [s.kind for s in slips]
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("import rospy\nrospy.spin()\n", []),
+        ("import nosuch\n", ["unused-import", "lacking-import"]),
+        ("from nosuch import rate\nrate = 10\nprint(rate)\n", ["unused-import", "lacking-import"]),
+        ("import nosuch as n\nprint(n)\n", ["lacking-import"]),
+        ("from json import dumps\n", ["unused-import"]),
+        ("from json import rate\nrate = 10\nprint(rate)\n", ["unused-import"]),
+        ("from nosuch import *\n", ["lacking-import"]),
+        ("from . import nosuch\nimport os\n", []),
+        ("try:\n    import nosuch\nexcept ImportError:\n    pass\n", []),
+    ],
+)
+def test_imports_that_are_not_used_or_not_there(tmp_path, text, found):
+    (tmp_path / "a.py").write_text(text)
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.kind for s in slips if s.kind in ("unused-import", "lacking-import")] == found
+    assert all("line 1" in s.fix for s in slips if s.kind == "unused-import")

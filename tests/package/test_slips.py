@@ -587,27 +587,6 @@ def test_slips_that_hide_what_was_meant(tmp_path, text, kinds):
     assert {s.kind for s in found} == kinds
 
 
-@pytest.mark.parametrize(
-    ("text", "found"),
-    [
-        ("import rospy\nrospy.spin()\n", []),
-        ("import nosuch\n", ["unused-import", "lacking-import"]),
-        ("from nosuch import rate\nrate = 10\nprint(rate)\n", ["unused-import", "lacking-import"]),
-        ("import nosuch as n\nprint(n)\n", ["lacking-import"]),
-        ("from json import dumps\n", ["unused-import"]),
-        ("from json import rate\nrate = 10\nprint(rate)\n", ["unused-import"]),
-        ("from nosuch import *\n", ["lacking-import"]),
-        ("from . import nosuch\nimport os\n", []),
-        ("try:\n    import nosuch\nexcept ImportError:\n    pass\n", []),
-    ],
-)
-def test_imports_that_are_not_used_or_not_there(tmp_path, text, found):
-    (tmp_path / "a.py").write_text(text)
-    slips = check_syntax(tmp_path, ["a.py"]).slips
-    assert [s.kind for s in slips if s.kind in ("unused-import", "lacking-import")] == found
-    assert all("line 1" in s.fix for s in slips if s.kind == "unused-import")
-
-
 def test_every_kind_is_described() -> None:
     rows = re.findall(r"^- (`.*?`):", inspect.getdoc(PythonSlip) or "", re.MULTILINE)
     assert sorted(re.findall(r"`([\w-]+)`", " ".join(rows))) == sorted(get_args(SlipKind))

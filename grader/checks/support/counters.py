@@ -13,8 +13,8 @@ from pydantic import Field, model_validator
 
 from grader.checks.support.exit_causes import explain_early_end, explain_traceback, process_tracebacks
 from grader.checks.support.processes import OnTopic, lives, observed_until_ns, slips_of
+from grader.checks.support.recorder_losses import losses, whole_until_ns
 from grader.checks.support.text import loop_rate
-from grader.checks.support.topics import losses, whole_until_ns
 from grader.evidence.run import Channel, Run, once_for_each_run
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind

@@ -14,7 +14,6 @@ from grader.checks.support.exceptions import (
     SLIPS,
     evaluated,
     explain_exception,
-    explain_formatting,
     explain_number_of_values,
     explain_operand,
 )
@@ -34,6 +33,7 @@ from grader.checks.support.missing_names import (
 )
 from grader.checks.support.processes import Life, early_end, lives, nodes_of, signal_name
 from grader.checks.support.rospy_calls import (
+    explain_formatting,
     of_typed_text,
     other_items,
     part_of_action,
@@ -436,18 +436,14 @@ def _no_number(found: Traceback, place: FileCitation, package: PackageFacts) -> 
     kind = "int" if "integer" in found.message else "float"
     read = next((s for s in package.slips if (s.file, s.kind) == (place.file, "argument-text")), None)
     if read is not None:
-        fix = (
-            read.fix
-            if kind == "int"
-            else read.fix.replace("map(int, ", "map(float, ").replace("= int(", "= float(")
-        )
+        fix = read.fix
+        if kind == "float":
+            fix = fix.replace("map(int, ", "map(float, ").replace("= int(", "= float(")
         return "a command-line argument is a string", f"on line {read.line}, write `{fix}`"
     if ".publish(" in found.innermost.source:
         return None
-    return (
-        "it takes a number but gets something else",
-        f"turn the value into one first: {as_number(kind, found.own_frames[-1].source)}",
-    )
+    fix = f"turn the value into one first: {as_number(kind, found.own_frames[-1].source)}"
+    return "it takes a number but gets something else", fix
 
 
 def _late_init(place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:

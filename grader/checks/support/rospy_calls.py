@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import PurePosixPath
 
@@ -492,3 +493,51 @@ def message_operand(message: str, left: str, source: str) -> tuple[str, str]:
     inner = f"`{shown(name)}.…`" if name else "`msg.…`"
     hint = "write `.to_sec()` behind that side" if is_time else f"take the field that you mean: {inner}"
     return f"one side is {what} ({message})", hint
+
+
+def explain_formatting(message: str, source: str) -> tuple[str, str] | None:
+    """Of a text with `%`: as many values as it has places, in brackets behind the `%`."""
+    lacks = message == "not enough arguments for format string"
+    if not lacks and message != "not all arguments converted during string formatting":
+        return None
+    there = "more" if lacks else "fewer"
+    why = f"the string has {there} `%` than there are values after it"
+    with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
+        for node in ast.walk(parsed(source)):
+            beside = node.args if isinstance(node, ast.Call) else getattr(node, "elts", [])
+            if fix := _values_in_brackets(source, beside) if lacks else _places_added(source, beside):
+                return why, fix
+    fix = "give one value for each `%` in the string, or remove one"
+    return why, fix if lacks else "put one `%s` for each value into the string"
+
+
+def _places_in(node: ast.expr) -> int:
+    """Return how many values a text takes behind its `%`; 0 of all else."""
+    text = node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ""
+    return len(re.findall(r"%[-+ #0-9.]*[a-zA-Z]", text.replace("%%", "")))
+
+
+def _values_in_brackets(source: str, beside: Sequence[ast.expr]) -> str:
+    """Return the line of `'%s %s' % a, b` with the values in brackets; "" for another line."""
+    for at, one in enumerate(beside):
+        if (
+            isinstance(one, ast.BinOp)
+            and isinstance(one.op, ast.Mod)
+            and not isinstance(one.right, ast.Tuple)
+        ):
+            values = [one.right, *beside[at + 1 :]]
+            if _places_in(one.left) == len(values) > 1:
+                texts = [ast.get_source_segment(source, value) or "" for value in values]
+                return rewritten(source, (values[0], f"({', '.join(texts)})"), span_to=values[-1])
+    return ""
+
+
+def _places_added(source: str, beside: Sequence[ast.expr]) -> str:
+    """Return the line of `loginfo('a', b)` with a place for each value at the end of the text; "" for another line."""
+    first = beside[0] if beside else None
+    text = (ast.get_source_segment(source, first) or "") if first is not None else ""
+    lacking = len(beside) - 1 - (_places_in(first) if first is not None else 0)
+    if first is None or not is_text(first) or lacking < 1 or text[-3:] in ('"""', "'''"):
+        return ""
+    places = " ".join(["%s"] * lacking)
+    return rewritten(source, (first, f"{text[:-1].rstrip()} {places}{text[-1]}"))

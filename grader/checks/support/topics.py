@@ -1,8 +1,8 @@
-"""Topics of a run: who is on them, why no message came, what the recorder lost."""
+"""Topics of a run: who is on them, and why no message came."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator
 from pathlib import PurePosixPath
 from typing import Literal
 
@@ -23,6 +23,7 @@ from grader.checks.support.processes import (
     run_slips,
     taken_off,
 )
+from grader.checks.support.recorder_losses import all_lost
 from grader.checks.support.scripts import programs
 from grader.checks.support.text import (
     INIT,
@@ -35,13 +36,11 @@ from grader.checks.support.text import (
     publisher,
     shown,
     subscriber,
-    texts_in,
 )
 from grader.evidence.events import MISFIT, UNHEARD, UNSENDABLE
 from grader.evidence.run import Channel, Run
 from grader.model.package import LaunchNode, PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
-from grader.model.record import Record
 from grader.model.verdict import (
     EvidenceCitation,
     Status,
@@ -51,15 +50,12 @@ from grader.model.verdict import (
     grade_again,
     inconclusive,
 )
-from grader.wording import NOTHING_TO_DO, join_words, plural
+from grader.wording import NOTHING_TO_DO, join_words
 
 SYSTEM_TOPICS = frozenset({"/rosout", "/rosout_agg", "/clock"})
 End = Literal["publishers", "subscribers"]
 Sender = Literal["student", "program", "anyone"]
 """Whose messages a check judges: the student's nodes', those of the programs beside them, or both."""
-READ_TOO = {"logs": ("/rosout",), "hears": ("/rosout",), "transform": ("/tf", "/tf_static")}
-"""Topics that a check reads, and that its parameters do not name."""
-TAKEN = {Status.FAIL, Status.PARTIAL}
 
 
 def cite(run: Run, topic: str, from_ns: int | None = None, to_ns: int | None = None) -> EvidenceCitation:
@@ -538,69 +534,3 @@ def _judge_refused(run: Run, topic: str) -> Verdict | None:
         return None
     message = f"the recorder could not listen to {topic}: {refused[0].detail or refused[0].event}"
     return grade_again(message, measured="no message")
-
-
-class Losses(Record):
-    """From `at_ns` on messages of the topic are missing: `dropped` of them, or no one knows how many (0)."""
-
-    topic: str
-    at_ns: int
-    kept: int
-    dropped: int
-
-    @property
-    def words(self) -> str:
-        if self.dropped:
-            return f"the recorder kept {plural(self.kept, 'message')} of {self.topic}, dropped {self.dropped}"
-        return f"the recorder may have missed messages of {self.topic}, because it could not keep up"
-
-
-def losses(run: Run, topic: str) -> Losses | None:
-    """Return what is missing of a topic, None where the recorder took all that came."""
-    events = [(at_ns, e) for at_ns, e in run.recorder if e.topic == topic]
-    lost = [at_ns for at_ns, e in events if e.event in {"limit", "behind"} or e.dropped]
-    if not lost:
-        return None
-    kept = sum(len(c.messages) for c in run.channels if c.topic == topic)
-    return Losses(topic=topic, at_ns=min(lost), kept=kept, dropped=sum(e.dropped for _, e in events))
-
-
-def whole_until_ns(run: Run, topic: str, until_ns: int | None = None) -> int | None:
-    """Return until when every message of the topic was recorded, `until_ns` at the most."""
-    lost = losses(run, topic)
-    if lost is None:
-        return until_ns
-    return lost.at_ns - 1 if until_ns is None else min(until_ns, lost.at_ns - 1)
-
-
-def all_lost(run: Run, topic: str) -> Verdict | None:
-    """Return the verdict where nothing was recorded of a topic because the recorder dropped it."""
-    lost = losses(run, topic)
-    gone = lost is not None and not lost.kept
-    return grade_again(f"nothing was recorded on {topic}", measured="no message") if gone else None
-
-
-def account_for_losses(check: Check, facts: Mapping[str, object], verdict: Verdict) -> Verdict:
-    """Return the verdict with what the recorder lost of its topics. A lost mark becomes `inconclusive`, unless the
-    check rests on what came whole (`heeds_losses`): then what was lost only stands with what was measured."""
-    run = facts.get("run")
-    if not isinstance(run, Run):
-        return verdict
-    found = [one for topic in _topics(check, facts.get("params")) if (one := losses(run, topic))]
-    if not found:
-        return verdict
-    taken = verdict.status in TAKEN and not check.heeds_losses
-    verdict = verdict.model_copy(update={"dropped": any(one.dropped for one in found)})
-    if not taken and verdict.status is not Status.INCONCLUSIVE:
-        measured = "; ".join(filter(None, (verdict.measured, *(one.words for one in found))))
-        return verdict.model_copy(update={"measured": measured})
-    update: dict[str, object] = {"message": "; ".join([verdict.message, *(one.words for one in found)])}
-    if taken:
-        update |= {"status": Status.INCONCLUSIVE, "score": 0.0, "unjudged": False, "hint": "grade again"}
-    return verdict.model_copy(update=update)
-
-
-def _topics(check: Check, params: object) -> Iterable[str]:
-    """Whatever of its parameters may be the name of a topic."""
-    named = texts_in(params.model_dump() if isinstance(params, Record) else None)
-    return tuple(dict.fromkeys((*named, *READ_TOO.get(check.name, ()))))

@@ -90,11 +90,9 @@ def never_reached(tree):
 def read_late(rest, loop):
     """Lines behind a loop without an end, or `spin()`, that read a parameter: nothing needs it any more."""
     if any(calls_in(one, "get_param") for one in rest):
-        message = "line %d runs only once the node ends, below line %d" % (rest[0].lineno, loop.lineno)
-        last = rest[-1].end_lineno
-        yield slip(
-            rest[0].lineno, "read-late", message, "delete " + lines_from(rest[0].lineno, last), str(last)
-        )
+        first, last = rest[0].lineno, rest[-1].end_lineno
+        message = "line %d runs only once the node ends, below line %d" % (first, loop.lineno)
+        yield slip(first, "read-late", message, "delete " + lines_from(first, last), str(last))
 
 
 def method_run_by(node, classes, made):

@@ -77,6 +77,11 @@ def text_of(node):
     return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ""
 
 
+def is_call_alone(node):
+    """Whether a statement is a call whose answer nothing keeps."""
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Call)
+
+
 def called_name(node):
     """Return `b` of the calls `a.b()` and `b()`, "" of all else."""
     if not isinstance(node, ast.Call):

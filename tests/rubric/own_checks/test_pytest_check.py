@@ -256,10 +256,10 @@ def test_the_digest_is_of_the_tests_too(tmp_path):
         (
             '"src/kinematics.py"',
             '"src/kinematic.py"',
-            "line 43: the handout says kinematics.py, not kinematic.py",
+            "line 44: the handout says kinematics.py, not kinematic.py",
         ),
-        ("student(FILE).wrap(", "student(FILE).wrapped(", "line 61: the handout says wrap, not wrapped"),
-        ("wrap(angle)\n", "wrap(angle, 1)\n", "line 61: wrap has 1 argument in the handout, and 2 here"),
+        ("student(FILE).wrap(", "student(FILE).wrapped(", "line 62: the handout says wrap, not wrapped"),
+        ("wrap(angle)\n", "wrap(angle, 1)\n", "line 62: wrap has 1 argument in the handout, and 2 here"),
         ("src/kinematics.py", "arm/src/kinematics.py", ""),
         ("student(FILE).wrap(", "student(FILE).wrap2(", ""),
         # what the handout does not have, is worked out, or is called wrongly on purpose

@@ -1,0 +1,272 @@
+"""Finds values that go wrong in a student's Python, for `slips.py`: comparisons that no value or every value fulfils,
+answers that are not returned, and what each turn of a loop adds or sets again.
+
+Nothing is executed. Python 3.8, standard library only.
+"""
+
+import ast
+
+from script_names import (
+    all_of,
+    called_name,
+    calls_in,
+    dotted,
+    is_call,
+    is_call_alone,
+    names_in,
+    parents_of,
+    slip,
+    text_of,
+    walk,
+    walk_own,
+)
+
+IN_DEGREES = ("degrees", "rad2deg")
+OF_ANGLES = ("sin", "cos", "tan")
+TO_RADIANS = ("radians", "deg2rad")
+
+
+def wrong_values(tree):
+    """Comparisons with NaN, angles in degrees of which a sine is taken, answers of services that are dropped."""
+    made = [n for n in all_of(tree, ast.Assign) if called_name(n.value) in IN_DEGREES]
+    degrees = {dotted(target) for n in made for target in n.targets}
+    own = {dotted(n.targets[0]) for n in all_of(tree, ast.Assign) if getattr(n.value, "attr", "") != "theta"}
+    for node in walk(tree):
+        line = getattr(node, "lineno", 0)
+        if isinstance(node, ast.Compare) and any(map(is_nan, [node.left, *node.comparators])):
+            name = dotted(node.comparators[0] if is_nan(node.left) else node.left)
+            fix = "write `math.isnan(%s)`" % (name if "..." not in name else "…")
+            yield slip(line, "wrong-value", "no number is equal to NaN, not even NaN itself", fix, "nan")
+        elif called_name(node) in OF_ANGLES and node.args:
+            given = dotted(node.args[0])
+            if given in degrees or called_name(node.args[0]) in IN_DEGREES:
+                message = "`%s` takes radians, and gets degrees" % called_name(node)
+                fix = "leave out `degrees(…)`: the angle is already in radians"
+                yield slip(line, "wrong-value", message, fix, "degrees")
+        elif called_name(node) in TO_RADIANS and node.args and getattr(node.args[0], "attr", "") == "theta":
+            angle = dotted(node.args[0])
+            if angle in own:
+                continue  # a name of the script's own, which may be in degrees
+            fix = "on line %d, write `%s` alone, without `%s(…)`" % (line, angle, called_name(node))
+            yield slip(line, "wrong-value", "`%s` is already in radians" % angle, fix, "added")
+        elif isinstance(node, ast.Expr) and called_name(node.value).endswith("Response"):
+            name = called_name(node.value)
+            message, fix = "the `%s` that is made is not returned" % name, "write `return %s(…)`" % name
+            yield slip(line, "wrong-value", message, fix, "return")
+        elif isinstance(node, ast.FunctionDef) and unfilled_answer(node):
+            variable, name, line = unfilled_answer(node)
+            message = "no field of the `%s` that is returned is ever set" % name
+            fix = "set it above the `return`: `%s.<field> = …`" % variable
+            yield slip(line, "wrong-value", message, fix, "empty")
+
+
+def unfilled_answer(function):
+    """Return the variable, the class and the line of an answer that a callback makes without values, sets nothing of,
+    and always returns; None where there is none."""
+    own = list(walk_own(function))
+    made = [n for n in own if isinstance(n, ast.Assign) and called_name(n.value).endswith("Response")]
+    # Values that are given in the call need no field to be set below it
+    made = [n for n in made if not n.value.args + n.value.keywords and isinstance(n.targets[0], ast.Name)]
+    returned = {dotted(n.value) for n in own if isinstance(n, ast.Return) and n.value is not None}
+    variable = dotted(made[0].targets[0]) if len(made) == 1 else ""
+    # its name stands where it is made and returned, and nowhere else: `answer.sum` would be one more
+    uses = [n for n in ast.walk(function) if isinstance(n, ast.Name) and n.id == variable]
+    is_alone = returned == {variable} and len(uses) == 1 + sum(isinstance(n, ast.Return) for n in own)
+    name = called_name(made[0].value) if made else ""
+    # std_srvs/Empty has no field that could be set
+    return (variable, name, made[0].lineno) if is_alone and variable and name != "EmptyResponse" else None
+
+
+BELOW = (ast.Lt, ast.LtE)
+NUMBERS_BELOW, TEXT_SHOWN = 1e9, 40
+SIGNS = {ast.Gt: ">", ast.GtE: ">=", ast.Lt: "<", ast.LtE: "<="}
+TURNED = {ast.Gt: ast.Lt, ast.GtE: ast.LtE, ast.Lt: ast.Gt, ast.LtE: ast.GtE}
+
+
+def decided_conditions(tree):
+    """`x > 265 or x < 275`, which every number fulfils, and `x < 10 and x > 350`, which none does."""
+    for node in all_of(tree, ast.BoolOp):
+        any_of, bounds = isinstance(node.op, ast.Or), {}
+        yield from decided_by_values(node, ast.NotEq if any_of else ast.Eq)
+        for name, kind, number in filter(None, map(bound_of, node.values)):
+            lowest, highest = bounds.setdefault(name, [None, None])
+            side = kind in BELOW
+            before = (lowest, highest)[side]
+            # of several bounds on one side, the widest one counts for `or`, and the narrowest for `and`
+            if before is None or (number < before[1]) == (any_of != side):
+                bounds[name][side] = (kind, number)
+        for name, (low, high) in bounds.items():
+            if low is None or high is None or not (low[1] < high[1] if any_of else low[1] > high[1]):
+                continue
+            word, other, holds = ("or", "and", "every number") if any_of else ("and", "or", "no number")
+            pair = "%s %s %g %s %s %s %g" % (name, SIGNS[low[0]], low[1], word, name, SIGNS[high[0]], high[1])
+            fix = "on line %d, write `%s` in place of `%s`, or compare with other numbers"
+            fix %= (node.lineno, other, word)
+            yield slip(node.lineno, "wrong-value", "`%s` is true for %s" % (pair, holds), fix, "bounds")
+
+
+def decided_by_values(condition, kind):
+    """`key != 'a' or key != 'b'`, which every value fulfils, and `key == 'a' and key == 'b'`, which none does."""
+    asked = {}
+    for one in condition.values:
+        is_plain = isinstance(one, ast.Compare) and len(one.ops) == 1 and isinstance(one.ops[0], kind)
+        if is_plain and isinstance(one.comparators[0], ast.Constant) and "..." not in dotted(one.left):
+            value = one.comparators[0].value  # 1 and 1.0 are one value
+            asked.setdefault(dotted(one.left), {})[value] = repr(value)[:TEXT_SHOWN].replace("`", "'")
+    for name, values in asked.items():
+        if len(values) > 1:
+            is_or = kind is ast.NotEq
+            sign, word, other, holds = ("!=", "or", "and", "every") if is_or else ("==", "and", "or", "no")
+            first, second = list(values.values())[:2]
+            pair = "%s %s %s %s %s %s %s" % (name, sign, first, word, name, sign, second)
+            fix = "on line %d, write `%s` in place of `%s`" % (condition.lineno, other, word)
+            message = "`%s` is true for %s value" % (pair, holds)
+            yield slip(condition.lineno, "wrong-value", message, fix, "bounds")
+
+
+def params_read_unset(tree):
+    """`if not rospy.has_param('~a'): a = rospy.get_param('~a')`, which reads it only where nobody sets it."""
+    for node in all_of(tree, ast.If):
+        is_not = isinstance(node.test, ast.UnaryOp) and isinstance(node.test.op, ast.Not)
+        asked = node.test.operand if is_not else node.test
+        name = text_of(asked.args[0]) if called_name(asked) == "has_param" and asked.args else ""
+        unset, is_set = (node.body, node.orelse) if is_not else (node.orelse, node.body)
+        reads = [
+            [c for n in block for c in calls_in(n, "get_param") if c.args and text_of(c.args[0]) == name]
+            for block in (unset, is_set)
+        ]
+        if name and reads[0] and not reads[1] and all(len(c.args) == 1 and not c.keywords for c in reads[0]):
+            message = "this reads the parameter %s only where it is not set" % name
+            right = "without its `not`" if is_not else "with a `not`"
+            fix = "on line %d, write the condition %s" % (node.lineno, right)
+            yield slip(node.lineno, "wrong-value", message, fix, "unset")
+
+
+CLOCKS = ("now", "get_time", "time", "get_rostime", "to_sec", "toSec")
+
+
+def function_around(node, tree):
+    """Return the name of the function that a node is in, "" outside all of them."""
+    while node is not tree and not isinstance(node, ast.FunctionDef):
+        node = parents_of(tree)[node]
+    return getattr(node, "name", "")
+
+
+def times_added_again(tree):
+    """`way += speed * (t1 - t0)` in a loop that leaves t0 as it is."""
+    given = [n for n in all_of(tree, ast.Assign) if calls_in(n.value, *CLOCKS)]
+    timed, started_in = {id(n.value) for n in given}, {}
+    for node, target in ((n, target) for n in given for target in n.targets):
+        started_in.setdefault(dotted(target), set()).add(function_around(node, tree))
+    shared = {name for n in all_of(tree, ast.Global, ast.Nonlocal) for name in n.names}
+    for loop in all_of(tree, ast.While, ast.For):
+        inside = list(ast.walk(loop))
+        stored = dict.fromkeys(dotted(n) for n in inside if isinstance(getattr(n, "ctx", None), ast.Store))
+        here = {function_around(loop, tree), "__init__"}
+        stored.update((dotted(t), n.value) for n in inside if isinstance(n, ast.Assign) for t in n.targets)
+        for node in loop.body:
+            is_sum = isinstance(node, ast.AugAssign) and isinstance(node.op, ast.Add)
+            spans = [n for n in ast.walk(node.value) if isinstance(n, ast.BinOp)] if is_sum else ()
+            for span in spans:
+                start, end = dotted(getattr(span, "right", None)), stored.get(dotted(span.left), span.left)
+                is_clock = isinstance(span.op, ast.Sub) and (id(end) in timed or is_call(end, *CLOCKS))
+                renewed = ("." in start or start in shared) and started_in.get(start, here) - here
+                if is_clock and start not in stored and "..." not in start and not renewed:
+                    name = dotted(node.target)
+                    message = "`%s +=` adds the whole time since `%s` again in each turn" % (name, start)
+                    fix = "on line %d, write `%s =` instead of `%s +=`" % (node.lineno, name, name)
+                    yield slip(node.lineno, "wrong-value", message, fix, "added")
+
+
+def published_in_turn(tree):
+    """An `if` with an `else` about each item of a list, and a `publish(…)` of what both set, all in one `for` loop."""
+    for loop in all_of(tree, ast.For):
+        published = [
+            one.value for one in loop.body if is_call_alone(one) and called_name(one.value) == "publish"
+        ]
+        choices = [one for one in loop.body if isinstance(one, ast.If) and one.orelse]
+        seen = {n.id for n in ast.walk(loop.target) if isinstance(n, ast.Name)}
+        if not published or not choices or acts(ast.Module(loop.body, []), "publish"):
+            continue
+        about = [one for one in choices if seen & names_in(one.test) and "ranges" in ast.dump(loop)]
+        if about and len(published) == 1:
+            line = published[0].lineno
+            message = (
+                "the loop on line %d publishes once for each range, and the last one decides" % loop.lineno
+            )
+            fix = "work out the smallest of the ranges first, and write the `if` of line %d and the `publish(…)` of "
+            fix += "line %d below the loop, for that one"
+            yield slip(line, "wrong-value", message, fix % (about[0].lineno, line), "added")
+
+
+def overwritten_values(tree):
+    """An `if` with an `else`, alone in a `for` loop, both of which give one name a fixed value, so that what the loop
+    saw before its last turn is forgotten.
+    """
+    for loop in all_of(tree, ast.For):
+        only = loop.body[0] if len(loop.body) == 1 else None
+        if isinstance(only, ast.If) and isinstance(only.test, ast.Compare) and not acts(only):
+            yield from overwritten(loop, only)
+
+
+HARMLESS = {
+    "print", "loginfo", "logwarn", "str", "format", "round", "abs", "float", "isnan", "isinf", "append",
+}  # fmt: skip
+"""Calls that change nothing outside the loop that a student may see."""
+
+
+def acts(node, *spared):
+    """Whether something leaves a loop, or happens in its turns beyond what is computed and printed."""
+    calls = {called_name(n) or "" for n in ast.walk(node) if isinstance(n, ast.Call)}
+    leaving = (ast.Break, ast.Return, ast.Raise, ast.Yield)
+    return not calls <= HARMLESS.union(spared) or any(isinstance(n, leaving) for n in ast.walk(node))
+
+
+def overwritten(loop, choice):
+    """Yield the `if` of a loop's body that gives a name one fixed value, and its `else` another one."""
+    one, other = (
+        {
+            dotted(n.targets[0]): n.value
+            for n in block
+            if isinstance(n, ast.Assign) and isinstance(getattr(n.value, "operand", n.value), ast.Constant)
+        }
+        for block in (choice.body, choice.orelse)
+    )
+    read = {dotted(n) for n in ast.walk(choice) if isinstance(getattr(n, "ctx", None), ast.Load)}
+    names = [name for name in one if name in other and ast.dump(one[name]) != ast.dump(other[name])]
+    names = [name for name in names if name not in read]
+    if names and type(choice.test.ops[0]) in SIGNS:
+        near = type(choice.test.ops[0]) in BELOW
+        value = (other if near else one)[names[0]]
+        sign = {ast.USub: "-", ast.Not: "not ", ast.Invert: "~"}.get(type(getattr(value, "op", None)), "")
+        usual = sign + repr(getattr(value, "operand", value).value)
+        message = "each turn of this loop sets `%s`, so that only the last one counts" % names[0]
+        fix = "set `%s` to %s above the loop on line %d, and not in the `%s`"
+        fix %= (names[0], usual, loop.lineno, "else" if near else "if")
+        yield slip(choice.lineno, "wrong-value", message, fix, "added")
+
+
+def bound_of(node):
+    """Return the name, the kind and the number of a comparison with a number; None of all else."""
+    if not isinstance(node, ast.Compare) or len(node.ops) != 1 or type(node.ops[0]) not in SIGNS:
+        return None
+    name, kind, number = node.left, type(node.ops[0]), number_of(node.comparators[0])
+    if number is None:
+        name, kind, number = node.comparators[0], TURNED[kind], number_of(node.left)
+    return None if number is None or "..." in dotted(name) else (dotted(name), kind, number)
+
+
+def number_of(node):
+    """Return a number that stands in the script, with its sign; None of all else."""
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        number = number_of(node.operand)
+        return None if number is None else -number
+    is_number = isinstance(node, ast.Constant) and type(node.value) in (int, float)
+    return node.value if is_number and abs(node.value) < NUMBERS_BELOW else None
+
+
+def is_nan(node):
+    """Return whether it is written as `float('nan')`, `math.nan` or `numpy.nan`."""
+    if called_name(node) == "float" and node.args:
+        return str(getattr(node.args[0], "value", "")).lower() == "nan"
+    return isinstance(node, ast.Attribute) and node.attr.lower() == "nan"
