@@ -11,8 +11,8 @@ from grader.model.verdict import Placed
 SlipKind = Literal[
     "not-called", "input", "no-clock", "misspelt", "rate-parameter", "rate-number", "reset-value", "reset-limit",
     "set-in-loop", "reset-early", "never-called", "main-guard", "never-reached", "spin-in-loop", "loop-left",
-    "sleep-outside", "sleep-twice", "callback-called", "callback-missing", "callback-values", "callback-waits",
-    "defined-twice", "subscribed-again",
+    "ends-node", "sleep-outside", "sleep-twice", "callback-called", "callback-missing", "callback-values",
+    "callback-waits", "defined-twice", "subscribed-again",
     "clock-value", "queue-size", "deaf", "node-name", "no-init", "commented-out", "publisher", "publisher-type",
     "subscriber", "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes",
     "prints", "argument-text", "unused-import", "lacking-import", "unregistered", "not-started", "start-value",
@@ -54,6 +54,7 @@ class PythonSlip(Placed, Record):
     - `spin-in-loop`: a loop that publishes and waits in `spin()`.
     - `loop-left`: a loop that ends in its first turn, or after a number of them, or a callback that ends the node, or
       the only `publish(…)`, above a loop that waits; `name` is the function that it asks, where a `not` is missing.
+    - `ends-node`: a callback that ends the node, at least sometimes; a slip only if the node ended by itself.
     - `sleep-outside`, `sleep-twice`: a loop whose `sleep()` is outside it, or that only makes its Rate, or that
       waits twice in each turn.
     - `publish-twice`: a loop that publishes on one topic more than once in each turn.

@@ -206,15 +206,22 @@ ENDING = ("signal_shutdown", "exit", "quit", "_exit")
 
 
 def ending_callbacks(tree):
-    """Callbacks of topics that end the node at the first message."""
+    """Callbacks that end the node: those of topics at the first message, and others under some condition."""
     functions = functions_in(tree)
     for node in walk(tree):
-        own = callback_of(node, functions)
-        for one in own.body if own is not None else ():
-            if isinstance(one, ast.Expr) and called_name(one.value) in ENDING:
-                message = "the callback `%s` ends the node on line %d, at the first message"
-                message %= (own.name, one.lineno)
-                yield slip(one.lineno, "loop-left", message, "delete line %d" % one.lineno)
+        keyword, place, _ = CALLBACKS.get(called_name(node), ("", 0, 0))
+        # what ROS or Python calls at the end does not end the node
+        given = argument(node, place, keyword) if keyword in ("callback", "handler", "execute_cb") else []
+        given = [] if called_name(node) == "signal" else given
+        own = functions.get(dotted(given[0]).rpartition(".")[2]) if given else None
+        for one in calls_in(own, *ENDING) if own is not None else ():
+            message, line = "the callback `%s` ends the node on line %d" % (own.name, one.lineno), one.lineno
+            at_once = any(isinstance(n, ast.Expr) and n.value is one for n in own.body)
+            if at_once and called_name(node) == "Subscriber":
+                yield slip(line, "loop-left", message + ", at the first message", "delete line %d" % line)
+            else:
+                fix = "leave out line %d, or end the node only where the lab asks for it" % line
+                yield slip(line, "ends-node", message, fix)
 
 
 # ---- what a topic's callback prints of its message

@@ -102,14 +102,16 @@ def _delete_empty(files: Files, package: PackageFacts, used: Collection[str]) ->
     """Delete calls that ask for a folder that is not there, where they name no file, or only what was not handed in and
     no code uses."""
     paths = [file.path for file in package.files]
+    handed_in = {PurePosixPath(path).name for path in paths}
     for name, folder in INTERFACE_FOLDERS.items():
         there = any(path.startswith(f"{folder}/") for path in paths)
         unused = folder not in used and not any(path.endswith(f".{folder}") for path in paths)
         for call in reversed(calls_of(files, name)) if not there else ():
-            if [token.value for token in words_of(call)] in ([], ["FILES"]):
+            words = [token.value for token in words_of(call)]
+            if words in ([], ["FILES"]):
                 why = f"{name}(…) names no file, and needs the folder {folder}/, which is not there"
                 _delete(files, call, why)
-            elif unused:
+            elif unused and handed_in.isdisjoint(words):
                 _delete(files, call, f"{name}(…) needs the folder {folder}/, which is not there")
 
 
