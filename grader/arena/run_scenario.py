@@ -56,7 +56,7 @@ RETRIES = re.compile(
     rb"^([ \t]*)while(?:\s*\()?\s*" + ENDLESS + rb"\s*(?:\)\s*)?:[ \t]*(?:#[^\n]*)?\n\1([ \t]+)try:[ \t]*\n"
     rb"\1\2[ \t]+[^\n;]*[wW]ait_?[fF]or_?[sS]erv[^\n;]*\n(?:\1\2[ \t]+(?:break|return)\b[^\n]*\n)?"
     rb"\1\2except\b[^\n]*:[ \t]*\n(?:\1\2[ \t]+(?:(?:pass|continue)\b[^\n;]*(?:\n|\Z)|" + SLEEPS + rb"))+"
-    rb"(?:\1\2[\w.]*sleep\([^\n;]*(?:\n|\Z))?(?!\1[ \t])",
+    rb"(?:\1\2[\w.]*sleep\([^\n;]*(?:\n|\Z))?(?!(?:[ \t]*\n)*\1[ \t]+\S)",
     re.MULTILINE,
 )
 """One that waits for a service again each time it has waited for long enough."""

@@ -26,8 +26,6 @@ LISTED = 10
 """So many values of the feedback are listed."""
 GOES_ON_NS = 1_000_000_000
 """Feedback so long after a goal was cancelled says that the server goes on with it."""
-LONG_S = 1.0
-"""No turn of a loop that reports on a goal lasts longer, where the rubric does not say."""
 CANCELLED_MORE_S = 5.0
 """So much longer than `within_s`, at least, the result of a goal that is cancelled is waited for."""
 ENDS = {
@@ -240,8 +238,12 @@ def _no_result(package: PackageFacts, run: Run, goal: Goal, params: ActionResult
         return end.verdict(failed, f"{said}: the node ended before ({end.cause})")
     if end := explain_error(package, run):
         return end.verdict(failed, f"{said}: {end.cause}")
-    if waits := _long_wait(package, run, params):
-        return waits.verdict(failed, f"{said}: {waits.cause}")
+    to_s = run_seconds(run)
+    waited_s = (
+        to_s(goal.ended_ns) - to_s(goal.cancelled_ns or goal.at_ns) if to_s and goal.ended_ns else math.inf
+    )
+    if waits := _long_wait(package, run, waited_s):
+        return _excused(waits.verdict(failed, f"{said}: {waits.cause}"), run, goal)
     message = f"{said}: {shown(goal.end.detail) if goal.end else ''}"
     hint = "every path through the callback must end with set_succeeded, set_aborted or set_preempted"
     verdict = failed(message, hint=hint).if_repeated()
@@ -276,10 +278,10 @@ def _other_end(package: PackageFacts, run: Run, goal: Goal, params: ActionResult
     return failed(message, hint=HINTS[params.status])
 
 
-def _long_wait(package: PackageFacts, run: Run, params: ActionResultParams) -> Ending | None:
-    """Return the line of a script that runs which makes a turn of its loop last longer than the goal may."""
+def _long_wait(package: PackageFacts, run: Run, limit_s: float) -> Ending | None:
+    """Return the line of a script that runs which makes a turn of its loop last longer than the goal may (s)."""
     for slip in run_slips(package, run, "rate-number"):
-        pause_s, limit_s = 1 / (float(slip.message) or math.inf), params.within_s or LONG_S
+        pause_s = 1 / (float(slip.message) or math.inf)
         if pause_s > limit_s:
             lasts = (
                 f"line {slip.line} of {slip.file} lets each turn of its loop last {significant(pause_s)} s"
@@ -304,7 +306,7 @@ def _too_late(package: PackageFacts, run: Run, goal: Goal, params: ActionResultP
         else "do not sleep longer than the handout asks"
     )
     verdict = failed(message, hint=hint)
-    if waits := _long_wait(package, run, params):
+    if waits := _long_wait(package, run, params.within_s):
         return waits.verdict(failed, f"{message}: {waits.cause}")
     # So much later than asked is no lateness of a machine.
     if took_s > params.within_s + NEVER_LATE_S * run.warp:

@@ -45,10 +45,10 @@ from grader.checks.support.launch_slips import (
     refusals,
 )
 from grader.checks.support.parameters import absolute_name
-from grader.checks.support.processes import GlobalName, early_end
+from grader.checks.support.processes import GlobalName, early_end, run_slips
 from grader.checks.support.scripts import asks_for_wrapper, shebang_obstacles
 from grader.checks.support.text import SPIN, near_names
-from grader.checks.support.topics import cite, connected_nodes, nodes_on
+from grader.checks.support.topics import SYSTEM_TOPICS, cite, connected_nodes, nodes_on
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
@@ -282,7 +282,7 @@ def _judge_nodes(package: PackageFacts, file: LaunchFile, run: Run, params: Laun
         return _not_connected(package, file, run, wanted, params.topic)
     if params.topic and (ended := _ended_soon(run, [w.node for w in wanted], params.topic)):
         return _ended_by_itself(package, file, ended)
-    if lost := _judge_deaths(package, run, wanted, "came up, but then") or _stopped_clock(run, file):
+    if lost := _judge_deaths(package, run, wanted, "came up, but then") or _stopped_clock(package, run, file):
         return lost
     if params.programs and params.params:
         # `_find_unnamed` has seen to it that there is one.
@@ -314,7 +314,7 @@ def _right_parts(
         topic is not None
         and any(connected_nodes(package, run, topic))
         and not _ended_soon(run, every, topic)
-        and not _stopped_clock(run, file)
+        and not _stopped_clock(package, run, file)
     )
     if not up:
         misnamed = [one for name, pkg in params.nodes.items() for one in _misnamed(file, name, pkg)]
@@ -514,12 +514,15 @@ def _judge_deaths(package: PackageFacts, run: Run, wanted: list[Wanted], when: s
     return None
 
 
-def _stopped_clock(run: Run, file: LaunchFile) -> Verdict | None:
-    """Return that no time goes by for the file's nodes: they are to take it from a simulator, and there is none."""
-    set_at = next(
-        (p for p in file.params if p.name == "/use_sim_time" and p.value in {"true", "True", "1"}), None
-    )
-    if set_at is None or run.clock == "warped" or run.student_channels("/clock"):
+def _stopped_clock(package: PackageFacts, run: Run, file: LaunchFile) -> Verdict | None:
+    """Return that no time goes by for the file's nodes: they are to take it from a simulator, and there is none. Nodes
+    that publish again, or never sleep, do without."""
+    set_at = next((p for p in reversed(file.params) if p.name == "/use_sim_time"), None)
+    if set_at is None or set_at.value not in {"true", "True", "1"} or run.clock == "warped":
+        return None
+    came = [len(c.messages) for c in run.student_channels() if c.topic not in SYSTEM_TOPICS]
+    waits = max(came) == 1 if any(came) else run_slips(package, run, "rate-number", "rate-parameter")
+    if not waits or run.student_channels("/clock") or nodes_on(run, "/clock", "publishers"):
         return None
     why = "/use_sim_time is true, and nothing publishes /clock: each node waits in its first sleep for ever"
     return failed(

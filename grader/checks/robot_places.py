@@ -535,7 +535,11 @@ def _stays(
             verdict = verdict.explained(f"it drives in circles there, {around:.1f} times around", CIRCLES)
     elif long_m < params.least_m:
         verdict = drives_too_little(path, region, params.least_m)
-    elif params.least_m and (way_m := long_m - length_m((end := circling(path))[0])) < params.least_m:
+    elif (
+        params.least_m
+        and isinstance(region, Band)  # in a box, circles may be what is asked for
+        and (way_m := long_m - length_m((end := circling(path, region))[0])) < params.least_m
+    ):
         message = f"it drives in circles at {spot(path[-1].point)} in the end, {end[1]:.1f} times around"
         verdict = failed(message, hint=CIRCLES if params.max_m is not None else STILL_TURNS)
         long_m = way_m

@@ -124,11 +124,19 @@ def _waits_s(step: Step, first_s: float) -> float:
     return first_s if step.published is not None or step.play is not None else 0.0
 
 
+def _steps_on(topic: object, scenario: dict[str, Any]) -> list[int]:
+    """Return which steps send a message on a topic; none where one of them sends several, or nobody knows."""
+    sent = [
+        one for one in as_maps(scenario.get("steps")) if as_map(one[1].get("publish")).get("topic") == topic
+    ]
+    parts = [step.published if (step := _read_step(written)) else None for _, written in sent]
+    return [n for n, _ in sent] if all(part is not None and part.total == 1 for part in parts) else []
+
+
 def until_next_s(topic: object, number: object, scenario: dict[str, Any]) -> float | None:
     """Return how long after a message of that number on a topic the steps send the next one there; None where nobody
     knows, or it is the last."""
-    steps = as_maps(scenario.get("steps"))
-    sent = [n for n, step in steps if as_map(step.get("publish")).get("topic") == topic]
+    sent = _steps_on(topic, scenario)
     if not isinstance(number, int) or not 0 < number < len(sent):
         return None
     passed = scenario["steps"][sent[number - 1] : sent[number]]
@@ -138,8 +146,7 @@ def until_next_s(topic: object, number: object, scenario: dict[str, Any]) -> flo
 
 def _until_last_s(topic: object, number: object, scenario: dict[str, Any]) -> float | None:
     """Return how long after the last message on a topic, if that is its number, the steps and the run end."""
-    steps = as_maps(scenario.get("steps"))
-    sent = [n for n, step in steps if as_map(step.get("publish")).get("topic") == topic]
+    sent = _steps_on(topic, scenario)
     if "until" in scenario or not sent or number != len(sent):
         return None
     return steps_s({"steps": scenario["steps"][sent[-1] :]})

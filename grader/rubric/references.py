@@ -12,6 +12,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.registry import Check, Reference
+from grader.checks.support.scripts import NODE_FOLDERS
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.ros_env import TypeKind, ros_packages
 from grader.rubric.definitions import Definitions
@@ -160,8 +161,10 @@ def _in_other_folder(path: PurePosixPath, rubric: WrittenRubric) -> str:
     with_folder = re.compile(rf"(?<![\w./-])(?:[\w-]+/)+{re.escape(path.name)}(?!\w)")
     named = sorted({one for text in texts for one in with_folder.findall(text)})
     is_named = any(f"/{one}".endswith(f"/{path}") for one in named) and len(path.parts) > 1
-    is_python = path.suffix == ".py" and bool(named)
-    return f"the rubric names {named[0]} elsewhere: write it so" if is_python and not is_named else ""
+    # `rospy_tutorials/talker.py` is another package's
+    own = [one for one in named if str(PurePosixPath(one).parent) in NODE_FOLDERS]
+    is_python = path.suffix == ".py" and bool(own)
+    return f"the rubric names {own[0]} elsewhere: write it so" if is_python and not is_named else ""
 
 
 def _with_ending(file: str, rubric: WrittenRubric) -> str:

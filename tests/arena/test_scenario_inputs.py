@@ -215,6 +215,11 @@ RETRYING = """def ask():
         ("rospy.sleep(0.5)", "raise", True),
         ("rospy.sleep(0.5)", "tries += 1", True),
         ("            rospy.sleep(0.5)\n", "        if late():\n            break\n", True),
+        (
+            "rospy.sleep(0.5)\n",
+            "rospy.sleep(0.5)\n\n        tries += 1\n        if tries > 5:\n            break\n",
+            True,
+        ),
         ("not rospy.is_shutdown()", "tries < 5", True),
         ("    print('there')", "    rospy.wait_for_service('/sub', 5)", True),
         (", timeout=1", "", False),

@@ -321,13 +321,36 @@ def test_a_goal_behind_one_that_never_ends_is_waited_for_until_that_shows(
     server = SERVER.format(goal=goal, result=result).replace("end(m.id, 2, -1)", "None")
     server = server.replace("def goal(message):\n", "def goal(message):\n    goals.append(message.goal_id)\n")
     server = server.replace("rospy.Subscriber", TELLS.replace("NEXT", str(status)) + "rospy.Subscriber", 1)
-    about = {"name": "/count", "type": "lab/Count", "goal": {"target": -1}, "limit_s": 1}
+    about = {"name": "/count", "type": "lab/Count", "goal": {"target": -1}, "limit_s": 2}
     seen = _run(
         tmp_path,
         {"scripts/server.py": server, "action/Count.action": COUNT},
         [{"action": about}, {"action": {**about, "limit_s": 5}}],
     )
-    assert [detail for _, _, detail in _did(seen, "result")] == ["no result within 1 s", detail]
+    assert [detail for _, _, detail in _did(seen, "result")] == ["no result within 2 s", detail]
+
+
+@pytest.mark.parametrize(("first_s", "answer_s"), [(4, 4.0), (1, 2.0)])
+def test_a_goal_that_ends_an_earlier_one_late_is_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, first_s: float, answer_s: float
+) -> None:
+    """The server looks for another goal every three seconds, or works on the first for longer than the step waits."""
+    monkeypatch.setattr("grader.arena.steps.ANSWER_S", answer_s)
+    find = action_texts("lab/Count", COUNT).get
+    goal, result = (MessageType(f"lab/CountAction{part}", find).definition for part in ("Goal", "Result"))
+    server = SERVER.format(goal=goal, result=result).replace("range(80 ", "range(30 ")
+    server = server.replace("def goal(message):\n", "def goal(message):\n    goals.append(message.goal_id)\n")
+    server = server.replace("rospy.Subscriber", TELLS.replace("NEXT", "0") + "rospy.Subscriber", 1)
+    about = {"name": "/count", "type": "lab/Count"}
+    seen = _run(
+        tmp_path,
+        {"scripts/server.py": server, "action/Count.action": COUNT},
+        [
+            {"action": {**about, "goal": {"target": -1}, "limit_s": first_s}},
+            {"action": {**about, "goal": {"target": 7}, "limit_s": 8}},
+        ],
+    )
+    assert [detail for _, _, detail in _did(seen, "result")] == [f"no result within {first_s} s", "SUCCEEDED"]
 
 
 def test_an_action_that_the_package_lacks_is_noted(tmp_path: Path) -> None:

@@ -82,7 +82,9 @@ def _written(folder: Path, old: str = "", new: str = "") -> Path:
 
 
 def test_what_names_only_what_is_there_loads(tmp_path: Path) -> None:
-    assert len(load_rubric(str(_written(tmp_path))).rubric.criteria) == len(SOUND)
+    other = "package: lab1\nhandout: Look at rospy_tutorials/talker.py first.\n"
+    for path in (_written(tmp_path), _written(tmp_path, "package: lab1\n", other)):
+        assert len(load_rubric(str(path)).rubric.criteria) == len(SOUND)
 
 
 @pytest.mark.parametrize(

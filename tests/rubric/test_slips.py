@@ -333,6 +333,17 @@ def test_what_may_be_right_is_taken(examples: Path, name: str, old: str, new: st
     assert load_rubric(str(_spoiled(examples, name, old, new))).rubric.id == name
 
 
+def test_a_step_may_send_several_goals(examples: Path) -> None:
+    """The third goal is the last of the first step: the last step's wait is none of its own."""
+    about, _, rest = (examples / "go-to-goal.yaml").read_text(encoding="utf-8").partition("    steps:\n")
+    sent = "values: [{x: 8, y: 8}, {x: 3, y: 8}, {x: 3, y: 2}], rate_hz: 0.1"
+    one = "      - publish: {topic: /goal, type: geometry_msgs/Pose2D, %s}\n      - wait: {seconds: 2}\n"
+    steps = "".join(one % each for each in (sent, "value: {x: 3, y: 2}", "value: {x: 3, y: 2}"))
+    path = examples / "spoiled.yaml"
+    path.write_text(f"{about}    steps:\n{steps}\ncriteria{rest.partition('criteria')[2]}", encoding="utf-8")
+    assert load_rubric(str(path)).rubric.id == "go-to-goal"
+
+
 def test_the_parameters_of_the_robot_world_are_known() -> None:
     """The program itself runs on ROS's Python alone: its source is read."""
     source = (STANDINS / "robot_world" / "world_node.py").read_text(encoding="utf-8")

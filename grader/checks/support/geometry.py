@@ -508,15 +508,22 @@ def circles(path: Sequence[Pose], out: Sequence[float]) -> float:
 CIRCLE_M, OFTEN = 1.0, 1.5
 
 
-def circling(path: Sequence[Pose]) -> tuple[list[Pose], float]:
+def circling(path: Sequence[Pose], band: Band) -> tuple[list[Pose], float]:
     """Return the end of a path that stays near its last place, and how often it drives around there; nothing where
-    that is seldom."""
+    that is seldom, or where it drives around a wall or a point."""
     near = next(
         (i for i, p in enumerate(reversed(path)) if math.dist(p.point, path[-1].point) > CIRCLE_M), len(path)
     )
     end = list(path[len(path) - near :])
     around = circles(end, [1.0] * len(end))
-    return (end, around) if around > OFTEN else ([], 0.0)
+    has_inside = any(abs(_sweep(end, point)) > math.tau for wall in band.walls for point in wall)
+    return (end, around) if around > OFTEN and not has_inside else ([], 0.0)
+
+
+def _sweep(path: Sequence[Pose], point: Point) -> float:
+    """Return by how much the direction from a point to the robot turns along its path (rad)."""
+    seen = [math.atan2(pose.point[1] - point[1], pose.point[0] - point[0]) for pose in path]
+    return math.fsum(math.remainder(b - a, math.tau) for a, b in pairwise(seen))
 
 
 def nearest_m(point: Point, lines: Sequence[Polyline]) -> float:
