@@ -85,6 +85,8 @@ RANGES = {
 }
 """Between which values a field is, by the comments and the constants in its message's definition."""
 SHARE = (0, 1)
+ROUNDED = 0.02
+"""So much of its range beyond it, a bound allows for a value that is rounded."""
 VELOCITIES = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")
 PLACES = frozenset({"ends-at", "path", "stays-within"})
 """Checks of where a robot is."""
@@ -138,7 +140,11 @@ def range_warnings(rubric: WrittenRubric) -> Iterator[Fault]:
                 ]
     for path, types, field, value in given:
         limits = [RANGES.get((kind, field)) for kind in types]
-        if is_number(value) and len(limits) == 1 and limits[0] and not limits[0][0] <= value <= limits[0][1]:
+        if not is_number(value) or len(limits) != 1 or limits[0] is None:
+            continue
+        low, high = limits[0]
+        rounded = ROUNDED * (high - low) if path[-1] in {"min", "max"} else 0
+        if not low - rounded <= value <= high + rounded:
             yield path, f"{field} of {min(types)} is {_in_range(limits[0], value)}"
 
 

@@ -114,10 +114,11 @@ def _not_driven(criterion: WrittenCriterion) -> Iterator[Fault]:
     """Yield parts of a velocity that a robot with two wheels cannot have, and that are to be other than 0."""
     for at, asked in criterion.conditions if robot_of(criterion.scenario) else ():
         field, bounds = asked.get("field"), (asked.get("value"), asked.get("min"), asked.get("max"))
-        low, high = asked.get("min", -math.inf), asked.get("max", math.inf)
-        moves = any(map(is_number, bounds)) and not (
-            asked["value"] == 0 if is_number(asked.get("value")) else low <= 0 <= high
+        value, low, high = (
+            one if is_number(one) else other
+            for one, other in zip(bounds, (0, -math.inf, math.inf), strict=True)
         )
+        moves = not (value == 0 and low <= 0 <= high) and not criterion.given.get("never")
         if asked.get("topic") == "/cmd_vel" and field in SIDEWAYS and moves:
             yield (*at, "field"), f"the robot cannot move by {field}: it has linear.x and angular.z alone"
 

@@ -187,6 +187,24 @@ def test_what_looks_like_a_slip_and_is_none_is_accepted(
     assert not [one for one in found if "did you mean" in one or "has 20" in one or "to max is" in one]
 
 
+STOPS = "linear.x, value: 0, tolerance: 0.01}, within_s: 1.5}"
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        # so much may be rounded
+        ("battery", "percentage, max: 0.2}", "percentage, min: -0.001, max: 1.001}"),
+        # what is never to be need not be possible, and a bound may be left out
+        ("avoid-obstacles", STOPS, "linear.y, min: 0.01}, within_s: 1.5, never: true}"),
+        ("avoid-obstacles", STOPS, "linear.y, min: null, max: 0.01}, within_s: 1.5}"),
+    ],
+)
+def test_what_is_out_of_reach_may_be_named(examples: Path, name: str, old: str, new: str) -> None:
+    found = warnings_of(load_rubric(str(_spoiled(examples, name, old, new))), "spoiled.yaml")
+    assert not [one for one in found if "and never" in one or "cannot move" in one]
+
+
 def test_a_client_may_be_asked_to_cancel_its_goal(examples: Path) -> None:
     served = "serves: [{action: /dock, type: adder/Dock, delay_s: 12}]"
     start = "start: [{name: client, script: scripts/add_client.py}]"

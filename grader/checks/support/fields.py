@@ -309,7 +309,8 @@ def made_of(found: Sequence[Reading], channels: Iterable[Channel], wanted: _Want
                 f"it is the sum of what came on {topic}, less what is negative",
                 "add `abs(…)` of each value",
             )
-        if ends == (len(sent),):
+        is_sum = any(wanted.fits(found[-1]._replace(values=(sum(each),))) for each in (sent, sizes))
+        if ends == (len(sent),) and is_sum and len(sent) not in sizes:
             return f"so many messages came on {topic}", "add what is in each message, and not 1"
     return None
 

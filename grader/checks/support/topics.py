@@ -142,7 +142,7 @@ def no_message(
         seen = f"; {join_words(near)} is" if near else ""
         hint = f"publish on {topic} while you record, and record it: rosbag record {topic}, or -a for all"
         return failed_or_blocked(f"{topic} is not in {run.evidence}{seen}", measured=measured, hint=hint)
-    if found := _sent_otherwise(run, topic) or _judge_misnamed(package, run, topic, of_node):
+    if found := _sent_otherwise(package, run, topic) or _judge_misnamed(package, run, topic, of_node):
         return found
     if absent := no_node(package, run, what) or _judge_refused(run, topic) or misfit(run):
         return absent if topic in published else _with_others(absent, published)
@@ -151,11 +151,16 @@ def no_message(
     return _not_advertised(package, run, topic, of_node, kind)
 
 
-def _sent_otherwise(run: Run, topic: str) -> Verdict | None:
-    """Return the verdict where transforms are sent as static ones, or a goal is sent to the action of this topic,
+def _sent_otherwise(package: PackageFacts, run: Run, topic: str) -> Verdict | None:
+    """Return the verdict where all transforms are sent as static ones, or a goal is sent to the action of this topic,
     `/dock/cancel`, and not cancelled."""
     action, _, part = topic.rpartition("/")
-    if topic == "/tf" and any(c.messages for c in run.student_channels("/tf_static")):
+    is_static = topic == "/tf" and any(c.messages for c in run.student_channels("/tf_static"))
+    if (
+        is_static
+        and "/tf" not in published_topics(run)
+        and not (early_end(run) or explain_error(package, run))
+    ):
         hint = "send what changes with a tf2_ros.TransformBroadcaster: a static one sends on /tf_static"
         message = "no message came on /tf; what is sent goes to /tf_static"
         return failed_or_blocked(message, measured="no message", hint=hint)
