@@ -23,7 +23,7 @@ from grader.checks.robot_path import (
     why_still,
 )
 from grader.checks.support.clocks import LATE_MS, Lateness, excused, no_clock, run_seconds
-from grader.checks.support.exit_causes import explain_early_end
+from grader.checks.support.exit_causes import explain_early_end, explain_end
 from grader.checks.support.geometry import (
     MOVED_M,
     TURNING_RAD,
@@ -51,7 +51,7 @@ from grader.checks.support.geometry import (
     turned_rad,
     turns_away,
 )
-from grader.checks.support.processes import GlobalName, named_at, observed_until_ns, run_slips
+from grader.checks.support.processes import GlobalName, life_of, named_at, observed_until_ns, run_slips
 from grader.checks.support.scans import scan_near, with_scan
 from grader.checks.support.text import subscriber
 from grader.checks.support.topics import SYSTEM_TOPICS, cite, no_message, nodes_on, topics_with
@@ -224,9 +224,10 @@ def _unreadable(found: Track | None, package: PackageFacts, run: Run, params: Pl
 def _not_asked(package: PackageFacts, run: Run, params: EndsAtParams) -> Verdict | None:
     if params.asked_on is None:
         return None
-    if nodes_on(run, params.asked_on, "subscribers"):
+    if hearing := nodes_on(run, params.asked_on, "subscribers"):
         missed = f"message {params.number} on {params.asked_on} was not sent"
-        end = explain_early_end(package, run)
+        dead = [one for node in hearing if (one := life_of(run, node)) and one.ended_early]
+        end = explain_end(dead[0], run, package) if dead else None
         return end.verdict(failed_or_blocked, f"{missed}: {end.cause}") if end else grade_again(missed)
     hint = f"subscribe to it: {subscriber(params.asked_on)}"
     return failed_or_blocked(f"no node listens to {params.asked_on}, so no goal could be sent", hint=hint)
