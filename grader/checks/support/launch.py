@@ -369,11 +369,14 @@ TAKE_A_VALUE = re.compile(
     r"(?:-[OoblxN]|--(?:output-\w+|buffsize|chunksize|limit|duration|size|exclude|tcpnodelay))\s+\S+"
 )
 
+CHOOSES = re.compile(r"[^-]|-\w*[ae]|--(?:all|regex|node)\b")
+"""A topic, or a flag that stands for several (`-a`, or `-ao` of two in one)."""
+
 
 def _names_no_topic(args: str) -> bool:
     """Return whether a call of `rosbag record` names no topic, and no other way to choose them."""
     rest = TAKE_A_VALUE.sub("", args).split()
-    return all(one.startswith("-") for one in rest) and not {"-a", "--all", "-e", "--regex"} & {*rest}
+    return not any(map(CHOOSES.match, rest))
 
 
 def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | None:
