@@ -430,6 +430,9 @@ SEEN_AS = {
 }  # fmt: skip
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so; others always show."""
 
+OF_TURNS = ("orientation", "rotation", "transform")
+"""What a quaternion can be wrong in."""
+
 
 def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a lost mark with the line of a script that runs on which the value goes wrong, or with its conditions that
@@ -442,6 +445,8 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
     found = [s for s in package.slips if s.kind in kinds and s.file in files]
     wrong = verdict.wrong
     sure = [s for s in found if s.kind == "goes-on" or (wrong and SEEN_AS.get(s.name) == wrong)]
+    turns = any(word in verdict.message for word in OF_TURNS)
+    sure = [s for s in sure if s.name != "half" or turns]
     maybe = [s for s in found if not (SEEN_AS.get(s.name) or (wrong and s.name in SEEN_AS))]
     for slip in sure[:1] or maybe[:4]:
         why, hint = f"line {slip.line} of {slip.file}: {slip.message}", f"{verdict.hint}; {slip.fix}"
