@@ -463,6 +463,11 @@ def test_a_listener_that_each_turn_makes_again(tmp_path: Path) -> None:
         ("distance = sqrt((a - b) ** 2 + (c - d) ** 2)\n", []),
         ("dist_sq = (a - b) ** 2 + (c - d) ** 2\n", []),
         ("d2 = (a - b) ** 2 + (c - d) ** 2\n", []),
+        ("dist = (a - b) ** 2 + (c - d) ** 2\nif math.sqrt(dist) < 1:\n    stop()\n", []),
+        ("dist = (a - b) ** 2 + (c - d) ** 2\nif dist < near ** 2:\n    stop()\n", []),
+        ("dist = (a - b) ** 2 + (c - d) ** 2\nif dist < near * near:\n    stop()\n", []),
+        ("def dist(a, b):\n    return a ** 2 + b ** 2\nfar = self.dist(1, 2) ** 0.5\n", []),
+        ("dist = (a - b) ** 2 + (c - d) ** 2\nif dist < near:\n    stop()\n", [1]),
         ("distance = a + b\n", []),
     ],
 )

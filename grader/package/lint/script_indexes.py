@@ -137,8 +137,10 @@ def without_root(tree):
     named = [(dotted(n.targets[0]), n.value) for n in all_of(tree, ast.Assign)]
     for function in all_of(tree, ast.FunctionDef):
         named += [(function.name, n.value) for n in function.body if isinstance(n, ast.Return)]
+    rooted = compared_as_squares(tree) if named else set()
     for name, value in named:
-        word = name.rpartition(".")[2].lower()
+        last = name.rpartition(".")[2]
+        word = "" if last in rooted else last.lower()
         is_sum = (
             isinstance(getattr(value, "op", None), ast.Add)
             and is_square(value.left)
@@ -148,6 +150,17 @@ def without_root(tree):
             message = "`%s` is the square of a distance, as without a square root" % name
             fix = "on line %d, write `(… + …) ** 0.5`, with brackets around the whole sum" % value.lineno
             yield slip(value.lineno, "wrong-value", message, fix, "rootless")
+
+
+def compared_as_squares(tree):
+    """Return the names of what a root is taken of elsewhere, or that is compared with a square."""
+    used = [one for call in all_of(tree, ast.Call) if called_name(call) == "sqrt" for one in call.args]
+    used += [n.left for n in all_of(tree, ast.BinOp) if isinstance(n.op, ast.Pow)]
+    for node in all_of(tree, ast.Compare):
+        sides = [node.left, *node.comparators]
+        if any(isinstance(getattr(one, "op", None), (ast.Pow, ast.Mult)) for one in sides):
+            used += sides
+    return {name.rpartition(".")[2] for one in used for name in names_in(one)}
 
 
 def is_square(node):
