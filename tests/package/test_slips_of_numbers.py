@@ -445,6 +445,12 @@ def test_a_parameter_that_is_read_only_where_it_is_not_set(
     assert [s.fix for s in slips] == fixes
 
 
+def test_a_parameter_may_be_read_where_it_has_just_been_set(tmp_path: Path) -> None:
+    text = "if not rospy.has_param('~a'):\n    rospy.set_param('~a', 2)\n    a = rospy.get_param('~a')\n"
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    assert not [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+
+
 def test_a_listener_that_each_turn_makes_again(tmp_path: Path) -> None:
     text = (
         "while not rospy.is_shutdown():\n    b = tf2_ros.Buffer()\n    ear = tf2_ros.TransformListener(b)\n"

@@ -135,7 +135,14 @@ def params_read_unset(tree):
             [c for n in block for c in calls_in(n, "get_param") if c.args and text_of(c.args[0]) == name]
             for block in (unset, is_set)
         ]
-        if name and reads[0] and not reads[1] and all(len(c.args) == 1 and not c.keywords for c in reads[0]):
+        is_made = any(text_of(c.args[0]) == name for n in unset for c in calls_in(n, "set_param") if c.args)
+        if (
+            name
+            and reads[0]
+            and not reads[1]
+            and not is_made
+            and all(len(c.args) == 1 and not c.keywords for c in reads[0])
+        ):
             message = "this reads the parameter %s only where it is not set" % name
             right = "without its `not`" if is_not else "with a `not`"
             fix = "on line %d, write the condition %s" % (node.lineno, right)
