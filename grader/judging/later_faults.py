@@ -197,8 +197,7 @@ class Later:
         }  # fmt: skip
         if not self._ran:
             yield from self._names()
-        there = filter(None, map(self._package.file, self._paths))
-        readable = not any(one.is_no_script for one in there)
+        readable = not any(f.is_no_script for f in map(self._package.file, self._paths) if f is not None)
         yield from by_check[self._criterion.check]() if self._criterion.check in by_check and readable else ()
 
     def _of(self, *kinds: str) -> list[PythonSlip]:
@@ -564,7 +563,8 @@ class Later:
     def _logged(self) -> Iterator[Fix]:
         text, said = str(self._wanted.get("text", "")), self._of("prints")
         source = "\n".join(line for path in self._paths for line in self._lines(path)).casefold()
-        if source and not any(word in source for word in re.findall(r"\w{3,}", text.casefold())):
+        words = re.findall(r"\w{3,}", text.casefold())
+        if source and words and not any(word in source for word in words):
             yield Fix(f"log {text!r}, which no line of {join_words(sorted(self._paths))} does")
         elif len(said) == 1 and "{" not in said[0].message and text not in said[0].message:
             yield Fix(f"log {text!r} on {_line(said[0])}, not {said[0].message!r}")

@@ -594,3 +594,5 @@ def test_messages_that_are_not_there_are_named_where_catkin_sees_no_package() ->
 def test_a_text_that_no_line_has_is_named() -> None:
     told = hint_of("node", DIES, [NODE | ROOT, LOGS], source="rospy.loginfo('at %f', x)\n")
     assert told.endswith(f"; then log 'Hello World!', which no line of {FILE} does")
+    short = {**LOGS, "with": {**LOGS["with"], "text": "OK"}}
+    assert "log 'OK'" not in hint_of("node", DIES, [NODE | ROOT, short], source="rospy.loginfo('OK')\n")
