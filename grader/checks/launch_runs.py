@@ -514,14 +514,19 @@ def _judge_deaths(package: PackageFacts, run: Run, wanted: list[Wanted], when: s
     return None
 
 
+TURN_NS = 500_000_000
+"""What a node publishes in the first turn of its loop comes within this time."""
+
+
 def _stopped_clock(package: PackageFacts, run: Run, file: LaunchFile) -> Verdict | None:
     """Return that no time goes by for the file's nodes: they are to take it from a simulator, and there is none. Nodes
     that publish again, or never sleep, do without."""
     set_at = next((p for p in reversed(file.params) if p.name == "/use_sim_time"), None)
     if set_at is None or set_at.value not in {"true", "True", "1"} or run.clock == "warped":
         return None
-    came = [len(c.messages) for c in run.student_channels() if c.topic not in SYSTEM_TOPICS]
-    waits = max(came) == 1 if any(came) else run_slips(package, run, "rate-number", "rate-parameter")
+    came = [c for c in run.student_channels() if c.messages and c.topic not in SYSTEM_TOPICS]
+    spans_ns = [c.times_ns[-1] - c.times_ns[0] for c in came]
+    waits = max(spans_ns) < TURN_NS if came else run_slips(package, run, "rate-number", "rate-parameter")
     if not waits or run.student_channels("/clock") or nodes_on(run, "/clock", "publishers"):
         return None
     why = "/use_sim_time is true, and nothing publishes /clock: each node waits in its first sleep for ever"
