@@ -402,6 +402,7 @@ def test_a_slip_within_a_value_is_named_and_undone(right: str, wrong: str, says:
         ("'I heard %s', msg.data)", "'I heard {msg.data}')", "f'I heard {msg.data}')"),
         ("'I heard %s', msg.data)", "'I heard {}' % msg.data)", "'I heard {}'.format(msg.data))"),
         ("'I heard %s', msg.data)", "'I heard {n}' % msg.data)", None),
+        ("'I heard %s', msg.data)", "'%s: ' + 'I heard') % msg.data", None),
         ("'I heard %s', msg.data)", "'I heard {name}')", None),
         ("'I heard %s', msg.data)", "('I heard {msg}').replace('{msg}', msg.data))", None),
         ("'I heard %s', msg.data)", "f'I heard {{msg}} {msg.data}')", None),
@@ -411,6 +412,12 @@ def test_values_are_put_into_the_string(old: str, new: str, right: str | None, t
     folder = package(tmp_path, {**FILES, LISTENER: FILES[LISTENER].replace(old, new)})
     repair_all(folder, WANTED)
     assert (folder / LISTENER).read_text() == FILES[LISTENER].replace(old, new if right is None else right)
+
+
+def test_the_function_keeps_its_name_in_what_is_said(tmp_path: Path) -> None:
+    text = FILES[LISTENER].replace("callback(msg)", "callback(msg, topic)").replace("callback", "on_msg")
+    said = [one.message for one in repair_all(package(tmp_path, {**FILES, LISTENER: text}), WANTED)]
+    assert ["`on_msg` takes 2 arguments" in one for one in said] == [True]
 
 
 def test_an_argument_beside_self_stays_one(tmp_path: Path) -> None:
@@ -471,6 +478,8 @@ def test_the_name_of_a_message_class_may_be_a_parameter(tmp_path: Path) -> None:
     [
         "    robot = Driver()\n    speed = 1\n    robot.publish()\n",  # its own method needs no message
         "    pixel_region = PixelRegion()\n    pub.publish(str(pixel_region))\n",  # a class is not the variable
+        # of Python, and not of ROS
+        "    from threading import Timer\n    Timer(1, late).start()\ndef late():\n    rospy.sleep(1)\n",
     ],
 )
 def test_what_another_module_may_have_is_left_alone(body: str, tmp_path: Path) -> None:

@@ -344,6 +344,10 @@ def test_what_comes_behind_a_function_that_never_ends_is_never_reached(text, fou
         ("    while 1:\n        s.accept_new_goal()\n        s.publish_feedback(f)\n        s.set_succeeded()\n", []),
         ("    for one in goals:\n        one.publish_feedback(f)\n        one.set_succeeded()\n", []),
         ("    while True:\n        s.publish_feedback(f)\n        s.set_succeeded()\n        return\n", []),
+        ("    while 1:\n        s = got.get()\n        s.publish_feedback(f)\n        s.set_succeeded()\n", []),
+        ("    if n < 3:\n        s.set_aborted()\n    if n >= 3:\n        s.set_succeeded()\n", []),
+        ("    if a == 'b':\n        s.set_aborted()\n    if a == 'c':\n        s.set_succeeded()\n", []),
+        ("    if done:\n        s.set_succeeded()\n    for i in range(3):\n        stop.publish(Twist())\n", []),
     ],
 )  # fmt: skip
 def test_callbacks_that_go_on_after_their_goal(text: str, fixes: list[str], tmp_path: Path) -> None:

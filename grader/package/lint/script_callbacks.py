@@ -23,6 +23,7 @@ from script_names import (
     listed,
     names_in,
     parents_of,
+    set_in,
     slip,
     statements_of,
     text_of,
@@ -56,11 +57,40 @@ def answers_in_some_cases(tree):
         while isinstance(ends[-1], ast.If):
             answer = called_name(getattr(ends[-1].body[-1], "value", None)) or answer
             ends.append(ends[-1].orelse[-1] if ends[-1].orelse else None)
-        if ends[-1] is None and answer.endswith("Response"):
+        tests = [n.test for n in functions[name].body if isinstance(n, ast.If)] if answer else []
+        tests += [n.test for n in ends[1:-1]]
+        if (
+            ends[-1] is None
+            and answer.endswith("Response")
+            and not is_the_rest(tests[-1], tests[-BELOW_LIMIT:-1])
+        ):
             message = "`%s` returns nothing where no condition of its last `if` holds" % name
             fix = "below line %d, and as far in as line %d, write `return %s(…)`"
             fix %= (last.end_lineno, last.lineno, answer)
             yield slip(last.lineno, "wrong-value", message, fix, "return")
+
+
+def excludes(test, other):
+    """Whether one condition cannot hold where the other does: `a` and `not a`, `n < 3` and `n >= 3`, `s == 1` and
+    `s == 2`."""
+    if isinstance(test, ast.UnaryOp) != isinstance(other, ast.UnaryOp):
+        return ast.dump(getattr(test, "operand", test)) == ast.dump(getattr(other, "operand", other))
+    if not all(isinstance(one, ast.Compare) for one in (test, other)) or ast.dump(test.left) != ast.dump(
+        other.left
+    ):
+        return False
+    signs = {type(one.ops[0]) for one in (test, other)}
+    return len(signs) > 1 or signs == {ast.Eq}
+
+
+def is_the_rest(test, others):
+    """Whether a condition may hold wherever the others do not: `n >= 3` behind `n < 3`, `a == False` behind
+    `a == True`."""
+    near = [one for one in others if excludes(test, one)]
+    asked = ast.dump(test.comparators[0]) if isinstance(test, ast.Compare) else ""
+    return any(
+        not asked or isinstance(one, ast.UnaryOp) or asked == ast.dump(one.comparators[0]) for one in near
+    ) or (bool(asked) and type(getattr(test.comparators[0], "value", 0)) is bool)
 
 
 def callbacks(tree):
@@ -72,9 +102,12 @@ def callbacks(tree):
     functions = functions_in(tree)
     yield from spare_callbacks(tree, functions)
     yield from own_callbacks(tree, functions)
+    of_threads = {
+        a.asname or a.name for n in all_of(tree, ast.ImportFrom) if n.module == "threading" for a in n.names
+    }
     for node in walk(tree):
         name = called_name(node)
-        if name not in CALLBACKS:
+        if name not in CALLBACKS or dotted(node.func) in {"threading.Timer", *of_threads}:
             continue
         keyword, place, values = CALLBACKS[name]
         given = argument(node, place, keyword)
@@ -516,7 +549,8 @@ def finished_goals(tree):
         block = statements_of(around)
         at = block.index(node) + 1 if node in block else len(block)
         below = [one for one in block[at : at + BELOW_LIMIT] if not is_other_case(one, node)]
-        more = any(calls_in(one, *FINISHING) or isinstance(one, LOOPS) for one in below)
+        # a loop may also be there to stop the robot
+        more = any(calls_in(one, *FINISHING, "publish_feedback") for one in below)
         in_loop = isinstance(around, LOOPS)
         if more or (in_loop and not is_last_turn(around, node, call)):
             what = "loop" if in_loop else "callback"
@@ -532,7 +566,8 @@ def finished_in_loops(tree):
         ending = [one for one in alone if called_name(one) in FINISHING]
         left = any(isinstance(one, (ast.Break, ast.Return)) for one in loop.body)
         takes = calls_in(loop, "accept_new_goal", "is_active")
-        takes = takes or {dotted(getattr(loop, "target", None))} & {dotted(one.func.value) for one in ending}
+        # as of `for goal in goals:` and `goal = waiting.get()`
+        takes = takes or set_in(loop) & {dotted(one.func.value) for one in ending}
         if ending and not left and not takes and calls_in(loop, "publish_feedback"):
             call, end = ending[-1], loop.end_lineno
             message = "`%s(…)` is inside of the loop on line %d, whose first turn ends the goal"
@@ -549,9 +584,7 @@ def is_other_case(node, before):
     if not isinstance(node, ast.If):
         return False
     # `if not done:` below `if done:` does not run in the same turn
-    opposite = isinstance(node.test, ast.UnaryOp) != isinstance(before.test, ast.UnaryOp)
-    asked = [ast.dump(getattr(one.test, "operand", one.test)) for one in (node, before) if opposite]
-    return bool(calls_in(node.test, "is_active")) or (opposite and asked[0] == asked[1])
+    return bool(calls_in(node.test, "is_active")) or excludes(node.test, before.test)
 
 
 def is_last_turn(loop, node, call):

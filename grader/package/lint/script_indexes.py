@@ -14,14 +14,15 @@ SIDES = ("width", "height")
 def indexes(tree):
     """Indexes that are floats, or step through a grid by its height; cells worked out with `int(…)`; and which ranges
     of a scan are read."""
-    sides = grid_sides(tree)
+    sides, cells = grid_sides(tree), names_of_cells(tree)
     for node in all_of(tree, ast.Subscript):
         key, line = key_of(node), getattr(node, "lineno", 0)
         if is_quotient(key):
             message = "`/` makes a float, also of whole numbers, and an index is a whole number"
             fix = "on line %d, write `//` instead of `/` in the index" % line
             yield slip(line, "float-index", message, fix, dotted(node.value))
-        yield from wrong_step(node, key, sides)
+        if dotted(node.value).rpartition(".")[2] in cells:
+            yield from wrong_step(node, key, sides)
     yield from cut_to_zero(tree)
     yield from whole_angles(tree)
     yield from float_seconds(tree)
@@ -47,11 +48,20 @@ def grid_sides(tree):
         pairs = [(dotted(target), read or dotted(node.value)) for target in node.targets]
         for name, side in pairs + [(dotted(node.value), name) for name, _ in pairs if ".info." in name]:
             if side.endswith(SIDES):
-                found[name] = "width" if side.endswith("width") else "height"
+                found.setdefault(name, set()).add("width" if side.endswith("width") else "height")
     for node in all_of(tree, ast.Attribute):
         if node.attr in SIDES and ".info." in dotted(node):
-            found[dotted(node)] = node.attr
-    return {name: side for name, side in found.items() if "..." not in name}
+            found[dotted(node)] = {node.attr}
+    # One number for both is the side of a square.
+    return {name: of.pop() for name, of in found.items() if "..." not in name and len(of) == 1}
+
+
+def names_of_cells(tree):
+    """Return the last names of the lists with a grid's cells; a list of the script's own may have another order."""
+    pairs = [(target, n.value) for n in all_of(tree, ast.Assign) for target in n.targets]
+    held = [one for pair in pairs if any(getattr(n, "attr", "") == "data" for n in pair) for one in pair]
+    held += [n.value for n in all_of(tree, ast.keyword) if n.arg == "data"]
+    return {dotted(one).rpartition(".")[2] for one in held} | {"data"}
 
 
 def wrong_step(node, key, sides):
@@ -78,8 +88,16 @@ def cut_to_zero(tree):
         asked = set()
         for test in (n for n in inside if isinstance(n, ast.Compare)):
             sides = [test.left, *test.comparators]
-            if any(isinstance(one, ast.Constant) and one.value == 0 for one in sides):
-                asked.update(dotted(one) for one in sides if isinstance(one, (ast.Name, ast.Attribute)))
+            # `0 <= n`, and not `n > 0`: what is below 0 is told from 0
+            pairs = [
+                (sides[at + isinstance(op, (ast.Gt, ast.LtE))], sides[at + isinstance(op, (ast.Lt, ast.GtE))])
+                for at, op in enumerate(test.ops)
+                if isinstance(op, (ast.Lt, ast.LtE, ast.Gt, ast.GtE))
+            ]
+            asked.update(dotted(one) for one, of in pairs if getattr(of, "value", None) == 0)
+        # `if n < 0: n = 0` comes to the same
+        tests = [n for n in inside if isinstance(n, ast.If)]
+        asked -= {dotted(t) for n in tests for one in n.body for t in getattr(one, "targets", ())}
         made = [
             n for n in inside if isinstance(n, ast.Assign) and called_name(n.value) == "int" and n.value.args
         ]
@@ -96,7 +114,12 @@ def float_seconds(tree):
     """`stamp.secs = rospy.get_time()`: both parts of a time are whole numbers."""
     for node in all_of(tree, ast.Assign):
         target, name = dotted(node.targets[0]), called_name(node.value)
-        if target.endswith((".secs", ".nsecs")) and name in ("get_time", "time", "to_sec"):
+        # a `self.secs` is the script's own
+        if (
+            target.count(".") > target.startswith("self.")
+            and target.endswith((".secs", ".nsecs"))
+            and name in ("get_time", "time", "to_sec")
+        ):
             message = "`%s` takes a whole number, and `%s()` is a float" % (target, name)
             fix = "on line %d, write `%s = rospy.Time.now()`" % (node.lineno, target.rpartition(".")[0])
             yield slip(node.lineno, "wrong-value", message, fix, "secs")
@@ -107,6 +130,8 @@ def not_the_smallest(tree):
     reads = any(is_ranges(n) for n in all_of(tree, ast.Attribute))
     if not reads or any(called_name(n) == "min" for n in all_of(tree, ast.Call)):
         return
+    given = [n for n in all_of(tree, ast.Assign) if any(map(is_ranges, ast.walk(n.value)))]
+    held = {dotted(target) for n in given for target in n.targets}
     for node in all_of(tree, ast.BinOp):
         total, count = called_name(node.left), called_name(node.right)
         if (
@@ -116,6 +141,8 @@ def not_the_smallest(tree):
             and node.right.args
         ):
             name = dotted(node.right.args[0])
+            if name not in held and not any(map(is_ranges, ast.walk(node.left))):
+                continue
             message = "the mean of many ranges is large even where one of them is small"
             fix = "on line %d, write `min(%s)` in its place" % (
                 node.lineno,
@@ -137,29 +164,28 @@ def without_root(tree):
     named = [(dotted(n.targets[0]), n.value) for n in all_of(tree, ast.Assign)]
     for function in all_of(tree, ast.FunctionDef):
         named += [(function.name, n.value) for n in function.body if isinstance(n, ast.Return)]
-    rooted = compared_as_squares(tree) if named else set()
-    for name, value in named:
+    sums = [(name, value) for name, value in named if isinstance(getattr(value, "op", None), ast.Add)]
+    squared = squares_in_use(tree) if sums else ()
+    for name, value in sums:
         last = name.rpartition(".")[2]
-        word = "" if last in rooted else last.lower()
-        is_sum = (
-            isinstance(getattr(value, "op", None), ast.Add)
-            and is_square(value.left)
-            and is_square(value.right)
-        )
-        if is_sum and "dist" in word and "sq" not in word and "2" not in word:
+        is_called_so = "dist" in last.lower() and "sq" not in last.lower() and "2" not in last
+        if is_called_so and is_square(value.left) and is_square(value.right) and last not in squared:
             message = "`%s` is the square of a distance, as without a square root" % name
             fix = "on line %d, write `(… + …) ** 0.5`, with brackets around the whole sum" % value.lineno
             yield slip(value.lineno, "wrong-value", message, fix, "rootless")
 
 
-def compared_as_squares(tree):
-    """Return the names of what a root is taken of elsewhere, or that is compared with a square."""
-    used = [one for call in all_of(tree, ast.Call) if called_name(call) == "sqrt" for one in call.args]
-    used += [n.left for n in all_of(tree, ast.BinOp) if isinstance(n.op, ast.Pow)]
+def squares_in_use(tree):
+    """Return the last names of what a root is taken of elsewhere, or is compared as a square: with a square or a
+    product, or with each other, by `key=`."""
+    used = [n for n in all_of(tree, ast.Call) if called_name(n) == "sqrt"]
+    powers = [n for n in all_of(tree, ast.BinOp) if isinstance(n.op, ast.Pow)]
+    used += [n for n in powers if getattr(n.right, "value", 0) == 0.5]
+    used += [n for n in all_of(tree, ast.keyword) if n.arg == "key"]
     for node in all_of(tree, ast.Compare):
         sides = [node.left, *node.comparators]
-        if any(isinstance(getattr(one, "op", None), (ast.Pow, ast.Mult)) for one in sides):
-            used += sides
+        products = [one for one in sides if isinstance(getattr(one, "op", None), (ast.Pow, ast.Mult))]
+        used += [node] if products or any(map(is_square, sides)) else []
     return {name.rpartition(".")[2] for one in used for name in names_in(one)}
 
 
@@ -175,8 +201,12 @@ OF_QUATERNION = 4
 
 def whole_angles(tree):
     """Quaternions of the sine and cosine of a whole angle."""
+    given = [(dotted(n.targets[0]), n.value) for n in all_of(tree, ast.Assign)]
+    sides = {name: value for name, value in reversed(given) if name.endswith(".w")}
+    halves = {name for name, value in given if any(map(is_part, ast.walk(value)))}
+    halves |= {dotted(n.target) for n in all_of(tree, ast.AugAssign) if isinstance(n.op, (ast.Div, ast.Mult))}
     for node in all_of(tree, ast.Assign, ast.Call):
-        angle, lines = whole_angle(node, tree) or ("", [])
+        angle, lines = whole_angle(node, sides, halves) or ("", [])
         if angle:
             message = "a quaternion is made of half the angle, and `%s` is all of it" % angle
             fix = "on %s, write `%s / 2` in place of `%s`" % (listed(lines), angle, angle)
@@ -195,21 +225,19 @@ def is_product(node):
     return isinstance(getattr(node, "op", None), ast.Mult)
 
 
-def whole_angle(node, tree):
+def whole_angle(node, sides, halves):
     """Return the angle and the lines of `q.z = sin(yaw)` and `q.w = cos(yaw)`, or of a Quaternion made of these; None
-    of all else."""
+    of all else. `sides` are the values of each `q.w`."""
     if called_name(node) == "Quaternion" and len(node.args) == OF_QUATERNION:
         parts = node.args[2:]
     elif isinstance(node, ast.Assign) and getattr(node.targets[0], "attr", "") == "z":
-        to = dotted(node.targets[0].value) + ".w"
-        others = [n.value for n in all_of(tree, ast.Assign) if dotted(n.targets[0]) == to]
-        parts = [node.value, *others[:1]]
+        parts = [node.value, sides.get(dotted(node.targets[0].value) + ".w")]
     else:
         return None
     if [called_name(one) for one in parts] != ["sin", "cos"]:
         return None
-    angles = {dotted(one.args[0]) for one in parts if one.args} - {"..."}
-    angles -= {dotted(n.targets[0]) for n in all_of(tree, ast.Assign) if is_part(n.value)}
+    angles = {dotted(one.args[0]) for one in parts if one.args} - {"...", *halves}
+    angles = {one for one in angles if "half" not in one.lower()}
     return (angles.pop(), sorted({one.lineno for one in parts})) if len(angles) == 1 else None
 
 

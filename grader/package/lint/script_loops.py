@@ -146,7 +146,6 @@ def stopped_loops(tree):
     """`spin()` in a loop that publishes: the loop does not come round. `break` or `return` in each of its turns, or so
     many turns and no more. And `if` in place of `while`.
     """
-    yield from flagged_loops(tree)
     turned, called = dict(turns(tree)), calls_made(tree)
     for loop in walk(tree):
         once = isinstance(loop, ast.If) and is_call(getattr(loop.test, "operand", None), "is_shutdown")
@@ -189,29 +188,6 @@ def stopped_loops(tree):
             message = "the loop ends the first time around, at the %s on line %d" % (word, left.lineno)
             fix = "remove it from line %d, or put it inside an `if`" % left.lineno
             yield slip(left.lineno, "loop-left", message, fix)
-
-
-def flagged_loops(tree):
-    """Loops that ask for a flag which has the wrong value from the start: `while not self.stopped`, and it is given
-    nothing but True."""
-    given = {}
-    for one in all_of(tree, ast.Name, ast.Attribute, ast.arg):
-        if not isinstance(getattr(one, "ctx", ast.Store()), ast.Load):
-            name = one.arg if isinstance(one, ast.arg) else dotted(one).rpartition(".")[2]
-            given.setdefault(name, []).append(id(one))
-    values = {
-        id(n.targets[0]): n.value for n in all_of(tree, ast.Assign) if isinstance(n.value, ast.Constant)
-    }
-    for loop in all_of(tree, ast.While):
-        negated = isinstance(loop.test, ast.UnaryOp) and isinstance(loop.test.op, ast.Not)
-        flag = loop.test.operand if negated else loop.test
-        name = dotted(flag).rpartition(".")[2] if isinstance(flag, (ast.Name, ast.Attribute)) else ""
-        found = [values.get(one) for one in given.get(name, ())]
-        if found and all(one is not None and one.value is negated for one in found):
-            message = "the loop on line %d never runs: `%s` is %s from line %d on"
-            message %= (loop.lineno, dotted(flag), negated, found[0].lineno)
-            fix = "write %s on line %d" % (not negated, found[0].lineno)
-            yield slip(loop.lineno, "loop-left", message, fix, dotted(flag))
 
 
 def is_of_robot(tree):

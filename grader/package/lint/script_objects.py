@@ -33,6 +33,7 @@ from script_names import (
     text_of,
     walk,
 )
+from script_values import stored_in
 
 
 def object_slips(tree):
@@ -123,14 +124,14 @@ def fields_of_none(tree):
     for n in all_of(tree, ast.Assign):
         for target in n.targets if getattr(n.value, "value", 0) is None else []:
             empty.setdefault(dotted(target), []).append(n.lineno)
-    # as in `self.x, self.y = …`, too
-    every = Counter(dotted(n) for n in stored_in([tree]))
-    filled = {name for name, count in every.items() if count > len(empty.get(name, []))}
+    # as in `self.x, self.y = …`, too, and of an object from outside
+    every = Counter(n.attr for n in stored_in([tree]))
+    every.subtract(name.rpartition(".")[2] for name, lines in empty.items() for _ in lines)
     found = {}
     for function, kind in callbacks.items():
         for n in stored_in([function] if function and kind else []):
             name = dotted(n.value)
-            if name.startswith("self.") and name in empty and name not in filled:
+            if name.startswith("self.") and name in empty and not every[n.value.attr]:
                 found[name] = empty[name][0], kind
     # It fails where a field is set, and where one is read.
     for n in all_of(tree, ast.Attribute):
@@ -345,11 +346,18 @@ def subscribed_again(tree):
                 lines = (made.lineno, loop.lineno)
                 yield slip(made.lineno, "subscribed-again", message % lines[::-1], fix % lines)
         made = [n for n in ast.walk(loop) if called_name(n) in ("Buffer", "TransformListener")]
-        if any(called_name(n) == "TransformListener" for n in made) and calls_in(loop.test, "is_shutdown"):
+        waits = calls_in(loop, "waitForTransform", "wait_for_transform_async", "can_transform")
+        waits += [n for n in calls_in(loop, "lookup_transform") if len(n.args) > LOOKED_UP or n.keywords]
+        is_made = any(called_name(n) == "TransformListener" for n in made)
+        if is_made and not waits and calls_in(loop.test, "is_shutdown"):
             lines = listed(sorted({n.lineno for n in made}))
             message = "each turn of the loop makes another TransformListener, which has heard nothing yet"
             fix = "move %s above line %d" % (lines, loop.lineno)
             yield slip(made[0].lineno, "wrong-value", message, fix, "added")
+
+
+LOOKED_UP = 3
+"""So many arguments of `lookup_transform` say what it looks up; a fourth is how long it waits for that."""
 
 
 def taken_off(tree):
@@ -393,55 +401,15 @@ def unsent_messages(tree):
         around, name = scope_of(node, tree, parents), dotted(node.targets[0])
         if isinstance(around, ast.ClassDef):
             around, name = tree, "self." + name
+        # a part of another message is sent with it
+        if "." in name.replace("self.", "", 1):
+            continue
         filled = stores_in(name, around if name.isidentifier() else tree)
         if filled and "..." not in name and len(node.targets) == 1:
             last = max(n.lineno for n in filled)
             message = "`%s` is filled in, and never used after that" % name
             fix = how_to_send(name, kind.rpartition(".")[2], last, around, tree)
             yield slip(last, "wrong-value", message, fix, "unsent")
-
-
-def kept_velocities(tree):
-    """Yield each `if` of which not all branches set a speed of a Twist that is kept from turn to turn, or from call to
-    call, and is published below it."""
-    made = {dotted(n.targets[0]): n for n in all_of(tree, ast.Assign) if called_name(n.value) == "Twist"}
-    every = [dotted(n) for n in stored_in([tree])]
-    for block in all_of(tree, ast.FunctionDef, ast.While)[:USES_LIMIT]:
-        inside = set(ast.walk(block))
-        kept = [name for name, node in made.items() if node not in inside and name not in set_in(block)]
-        choices = [n for n in block.body if isinstance(n, ast.If)] if kept else []
-        for choice in choices[:USES_LIMIT]:
-            below = [n for one in block.body if one.lineno > choice.lineno for n in calls_in(one, "publish")]
-            sent = {
-                dotted(n.args[0]) for n in below if n.args and isinstance(block, (ast.FunctionDef, ast.While))
-            }
-            stored = [dotted(n) for n in stored_in([choice])]
-            fields = [one for name in kept if name in sent for one in moving(choice, name)]
-            for field in dict.fromkeys(fields):
-                sides = [[dotted(n) for n in stored_in(one)] for one in branches_of(choice)]
-                if every.count(field) == stored.count(field) and any(field not in one for one in sides):
-                    line, (name, part, axis) = choice.lineno, field.rsplit(".", 2)
-                    message = "`%s` keeps its last %s.%s where the `if` on line %d does not set it"
-                    fix = "above line %d, write `%s = 0`" % (line, field)
-                    yield slip(line, "wrong-value", message % (name, part, axis, line), fix, "kept")
-
-
-def branches_of(choice):
-    """Return the blocks of an `if` with its `elif`s and its `else`, an empty one where it has none."""
-    last = choice.orelse[0] if len(choice.orelse) == 1 else None
-    return [choice.body, *(branches_of(last) if isinstance(last, ast.If) else [choice.orelse])]
-
-
-def stored_in(block):
-    every = [n for one in block for n in ast.walk(one) if isinstance(n, ast.Attribute)]
-    return [n for n in every if isinstance(n.ctx, ast.Store)]
-
-
-def moving(choice, name):
-    """Return the fields of a Twist that an `if` gives another value than 0."""
-    given = [n for n in ast.walk(choice) if isinstance(n, ast.Assign) and getattr(n.value, "value", 1) != 0]
-    fields = [target for n in given for target in n.targets]
-    return [one for one in map(dotted, fields) if one.startswith((name + ".linear.", name + ".angular."))]
 
 
 def is_of_messages(module):

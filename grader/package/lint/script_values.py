@@ -1,12 +1,14 @@
 """Finds values that go wrong in a student's Python, for `slips.py`: comparisons that no value or every value fulfils,
-answers that are not returned, and what each turn of a loop adds or sets again.
+answers that are not returned, flags of loops, and what each turn of a loop adds, keeps or sets again.
 
 Nothing is executed. Python 3.8, standard library only.
 """
 
 import ast
+from collections import Counter
 
 from script_names import (
+    USES_LIMIT,
     all_of,
     called_name,
     calls_in,
@@ -15,6 +17,7 @@ from script_names import (
     is_call_alone,
     names_in,
     parents_of,
+    set_in,
     slip,
     text_of,
     walk,
@@ -31,6 +34,7 @@ def wrong_values(tree):
     made = [n for n in all_of(tree, ast.Assign) if called_name(n.value) in IN_DEGREES]
     degrees = {dotted(target) for n in made for target in n.targets}
     own = {dotted(n.targets[0]) for n in all_of(tree, ast.Assign) if getattr(n.value, "attr", "") != "theta"}
+    of_poses = any(a.name in ("Pose", "Pose2D") for n in all_of(tree, ast.ImportFrom) for a in n.names)
     for node in walk(tree):
         line = getattr(node, "lineno", 0)
         if isinstance(node, ast.Compare) and any(map(is_nan, [node.left, *node.comparators])):
@@ -45,11 +49,11 @@ def wrong_values(tree):
                 yield slip(line, "wrong-value", message, fix, "degrees")
         elif called_name(node) in TO_RADIANS and node.args and getattr(node.args[0], "attr", "") == "theta":
             angle = dotted(node.args[0])
-            if angle in own:
+            if angle in own or not (of_poses or "pose" in angle.lower()):
                 continue  # a name of the script's own, which may be in degrees
             fix = "on line %d, write `%s` alone, without `%s(…)`" % (line, angle, called_name(node))
             yield slip(line, "wrong-value", "`%s` is already in radians" % angle, fix, "added")
-        elif isinstance(node, ast.Expr) and called_name(node.value).endswith("Response"):
+        elif isinstance(node, ast.Expr) and is_class_of_answers(called_name(node.value)):
             name = called_name(node.value)
             message, fix = "the `%s` that is made is not returned" % name, "write `return %s(…)`" % name
             yield slip(line, "wrong-value", message, fix, "return")
@@ -58,6 +62,10 @@ def wrong_values(tree):
             message = "no field of the `%s` that is returned is ever set" % name
             fix = "set it above the `return`: `%s.<field> = …`" % variable
             yield slip(line, "wrong-value", message, fix, "empty")
+
+
+def is_class_of_answers(name):
+    return name[:1].isupper() and name.endswith("Response")
 
 
 def unfilled_answer(function):
@@ -135,12 +143,12 @@ def params_read_unset(tree):
             [c for n in block for c in calls_in(n, "get_param") if c.args and text_of(c.args[0]) == name]
             for block in (unset, is_set)
         ]
-        is_made = any(text_of(c.args[0]) == name for n in unset for c in calls_in(n, "set_param") if c.args)
+        sets = any(calls_in(n, "set_param") for n in unset)
         if (
             name
+            and not sets
             and reads[0]
             and not reads[1]
-            and not is_made
             and all(len(c.args) == 1 and not c.keywords for c in reads[0])
         ):
             message = "this reads the parameter %s only where it is not set" % name
@@ -191,11 +199,13 @@ def published_in_turn(tree):
         published = [
             one.value for one in loop.body if is_call_alone(one) and called_name(one.value) == "publish"
         ]
-        choices = [one for one in loop.body if isinstance(one, ast.If) and one.orelse]
+        # of plain names, as in `text = 'near'`, each turn may publish its own
+        choices = [one for one in loop.body if isinstance(one, ast.If) and one.orelse and sets_fields(one)]
         seen = {n.id for n in ast.walk(loop.target) if isinstance(n, ast.Name)}
         if not published or not choices or acts(ast.Module(loop.body, []), "publish"):
             continue
-        about = [one for one in choices if seen & names_in(one.test) and "ranges" in ast.dump(loop)]
+        is_of_scan = any("ranges" in (getattr(n, "attr", ""), getattr(n, "id", "")) for n in ast.walk(loop))
+        about = [one for one in choices if is_of_scan and seen & names_in(one.test)]
         if about and len(published) == 1:
             line = published[0].lineno
             message = (
@@ -204,6 +214,10 @@ def published_in_turn(tree):
             fix = "work out the smallest of the ranges first, and write the `if` of line %d and the `publish(…)` of "
             fix += "line %d below the loop, for that one"
             yield slip(line, "wrong-value", message, fix % (about[0].lineno, line), "added")
+
+
+def sets_fields(node):
+    return any(isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store) for n in ast.walk(node))
 
 
 def overwritten_values(tree):
@@ -277,3 +291,94 @@ def is_nan(node):
     if called_name(node) == "float" and node.args:
         return str(getattr(node.args[0], "value", "")).lower() == "nan"
     return isinstance(node, ast.Attribute) and node.attr.lower() == "nan"
+
+
+def flagged_loops(tree):
+    """Loops that ask for a flag which has the wrong value from the start: `while not self.stopped`, and it is given
+    nothing but True."""
+    given = {}
+    # `Flags(running=True)` gives a value, too
+    for one in all_of(tree, ast.Name, ast.Attribute, ast.arg, ast.keyword):
+        if not isinstance(getattr(one, "ctx", ast.Store()), ast.Load):
+            name = getattr(one, "arg", None) or dotted(one).rpartition(".")[2]
+            given.setdefault(name, []).append(id(one))
+    values = {
+        id(n.targets[0]): n.value for n in all_of(tree, ast.Assign) if isinstance(n.value, ast.Constant)
+    }
+    classes = all_of(tree, ast.ClassDef)
+    own = {"object", *(one.name for one in classes)}
+    # a class of elsewhere may set what its own has
+    flags = (
+        ast.Name
+        if {dotted(base) for one in classes for base in one.bases} - own
+        else (ast.Name, ast.Attribute)
+    )
+    for loop in all_of(tree, ast.While):
+        negated = isinstance(loop.test, ast.UnaryOp) and isinstance(loop.test.op, ast.Not)
+        flag = loop.test.operand if negated else loop.test
+        name = dotted(flag).rpartition(".")[2] if isinstance(flag, flags) else ""
+        found = [values.get(one) for one in given.get(name, ())]
+        if found and all(one is not None and one.value is negated for one in found):
+            message = "the loop on line %d never runs: `%s` is %s from line %d on"
+            message %= (loop.lineno, dotted(flag), negated, found[0].lineno)
+            fix = "write %s on line %d" % (not negated, found[0].lineno)
+            yield slip(loop.lineno, "loop-left", message, fix, dotted(flag))
+
+
+def kept_velocities(tree):
+    """Yield each `if` of which not all branches set a speed of a Twist that is kept from turn to turn, or from call to
+    call, and is published below it."""
+    made = {}
+    for n in all_of(tree, ast.Assign):
+        if called_name(n.value) == "Twist":
+            made.setdefault(dotted(n.targets[0]), {})[n] = function_around(n, tree)
+    every = Counter(dotted(n) for n in stored_in([tree]))
+    for block in all_of(tree, ast.FunctionDef, ast.While)[:USES_LIMIT]:
+        inside = set(ast.walk(block))
+        here, given = {"", "__init__", function_around(block, tree)}, set_in(block)
+        # what another function makes, a call of it may make again
+        kept = [
+            n
+            for n, of in made.items()
+            if inside.isdisjoint(of) and here.issuperset(of.values()) and n not in given
+        ]
+        choices = [n for n in block.body if isinstance(n, ast.If)] if kept else []
+        for choice in choices[:USES_LIMIT]:
+            below = [n for one in block.body if one.lineno > choice.lineno for n in calls_in(one, "publish")]
+            sent = {
+                dotted(n.args[0]) for n in below if n.args and isinstance(block, (ast.FunctionDef, ast.While))
+            }
+            stored, zeros = Counter(dotted(n) for n in stored_in([choice])), zeros_in(choice)
+            sides = [{dotted(n) for n in stored_in(one)} for one in branches_of(choice)]
+            fields = [one for name in kept if name in sent for one in moving(choice, name)]
+            # where a branch gives it 0, the others may mean to keep it
+            for field in dict.fromkeys(one for one in fields if one not in zeros):
+                if every[field] == stored[field] and any(field not in one for one in sides):
+                    line, (name, part, axis) = choice.lineno, field.rsplit(".", 2)
+                    message = "`%s` keeps its last %s.%s where the `if` on line %d does not set it"
+                    fix = "above line %d, write `%s = 0`" % (line, field)
+                    yield slip(line, "wrong-value", message % (name, part, axis, line), fix, "kept")
+
+
+def branches_of(choice):
+    """Return the blocks of an `if` with its `elif`s and its `else`, an empty one where it has none."""
+    last = choice.orelse[0] if len(choice.orelse) == 1 else None
+    return [choice.body, *(branches_of(last) if isinstance(last, ast.If) else [choice.orelse])]
+
+
+def stored_in(block):
+    every = [n for one in block for n in ast.walk(one) if isinstance(n, ast.Attribute)]
+    return [n for n in every if isinstance(n.ctx, ast.Store)]
+
+
+def moving(choice, name):
+    """Return the fields of a Twist that an `if` gives another value than 0."""
+    given = [n for n in ast.walk(choice) if isinstance(n, ast.Assign) and getattr(n.value, "value", 1) != 0]
+    fields = [target for n in given for target in n.targets]
+    return [one for one in map(dotted, fields) if one.startswith((name + ".linear.", name + ".angular."))]
+
+
+def zeros_in(choice):
+    """Return what an `if` gives the value 0."""
+    given = [n for n in ast.walk(choice) if isinstance(n, ast.Assign) and getattr(n.value, "value", 1) == 0]
+    return {dotted(target) for n in given for target in n.targets}

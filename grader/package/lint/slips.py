@@ -53,8 +53,9 @@ def slips(tree):
         counters.counter_starts, without_effect, names.assigned_late, objects.hidden_names, objects.subscribed_again,
         imports, objects.taken_off, objects.unstarted_servers, values.wrong_values, values.decided_conditions,
         values.times_added_again, values.params_read_unset, values.overwritten_values, values.published_in_turn,
-        script_indexes.indexes, objects.kept_velocities, callbacks.unprinted_messages, counters.values_left_out,
-        counters.published_unchanged, objects.unused_publishers, objects.unsent_messages, loops.loops_of_numbers,
+        script_indexes.indexes, values.flagged_loops, values.kept_velocities,
+        callbacks.unprinted_messages, counters.values_left_out, counters.published_unchanged,
+        objects.unused_publishers, objects.unsent_messages, loops.loops_of_numbers,
         callbacks.finished_goals, callbacks.finished_in_loops, counters.sends_no_time, without_node,
     )  # fmt: skip
     found = [one for find in finders for one in find(tree)]

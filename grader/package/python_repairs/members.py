@@ -348,7 +348,9 @@ def _values_behind(text: str, _known: Known) -> Iterator[tuple[Edit, str]]:
             continue
         name, spans = last_name(called.func), [span_of(lines, n) for n in (node, called, *called.args)]
         places = [one for one in spans if one is not None]
-        if not TAKES_TEXT.fullmatch(name) or len(called.args) != 1 or len(places) != len(spans):
+        # `%` binds more closely than the `+` of a longer text
+        is_text = len(called.args) == 1 and isinstance(called.args[0], ast.Constant | ast.JoinedStr)
+        if not TAKES_TEXT.fullmatch(name) or not is_text or len(places) != len(spans):
             continue
         (line, start, end), (_, _, inner), (_, _, first) = places
         code = lines[line]

@@ -129,7 +129,10 @@ def with_parameters(text: str) -> Iterator[Step]:
     """`def tick():` of a timer, and `def on_text(msg, topic):` of a topic, of which `topic` is not used: ROS passes one
     value to a callback."""
     tree, lines = tree_of(text), text.split("\n")
-    for call in (n for n in nodes_in(tree) if isinstance(n, ast.Call) and last_name(n.func) in PASSED):
+    froms = [n for n in nodes_in(tree) if isinstance(n, ast.ImportFrom) and n.module == "threading"]
+    of_threads = {"threading.Timer", *(a.asname or a.name for n in froms for a in n.names)}
+    calls = [n for n in nodes_in(tree) if isinstance(n, ast.Call) and last_name(n.func) in PASSED]
+    for call in (n for n in calls if ast.unparse(n.func) not in of_threads):
         place, usual = PASSED[last_name(call.func)]
         words = {str(k.arg): k.value for k in call.keywords}
         given = call.args[place] if len(call.args) > place else words.get("callback") or words.get("handler")
@@ -145,8 +148,8 @@ def with_parameters(text: str) -> Iterator[Step]:
         line = f"{head[1]}{', '.join([*kept, value])}{head[2]}"
         after = "\n".join([*lines[: function.lineno - 1], line, *lines[function.lineno :]])
         why = f"`{function.name}` takes {plural(len(own), 'argument')}, but ROS passes it "
-        why += f"`self` and the {usual}" if kept else f"the {usual}"
-        for step in step_to("argument", function.lineno, text, after, why.replace("msg", "message")):
+        why += f"{'`self` and ' if kept else ''}the {usual.replace('msg', 'message')}"
+        for step in step_to("argument", function.lineno, text, after, why):
             yield step
             yield from with_parameters(step["text"])
             return
