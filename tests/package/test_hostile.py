@@ -468,6 +468,12 @@ SCRIPT = "import rospy\nrospy.init_node('x')\npub = rospy.Publisher('c', String,
         "".join(f"def f{number}():\n    pub.publish(x)\n" for number in range(400)),
         SCRIPT + "while a:\n    pub.publish(b)\n" * 400,
         SCRIPT + "rospy.spin()\n" * 2000,
+        "".join(f"def f{n}():\n    print(d{n})\nrospy.Subscriber('a', String, f{n})\n" for n in range(1000)),
+        "for r in m.ranges:\n"
+        + "    if r < 1:\n        v.x = 1\n    else:\n        v.x = 2\n" * 1200
+        + "    p.publish(v)\n",
+        "".join(f"q{n}.z = sin(a)\nq{n}.w = cos(a)\n" for n in range(2000)),
+        "while a:\n" + "    for i in b:\n        p.publish(i)\n" * 1500,
         SCRIPT + "rospy.spin()\ndef f():\n" + "    if a:\n        g()\n" * 4000,
         SCRIPT
         + "".join(f"def f{n}(m):\n    global x{n}\n    x{n} = m.data\n" for n in range(1000))

@@ -174,8 +174,9 @@ def test_faults_have_line_and_plain_cause(tmp_path):
         ("print 1, \\\n  2\nprint 3\n", "line 1: write `print(...)`"),
         ("print 1\n  x = 2\nprint 3\n", "line 1: write `print(1)`"),
         ("if x: print 1\nprint(2)\n", ""),
+        ("a = 1\n" * 30_000 + "print 1\nprint 2\n", "line 30001: write `print(1)`"),
     ],
-    ids=["print", "colon", "many", "statement of two lines", "another kind", "one line"],
+    ids=["print", "colon", "many", "statement of two lines", "another kind", "one line", "too long"],
 )  # fmt: skip
 def test_further_lines_of_one_kind_are_told_too(tmp_path, text, hint):
     (tmp_path / "a.py").write_text(text)

@@ -12,12 +12,12 @@ from script_names import (
     LOOPS,
     all_of,
     argument,
-    bound_names,
     callback_of,
     called_name,
     calls_in,
     dotted,
     functions_in,
+    given_names,
     is_call,
     is_call_alone,
     listed,
@@ -204,12 +204,13 @@ def wrong_callback(own, call, tree, bound, values):
 def unknown_name(own, tree):
     """Return the one name that a callback without an argument reads a part of, or uses as a value, and that nothing
     in the script has; "" where there is not one."""
-    known = {n.id for n in all_of(tree, ast.Name) if not isinstance(n.ctx, ast.Load)} | set(dir(builtins))
-    known |= {n.arg for n in all_of(tree, ast.arg)} | bound_names(tree) | set(functions_in(tree))
+    if not hasattr(tree, "all_given"):
+        tree.all_given = given_names(tree, all_of(tree, ast.Name)) | set(dir(builtins))
     called = {n.func for n in ast.walk(own) if isinstance(n, ast.Call)}
     called |= {n.value for n in called if isinstance(n, ast.Attribute)}
     used = {n.id for n in ast.walk(own) if isinstance(n, ast.Name) and n not in called}
-    return "".join(used - known) if len(used - known) == 1 else ""
+    unknown = used - tree.all_given
+    return "".join(unknown) if len(unknown) == 1 else ""
 
 
 def made_response(own, call, kept):

@@ -499,7 +499,7 @@ def deaf_loops(tree):
     endless, others, counted = [], [], []
     for loop in all_of(tree, *LOOPS):
         is_while, inside = isinstance(loop, ast.While), list(ast.walk(loop))
-        may_last = is_while or is_endless_for(loop) or sleeps(loop)
+        may_last = is_while or is_endless_for(loop) or calls_in(loop, "sleep")
         if not may_last or any(map(is_shutdown, inside)) or counts_down(loop):
             continue
         caught = [h for n in inside if isinstance(n, ast.Try) for h in n.handlers if goes_on(h)]
@@ -510,9 +510,7 @@ def deaf_loops(tree):
                 endless.append(slip(loop.lineno, "deaf", message, ASKS))
         elif is_while or is_endless_for(loop):
             known = endless if not is_while or isinstance(loop.test, ast.Constant) else others
-            known.append(
-                deaf(loop, [n for n in inside if n is not loop and (sleeps(n) or is_to_sleep(n, loop, tree))])
-            )
+            known.append(deaf(loop, sleeping(inside, loop, tree)))
         else:
             counted.append(deaf(loop, []))
     for node in walk(tree):
@@ -550,19 +548,13 @@ def is_endless_for(loop):
     return isinstance(loop, ast.For) and called_name(loop.iter) == "count"
 
 
-def sleeps(loop):
-    """Whether it is a `for` that sleeps in each of its turns, so that it can take long."""
-    return isinstance(loop, ast.For) and bool(calls_in(loop, "sleep"))
-
-
-def is_to_sleep(one, loop, tree):
-    """Whether it is a `for` that will sleep once `sleep()`, which stands below both loops, is moved into it."""
-    publishes = isinstance(one, ast.For) and calls_in(one, "publish")
-    return (
-        publishes
-        and not calls_in(loop, "sleep")
-        and any(n.lineno > loop.lineno for n in calls_in(tree, "sleep"))
-    )
+def sleeping(inside, loop, tree):
+    """Return the `for`s in a loop that sleep in each of their turns, so that they can take long: also those that will,
+    once `sleep()`, which stands below both loops, is moved into them."""
+    loops = [n for n in inside if n is not loop and isinstance(n, ast.For)]
+    is_below = loops and not calls_in(loop, "sleep")
+    is_below = is_below and any(n.lineno > loop.lineno for n in calls_in(tree, "sleep"))
+    return [n for n in loops if calls_in(n, *("sleep", "publish")[: 1 + bool(is_below)])]
 
 
 def goes_on(handler):

@@ -43,7 +43,8 @@ OUTERMOST = re.compile(r"(import|from)\s|if\s+__name__\b")
 COMMENTED = re.compile(r"\s*#[#\s]*((?:if|while|for|def|class|try|with)\b.*:)\s*$")
 """The first line of a block, commented out: Python speaks of the line below, which stands too far in."""
 REFUSED_LIMIT = 20
-FURTHER_LIMIT = 12
+FURTHER_LIMIT, FURTHER_BYTES = 12, 100_000
+"""So many more errors are looked for, in a file of no more than that: each compiles all of it again."""
 OF_NAMES = ("node-name", "publisher", "publisher-type", "subscriber", "subscriber-type", "rate-number")
 MARKER = re.compile(r"(<<<<<<<|=======|>>>>>>>|\|\|\|\|\|\|\|)( |$)")
 CPP = re.compile(rb"^#include\s*[<\"].*?^(int|void)\s+\w+\s*\(", re.MULTILINE | re.DOTALL)
@@ -132,7 +133,7 @@ def check(root, name, with_slips=True):
 def further_errors(lines, error):
     """Yield what Python says of the lines below the first one that it refuses, each time with another line in place of
     those that it refused before. What spreads over several lines is told by its first one alone."""
-    for _ in range(FURTHER_LIMIT):
+    for _ in range(FURTHER_LIMIT if sum(map(len, lines)) < FURTHER_BYTES else 0):
         line = getattr(error, "lineno", None)
         if line is None or not 0 < line <= len(lines):
             return
