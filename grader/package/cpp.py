@@ -112,7 +112,7 @@ def _whole_numbers(path: str, text: str, code: str) -> Iterator[PythonSlip]:
         return
     for match in _WHOLE_SUM.finditer(code):
         line, name = code.count("\n", 0, match.start()) + 1, match["name"]
-        added = rf"\b{name}\s*(?:\+=|=\s*{name}\s*\+)(?!\s*1\s*;)"
+        added = rf"\b{name}\s*(?:\+=|=\s*{name}\s*\+)(?!\s*\d+\s*;)"
         if name and not (re.search(added, code) and re.search(rf"=[^;=]*\b{name}\s*/", code)):
             continue
         message, fix = f"`{name}` is an int", f"write `double {name}` on line {line}"

@@ -234,6 +234,7 @@ def test_what_is_made_again_and_again(callback: str, loop: str, told: str) -> No
         ("m.data = accumulate(a.begin(), a.end(), 0.0) / 3;", ""),
         ("int n = 0; n += 1; m.data = sum / n;", ""),
         ("int n = 0; n++; m.data = n / 2;", ""),
+        ("int ticks = 0; ticks += 4; m.data = ticks / 360.0;", ""),
         ("double sum = 0; sum += v; m.data = sum / 3;", ""),
         ("std_msgs::Int8 other; int sum = 0; sum += v; m.data = sum / 3;", ""),
     ],
