@@ -45,7 +45,7 @@ from grader.checks.support.text import (
     refuse_others,
     shown,
 )
-from grader.checks.support.topics import Sender, cite, no_message, nothing_sent, sent_by
+from grader.checks.support.topics import SYSTEM_TOPICS, Sender, cite, no_message, nothing_sent, sent_by
 from grader.evidence.run import Channel, Run
 from grader.model.message_definitions import NOT_FINITE
 from grader.model.package import PackageFacts
@@ -564,7 +564,7 @@ def _other_value(
     if params.when == "first":
         # What fails after the first message does not make it what it is
         due = ((run.start_ns, first.time_ns),)
-        verdict = _of_one_branch(verdict, found, run, params)
+        verdict = verdict if beside else _of_one_branch(verdict, found, run, params)
         return verdict.model_copy(update={"callbacks": "before", "due": due})
     update: dict[str, object] = {"timing": True}
     if since := turned_wrong(found, params.value):  # a callback that fails later did not do it
@@ -576,7 +576,8 @@ def _of_one_branch(
     verdict: Verdict, found: Sequence[Reading], run: Run, params: FieldEqualsParams
 ) -> Verdict:
     """Return the loss with how many messages came on the only topic on which the grader sent, if those are more."""
-    sent = [c for c in run.channels if c.by_grader and c.messages and not c.topic.startswith("/grader")]
+    sent = [c for c in run.channels if c.by_grader and c.messages and c.topic not in SYSTEM_TOPICS]
+    sent = [c for c in sent if not c.topic.startswith("/grader")]
     if len(sent) != 1 or sent[0].topic == params.topic or len(sent[0].messages) <= len(found):
         return verdict
     topic, count = sent[0].topic, plural(len(sent[0].messages), "message")
