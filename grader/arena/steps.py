@@ -505,17 +505,15 @@ class StepRunner:
         except ValueError as error:
             self._note("note", action.name, f"the grader cannot use {action.type}: {error}")
             return
-        goal, cancel = f"{action.name}/goal", f"{action.name}/cancel"
-        self._advertise(goal, f"{action.type}ActionGoal", latched=False, find_text=find_text)
-        self._advertise(cancel, GOAL_ID, latched=False)
+        self._advertise(f"{action.name}/goal", f"{action.type}ActionGoal", latched=False, find_text=find_text)
+        self._advertise(f"{action.name}/cancel", GOAL_ID, latched=False)
         self._arena.watch(f"{action.name}/result")
         self._arena.watch(f"{action.name}/status")
 
     async def _act(self, action: Action) -> None:
         goal, cancel = f"{action.name}/goal", f"{action.name}/cancel"
-        if goal not in self._types or not (
-            await self._has_subscriber(goal) and await self._has_subscriber(cancel)
-        ):
+        is_heard = goal in self._types and await self._has_subscriber(goal)
+        if not is_heard or not await self._has_subscriber(cancel):
             return
         self._goals += 1
         name = f"grader-{self._goals}"
@@ -544,8 +542,7 @@ class StepRunner:
         self._arena.note(ActorEvent(action="result", actor="grader", **about, value=value_, detail=detail))
 
     def _patience_s(self, action: Action) -> float:
-        """Return how long the result of a goal that is cancelled is waited for. Before another goal, it is the server
-        that has to have an end."""
+        """Return how long the result of a cancelled goal is waited for. Before another goal, the server must end it."""
         last = [s.action for s in self._scenario.steps if s.action and s.action.name == action.name][-1]
         cancelled_s = self._cancels.get(action.name, math.inf) if action is last else math.inf
         return min(action.limit_s, cancelled_s)
@@ -575,8 +572,7 @@ class StepRunner:
         return found["result"], GOAL_STATUS[status] if status < len(GOAL_STATUS) else f"status {status}"
 
     def _is_older(self, goal: str, patience_s: float) -> bool:
-        """Return whether a goal without its result was sent, or cancelled, so long ago; longer, where others fill the
-        machine."""
+        """Return whether a goal was sent, or cancelled, so long ago; longer, where others fill the machine."""
         sent_s, lost_before_s = self._asked[goal]
         lost_s = self._live.lost_s - lost_before_s
         if self._live.running <= self._live.at_rest.keys():

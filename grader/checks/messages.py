@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from itertools import chain, pairwise
 from typing import Annotated, Any, Literal
 
@@ -535,7 +535,7 @@ def _other_value(
     own = sent_by(run, params.topic, params.of)
     beside = "" if other else set_beside(own, first.time_ns, params.field, params.value, params.tolerance)
     if beside:
-        seen = f"{seen}; {beside} is {value_text(params.value)}"
+        seen += f"; {beside} is {value_text(params.value)}"
         hint += f": is {beside} set in its place?"
     if params.when == "any":
         none = f"in none of {plural(len(found), 'message')}: at first {seen}"
@@ -556,15 +556,12 @@ def _other_value(
         hint = f"change {params.field} where it has to change, and keep the rest as in the message before"
     elif params.when == "last" and (made := made_of(found, run.channels, params)):
         message, hint = f"{message}: {made[0]}", made[1]
-    elif params.when == "first" and _waited_without_message(run, params.topic, first.time_ns):
-        topics = join_words(sorted(filter(None, sent))) or "that"
-        message += f", which came only after {topics}"
-        hint = f"publish once on {params.topic} before you wait for any message, as soon as the publisher is made"
+    elif params.when == "first" and (why_first := _why_first(found, run, params, sent, beside)):
+        message, hint = message + why_first[0], why_first[1]
     verdict = failed(message, hint=hint)
     if params.when == "first":
         # What fails after the first message does not make it what it is
         due = ((run.start_ns, first.time_ns),)
-        verdict = verdict if beside else _of_one_branch(verdict, found, run, params)
         return verdict.model_copy(update={"callbacks": "before", "due": due})
     update: dict[str, object] = {"timing": True}
     if since := turned_wrong(found, params.value):  # a callback that fails later did not do it
@@ -572,17 +569,22 @@ def _other_value(
     return verdict.model_copy(update=update)
 
 
-def _of_one_branch(
-    verdict: Verdict, found: Sequence[Reading], run: Run, params: FieldEqualsParams
-) -> Verdict:
-    """Return the loss with how many messages came on the only topic on which the grader sent, if those are more."""
+def _why_first(
+    found: Sequence[Reading], run: Run, params: FieldEqualsParams, after: Collection[str | None], beside: str
+) -> tuple[str, str] | None:
+    """Return why the first message is another one, and a hint: it was waited for before anything was sent, or more
+    messages came on the only topic on which the grader sent than on this one."""
+    if _waited_without_message(run, params.topic, found[0].time_ns):
+        topics = join_words(sorted(filter(None, after))) or "that"
+        hint = f"publish once on {params.topic} before you wait for any message, as soon as the publisher is made"
+        return f", which came only after {topics}", hint
     sent = [c for c in run.channels if c.by_grader and c.messages and c.topic not in SYSTEM_TOPICS]
     sent = [c for c in sent if not c.topic.startswith("/grader")]
-    if len(sent) != 1 or sent[0].topic == params.topic or len(sent[0].messages) <= len(found):
-        return verdict
+    if beside or len(sent) != 1 or sent[0].topic == params.topic or len(sent[0].messages) <= len(found):
+        return None
     topic, count = sent[0].topic, plural(len(sent[0].messages), "message")
     hint = f"publish for each message on {topic}: in the callback, below the `if` and not in it"
-    return verdict.explained(f"{count} came on {topic}, and {len(found)} on {params.topic}", hint)
+    return f"; {count} came on {topic}, and {len(found)} on {params.topic}", hint
 
 
 def _waited_without_message(run: Run, topic: str, before_ns: int) -> bool:
@@ -593,7 +595,5 @@ def _waited_without_message(run: Run, topic: str, before_ns: int) -> bool:
 
 def _values(asked: Sequence[Reading]) -> str:
     each = dict.fromkeys(value_text(value) for one in asked for value in one.values)
-    return (
-        shown(join_words(list(each)[:VALUES_SHOWN]) + (", …" if len(each) > VALUES_SHOWN else ""))
-        or "no value"
-    )
+    more = ", …" if len(each) > VALUES_SHOWN else ""
+    return shown(join_words(list(each)[:VALUES_SHOWN]) + more) or "no value"
