@@ -405,3 +405,105 @@ def test_imports_that_are_not_used_or_not_there(tmp_path, text, found):
     slips = check_syntax(tmp_path, ["a.py"]).slips
     assert [s.kind for s in slips if s.kind in ("unused-import", "lacking-import")] == found
     assert all("line 1" in s.fix for s in slips if s.kind == "unused-import")
+
+
+RIGHT = {
+    "setter": (
+        "undefined",
+        """\
+class A:
+    @property
+    def n(self):
+        return 1
+
+    @n.setter
+    def n(self, n):
+        pass
+""",
+    ),
+    "default-of-a-class": (
+        "undefined",
+        """\
+class A:
+    LIMIT = 5
+
+    def f(self, n=LIMIT):
+        return n
+""",
+    ),
+    "maker-of-callbacks": (
+        "callback-called",
+        """\
+def made(topic):
+    def heard(msg):
+        print(topic, msg.data)
+    return heard
+
+rospy.Subscriber('a', String, made('a'))
+""",
+    ),
+    "maker-of-lambdas": (
+        "callback-called",
+        """\
+def made(topic):
+    return lambda msg: print(topic, msg)
+
+rospy.Subscriber('a', String, made('a'))
+""",
+    ),
+    "publisher-of-another-object": (
+        "never-published",
+        """\
+class A:
+    def __init__(self):
+        self.out = rospy.Publisher('a', Int8)
+
+a = A()
+a.out.publish(1)
+""",
+    ),
+    "publisher-of-a-class": (
+        "never-published",
+        """\
+class A:
+    pub = rospy.Publisher('a', Int8)
+
+    def f(self):
+        self.pub.publish(1)
+""",
+    ),
+    "publisher-of-a-type": (
+        "never-published",
+        """\
+class A:
+    def __init__(self):
+        type(self).pub = rospy.Publisher('a', Int8)
+""",
+    ),
+    "unregisters-on-leaving": (
+        "unregistered",
+        """\
+class A:
+    def __exit__(self, *why):
+        self.pub.unregister()
+""",
+    ),
+    "called-by-name": (
+        "never-called",
+        """\
+class A:
+    def __init__(self):
+        rospy.Subscriber('a', Int8, getattr(self, 'on_' + 'a'))
+
+    def on_a(self, msg):
+        self.pub.publish(msg)
+""",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_a_style_that_few_students_write_is_no_slip(name: str, tmp_path: Path) -> None:
+    kind, text = RIGHT[name]
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    assert [s.message for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == kind] == []

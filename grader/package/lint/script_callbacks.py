@@ -18,6 +18,7 @@ from script_names import (
     dotted,
     functions_in,
     given_names,
+    gives_function,
     is_call,
     is_call_alone,
     listed,
@@ -126,7 +127,7 @@ def callbacks(tree):
             meant = one.func if called else one
             own = functions.get(dotted(meant).rpartition(".")[2])
             least, most = takes(own, isinstance(meant, ast.Attribute)) if own else (values, values)
-            if own and called and (least or not gives_value(own)):
+            if own and called and (least or not gives_value(own)) and not gives_function(own):
                 message, fix = "`%s()` is called here", "write `%s`, without brackets"
                 name = dotted(meant)
                 yield slip(one.lineno, "callback-called", message % name, fix % name, name)

@@ -56,6 +56,14 @@ def functions_in(tree):
     return {n.name: n for n in all_of(tree, ast.FunctionDef)}
 
 
+def gives_function(function):
+    """Whether it returns a function that it makes: one within it, a `lambda`, `partial(…)`."""
+    inside = list(ast.walk(function))
+    made = {n.name for n in inside if isinstance(n, (ast.FunctionDef, ast.ClassDef)) and n is not function}
+    given = [n.value for n in inside if isinstance(n, ast.Return)]
+    return any(isinstance(n, ast.Lambda) or called_name(n) == "partial" or dotted(n) in made for n in given)
+
+
 def callback_of(call, functions):
     """Return the script's function that a `Subscriber(…)` is given; None of any other node."""
     given = argument(call, 2, "callback") if called_name(call) == "Subscriber" else []
@@ -379,8 +387,12 @@ def unbound_names(tree, known):
             left += [(c, visible) for c in outer] + [(c, inner) for c in body]
         elif isinstance(node, ast.ClassDef):
             own = visible | bound_names(node)
-            children = ast.iter_child_nodes(node)
-            left += [(child, visible if isinstance(child, FUNCTIONS) else own) for child in children]
+            for child in ast.iter_child_nodes(node):
+                body = set(statements_of(child)) if isinstance(child, FUNCTIONS) else ()
+                # a method's decorators and default values can read what its class has, its body cannot
+                inner = visible | bound_names(child) if body else own
+                parts = ast.iter_child_nodes(child) if body else [child]
+                left += [(one, inner if one in body else own) for one in parts]
         else:
             inner = visible | set_in(node) if isinstance(node, COMPREHENSIONS) else visible
             left += [(child, inner) for child in ast.iter_child_nodes(node)]

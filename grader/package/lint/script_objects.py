@@ -363,7 +363,8 @@ LOOKED_UP = 3
 def taken_off(tree):
     """Yield where a `Publisher` or `Subscriber` is unregistered, but for what a function does at the node's end."""
     at_end = {dotted(arg).rpartition(".")[2] for n in calls_in(tree, "on_shutdown") for arg in n.args}
-    functions = [n for n in all_of(tree, ast.FunctionDef) if n.name in at_end]
+    # `__exit__` and its like run at the end, too
+    functions = [n for n in all_of(tree, ast.FunctionDef) if n.name in at_end or n.name.startswith("__")]
     spared = {inner for function in functions for inner in ast.walk(function)}
     for node in calls_in(tree, "unregister"):
         if not node.args and node not in spared:
@@ -374,11 +375,12 @@ def taken_off(tree):
 
 def unused_publishers(tree):
     """Yield each `pub = Publisher(…)` whose `pub` nothing in the script uses, so that nothing is published by it."""
-    read = {dotted(n) for n in walk(tree) if isinstance(getattr(n, "ctx", None), ast.Load)}
+    # of an attribute, another object's name may stand for `self`, and a class's own is read by `self`
+    read = {dotted(n).rpartition(".")[2] for n in walk(tree) if isinstance(getattr(n, "ctx", None), ast.Load)}
     for node in all_of(tree, ast.Assign):
         name = dotted(node.targets[0])
         topics = argument(node.value, 0, "name") if is_call(node.value, "Publisher") else []
-        if topics and name not in read:
+        if topics and "..." not in name and name.rpartition(".")[2] not in read:
             message = "nothing in the script calls `%s.publish(…)`" % name
             fix = "call `%s.publish(…)` inside the loop" % name
             yield slip(node.lineno, "never-published", message, fix, text_of(topics[0]))

@@ -113,6 +113,8 @@ def never_run(tree):
     """
     named = {n.id for n in all_of(tree, ast.Name) if isinstance(n.ctx, ast.Load)}
     named |= {n.attr for n in all_of(tree, ast.Attribute)}
+    if any(called_name(n) in ("getattr", "globals", "locals", "eval", "exec") for n in walk(tree)):
+        named |= {n.name for n in all_of(tree, ast.FunctionDef)}  # each may be called by its name
     made = [n for n in all_of(tree, ast.Assign) if isinstance(n.value, ast.Call)]
     made_of = {dotted(n.value.func): dotted(n.targets[0]) for n in made}
     classes = all_of(tree, ast.ClassDef)
