@@ -408,6 +408,33 @@ def test_imports_that_are_not_used_or_not_there(tmp_path, text, found):
 
 
 RIGHT = {
+    "flag": (
+        "not-called",
+        """\
+class A:
+    def __init__(self):
+        self.is_shutdown = False
+
+    def f(self):
+        while not self.is_shutdown:
+            pass
+""",
+    ),
+    "property": (
+        "not-called",
+        """\
+class A:
+    @property
+    def is_shutdown(self):
+        return False
+
+    def f(self):
+        while not self.is_shutdown:
+            pass
+""",
+    ),
+    "own-timer": ("callback-values", "class Timer:\n    pass\n\ndef tick():\n    pass\n\nTimer(1, tick)\n"),
+    "both-Pythons": ("undefined", "import sys\nif sys.version_info[0] < 3:\n    range = xrange\n"),
     "setter": (
         "undefined",
         """\

@@ -103,12 +103,12 @@ def callbacks(tree):
     functions = functions_in(tree)
     yield from spare_callbacks(tree, functions)
     yield from own_callbacks(tree, functions)
-    of_threads = {
-        a.asname or a.name for n in all_of(tree, ast.ImportFrom) if n.module == "threading" for a in n.names
-    }
+    froms = [n for n in all_of(tree, ast.ImportFrom) if n.module not in ("rospy", "actionlib", "signal")]
+    of_others = {a.asname or a.name for n in froms for a in n.names} | {"threading.Timer"}
+    of_others |= {n.name for n in all_of(tree, ast.ClassDef)}
     for node in walk(tree):
         name = called_name(node)
-        if name not in CALLBACKS or dotted(node.func) in {"threading.Timer", *of_threads}:
+        if name not in CALLBACKS or dotted(node.func) in of_others:
             continue
         keyword, place, values = CALLBACKS[name]
         given = argument(node, place, keyword)

@@ -265,11 +265,13 @@ def key_of(subscript):
 
 def imported_otherwise(tree, names):
     """Return those of the names that are classes of messages or services, and are imported with other capitals: it is
-    the import that fails."""
+    the import that fails; and those of Python 2, where a script asks for Python's version."""
     froms = all_of(tree, ast.ImportFrom)
     modules = [n for n in froms if (n.module or "").endswith((".msg", ".srv"))]
     imported = {alias.name.lower() for n in modules for alias in n.names}
-    return {name for name in names if name.lower() in imported}
+    versions = ("version_info", "PY2", "PY3")
+    is_old = any(isinstance(n, ast.Attribute) and n.attr in versions for n in walk(tree))
+    return {name for name in names if name.lower() in imported or (is_old and name in OLD_NAMES)}
 
 
 DIGITS = "0123456789"
@@ -371,7 +373,7 @@ def unbound_names(tree, known):
     if any(called_name(n) in ("exec", "globals", "locals", "setattr") for n in walk(tree)):
         return set()
     shared = {name for n in all_of(tree, ast.Global) for name in n.names}
-    builtin = (set(dir(builtins)) | MODULE_NAMES) & known
+    builtin = (set(dir(builtins)) | MODULE_NAMES | OLD_NAMES) & known
     found, left = set(), [(tree, bound_names(tree) | shared | builtin)]
     while left:
         node, visible = left.pop()

@@ -69,10 +69,12 @@ def slips(tree):
 def uncalled_and_asked(tree):
     """Functions that are named but not called, and questions that wait for a keyboard."""
     functions, kept = {n.name for n in all_of(tree, ast.FunctionDef, ast.ClassDef)}, targets_of(tree)
+    values = {n.attr for n in all_of(tree, ast.Attribute) if isinstance(n.ctx, ast.Store)}
+    values |= {n.name for n in all_of(tree, ast.FunctionDef) if n.decorator_list}  # as of a property
     count = 0
     for node in walk(tree):
         name = uncalled(node, functions)
-        if name:
+        if name and name.rpartition(".")[2] not in values:
             count += 1
             message, fix = "`%s` is named but not called" % name, "write `%s()`" % name
             yield slip(node.lineno, "not-called", message, fix, name)

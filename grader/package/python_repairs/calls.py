@@ -73,9 +73,12 @@ def with_calls(text: str) -> Iterator[Step]:
     functions = [n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)]
     # A property is read without brackets, and only its decorator tells.
     own = {n.name for n in functions} - {n.name for n in functions if n.decorator_list}
+    attributes = (n for n in nodes_in(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store))
+    values = {n.attr for n in attributes} | {n.name for n in functions if n.decorator_list}
     named = [n for node in nodes_in(tree) for n in _uncalled_expressions(node) if _is_callable(n, own)]
     alone = (n.value for n in nodes_in(tree) if isinstance(n, ast.Expr))
     named += [n for n in alone if isinstance(n, ast.Attribute) and n.attr in own - CALLED]
+    named = [n for n in named if last_name(n) not in values]
     spans = [span for n in named if (span := span_of(lines, n))]
     if spans:
         after = edited(text, [(line, end, end, "()") for line, _, end in spans])
@@ -176,7 +179,8 @@ def with_lines_turned(text: str) -> Iterator[Step]:
             late = {name for name in given & read - known if stored.count(name) == 1}
             ends = (first.lineno, first.end_lineno, second.end_lineno)
             alone = ends == (first.lineno, second.lineno - 1, second.lineno)
-            if late and alone and isinstance(second, ast.Assign):
+            is_later = any(isinstance(n, ast.Lambda) for n in nodes_in(first))
+            if late and alone and not is_later and isinstance(second, ast.Assign):
                 at = first.lineno - 1
                 after = "\n".join([*lines[:at], lines[at + 1], lines[at], *lines[at + 2 :]])
                 yield from step_to("turned", first.lineno, text, after)
@@ -377,8 +381,9 @@ def _names_of_objects(tree: ast.Module) -> Iterator[Argument]:
     """Yield names in methods that are there only with `self.` before them, and classes that stand in place of an object
     whose attributes are used."""
     shared = {name for one in tree.body for name in _bound_in(one)} | set(dir(builtins))
+    shared |= {name for n in nodes_in(tree) if isinstance(n, ast.Global) for name in n.names}
     classes = [n for n in tree.body if isinstance(n, ast.ClassDef)]
-    for one in classes:
+    for one in classes if "*" not in shared else ():
         methods = [n for n in one.body if isinstance(n, ast.FunctionDef) and not n.decorator_list]
         stored = (n for n in nodes_in(one) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store))
         attributes = {n.attr for n in stored if _is_self(n.value)} | {n.name for n in methods}
@@ -390,10 +395,16 @@ def _names_of_objects(tree: ast.Module) -> Iterator[Argument]:
             for name in (n for n in names if n.id in attributes - known):
                 yield Argument([(name, f"self.{name.id}")], f"`{name.id}` belongs to the class {one.name}")
     read = [n for n in nodes_in(tree) if isinstance(n, ast.Attribute)]
-    used = {ast.unparse(n.value) for n in read}
+    used = [(ast.unparse(n.value), n.attr) for n in read]
     owners = [ast.unparse(n.value).split(".") for n in read if isinstance(n.ctx, ast.Store)]
     given = {".".join(names[:end]) for names in owners for end in range(1, len(names) + 1)}
-    made = {one.name for one in classes if not one.bases}
+    # what a class itself has, and a method that a decorator may make its own, is read without an object
+    made = {
+        one.name: {name for part in one.body for name in _bound_in(part)}
+        - {m.name for m in one.body if isinstance(m, ast.FunctionDef) and not m.decorator_list}
+        for one in classes
+        if not one.bases
+    }
     of_messages = {
         alias.asname or alias.name
         for n in tree.body
@@ -406,7 +417,10 @@ def _names_of_objects(tree: ast.Module) -> Iterator[Argument]:
     for node in assigned:
         target, value = ast.unparse(node.targets[0]), node.value
         class_ = value.id if isinstance(value, ast.Name) else ""
-        if (class_ in made and target in used) or (class_ in of_messages and target in given):
+        of_objects = {name for owner, name in used if owner == target and class_ in made} - made.get(
+            class_, set()
+        )
+        if of_objects or (class_ in of_messages and target in given):
             yield Argument([(value, f"{class_}()")], f"`{target}` is the class itself, not an object of it")
 
 

@@ -73,6 +73,10 @@ ROSPY = frozenset(NAMES_OF_ROSPY.split())
 WAITING = frozenset({"Subscriber", "Service", "Timer", "SimpleActionServer"})
 """What a node that only waits is made of."""
 LOOPED = frozenset({"is_shutdown", "sleep", "spin"})
+HOLDING = frozenset(
+    {"exec_", "join", "mainloop", "pause", "run", "run_forever", "run_until_complete", "show", "wait"}
+)
+"""Methods of other libraries that keep a node alive: those of threads, of windows, of asyncio."""
 OF_TWO_FRAMES = {"lookup_transform", "can_transform", "lookupTransform", "canTransform", "waitForTransform"}
 ROLES = {
     "Publisher": "publisher",
@@ -144,12 +148,21 @@ def _steps(text: str, types: list[str], known: Known) -> Iterator[Step]:
 def _without_old_names(text: str) -> Iterator[Step]:
     tree, lines = tree_of(text), text.split("\n")
     bound = bound_in(tree)
+    if any(map(_asks_for_version, nodes_in(tree))):
+        return
     uses = [n for n in nodes_in(tree) if isinstance(n, ast.Name) and n.id in OLD_NAMES and n.id not in bound]
     spans = [(span, OLD_NAMES[n.id]) for n in uses if (span := span_of(lines, n))]
     if spans:
         names = ", ".join(sorted({n.id for n in uses}))
         after = edited(text, [(*span, new) for span, new in spans])
         yield from step_to("old-name", min(n.lineno for n in uses), text, after, names)
+
+
+def _asks_for_version(node: ast.AST) -> bool:
+    """Return whether a script may run under Python 2 as well, and use what that has only there."""
+    if isinstance(node, ast.ExceptHandler):
+        return node.type is not None and "NameError" in ast.unparse(node.type)
+    return isinstance(node, ast.Attribute) and node.attr in ("version_info", "version", "PY2", "PY3")
 
 
 def _without_old_print(text: str) -> Iterator[Step]:
@@ -175,11 +188,12 @@ def _with_quotes(text: str) -> Iterator[Step]:
     stored: dict[str, list[int]] = {}
     for name in (n for n in nodes_in(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)):
         stored.setdefault(name.id, []).append(name.lineno)
+    arguments = {n.arg for n in nodes_in(tree) if isinstance(n, ast.arg)}
     texts = [n for n in _texts_of_ros(tree) if isinstance(n, ast.Name)]
     missing = [n for n in texts if n.id not in known and not meant_by(n.id, set(stored))]
     assigned = [n for n in nodes_in(tree) if isinstance(n, ast.Assign)]
     own = {id(inner): last_name(n.targets[0]) for n in assigned for inner in nodes_in(n.value)}
-    keys = list(_keys_of_parameters(tree))
+    keys = [n for n in _keys_of_parameters(tree) if n.id not in arguments]
     own_keys = {id(n) for n in keys if stored.get(n.id) == [n.lineno] and own.get(id(n)) == n.id}
     unknown = [*missing, *(n for n in keys if n.id not in known or id(n) in own_keys)]
     spans = [(span, n.id) for n in unknown if (span := span_of(lines, n))]
@@ -243,7 +257,8 @@ def _with_start(text: str) -> Iterator[Step]:
     started = any(isinstance(n, ast.Call) for one in _runs(tree) for n in nodes_in(one))
     for function in functions:
         for before, after in pairwise(function.body):
-            if after.lineno - (before.end_lineno or after.lineno) <= BLANK_LINES:
+            between = lines[before.end_lineno or after.lineno : after.lineno - 1]
+            if sum(not line.strip() for line in between) < BLANK_LINES:
                 continue
             rest = ast.Module(function.body[function.body.index(after) :], [])
             calls = {last_name(n.func) for n in nodes_in(rest) if isinstance(n, ast.Call)}
@@ -343,7 +358,10 @@ def _with_spin(text: str) -> Iterator[Step]:
                   for a in n.names if a.name == "rospy"), "")  # fmt: skip
     loops = any(isinstance(n, ast.While) for n in nodes_in(tree))
     makes_node = any(last_name(c.func) == "init_node" for c in calls)
-    if not waits or loops or not rospy or not makes_node or LOOPED & {last_name(c.func) for c in calls}:
+    own = {n.name for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)}
+    if not waits or loops or not rospy or not makes_node:
+        return
+    if (LOOPED | (HOLDING - own)) & {last_name(c.func) for c in calls}:
         return
     lines = text.split("\n")
     block = _last_block(tree, waits)

@@ -90,6 +90,8 @@ class _Names:
         types = {ast.unparse(n) for one in calls for n in one.args if isinstance(n, ast.Attribute)}
         classes = [n for n in nodes_in(tree) if isinstance(n, ast.ClassDef)]
         self._types = types - {f"{one.name}.{name}" for one in classes for name in _members_of(one)}
+        assigned = (n for n in nodes_in(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store))
+        self._given = {n.id for n in assigned}
 
     def members_of(self, owner: str) -> Collection[str]:
         """Return what may stand behind a name and a dot."""
@@ -108,14 +110,15 @@ class _Names:
     def has_comma(self, first: tokenize.TokenInfo, second: tokenize.TokenInfo) -> bool:
         """Return whether a comma is meant by the dot between two words."""
         is_type = f"{first.string}.{second.string}" in self._types and first.string[:1].isupper()
-        is_class = is_type and first.string in self.known
+        is_class = is_type and first.string in self.known - self._given
         is_named = second.type == tokenize.NAME and second.string in self.bound - self.own
         return is_named and (first.type == tokenize.STRING or is_class)
 
 
 def _dots(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
     """Yield `rospy,spin()` and `rospyspin()`, for `rospy.spin()`, and `"chatter". String`, for `"chatter", String`."""
-    names = _Names(tree_of(text), known.of_rospy)
+    tree = tree_of(text)
+    names = _Names(tree, known.of_rospy)
     if "*" in names.bound:
         return
     given = list(tokenize.generate_tokens(io.StringIO(text).readline))
@@ -128,7 +131,9 @@ def _dots(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
             yield (place, "."), "a dot belongs between the string and `format`"
         if sign.string == "." and names.has_comma(first, second):
             yield (place, ","), f"a comma belongs between `{first.string}` and `{second.string}`"
-    for name in (one for one in given if one.type == tokenize.NAME and one.string not in names.known):
+    # neither behind a dot nor as an argument's own name can two words be one
+    alone = {(n.lineno, n.col_offset) for n in nodes_in(tree) if isinstance(n, ast.Name)}
+    for name in (one for one in given if one.start in alone and one.string not in names.known):
         for owner in ("rospy", *sorted(names.bound - {"rospy"})):
             member = name.string.removeprefix(owner)
             if member != name.string and member in names.members_of(owner):
@@ -227,7 +232,7 @@ class _Lacking:
 
 def _members_of(one: ast.ClassDef) -> tuple[str, ...]:
     """Return what the objects of a class have."""
-    nodes, assigned = nodes_in(one), [s for s in one.body if isinstance(s, ast.Assign)]
+    nodes, assigned = nodes_in(one), [s for s in one.body if isinstance(s, ast.Assign | ast.AnnAssign)]
     stored = [n.attr for n in nodes if isinstance(n, ast.Attribute) and not isinstance(n.ctx, ast.Load)]
     named = [n.id for s in assigned for n in nodes_in(s) if isinstance(n, ast.Name)]
     return (*(s.name for s in one.body if isinstance(s, ast.FunctionDef)), *stored, *named)
@@ -295,10 +300,15 @@ def _lost_values(text: str, _known: Known) -> Iterator[tuple[Edit, str]]:
     for node in (n for n in nodes_in(tree) if isinstance(n, ast.AnnAssign) and n.value is None):
         span, kind = span_of(lines, node.target), node.annotation
         is_text = isinstance(kind, ast.Constant) and kind.value is not None
+        is_text = is_text and not OF_TYPE.fullmatch(ast.unparse(kind))
         is_value = is_text or isinstance(kind, ast.Call | ast.BinOp)
         colon = lines[span[0]].find(":", span[2]) if span is not None else -1
         if is_value and span is not None and colon >= 0:
             yield ((span[0], colon, colon + 1), "="), "a name gets its value by `=`, and not by `:`"
+
+
+OF_TYPE = re.compile(r"'([a-z]\w*\.)*[A-Z]\w*(\[.*\])?'")
+"""A type whose name is written as a text: `'rospy.Publisher'`."""
 
 
 def _lost_places(text: str, _known: Known) -> Iterator[tuple[Edit, str]]:

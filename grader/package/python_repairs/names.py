@@ -129,10 +129,11 @@ def with_parameters(text: str) -> Iterator[Step]:
     """`def tick():` of a timer, and `def on_text(msg, topic):` of a topic, of which `topic` is not used: ROS passes one
     value to a callback."""
     tree, lines = tree_of(text), text.split("\n")
-    froms = [n for n in nodes_in(tree) if isinstance(n, ast.ImportFrom) and n.module == "threading"]
-    of_threads = {"threading.Timer", *(a.asname or a.name for n in froms for a in n.names)}
+    froms = [n for n in nodes_in(tree) if isinstance(n, ast.ImportFrom) and n.module != "rospy"]
+    of_others = {"threading.Timer", *(a.asname or a.name for n in froms for a in n.names)}
+    of_others |= {n.name for n in nodes_in(tree) if isinstance(n, ast.ClassDef)}
     calls = [n for n in nodes_in(tree) if isinstance(n, ast.Call) and last_name(n.func) in PASSED]
-    for call in (n for n in calls if ast.unparse(n.func) not in of_threads):
+    for call in (n for n in calls if ast.unparse(n.func) not in of_others):
         place, usual = PASSED[last_name(call.func)]
         words = {str(k.arg): k.value for k in call.keywords}
         given = call.args[place] if len(call.args) > place else words.get("callback") or words.get("handler")
