@@ -408,9 +408,71 @@ def test_imports_that_are_not_used_or_not_there(tmp_path, text, found):
 
 
 RIGHT = {
-    "flag": (
-        "not-called",
-        """\
+    "pause-in-a-function": ("sleep-outside", """\
+def ok():
+    rate.sleep()
+    return not rospy.is_shutdown()
+
+while ok():
+    pub.publish(1)
+"""),
+    "ticks-of-a-generator": ("sleep-outside", """\
+def ticks(rate):
+    while not rospy.is_shutdown():
+        yield
+        rate.sleep()
+
+for _ in ticks(rospy.Rate(10)):
+    pub.publish(1)
+"""),
+    "several-publishers": ("sleep-outside", """\
+while not rospy.is_shutdown():
+    for pub in pubs:
+        pub.publish(1)
+    rate.sleep()
+"""),
+    "endless-generator": ("deaf", "def numbers():\n    while True:\n        yield from range(128)\n"),
+    "asks-in-a-function": ("deaf", """\
+def ok():
+    rate.sleep()
+    return not rospy.is_shutdown()
+
+while ok():
+    pub.publish(1)
+"""),
+    "ends-on-a-signal": ("deaf", """\
+def stop(number, frame):
+    rospy.signal_shutdown('signal')
+
+rospy.init_node('a', disable_signals=True)
+signal.signal(signal.SIGINT, stop)
+"""),
+    "robot-that-arrives": ("loop-left", """\
+while distance() > 0.1 and not rospy.is_shutdown():
+    twist.angular.z = 1
+    pub.publish(twist)
+    rate.sleep()
+pub.publish(Twist())
+rospy.spin()
+"""),
+    "set-above": ("object", """\
+class A:
+    def f(self):
+        self.reset()
+        return self.n
+
+    def reset(self):
+        self.n = 0
+"""),
+    "set-on-entering": ("object", """\
+class A:
+    def __enter__(self):
+        self.n = 0
+
+    def f(self):
+        return self.n
+"""),
+    "flag": ("not-called", """\
 class A:
     def __init__(self):
         self.is_shutdown = False
@@ -418,11 +480,8 @@ class A:
     def f(self):
         while not self.is_shutdown:
             pass
-""",
-    ),
-    "property": (
-        "not-called",
-        """\
+"""),
+    "property": ("not-called", """\
 class A:
     @property
     def is_shutdown(self):
@@ -431,13 +490,10 @@ class A:
     def f(self):
         while not self.is_shutdown:
             pass
-""",
-    ),
+"""),
     "own-timer": ("callback-values", "class Timer:\n    pass\n\ndef tick():\n    pass\n\nTimer(1, tick)\n"),
     "both-Pythons": ("undefined", "import sys\nif sys.version_info[0] < 3:\n    range = xrange\n"),
-    "setter": (
-        "undefined",
-        """\
+    "setter": ("undefined", """\
 class A:
     @property
     def n(self):
@@ -446,87 +502,62 @@ class A:
     @n.setter
     def n(self, n):
         pass
-""",
-    ),
-    "default-of-a-class": (
-        "undefined",
-        """\
+"""),
+    "default-of-a-class": ("undefined", """\
 class A:
     LIMIT = 5
 
     def f(self, n=LIMIT):
         return n
-""",
-    ),
-    "maker-of-callbacks": (
-        "callback-called",
-        """\
+"""),
+    "maker-of-callbacks": ("callback-called", """\
 def made(topic):
     def heard(msg):
         print(topic, msg.data)
     return heard
 
 rospy.Subscriber('a', String, made('a'))
-""",
-    ),
-    "maker-of-lambdas": (
-        "callback-called",
-        """\
+"""),
+    "maker-of-lambdas": ("callback-called", """\
 def made(topic):
     return lambda msg: print(topic, msg)
 
 rospy.Subscriber('a', String, made('a'))
-""",
-    ),
-    "publisher-of-another-object": (
-        "never-published",
-        """\
+"""),
+    "publisher-of-another-object": ("never-published", """\
 class A:
     def __init__(self):
         self.out = rospy.Publisher('a', Int8)
 
 a = A()
 a.out.publish(1)
-""",
-    ),
-    "publisher-of-a-class": (
-        "never-published",
-        """\
+"""),
+    "publisher-of-a-class": ("never-published", """\
 class A:
     pub = rospy.Publisher('a', Int8)
 
     def f(self):
         self.pub.publish(1)
-""",
-    ),
-    "publisher-of-a-type": (
-        "never-published",
-        """\
+"""),
+    "publisher-of-a-type": ("never-published", """\
 class A:
     def __init__(self):
         type(self).pub = rospy.Publisher('a', Int8)
-""",
-    ),
-    "unregisters-on-leaving": (
-        "unregistered",
-        """\
+"""),
+    "unregisters-on-leaving": ("unregistered", """\
 class A:
     def __exit__(self, *why):
         self.pub.unregister()
-""",
-    ),
-    "called-by-name": (
-        "never-called",
-        """\
+"""),
+    "called-by-name": ("never-called", """\
 class A:
     def __init__(self):
         rospy.Subscriber('a', Int8, getattr(self, 'on_' + 'a'))
 
     def on_a(self, msg):
         self.pub.publish(msg)
-""",
-    ),
-}
+"""),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", RIGHT)

@@ -167,6 +167,7 @@ def stopped_loops(tree):
             yield slip(spin.lineno, "spin-in-loop", message, fix)
         name = getattr(turned[loop][0], "name", None)
         is_part = called[name] > 1 and name != "publish"  # of what the node does
+        is_part = is_part or spins_after(loop, tree)
         if is_counted(loop) and ending is None and not turned[loop][1] and not is_part:
             message = "the loop on line %d ends after a fixed number of rounds" % loop.lineno
             used = {n.id for one in loop.body for n in ast.walk(one) if isinstance(n, ast.Name)}
@@ -188,6 +189,11 @@ def stopped_loops(tree):
             message = "the loop ends the first time around, at the %s on line %d" % (word, left.lineno)
             fix = "remove it from line %d, or put it inside an `if`" % left.lineno
             yield slip(left.lineno, "loop-left", message, fix)
+
+
+def spins_after(loop, tree):
+    """Whether a robot's node stays alive in `spin()` once it has arrived."""
+    return is_of_robot(tree) and any(calls_in(one, "spin") for one in run_after(loop, tree))
 
 
 def is_of_robot(tree):
@@ -252,7 +258,10 @@ WAITS = ("sleep", "spin", "spin_once", "wait_for_message", "wait_for_service", "
 def sleepless_loops(tree):
     """Loops that publish and wait nowhere, where `rate.sleep()` stands outside of them or a Rate is made in them."""
     loops, sleeps = all_of(tree, *LOOPS), calls_in(tree, "sleep")
+    waiting = {name for name, one in functions_in(tree).items() if calls_in(one, *WAITS)}
     for loop in loops:
+        if waiting.intersection(called_name(n) for n in ast.walk(loop)) or is_of_publishers(loop):
+            continue
         inner = [n for n in ast.walk(loop) if n is not loop and n in loops and calls_in(n, "publish")]
         before = [n for n in sleeps if n.lineno < loop.lineno and dotted(n.func) not in PAUSES]
         outside = [n for n in sleeps if n.lineno > loop.lineno] or before
@@ -268,6 +277,12 @@ def sleepless_loops(tree):
         fix = "move it into that loop, below line %d, with the same spaces or tabs before it as line %d has"
         fix %= (last.end_lineno, last.lineno)
         yield slip(outside[0].lineno, "sleep-outside", message, fix, name)
+
+
+def is_of_publishers(loop):
+    """Whether each turn publishes by another publisher, as in `for pub in pubs:`: such a loop need not wait."""
+    given = names_in(loop.target) if isinstance(loop, ast.For) else set()
+    return bool(given) and all(given & names_in(n.func) for n in calls_in(loop, "publish"))
 
 
 def rates_in_loop(loop):
@@ -497,10 +512,14 @@ ASKS_TOO = "on line %d, write `and not rospy.is_shutdown()` before the colon"
 def deaf_loops(tree):
     """Why a node goes on after Ctrl-C: loops that do not ask for it, an `except` within them, signals put off."""
     endless, others, counted = [], [], []
+    asking = {name for name, one in functions_in(tree).items() if any(map(is_shutdown, ast.walk(one)))}
     for loop in all_of(tree, *LOOPS):
         is_while, inside = isinstance(loop, ast.While), list(ast.walk(loop))
         may_last = is_while or is_endless_for(loop) or calls_in(loop, "sleep")
         if not may_last or any(map(is_shutdown, inside)) or counts_down(loop):
+            continue
+        # what calls a generator, or a function that asks, leaves the loop to it
+        if any(isinstance(n, (ast.Yield, ast.YieldFrom)) or called_name(n) in asking for n in inside):
             continue
         caught = [h for n in inside if isinstance(n, ast.Try) for h in n.handlers if goes_on(h)]
         if calls_in(loop, *RAISING):
@@ -513,7 +532,7 @@ def deaf_loops(tree):
             known.append(deaf(loop, sleeping(inside, loop, tree)))
         else:
             counted.append(deaf(loop, []))
-    for node in walk(tree):
+    for node in () if calls_in(tree, "signal_shutdown") else walk(tree):
         if is_call(node, "init_node") and any(k.arg == "disable_signals" for k in node.keywords):
             message = "`disable_signals=True` on line %d keeps Ctrl-C from rospy" % node.lineno
             yield slip(node.lineno, "deaf", message, "leave it out")

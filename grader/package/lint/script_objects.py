@@ -66,6 +66,10 @@ class Members:
             elif given and dotted(n.value) == given[0].arg and not n.attr.startswith("__"):
                 self.reads.append((n, method))
         self.called = {called_name(n) for n in walk(tree)}
+        self.calls = {m: {} for m in self.methods.values()}
+        for m, lines in self.calls.items():
+            for n in ast.walk(m):
+                lines.setdefault(called_name(n), getattr(n, "lineno", 0))
 
     def astray(self):
         """Return the method that is meant to be `__init__`, with why it is not and what to do; None for none."""
@@ -103,9 +107,13 @@ def lacking_attributes(own):
             message, fix = astray[1:]
         elif not stores:
             message, fix = never_given(own, name, node.lineno)
+        elif any(giver.startswith("__") and giver != "__init__" for giver in givers):
+            continue  # Python itself calls `__enter__` and its like
         elif not own.called.union(["__init__", method.name]).intersection(givers):
             message = "only `%s(…)` gives `self.%s` a value, and it was not called before" % (givers[0], name)
             fix = "give `self.%s` its value in `__init__`, or call `self.%s(…)` there" % (name, givers[0])
+        elif any(own.calls[method].get(giver, node.lineno) < node.lineno for giver in givers):
+            continue
         elif not at_first.union(["__init__", method.name]).intersection(givers):
             message = "line %d of `%s(…)` gives `self.%s` a value, and had not been reached"
             fix = "give `self.%s` its value in `__init__`, before anything can ask for it" % name
