@@ -207,9 +207,11 @@ def _judge_results(found: Results, run: Run, package: PackageFacts, start_ns: in
     if dead is not None:
         verdict = _with_cause(verdict, dead, run, package)
     elif error := _error_behind(verdict, package, run):
-        fails = "" if error.hint == TYPES_HINT else "a callback fails: "
-        message = f"{verdict.message}; {fails}{error.cause}"
-        about = {"message": message, "hint": error.hint, "citations": error.citations, "unjudged": False}
+        of_types = error.hint == TYPES_HINT
+        message = f"{verdict.message}; {'' if of_types else 'a callback fails: '}{error.cause}"
+        # what no node hears is no fault of what it would do with it
+        unjudged = of_types and verdict.unjudged
+        about = {"message": message, "hint": error.hint, "citations": error.citations, "unjudged": unjudged}
         verdict = verdict.model_copy(update=about)
     return excused(verdict.if_repeated(), run, start_ns, run.end_ns, _why_late)
 
