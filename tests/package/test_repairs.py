@@ -25,6 +25,7 @@ from tests.package.repairing import (
     SCRIPT,
     TALKER,
     WANTED,
+    XML,
     Case,
     asking,
     check,
@@ -420,3 +421,36 @@ def test_what_few_students_write_and_is_right_is_left_alone(name: str, tmp_path:
     folder = package(tmp_path, {TALKER: head + RIGHT[name]})
     found = find_repairs(folder, facts_of(folder), asking(topics=()))
     assert [one.message for one in found if one.file == TALKER] == []
+
+
+CPP_CMAKE = CMAKE.replace(" rospy", " roscpp") + "add_executable(a src/a.cpp)\n"
+LINKED = "target_link_libraries(a ${catkin_LIBRARIES})\n"
+RIGHT_BUILDS = {
+    "linked-in-a-loop": {
+        CMAKELISTS: CPP_CMAKE + "foreach(t a)\n  target_link_libraries(${t} ${catkin_LIBRARIES})\nendforeach()\n"
+    },
+    "linked-all-at-once": {
+        CMAKELISTS: CPP_CMAKE.replace("add_exe", "link_libraries(${catkin_LIBRARIES})\nadd_exe")
+    },
+    "another-name-of-a-program": {CMAKELISTS: CPP_CMAKE + LINKED + "add_executable(lab::a ALIAS a)\n"},
+    "left-out-of-all": {CMAKELISTS: CPP_CMAKE.replace("(a ", "(a EXCLUDE_FROM_ALL ") + LINKED},
+    "made-source": {CMAKELISTS: CPP_CMAKE.replace("add_exe", "configure_file(b.in b.cpp)\nadd_exe").replace(
+        "a.cpp", "a.cpp b.cpp") + LINKED},
+    "installed-by-another-file": {
+        CMAKELISTS: CMAKE + "include(cmake/scripts.cmake)\n",
+        "cmake/scripts.cmake": f"catkin_install_python(PROGRAMS {TALKER} DESTINATION lib/lab)\n",
+    },
+    "place-of-rosrun": {
+        CMAKELISTS: CMAKE + f"catkin_install_python(PROGRAMS {TALKER} DESTINATION "
+        "${CATKIN_GLOBAL_LIB_DESTINATION}/${PROJECT_NAME})\n"
+    },
+    "version-of-a-dependency": swapped(XML, ("<depend>", '<depend version_gte="1.11.0">')),
+    "quoted-manifest": swapped(XML, (">x<", "><![CDATA[<version>one</version> & <depend>]]><")),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", RIGHT_BUILDS)
+def test_what_a_right_build_says_in_another_way_is_left_alone(name: str, tmp_path: Path) -> None:
+    folder = package(tmp_path, {"src/a.cpp": "int main() {}\n", "b.in": "", **RIGHT_BUILDS[name]})
+    needs = asking(installed=(TALKER,) if "catkin_install" in str(RIGHT_BUILDS[name]) else ())
+    assert find_repairs(folder, facts_of(folder), needs) == ()

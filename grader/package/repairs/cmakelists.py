@@ -121,7 +121,7 @@ def repair_cmake(
         install_scripts(files, package, wanted)
         correct_paths(files, package)
         leave_out_missing(files, wanted)
-    link_programs(files)
+    link_programs(files, package)
     _correct_include(files)
     _declare_exported(files)
     _name_project(files, package, name, wanted.package)

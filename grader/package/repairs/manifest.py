@@ -25,8 +25,8 @@ VALUES = (
     (r"(?<=>)(\s*<(name|version|description)>[^<]*</\2>)(?=\1)", "", "the same tag is there twice"),
 )  # fmt: skip
 """What a tag of a manifest says that catkin refuses, what is written for it, and the reason."""
-RUN_NEEDS = re.compile(r"<(?:depend|run_depend|exec_depend|build_export_depend)>\s*([\w-]+)\s*<")
-ALL_NEEDS = re.compile(r"<(build_depend|depend|run_depend|exec_depend)>\s*([\w-]+)\s*<")
+RUN_NEEDS = re.compile(r"<(?:depend|run_depend|exec_depend|build_export_depend)\b[^<>]*>\s*([\w-]+)\s*<")
+ALL_NEEDS = re.compile(r"<(build_depend|depend|run_depend|exec_depend)\b[^<>]*>\s*([\w-]+)\s*<")
 
 
 SLIPS_MAX = 20
@@ -92,8 +92,13 @@ def _rename_dependencies(files: Files) -> None:
 
 
 def _blank_comments(text: str) -> str:
-    """Return the text with blanks in place of its comments, so that all else stays where it is."""
-    return re.sub(r"<!--.*?-->", lambda found: re.sub(r"[^\n]", " ", found[0]), text, flags=re.DOTALL)
+    """Return the text with blanks in place of its comments and CDATA, so that all else stays where it is."""
+    return re.sub(
+        r"<!--.*?-->|<!\[CDATA\[.*?\]\]>",
+        lambda found: re.sub(r"[^\n]", " ", found[0]),
+        text,
+        flags=re.DOTALL,
+    )
 
 
 def _add_required(files: Files, name: str) -> None:

@@ -17,6 +17,7 @@ from grader.package.repairs.cmake_calls import (
     change_word,
     cmake_text,
     find_commented,
+    has_call,
     replace_token,
     words_of,
 )
@@ -27,17 +28,30 @@ from grader.wording import join_words, numbers_text
 
 BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
 INSTALL = "catkin_install_python"
+_IS_BIN = re.compile(
+    r"\$\{CATKIN_PACKAGE_BIN_DESTINATION\}|\$\{CATKIN_(GLOBAL|PACKAGE)_LIB_DESTINATION\}/\$\{(CMAKE_)?PROJECT_NAME\}"
+)
+"""How the place where rosrun looks can be written with catkin's variables."""
 
 
-def link_programs(files: Files) -> None:
+def link_programs(files: Files, package: PackageFacts) -> None:
     """Link ROS to programs that nothing is linked to. A program without ROS is none the worse for it."""
     linked = {words[0].value for c in calls_of(files, "target_link_libraries") if (words := words_of(c))}
+    told = package.cmake.calls if package.cmake is not None else ()  # loops and variables are followed there
+    linked |= {call.args[0] for call in told if call.name == "target_link_libraries" and call.args}
+    if has_call(files, package, "link_libraries"):
+        return
     for call in reversed(calls_of(files, "add_executable")):  # places above stay
         words = words_of(call)
-        if words and words[0].value not in linked and "IMPORTED" not in [t.value for t in words]:
+        if words and words[0].value not in linked and not _is_elsewhere(words):
             text, line = cmake_text(files), f"target_link_libraries({words[0].value} ${{catkin_LIBRARIES}})"
             changed = f"{text[: call.span.stop]}\n{line}{text[call.span.stop :]}"
             change_line(files, call, changed, f"nothing is linked to the program {words[0].value}")
+
+
+def _is_elsewhere(words: Sequence[Token]) -> bool:
+    """Return whether add_executable(…) only gives a name to what is made elsewhere."""
+    return not {"ALIAS", "IMPORTED"}.isdisjoint(token.value for token in words)
 
 
 def name_programs(files: Files, wanted: Wanted) -> None:
@@ -62,8 +76,10 @@ def install_scripts(files: Files, package: PackageFacts, wanted: Wanted) -> None
     there = {path for path in (_place(own, files, script) for script in wanted.installed) if path}
     calls = calls_of(files, INSTALL)
     named = {_plain(t.value) for c in calls for t in words_of(c)}
-    if any("$" in name and not name.upper().startswith("${CATKIN_") for name in named):
-        return  # which scripts a variable holds is for CMake to say
+    told = package.cmake.calls if package.cmake is not None else ()
+    by_others = any(call.name == INSTALL and call.file != CMAKE for call in told)
+    if by_others or any("$" in name and not name.upper().startswith("${CATKIN_") for name in named):
+        return  # which scripts a variable holds, or another file installs, is for CMake to say
     missing = sorted(there - named)
     if missing and not calls:
         line = f"{INSTALL}(PROGRAMS {' '.join(missing)}\n  DESTINATION {BIN}\n)"
@@ -118,6 +134,8 @@ def _is_slip_of(written: PurePosixPath, path: PurePosixPath) -> bool:
 
 OF_TARGETS = ("add_executable", "target_link_libraries", "add_dependencies", "set_target_properties")
 """Calls that begin with a target's name."""
+WRITING = ("configure_file", "add_custom_command", "file")
+"""Calls that name files which the build writes."""
 
 
 def leave_out_missing(files: Files, wanted: Wanted) -> None:
@@ -132,7 +150,12 @@ def leave_out_missing(files: Files, wanted: Wanted) -> None:
         whole = [call] if len(lost) == len(listed) else lost
         _leave_out(files, call, lost, [one.span for one in whole], "remove {it} from that call")
     made = [words for call in calls_of(files, "add_executable") if (words := words_of(call))]
-    sources = [(words[0], [t for t in words[1:] if _is_missing(files, t.value, asked)]) for words in made]
+    made = [words for words in made if not _is_elsewhere(words)]
+    asked |= {PurePosixPath(token.value).name for c in calls_of(files, *WRITING) for token in words_of(c)}
+    sources = [
+        (words[0], [t for t in words[1:] if not t.value.isupper() and _is_missing(files, t.value, asked)])
+        for words in made
+    ]
     targets = {target.value for target, lost in sources if lost}
     about = [c for c in calls_of(files, *OF_TARGETS) if words_of(c) and words_of(c)[0].value in targets]
     lines = f"{'lines' if len(about) > 1 else 'line'} {numbers_text([call.line for call in about])}"
@@ -245,7 +268,7 @@ def _correct_destination(files: Files, scripts: Collection[str]) -> None:
                 changed = f"{text[:last]}\n  DESTINATION {BIN}{text[last:]}"
             change_line(files, call, changed, f"{call.identifier}(…) has no {lacks}")
             return
-        if given and names_one and given.value != BIN and "CATKIN_" in given.value.upper():
+        if given and names_one and not _IS_BIN.fullmatch(given.value) and "CATKIN_" in given.value.upper():
             why, fix = f"{given.value} is not where rosrun looks", f"write DESTINATION {BIN}"
             change_word(files, given, BIN, why, fix, call=call)
             return
