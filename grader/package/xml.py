@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from difflib import get_close_matches
 from itertools import islice
 
@@ -63,7 +63,7 @@ _TAGS_MAX = 2_000
 _OPENERS_A_TAG = 20
 _MESSAGES = 50
 _LAST_LINE = 65_535
-COMMENT = re.compile(r"<!--(.*?)-->", re.DOTALL)
+_COMMENT = re.compile(r"<!--(.*?)-->", re.DOTALL)
 _SLIPS_CHARS_MAX = 20_000
 _SLIPS_LINES_MAX = 300
 _FURTHER_CHARS = 4
@@ -191,7 +191,7 @@ def _never_opened(message: str, data: bytes, root: str) -> Reason | None:
 def _closed_early(message: str, data: bytes, root: str) -> tuple[Reason, int] | None:
     """Return what is to be said, with the line, where the root's end comes above other tags of its own; None where
     what follows begins another root."""
-    plain = COMMENT.sub(lambda found: "\n" * found[0].count("\n"), data.decode("utf-8", "replace"))
+    plain = _without_comments(data.decode("utf-8", "replace"))
     before, end, behind = plain.partition(f"</{root}>")
     if "Extra content at the end" not in message or not end or not re.match(r"\s*<\w", behind):
         return None
@@ -204,6 +204,17 @@ def _closed_early(message: str, data: bytes, root: str) -> tuple[Reason, int] | 
     return Reason(why, f"move that `{end}` to the end of the file"), number
 
 
+def sub_comments(new: Callable[[re.Match[str]], str], text: str) -> str:
+    """Return the text with each of its comments replaced."""
+    end = text.rfind("-->") + len("-->")  # behind it, the end of each `<!--` is not to be found
+    return _COMMENT.sub(new, text[:end]) + text[end:]
+
+
+def _without_comments(text: str) -> str:
+    """Return the text with the newlines alone of its comments."""
+    return sub_comments(lambda found: "\n" * found[0].count("\n"), text)
+
+
 def opening_tag(text: str, root: str) -> str:
     """Return the root's tag; that of a manifest with the format that its other tags are of (REP 127, 140)."""
     is_later = root == "package" and re.search(r"<(exec_)?depend>", text)
@@ -212,7 +223,7 @@ def opening_tag(text: str, root: str) -> str:
 
 def first_tag(text: str, root: str) -> int | None:
     """Return the line, from 0, of the first tag of a file that never opens its root's; None where it does."""
-    plain = COMMENT.sub(lambda found: "\n" * found[0].count("\n"), text)
+    plain = _without_comments(text)
     lines = (n for n, line in enumerate(plain.split("\n")) if re.match(r"\s*<\w", line))
     return None if re.search(rf"<{re.escape(root)}[\s>/]", plain) else next(lines, None)
 

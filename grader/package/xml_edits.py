@@ -9,7 +9,6 @@ from difflib import get_close_matches
 
 from grader.model.package import Fault
 from grader.package.xml import (
-    COMMENT,
     NO_END,
     TYPOGRAPHIC,
     find_slip,
@@ -17,6 +16,7 @@ from grader.package.xml import (
     first_tag,
     opening_tag,
     parse_xml,
+    sub_comments,
 )
 
 EDITS_MAX = 4
@@ -66,7 +66,7 @@ def _edits(text: str, fault: Fault, root: str) -> Iterator[str]:
     elif unclosed := re.search(NO_END, message):
         yield from _closed(lines, unclosed[1], int(unclosed[2]) - 1, root)
     elif re.search(r"hyphen|must not contain '--'", message):
-        yield COMMENT.sub(_without_hyphens, text)
+        yield sub_comments(_without_hyphens, text)
     elif "EntityRef" in message:
         yield re.sub(r"&(?!#?\w+;)", "&amp;", text)
     elif "Extra content at the end" in message and (first := first_tag(text, root)) is not None:

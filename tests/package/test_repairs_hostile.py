@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 import os
+import time
 from pathlib import Path
 
 import pytest
 
 from grader.package.repairs import NotRepairable, Repair, apply_repair, find_repairs
 from grader.package.repairs.manifest import SLIPS_MAX
-from tests.package.repairing import MANIFEST, SCRIPT, TALKER, WANTED, XML, package, repair_all, swapped
+from tests.package.repairing import (
+    LAUNCHED,
+    MANIFEST,
+    SCRIPT,
+    TALKER,
+    WANTED,
+    XML,
+    package,
+    repair_all,
+    swapped,
+)
 from tests.package.trees import facts_of
 
 
@@ -141,3 +152,11 @@ def test_a_hostile_source_costs_its_own_repairs(source: str, tmp_path: Path) -> 
     found = [repair for repair in repair_all(folder) if repair.file == TALKER]
     assert [repair.kind for repair in found] == ["topic-name"]
     assert (folder / "src" / "talker.py").read_text() == SCRIPT
+
+
+@pytest.mark.parametrize("file", [XML, LAUNCHED])
+def test_comments_without_an_end_are_looked_through_once(file: str, tmp_path: Path) -> None:
+    folder = package(tmp_path, {file: "<!--" * 15_000})
+    begin = time.process_time()
+    repair_all(folder)
+    assert time.process_time() - begin < 5

@@ -94,7 +94,7 @@ def _rename_dependencies(files: Files) -> None:
 def _blank_comments(text: str) -> str:
     """Return the text with blanks in place of its comments and CDATA, so that all else stays where it is."""
     return re.sub(
-        r"<!--.*?-->|<!\[CDATA\[.*?\]\]>",
+        r"<!--.*?(?:-->|\Z)|<!\[CDATA\[.*?(?:\]\]>|\Z)",
         lambda found: re.sub(r"[^\n]", " ", found[0]),
         text,
         flags=re.DOTALL,
