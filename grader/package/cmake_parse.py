@@ -41,6 +41,7 @@ _CATKIN = {
     "CATKIN_PACKAGE_LIB_DESTINATION": "lib",
     "CATKIN_PACKAGE_SHARE_DESTINATION": "share/{0}",
 }
+_FOLDERS_HERE = ("${CMAKE_CURRENT_SOURCE_DIR}", "${CMAKE_CURRENT_LIST_DIR}")
 _NESTING_MAX = 50
 _WORK_MAX = 20_000_000
 _BLOCKS = ("if", "foreach", "while", "function", "macro", "block")
@@ -101,6 +102,7 @@ class _Reader:
         self.calls: list[CMakeCall] = []
         self.fault: Fault | None = None
         self.read = {CMAKE}
+        self.defined: dict[str, nodes.Function | nodes.Macro] = {}
         self.steps = self.letters = 0
         self.left_bytes = FILE_BYTES_MAX
         self.variables = _Variables()
@@ -119,7 +121,9 @@ class _Reader:
                 self._loop(node, file, depth)
             elif isinstance(node, nodes.While | nodes.Block):
                 self.run(node.body, file, depth + 1)
-            elif not isinstance(node, nodes.Function | nodes.Macro):  # a definition calls nothing
+            elif isinstance(node, nodes.Function | nodes.Macro):  # a definition calls nothing
+                self.defined |= {node.args[0].value.lower(): node} if node.args else {}
+            else:
                 self._call(node, file, depth)
 
     def _is_enough(self) -> bool:
@@ -164,7 +168,9 @@ class _Reader:
         line = getattr(node, "line", 1)
         args = self._arguments(getattr(node, "args", []), file)
         self.calls.append(CMakeCall(name=name, args=tuple(args), file=file, line=line))
-        if name == "set" and args:
+        if name in self.defined:
+            self._call_defined(self.defined[name], args, file, depth)
+        elif name == "set" and args:
             self._set(args)
         elif name == "list" and args[:1] == ["APPEND"] and len(args) > 1:
             before = filter(None, [dict.get(self.variables, args[1])])
@@ -179,6 +185,22 @@ class _Reader:
         elif name in {"include", "add_subdirectory"} and args:
             self._include(name, args[0], file, depth)
 
+    def _call_defined(
+        self, node: nodes.Function | nodes.Macro, args: list[str], file: str, depth: int
+    ) -> None:
+        """Follow a call of what the package defines, with the parameters as variables."""
+        names = [str(token.value) for token in node.args[1:] if token.kind != "COMMENT"]
+        given = dict(zip(names, args, strict=False))
+        given |= {"ARGV": ";".join(args), "ARGN": ";".join(args[len(names) :])}
+        before = {name: dict.get(self.variables, name) for name in given}
+        self.variables.update({name: value[:_VALUE_CHARS_MAX] for name, value in given.items()})
+        self.run(node.body, file, depth + 1)
+        for name, value in before.items():
+            if value is None:
+                self.variables.pop(name, None)
+            else:
+                self.variables[name] = value
+
     def _set(self, args: list[str]) -> None:
         values = args[1:]
         for end in ("CACHE", "PARENT_SCOPE"):
@@ -188,7 +210,10 @@ class _Reader:
     def _include(self, name: str, place: str, file: str, depth: int) -> None:
         """Read a file of the same package; modules of CMake and of other packages are none of its facts."""
         place = place if name == "include" else posixpath.join(place, CMAKE)
-        path = posixpath.normpath(posixpath.join(posixpath.dirname(file), place))
+        root, _, below = place.partition("/")
+        at_root = root == "${PROJECT_SOURCE_DIR}"
+        place = below if at_root or root in _FOLDERS_HERE else place
+        path = posixpath.normpath(posixpath.join("" if at_root else posixpath.dirname(file), place))
         if path in self.read or path.startswith(("/", "../")) or "\0" in path:
             return
         self.read.add(path)

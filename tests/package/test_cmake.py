@@ -48,6 +48,14 @@ INSTALL = ("PROGRAMS", "scripts/a.py", "scripts/b.py", "DESTINATION", "lib/lab1"
             "DESTINATION lib/${PROJECT_NAME})"
         ),
         (
+            "macro(place D f) # one\n  catkin_install_python(PROGRAMS ${f} ${ARGN} DESTINATION ${D})\nendmacro()\n"
+            "Place(lib/lab1 scripts/a.py scripts/b.py)"
+        ),
+        (
+            "function(place)\n  catkin_install_python(PROGRAMS ${ARGN} DESTINATION lib/lab1)\nendfunction()\n"
+            "place(scripts/a.py scripts/b.py)"
+        ),
+        (
             "set(D scripts)\nlist(APPEND S ${D}/a.py)\nlist(APPEND S ${D}/b.py)\n"
             'catkin_install_python(PROGRAMS ${S} DESTINATION "lib/${PROJECT_NAME}")'
         ),
@@ -90,6 +98,14 @@ def test_included_files_of_the_package_count_and_no_others(tmp_path):
         ("install", "cmake/more.cmake", 1),
         ("add_executable", "src/CMakeLists.txt", 1),
     ]
+
+
+@pytest.mark.parametrize(
+    "folder", ["PROJECT_SOURCE_DIR", "CMAKE_CURRENT_SOURCE_DIR", "CMAKE_CURRENT_LIST_DIR"]
+)
+def test_an_included_file_may_be_named_from_the_folder_of_the_package(tmp_path, folder):
+    (tmp_path / "more.cmake").write_text("install(FILES x)\n")
+    assert calls_of(facts_of(tmp_path, f"include(${{{folder}}}/more.cmake)\n"), "install") == [("FILES", "x")]
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import pytest
 from grader.package.repairs import NotRepairable, Repair, apply_repair, find_repairs
 from grader.package.repairs.manifest import SLIPS_MAX
 from tests.package.repairing import (
+    CMAKELISTS,
     LAUNCHED,
     MANIFEST,
     SCRIPT,
@@ -154,9 +155,20 @@ def test_a_hostile_source_costs_its_own_repairs(source: str, tmp_path: Path) -> 
     assert (folder / "src" / "talker.py").read_text() == SCRIPT
 
 
-@pytest.mark.parametrize("file", [XML, LAUNCHED])
-def test_comments_without_an_end_are_looked_through_once(file: str, tmp_path: Path) -> None:
-    folder = package(tmp_path, {file: "<!--" * 15_000})
+@pytest.mark.parametrize(
+    ("file", "text"),
+    [
+        (XML, "<!--" * 15_000),
+        (LAUNCHED, "<!--" * 15_000),
+        (CMAKELISTS, "#project(\n" * 6_000),
+        (CMAKELISTS, "projct(lab)\n" * 4_000),
+        (CMAKELISTS, "catkin_package(CATKIN_DEPENDS " + " ".join(f"q{n}" for n in range(6_000)) + ")"),
+    ],
+)
+def test_the_same_slip_thousands_of_times_is_looked_through_once(
+    file: str, text: str, tmp_path: Path
+) -> None:
+    folder = package(tmp_path, {file: text})
     begin = time.process_time()
     repair_all(folder)
     assert time.process_time() - begin < 5

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from itertools import takewhile
+from itertools import islice, takewhile
 
 from cmake_parser.ast import Command, Token
 
@@ -14,6 +14,8 @@ from grader.package.repairs.editing import Files
 from grader.wording import lines_text
 
 CALL_LINES_MAX = 30
+CALLS_MAX = 20
+"""Of one kind that are looked at, misspelt or in comments: more are not a student's."""
 
 
 def cmake_text(files: Files) -> str:
@@ -97,12 +99,11 @@ def find_commented(text: str, pattern: str) -> tuple[int, list[str]] | None:
     """Return the first such call that is commented out, up to its closing bracket: its first line, from 0, and its
     lines without `#`."""
     lines = text.split("\n")
-    for first, line in enumerate(lines):
-        if not re.match(rf"\s*#+\s?{pattern}", line, re.IGNORECASE):
-            continue
+    begun = re.compile(rf"\s*#+\s?{pattern}", re.IGNORECASE)
+    for first in islice((n for n, line in enumerate(lines) if begun.match(line)), CALLS_MAX):
         call: list[str] = []
         for line_of_call in lines[first : first + CALL_LINES_MAX]:
             call.append(re.sub(r"^(\s*)#+ ?", r"\1", line_of_call, count=1))
-            if commands_of("\n".join(call).encode()):
+            if ")" in line_of_call and commands_of("\n".join(call).encode()):
                 return first, call
     return None

@@ -16,6 +16,7 @@ from grader.package.cmake_corrections import find_slip, is_open
 from grader.package.cmake_parse import commands_of, join_half_comment, parse_tree_of
 from grader.package.manifest import parse_manifest
 from grader.package.repairs.cmake_calls import (
+    CALLS_MAX,
     add_call,
     all_calls,
     calls_of,
@@ -49,6 +50,8 @@ from grader.package.repairs.programs import (
 from grader.wording import is_one_edit, join_words, numbers_text
 
 OF_WORKSPACE = "catkin_workspace"
+DEPENDS_MAX = 50
+"""Of one call: each that is missing reads the manifest again."""
 
 
 # ---- the name
@@ -278,14 +281,13 @@ _PLACE = re.compile(
 def _spell_commands(files: Files) -> None:
     """Spell commands right that have nearly the name of a known one, unless the file defines them."""
     defined = {words[0].value.lower() for c in calls_of(files, "function", "macro") if (words := words_of(c))}
-    for command in reversed(all_calls(files)):
-        name = command.identifier
-        right = "" if name.lower() in defined else meant_command(name.lower())
-        if right:
-            text, start = cmake_text(files), command.span.start
-            start = text.index(name, start)
-            changed = text[:start] + right + text[start + len(name) :]
-            change_line(files, command, changed, f"there is no command {name}; it is called {right}")
+    meant = [(c, meant_command(c.identifier.lower())) for c in all_calls(files)]
+    slips = [(c, right) for c, right in meant if right and c.identifier.lower() not in defined]
+    for command, right in reversed(slips[:CALLS_MAX]):  # each change reads the file again
+        name, text = command.identifier, cmake_text(files)
+        start = text.index(name, command.span.start)
+        changed = text[:start] + right + text[start + len(name) :]
+        change_line(files, command, changed, f"there is no command {name}; it is called {right}")
 
 
 def _leave_out_rosbuild(files: Files) -> None:
@@ -331,7 +333,7 @@ def _correct_include(files: Files) -> None:
 def _declare_exported(files: Files) -> None:
     """Declare in `package.xml` what `catkin_package(CATKIN_DEPENDS …)` names, as catkin asks for."""
     for call in calls_of(files, "catkin_package"):
-        for name in values_behind(call, "CATKIN_DEPENDS"):
+        for name in values_behind(call, "CATKIN_DEPENDS")[:DEPENDS_MAX]:
             meant = [one for one in _declared(files) if is_one_edit(name, one) or name.lower() == one]
             token = next(t for t in words_of(call) if t.value == name)
             known = {*_declared(files), *known_packages(), *noetic_messages(), *OF_ROS}
