@@ -259,7 +259,7 @@ def parse_tree_of(data: bytes, file: str) -> tuple[list[nodes.AstFileNode], Faul
     if text is None:
         return [], _fault(file, None, "too many brackets", f"`{file}` holds too many `[[` to be read")
     commands, fault = _commands(text, file)
-    whole, unbalanced = _balance(commands, file)
+    whole, unbalanced = _balance(commands, file, is_cut=fault is not None)
     fault = unbalanced or fault
     if fault is not None and whole:
         text = text[: whole[-1].span.stop]
@@ -424,8 +424,11 @@ def _word(token: Token) -> str:
     return str(token.value or "")[:40]
 
 
-def _balance(commands: list[nodes.Command], file: str) -> tuple[list[nodes.Command], Fault | None]:
-    """Return the commands up to the last one outside every open block, and the fault where blocks do not match."""
+def _balance(
+    commands: list[nodes.Command], file: str, *, is_cut: bool
+) -> tuple[list[nodes.Command], Fault | None]:
+    """Return the commands up to the last one outside every open block, and the fault where blocks do not match. Where
+    the file `is_cut` at what cannot be read, the end of a block may come behind that."""
     open_blocks: list[nodes.Command] = []
     whole = 0
     for count, command in enumerate(commands, 1):
@@ -445,6 +448,8 @@ def _balance(commands: list[nodes.Command], file: str) -> tuple[list[nodes.Comma
             return commands[:whole], fault
         # Only here is no block open, so that the text up to here can be read on its own
         whole = whole if open_blocks else count
+    if open_blocks and is_cut:
+        return commands[:whole], None
     if open_blocks:
         name = open_blocks[0].identifier.lower()
         cause = f"`{name}()` is never closed by `end{name}()`"

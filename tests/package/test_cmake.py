@@ -434,3 +434,9 @@ def test_a_call_of_a_hundred_thousand_words_is_compared_at_once(tmp_path):
     begin = time.process_time()
     assert written_calls(trace, tmp_path, ROOT).trace == b""
     assert time.process_time() - begin < 10
+
+
+def test_a_slip_within_a_block_is_told_and_not_the_block(tmp_path):
+    text = "project(a)\nif(x)\n  foreach(y 1)\n    message(${y}\n  endforeach()\nendif()\n"
+    fault = facts_of(tmp_path, text).fault
+    assert (fault.line, fault.cause) == (4, "the `(` of `message(` is never closed by `)`")

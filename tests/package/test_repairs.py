@@ -444,6 +444,10 @@ RIGHT_BUILDS = {
         CMAKELISTS: CMAKE + f"catkin_install_python(PROGRAMS {TALKER} DESTINATION "
         "${CATKIN_GLOBAL_LIB_DESTINATION}/${PROJECT_NAME})\n"
     },
+    "programs-in-lower-case": {
+        CMAKELISTS: CMAKE + f"catkin_install_python(programs {TALKER} b.py DESTINATION "
+        "${CATKIN_PACKAGE_BIN_DESTINATION} OPTIONAL)\n"
+    },
     "version-of-a-dependency": swapped(XML, ("<depend>", '<depend version_gte="1.11.0">')),
     "quoted-manifest": swapped(XML, (">x<", "><![CDATA[<version>one</version> & <depend>]]><")),
 }  # fmt: skip

@@ -309,8 +309,9 @@ def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
                 why,
                 namespace_meant(node) or "give each <node> its own name: roslaunch refuses the file",
             )
-        # Nodes behind an `if` that only roslaunch works out may exclude each other.
-        if not node.uncertain:
+        # Nodes behind an `if` that only roslaunch works out may exclude each other; `$(anon …)` is another name each
+        # time that a file is included.
+        if not node.uncertain and UNRESOLVED not in node.full_name:
             seen.setdefault(node.full_name, node)
 
 

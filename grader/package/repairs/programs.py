@@ -144,6 +144,8 @@ def leave_out_missing(files: Files, wanted: Wanted) -> None:
     asked = {PurePosixPath(path).name for path in wanted.scripts}
     for call in reversed(calls_of(files, INSTALL)):  # places above stay
         words = [token for token in words_of(call) if token.value]
+        if any(token.value == "OPTIONAL" for token in words):
+            continue
         first = next((i for i, token in enumerate(words) if token.value == "PROGRAMS"), 0) + 1
         listed = list(takewhile(lambda token: not token.value.isupper(), words[first:]))
         lost = [token for token in listed if _is_missing(files, token.value, asked)]
