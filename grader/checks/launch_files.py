@@ -28,6 +28,7 @@ from grader.checks.support.launch_slips import (
     find_launch,
     has_program,
     illegal_name,
+    include_slips,
     later_fixes,
     node_slip,
     nodes_of_program,
@@ -214,6 +215,9 @@ def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
     for place, why, hint in _in_its_place(file, pkg, name):
         cited = place if isinstance(place, FileCitation) else FileCitation(file=file.path, line=place)
         return failed(f"{message}: {why}", hint=hint, citations=(cited,))
+    # What an <include> does not bring may be the node.
+    if slip := next(include_slips(file), None):
+        return slip.verdict()
     return failed(message, hint=f"below <launch>, add {_node_tag(file, pkg, name)}")
 
 

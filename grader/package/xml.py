@@ -398,7 +398,7 @@ def _strange_things(root: etree._Element, name: str) -> int:
         known = ATTRIBUTES.get(name, {}).get(tag, ())
         strange += (tag not in TAGS[name] if name in TAGS else 0) or (tag == name and element is not root)
         for one, value in element.attrib.items() if known else ():
-            strange += (one not in known) + bool(re.search("[\"'<>]", str(value)))
+            strange += (one not in known) + bool(re.search(r"[\"'>]|<(?![\s=\d])", str(value)))
         holds_tags = element is root or (name == "launch" and tag not in _OF_TEXT)
         texts = [element.text or "", *(child.tail or "" for child in element)]
         strange += sum(bool(one.strip()) if holds_tags else ">" in one for one in texts)

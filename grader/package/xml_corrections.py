@@ -69,6 +69,7 @@ def slips_of(line: str, root: str) -> Iterator[Slip]:
 
 
 _PATTERNS = (
+    (r"(=\s*([\"'])(?:(?!\2)[^<>])*)<(?=[\s=\d](?:(?!\2)[^<>])*\2)", r"\1&lt;", "`<` within a value is written `&lt;`"),
     (r"([<>=@])\1", r"\1", "`{0}` is there twice"),
     (r"<(/)/+(?=NAMES)", r"<\1", "`{0}` is there twice"),
     (r"/(/)>", r"\1>", "`{0}` is there twice"),

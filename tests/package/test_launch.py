@@ -104,6 +104,7 @@ def test_attributes_that_are_not_there_are_none():
         ("<robot/>", 1, "`<robot>`; roslaunch wants `<launch>`"),
         ("<launch>\n<launch/></launch>", 2, "a second `<launch>`"),
         ("<launch>a & b</launch>", 1, "`&amp;`"),
+        ('<launch>\n<param name="a" value="1 < 2"/>\n</launch>', 2, "`<` within a value is written `&lt;`"),
         ("<launch>\n< node/></launch>", 2, "delete the space after it"),
         ("<launch>\n<<<<<<< HEAD\n</launch>", 2, "merge markers"),
         ("\n<?xml version='1.0'?><launch/>", 2, "comes before `<?xml ... ?>`: delete it"),

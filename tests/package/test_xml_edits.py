@@ -38,6 +38,7 @@ EDITED = {
     "blank before the declaration": ("<launch>", "\n<?xml version='1.0'?>\n<launch>"),
     "a browser's line above the root": ("<launch>", "This file has no style of its own.\n<launch>"),
     "dashes in a comment": ("<launch>", "<launch>\n  <!-- first -- second --->"),
+    "less than": ('"screen"', '"screen" if="$(eval 1 < 2)"'),
     "ampersand": ('"screen"', '"screen" args="a & b"'),
     "a quote here, the root there": ('"talker.py"', '"talker.py'),
 }

@@ -290,10 +290,15 @@ def namespace_meant(*nodes: LaunchNode) -> str:
     return 'write ns="…" instead of namespace="…", which roslaunch does not know' if found else ""
 
 
-def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
-    """Yield what makes roslaunch start nothing at all."""
+def include_slips(file: LaunchFile) -> Iterator[Slip]:
+    """Yield why an `<include>` brings nothing."""
     for fault in file.include_faults:
         yield Slip(fault.file or file.path, fault.line or 1, fault.message, fault.advice)
+
+
+def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
+    """Yield what makes roslaunch start nothing at all."""
+    yield from include_slips(file)
     seen: dict[str, LaunchNode] = {}
     for node in file.brings:
         slip = node_slip(package, node)
