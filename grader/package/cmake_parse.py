@@ -41,6 +41,7 @@ _CATKIN = {
     "CATKIN_PACKAGE_LIB_DESTINATION": "lib",
     "CATKIN_PACKAGE_SHARE_DESTINATION": "share/{0}",
 }
+_MODULE_FOLDERS_MAX = 10
 _FOLDERS_HERE = ("${CMAKE_CURRENT_SOURCE_DIR}", "${CMAKE_CURRENT_LIST_DIR}")
 _NESTING_MAX = 50
 _WORK_MAX = 20_000_000
@@ -209,6 +210,11 @@ class _Reader:
 
     def _include(self, name: str, place: str, file: str, depth: int) -> None:
         """Read a file of the same package; modules of CMake and of other packages are none of its facts."""
+        if name == "include" and re.fullmatch(r"\w+", place):  # a module
+            folders = dict.get(self.variables, "CMAKE_MODULE_PATH", "").split(";")
+            for folder in islice(filter(None, folders), _MODULE_FOLDERS_MAX):
+                self._include(name, f"{folder}/{place}.cmake", file, depth)
+            return
         place = place if name == "include" else posixpath.join(place, CMAKE)
         root, _, below = place.partition("/")
         at_root = root == "${PROJECT_SOURCE_DIR}"

@@ -106,6 +106,8 @@ def test_included_files_of_the_package_count_and_no_others(tmp_path):
 def test_an_included_file_may_be_named_from_the_folder_of_the_package(tmp_path, folder):
     (tmp_path / "more.cmake").write_text("install(FILES x)\n")
     assert calls_of(facts_of(tmp_path, f"include(${{{folder}}}/more.cmake)\n"), "install") == [("FILES", "x")]
+    text = f"list(APPEND CMAKE_MODULE_PATH ${{{folder}}})\ninclude(more)\ninclude(other)\n"
+    assert calls_of(facts_of(tmp_path, text), "install") == [("FILES", "x")]
 
 
 @pytest.mark.parametrize(
