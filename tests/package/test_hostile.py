@@ -480,6 +480,13 @@ SCRIPT = "import rospy\nrospy.init_node('x')\npub = rospy.Publisher('c', String,
         + "".join(f"rospy.Subscriber('t{n}', String, f{n})\n" for n in range(1000))
         + "def f0(m):\n    global x0\n    x0 = m.data\n"
         + "    y = x0 + z\n" * 2000,
+        SCRIPT
+        + "def heard(m):\n"
+        + "".join(f"    x{n} = m.data\n    print(x{n})\n" for n in range(700))
+        + "".join(f"rospy.Subscriber('t{n}', String, heard)\n" for n in range(700)),
+        SCRIPT
+        + "class A:\n    def f(self):\n"
+        + "".join(f"        print(self.a{n}x)\n" for n in range(2000)),
     ],
 )
 def test_lines_that_all_have_to_do_with_each_other(tmp_path, text) -> None:

@@ -285,7 +285,7 @@ LEAVES, STORING = (ast.Return, ast.Raise), (ast.Assign, ast.AugAssign, ast.AnnAs
 def unprinted_messages(tree):
     """Callbacks of topics that print nothing of a message (`not-printed`), or of some messages only, or what they make
     of it (`printed-in-part`). Nothing of one that hands its message to another function, or keeps it for later."""
-    functions = functions_in(tree)
+    functions, looked_at = functions_in(tree), {}
     level = any(k.arg == "log_level" for n in walk(tree) if is_call(n, "init_node") for k in n.keywords)
     for node in walk(tree):
         given = argument(node, 2, "callback") if called_name(node) == "Subscriber" else []
@@ -294,12 +294,12 @@ def unprinted_messages(tree):
         if not taken:
             continue
         kinds, topics = argument(node, 1, "data_class"), argument(node, 0, "name")
-        plain = kinds and dotted(kinds[0]).rpartition(".")[2] in WITH_DATA
-        callback = Printing(own, taken[0], taken[0] + (".data" if plain else ""), functions)
-        found = callback.found(tree, level)
-        if found:
-            line, kind, message, fix = found
-            yield slip(line, kind, message, fix, text_of(topics[0]) if topics else "")
+        plain = any(dotted(kind).rpartition(".")[2] in WITH_DATA for kind in kinds[:1])
+        key = own, taken[0] + (".data" if plain else "")
+        if key not in looked_at:  # one callback may be given many times
+            looked_at[key] = Printing(own, taken[0], key[1], functions).found(tree, level)
+        if looked_at[key]:
+            yield slip(*looked_at[key], text_of(topics[0]) if topics else "")
 
 
 def stored_and_printed(function):

@@ -370,14 +370,16 @@ SLEEPS_SHOWN = 5
 
 def waiting_callbacks(tree):
     """Callbacks of topics and services that do not come to their end, or late: nothing further is read before."""
-    functions = functions_in(tree)
+    functions, known = functions_in(tree), {}
     for node in walk(tree):
         kind = called_name(node)
         given = argument(node, 2, CALLED_BACK[kind]) if kind in CALLED_BACK else []
         own = functions.get(dotted(given[0]).rpartition(".")[2]) if given else None
-        inside = list(ast.walk(own)) if own is not None else []
-        if node not in inside:
-            yield from islice(waits_in(own, inside), 1)
+        if own is not None and own not in known:
+            inside = list(ast.walk(own))
+            known[own] = set(inside), list(islice(waits_in(own, inside), 1))
+        if own is not None and node not in known[own][0]:
+            yield from known[own][1]
 
 
 def waits_in(callback, inside):

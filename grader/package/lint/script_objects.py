@@ -56,7 +56,12 @@ class Members:
         self.name, self.tree = node.name, tree
         self.methods = {n.name: n for n in node.body if isinstance(n, ast.FunctionDef)}
         self.fixed = bound_names(node)
-        owner = {id(n): m for m in self.methods.values() for n in ast.walk(m)}
+        inside = [(n, m) for m in self.methods.values() for n in ast.walk(m)]
+        owner = {id(n): m for n, m in inside}
+        plain = [n for n, _ in inside if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+        self.plain = {n.id: n.lineno for n in reversed(plain)}
+        """Where each name of a method, which is no attribute, first gets a value."""
+        self.called_on_self = called_methods(tree)
         self.stores, self.reads = {}, []
         for n in all_of(tree, ast.Attribute):
             method = owner.get(id(n))
@@ -174,18 +179,16 @@ def methods_inside(tree):
 
 def never_given(own, name, line):
     """Return why an attribute is not there that nothing gives a value, and what to do."""
-    for method in own.methods.values():
-        for n in ast.walk(method):
-            if isinstance(n, ast.Name) and n.id == name and isinstance(n.ctx, ast.Store):
-                why = "line %d gives a value to `%s`, and not to `self.%s`" % (n.lineno, name, name)
-                return why, "on line %d, write `self.%s` instead of `%s`" % (n.lineno, name, name)
+    if name in own.plain:
+        why = "line %d gives a value to `%s`, and not to `self.%s`" % (own.plain[name], name, name)
+        return why, "on line %d, write `self.%s` instead of `%s`" % (own.plain[name], name, name)
     there = sorted(own.fixed | set(own.stores))
     near = difflib.get_close_matches(name, there, 1, 0.75)
     near = near or [n for n in there if n.startswith(name) or name.startswith(n)]
     if near:
         fix = "on line %d, write `self.%s` instead of `self.%s`" % (line, near[0], name)
         return "did you mean self.%s?" % near[0], fix
-    if name in called_methods(own.tree):
+    if name in own.called_on_self:
         return never_defined(own, name, line)
     why = "nothing in the file gives `self.%s` a value" % name
     return why, "in `__init__`, write `self.%s = …`, with the value that it should have" % name

@@ -151,7 +151,7 @@ def handed_over(function, tree, owner):
     if len(taken) != 1 or function.args.defaults or calls_in(function, "init_node"):
         return ""
     name = (owner and "self.") + function.name
-    if calls_in(tree, "send_goal") and "feedback" in (function.name + taken[0]).lower():
+    if "feedback" in (function.name + taken[0]).lower() and calls_in(tree, "send_goal"):
         return "pass it: `send_goal(…, feedback_cb=%s)`" % name
     return "pass it to what calls it: `rospy.Subscriber(…, %s)`" % name
 
