@@ -2,9 +2,9 @@
 
 What nothing calls, statements without an effect, imports. Names are for `script_names.py`, texts for
 `script_texts.py`, objects for `script_objects.py`, callbacks for `script_callbacks.py`, loops for `script_loops.py`,
-their rates for `script_rates.py`, values for `script_values.py`, indexes for `script_indexes.py`, counters and clocks
-for `script_counters.py`. Nothing is executed. A file has to be parsed by ROS's own Python, which is to run it: Python
-3.8, standard library only.
+their rates for `script_rates.py`, values for `script_values.py`, arithmetic for `script_arithmetic.py`, counters and
+clocks for `script_counters.py`. Nothing is executed. A file has to be parsed by ROS's own Python, which is to run it:
+Python 3.8, standard library only.
 """
 
 import ast
@@ -14,9 +14,9 @@ import sys
 
 # `-I` leaves this folder out
 sys.path.append(os.path.dirname(os.path.abspath(__file__)))
+import script_arithmetic as arithmetic
 import script_callbacks as callbacks
 import script_counters as counters
-import script_indexes
 import script_loops as loops
 import script_names as names
 import script_objects as objects
@@ -53,7 +53,7 @@ def slips(tree):
         counters.counter_starts, without_effect, names.assigned_late, objects.hidden_names, objects.subscribed_again,
         imports, objects.taken_off, objects.unstarted_servers, values.wrong_values, values.decided_conditions,
         values.times_added_again, values.params_read_unset, values.overwritten_values, values.published_in_turn,
-        script_indexes.indexes, values.flagged_loops, values.kept_velocities,
+        arithmetic.arithmetic_slips, values.flagged_loops, values.kept_velocities,
         callbacks.unprinted_messages, counters.values_left_out, counters.published_unchanged,
         objects.unused_publishers, objects.unsent_messages, loops.loops_of_numbers,
         callbacks.finished_goals, callbacks.finished_in_loops, counters.sends_no_time, without_node,

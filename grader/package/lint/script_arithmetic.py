@@ -1,5 +1,5 @@
-"""Finds with which indexes a student's Python reads lists, and wrong arithmetic of indexes, angles and times, for
-`slips.py`.
+"""Finds wrong arithmetic in a student's Python, of indexes, angles, distances and times, for `slips.py`, and with which
+indexes it reads a scan.
 
 Nothing is executed. Python 3.8, standard library only.
 """
@@ -11,9 +11,8 @@ from script_names import all_of, called_name, dotted, key_of, listed, names_in, 
 SIDES = ("width", "height")
 
 
-def indexes(tree):
-    """Indexes that are floats, or step through a grid by its height; cells worked out with `int(…)`; and which ranges
-    of a scan are read."""
+def arithmetic_slips(tree):
+    """Numbers that are worked out wrongly, and which ranges of a scan are read."""
     sides, cells = grid_sides(tree), names_of_cells(tree)
     for node in all_of(tree, ast.Subscript):
         key, line = key_of(node), getattr(node, "lineno", 0)
