@@ -581,7 +581,7 @@ class StepRunner:
 
     def _is_behind(self, action: Action, name: str) -> bool:
         """Return whether the server has not begun with this goal for a while, since it still works on an earlier one
-        that got no result in its time. The first word to end that may be this goal, where it was not cancelled."""
+        that got no result in its time. One that was not cancelled may end only because of this goal: it gets longer."""
         stuck = {goal: left_s for goal, left_s in self._unended.items() if self._is_older(goal, ANSWER_S)}
         stuck.pop(name, None)
         came = self._arena.watch(f"{action.name}/status")

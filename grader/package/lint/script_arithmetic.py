@@ -113,12 +113,9 @@ def float_seconds(tree):
     """`stamp.secs = rospy.get_time()`: both parts of a time are whole numbers."""
     for node in all_of(tree, ast.Assign):
         target, name = dotted(node.targets[0]), called_name(node.value)
-        # a `self.secs` is the script's own
-        if (
-            target.count(".") > target.startswith("self.")
-            and target.endswith((".secs", ".nsecs"))
-            and name in ("get_time", "time", "to_sec")
-        ):
+        is_own = target.count(".") <= target.startswith("self.")  # a `self.secs` is the script's
+        is_part = target.endswith((".secs", ".nsecs")) and not is_own
+        if is_part and name in ("get_time", "time", "to_sec"):
             message = "`%s` takes a whole number, and `%s()` is a float" % (target, name)
             fix = "on line %d, write `%s = rospy.Time.now()`" % (node.lineno, target.rpartition(".")[0])
             yield slip(node.lineno, "wrong-value", message, fix, "secs")
@@ -132,30 +129,25 @@ def not_the_smallest(tree):
     given = [n for n in all_of(tree, ast.Assign) if any(map(is_ranges, ast.walk(n.value)))]
     held = {dotted(target) for n in given for target in n.targets}
     for node in all_of(tree, ast.BinOp):
-        total, count = called_name(node.left), called_name(node.right)
-        if (
+        is_mean = (
             isinstance(node.op, ast.Div)
-            and (total, count) == ("sum", "len")
-            and node.left.args
-            and node.right.args
-        ):
-            name = dotted(node.right.args[0])
-            if name not in held and not any(map(is_ranges, ast.walk(node.left))):
-                continue
+            and called_name(node.left) == "sum"
+            and called_name(node.right) == "len"
+        )
+        if not is_mean or not node.left.args or not node.right.args:
+            continue
+        name = dotted(node.right.args[0])
+        if name in held or any(map(is_ranges, ast.walk(node.left))):
             message = "the mean of many ranges is large even where one of them is small"
-            fix = "on line %d, write `min(%s)` in its place" % (
-                node.lineno,
-                name if "..." not in name else "…",
-            )
+            fix = "on line %d, write `min(%s)` in its place" % (node.lineno, "…" if "..." in name else name)
             yield slip(node.lineno, "wrong-value", message, fix, "mean")
     made = {dotted(n.targets[0]): n.value for n in all_of(tree, ast.Assign) if called_name(n.value) == "max"}
     tests = [n for n in all_of(tree, ast.Compare) if isinstance(n.ops[0], (ast.Lt, ast.LtE))]
     for call in (made.get(dotted(n.left), n.left) for n in tests):
         if called_name(call) == "max" and any(is_ranges(n) for n in ast.walk(call)):
             message = "the largest of these ranges is small only where all of them are"
-            yield slip(
-                call.lineno, "wrong-value", message, "on line %d, write `min` for `max`" % call.lineno, "mean"
-            )
+            fix = "on line %d, write `min` for `max`" % call.lineno
+            yield slip(call.lineno, "wrong-value", message, fix, "mean")
 
 
 def without_root(tree):

@@ -345,9 +345,7 @@ def kept_velocities(tree):
         choices = [n for n in block.body if isinstance(n, ast.If)] if kept else []
         for choice in choices[:USES_LIMIT]:
             below = [n for one in block.body if one.lineno > choice.lineno for n in calls_in(one, "publish")]
-            sent = {
-                dotted(n.args[0]) for n in below if n.args and isinstance(block, (ast.FunctionDef, ast.While))
-            }
+            sent = {dotted(n.args[0]) for n in below if n.args}
             stored, zeros = Counter(dotted(n) for n in stored_in([choice])), zeros_in(choice)
             sides = [{dotted(n) for n in stored_in(one)} for one in branches_of(choice)]
             fields = [one for name in kept if name in sent for one in moving(choice, name)]
@@ -367,6 +365,7 @@ def branches_of(choice):
 
 
 def stored_in(block):
+    """Return the attributes that a block of statements gives a value."""
     every = [n for one in block for n in ast.walk(one) if isinstance(n, ast.Attribute)]
     return [n for n in every if isinstance(n.ctx, ast.Store)]
 
