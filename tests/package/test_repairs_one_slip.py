@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from grader.package.python_repairs.examine import examine
 from grader.package.repairs import Wanted
 from grader.package.repairs.python import turn_sign
 from tests.package.repairing import CMAKE, CMAKELISTS, LAUNCH, LAUNCHED, MANIFEST, XML, package, repair_all
@@ -502,6 +503,37 @@ def test_a_slip_of_a_call_is_named_and_undone(right: str, wrong: str, tmp_path: 
     folder = package(tmp_path, {**FILES, LISTENER: FILES[LISTENER].replace(old, wrong)})
     assert [repair.line for repair in repair_all(folder, WANTED)] == [7]
     assert (folder / LISTENER).read_text() == FILES[LISTENER].replace(old, right)
+
+
+NODE = "import rospy\nfrom a.msg import A\nrospy.init_node('n')\n"
+LEFT_ALONE = {
+    "attribute-of-a-base": "class B(Base):\n    def f(self, m):\n        if self.is_shutdown:\n            return\n",
+    "parameter-like-a-function": "def stop():\n    pass\ndef run(stop):\n    if stop:\n        print(1)\nrun(stop)\n",
+    "own-publish": "class B:\n    def f(self):\n        a = 1\n        self.publish()\n    def publish(self):\n        pass\n",
+    "heard-by-nobody": f"{NODE}def name(n):\n    return n\nrospy.Subscriber('a', A)\nrospy.spin()\n",
+    "both-pythons": "try:\n    input = raw_input\nexcept:\n    pass\n",
+    "asks-for-version": "import sys\nif sys.hexversion > 0x03000000:\n    texts = str\nelse:\n    texts = basestring\n",
+    "other-axis": "class A:\n    def __init__(self):\n        self.max_z = 1\n        print(self.max_x)\n",
+    "other-side": "left_l = 1\nprint(left_r)\n",
+    "window": f"{NODE}rospy.Subscriber('a', A, print)\ngtk.main()\n",
+    "test": f"{NODE}rospy.Subscriber('a', A, print)\nrostest.rosrun('a', 'b', T)\n",
+    "goal": f"{NODE}rospy.Subscriber('a', A, print)\nclient.wait_for_result()\n",
+    "module": "import rospy\ndef f(n):\n    rospy.init_node(n)\n    rospy.Subscriber('a', B, print)\n",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LEFT_ALONE)
+def test_what_is_right_is_left_alone(name: str) -> None:
+    assert [
+        step["text"] for one in examine([["a.py", LEFT_ALONE[name]]], [], {}, "") for step in one["steps"]
+    ] == []
+
+
+def test_what_others_import_is_not_run() -> None:
+    text = "import rospy\ndef main():\n    rospy.init_node('a')\n    rospy.spin()\n"
+    for start, count in (("", 1), ("import lab.node\n", 0), ("from lab import node\n", 0)):
+        (own, _) = examine([["src/lab/node.py", text], ["scripts/run", start]], [], {}, "")
+        assert len(own["steps"]) == count
 
 
 STEERS = """\

@@ -75,6 +75,8 @@ def with_calls(text: str) -> Iterator[Step]:
     own = {n.name for n in functions} - {n.name for n in functions if n.decorator_list}
     attributes = (n for n in nodes_in(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store))
     values = {n.attr for n in attributes} | {n.name for n in functions if n.decorator_list}
+    # A parameter or a variable may have the name of a function.
+    own -= {n.arg for n in nodes_in(tree) if isinstance(n, ast.arg)} | _names_in(tree, ast.Store)
     named = [n for node in nodes_in(tree) for n in _uncalled_expressions(node) if _is_callable(n, own)]
     alone = (n.value for n in nodes_in(tree) if isinstance(n, ast.Expr))
     named += [n for n in alone if isinstance(n, ast.Attribute) and n.attr in own - CALLED]
@@ -109,9 +111,10 @@ def _uncalled_expressions(node: ast.AST) -> Iterator[ast.expr]:
 
 
 def _is_callable(node: ast.expr, own: set[str]) -> bool:
-    return (isinstance(node, ast.Attribute) and node.attr in CALLED) or (
-        isinstance(node, ast.Name) and node.id in own
-    )
+    if isinstance(node, ast.Attribute) and node.attr in CALLED:
+        # `self.is_shutdown` may be a value of a base class, and `rospy.sleep` needs one in its brackets
+        return ast.unparse(node) != "rospy.sleep" and (ast.unparse(node.value) != "self" or node.attr in own)
+    return isinstance(node, ast.Name) and node.id in own
 
 
 def with_callbacks(text: str) -> Iterator[Step]:
@@ -331,6 +334,7 @@ def _published_nothing(tree: ast.Module) -> Iterator[Argument]:
     known = {name for one in tree.body for name in bound_in(ast.Module([one], []))} | set(dir(builtins))
     made = [n for n in nodes_in(tree) if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)]
     of_others = {ast.unparse(t) for n in made if _called(n.value) != "Publisher" for t in n.targets}
+    of_others |= {"", "self"}  # `self.publish()` is a method of the class
     for function in (n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)):
         unread = _names_in(function, ast.Store) - _names_in(function, ast.Load)
         published = [n for n in nodes_in(function) if isinstance(n, ast.Call) and _called(n) == "publish"]
@@ -472,16 +476,23 @@ def _callback(call: ast.Call, name: str, functions: set[str]) -> Iterator[Argume
 
 
 def _without_callback(call: ast.Call, tree: ast.Module) -> Iterator[Argument]:
-    """Of `Subscriber('x', String)`, where one function that takes a message is used nowhere."""
+    """Of `Subscriber('x', String)`, where one function that reads a message is used nowhere."""
     if len(call.args) != len(("topic", "type")) or any(k.arg in {None, "callback"} for k in call.keywords):
         return
     used = {last_name(n) for n in nodes_in(tree) if isinstance(n, ast.Name | ast.Attribute)}
-    spare = [n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef) and n.name not in used]
-    taking = [n for n in spare if len([a for a in n.args.args if a.arg != "self"]) == 1]
+    parts = [tree, *(n for n in tree.body if isinstance(n, ast.ClassDef))]
+    own = (n for part in parts for n in part.body if isinstance(n, ast.FunctionDef))
+    taking = [n for n in own if n.name not in used and len([a for a in n.args.args if a.arg != "self"]) == 1]
+    taking = [n for n in taking if _reads_part(n, n.args.args[-1].arg)]
     if len(taking) == 1:
         name = "self." * (taking[0].args.args[0].arg == "self") + taking[0].name
         edit = (call.args[1], f"{ast.unparse(call.args[1])}, {name}")
         yield Argument([edit], "`Subscriber(…)` gets no callback")
+
+
+def _reads_part(function: ast.FunctionDef, name: str) -> bool:
+    parts = (n.value for n in nodes_in(function) if isinstance(n, ast.Attribute))
+    return any(isinstance(n, ast.Name) and n.id == name for n in parts)
 
 
 def _subscribed(call: ast.Call, name: str, functions: set[str]) -> Iterator[Argument]:

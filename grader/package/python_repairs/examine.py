@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import ast
 import builtins
+import re
 import sys
 import warnings
 from collections.abc import Iterator
 from difflib import get_close_matches
 from itertools import pairwise
+from pathlib import PurePosixPath
 from typing import Any
 
 from grader.package.python_repairs.calls import (
@@ -73,10 +75,12 @@ ROSPY = frozenset(NAMES_OF_ROSPY.split())
 WAITING = frozenset({"Subscriber", "Service", "Timer", "SimpleActionServer"})
 """What a node that only waits is made of."""
 LOOPED = frozenset({"is_shutdown", "sleep", "spin"})
-HOLDING = frozenset(
-    {"exec_", "join", "mainloop", "pause", "run", "run_forever", "run_until_complete", "show", "wait"}
+HOLDING_NAMES = (
+    "exec_ execute join main mainloop pause rosrun rostest run run_forever run_until_complete send_goal_and_wait "
+    "serve_forever show unitrun wait wait_for_result Thread"
 )
-"""Methods of other libraries that keep a node alive: those of threads, of windows, of asyncio."""
+HOLDING = frozenset(HOLDING_NAMES.split())
+"""What keeps a node alive: of threads, windows, asyncio, state machines, tests, and of a goal that is waited for."""
 OF_TWO_FRAMES = {"lookup_transform", "can_transform", "lookupTransform", "canTransform", "waitForTransform"}
 ROLES = {
     "Publisher": "publisher",
@@ -96,16 +100,23 @@ def examine(
     `fields` are those of the submission's own messages, by package and class, `site` is the folder that has fissix."""
     warnings.simplefilter("ignore")
     sys.path.append(site)
+    modules = {name for _, text in files for name in re.findall(IMPORTED, text)}
+    imported = {part for name in modules for part in re.findall(r"\w+", name)}
     for file, text in files:
         try:
-            steps = list(_steps(text, types, Known(ROSPY, fields)))
+            is_run = PurePosixPath(file).stem not in imported
+            steps = list(_steps(text, types, Known(ROSPY, fields), is_run=is_run))
             names = _names(steps[-1]["text"] if steps else text)
         except (RecursionError, MemoryError):
             steps, names = [], []
         yield {"file": file, "steps": steps, "names": names}
 
 
-def _steps(text: str, types: list[str], known: Known) -> Iterator[Step]:
+IMPORTED = re.compile(r"^\s*(?:from|import)\s+([\w.]+(?:\s+import\s+\w+)?)", re.MULTILINE)
+
+
+def _steps(text: str, types: list[str], known: Known, *, is_run: bool = True) -> Iterator[Step]:
+    """Yield what is wrong in a script that `is_run`, or in a module that others import."""
     for step in make_readable(text):
         text = step["text"]
         yield step
@@ -133,9 +144,7 @@ def _steps(text: str, types: list[str], known: Known) -> Iterator[Step]:
             with_lines_turned,
             _with_lines_inside,
             _with_start,
-            _with_main,
-            _with_server_started,
-            _with_spin,
+            *((_with_main, _with_server_started, _with_spin) if is_run else ()),
         ):
             for step in repair(text):
                 text = step["text"]
@@ -150,7 +159,9 @@ def _without_old_names(text: str) -> Iterator[Step]:
     bound = bound_in(tree)
     if any(map(_asks_for_version, nodes_in(tree))):
         return
+    tried = {id(n) for one in nodes_in(tree) if isinstance(one, ast.Try) for n in _caught_in(one)}
     uses = [n for n in nodes_in(tree) if isinstance(n, ast.Name) and n.id in OLD_NAMES and n.id not in bound]
+    uses = [n for n in uses if id(n) not in tried]
     spans = [(span, OLD_NAMES[n.id]) for n in uses if (span := span_of(lines, n))]
     if spans:
         names = ", ".join(sorted({n.id for n in uses}))
@@ -162,7 +173,17 @@ def _asks_for_version(node: ast.AST) -> bool:
     """Return whether a script may run under Python 2 as well, and use what that has only there."""
     if isinstance(node, ast.ExceptHandler):
         return node.type is not None and "NameError" in ast.unparse(node.type)
-    return isinstance(node, ast.Attribute) and node.attr in ("version_info", "version", "PY2", "PY3")
+    return isinstance(node, ast.Attribute) and node.attr in OF_VERSION
+
+
+OF_VERSION = ("version_info", "version", "hexversion", "PY2", "PY3", "python_version")
+
+
+def _caught_in(node: ast.Try) -> Iterator[ast.AST]:
+    """Yield the nodes of a `try:` whose `except` has an assignment's name missing (`input = raw_input`)."""
+    plain = [one for one in node.body if isinstance(one, ast.Assign | ast.Import | ast.ImportFrom)]
+    if any(one.type is None or "Exception" in ast.unparse(one.type) for one in node.handlers):
+        yield from (n for one in plain for n in nodes_in(one))
 
 
 def _without_old_print(text: str) -> Iterator[Step]:
@@ -359,7 +380,8 @@ def _with_spin(text: str) -> Iterator[Step]:
     loops = any(isinstance(n, ast.While) for n in nodes_in(tree))
     makes_node = any(last_name(c.func) == "init_node" for c in calls)
     own = {n.name for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)}
-    if not waits or loops or not rospy or not makes_node:
+    runs = any(isinstance(n, ast.Call) for one in _runs(tree) for n in nodes_in(one))
+    if not waits or loops or not rospy or not makes_node or not runs:
         return
     if (LOOPED | (HOLDING - own)) & {last_name(c.func) for c in calls}:
         return

@@ -18,7 +18,7 @@ from difflib import get_close_matches
 from itertools import chain
 from typing import NamedTuple
 
-from grader.package.python_repairs.names import MEMBERS, bound_in, made_by, meant_by_use
+from grader.package.python_repairs.names import MEMBERS, bound_in, is_of_series, made_by, meant_by_use
 from grader.package.python_repairs.syntax import Step, edited, last_name, nodes_in, span_of, step_to, tree_of
 from grader.wording import is_one_edit
 
@@ -408,5 +408,6 @@ def _near(word: str, names: Collection[str]) -> str:
     """Return the name of which a word is a slip; "" where there is none, or a word of one letter may be any."""
     small = word.lower()
     same = [one for one in names if small == one.lower()]
-    near = [one for one in names if len(word) > 1 and is_one_edit(small, one)]
+    others = [one for one in names if len(word) > 1 and not is_of_series(small, one)]
+    near = [one for one in others if is_one_edit(small, one)]
     return next(iter(same + near), "")

@@ -314,11 +314,14 @@ def meant_by(name: str, own: set[str], unused: Collection[str] = ()) -> str:
         return ""  # the next of a series, `pub3` behind `pub` and `pub2`, means none of them
     if name[:1].isupper():  # a class is not meant by a variable with a name like it
         own = {one for one in own if one[:1].isupper() or one.lower() == name.lower()}
+    own = {one for one in own if not is_of_series(name, one)}
     always = ("__name__", "True", "False", "None", *({"self", "rospy", "sys"} & own))
     if sure := [one for one in always if is_one_edit(name, one)]:
         return sure[0]
     inner = [one for one in own if is_letter_changed(name, one)]
-    slips = [one for one in unused if len(one) > SHORT_NAME_CHARS_MIN and is_one_edit(name, one)]
+    slips = [
+        one for one in own.intersection(unused) if len(one) > SHORT_NAME_CHARS_MIN and is_one_edit(name, one)
+    ]
     if len(slips) == 1:
         return slips[0]
     if len(inner) == 1:
@@ -337,6 +340,20 @@ def is_letter_changed(name: str, other: str) -> bool:
     pairs = [(a, b) for a, b in zip(name, other, strict=False) if a != b]
     same_ends = len(name) == len(other) >= NAME_CHARS_MIN and (name[0], name[-1]) == (other[0], other[-1])
     return same_ends and len(pairs) == 1 and "".join(pairs[0]).isalpha()
+
+
+def is_of_series(name: str, other: str) -> bool:
+    """Return whether two names differ only by a digit, or by the letter of an axis or a side with which a word begins
+    or ends: `max_x` and `max_y`."""
+    places = [i for i, (a, b) in enumerate(zip(name, other, strict=False)) if a != b]
+    if len(name) != len(other) or len(places) != 1:
+        return False
+    at = places[0]
+    at_end = name[at - 1 : at] in ("", "_") or name[at + 1 : at + 2] in ("", "_") or name[at].isdigit()
+    return at_end and any({name[at], other[at]} <= one for one in SERIES)
+
+
+SERIES = (set("xyz"), set("XYZ"), set("lr"), set("LR"), set(digits))
 
 
 def is_slip(name: str, other: str) -> bool:
