@@ -509,7 +509,7 @@ NODE = "import rospy\nfrom a.msg import A\nrospy.init_node('n')\n"
 LEFT_ALONE = {
     "attribute-of-a-base": "class B(Base):\n    def f(self, m):\n        if self.is_shutdown:\n            return\n",
     "parameter-like-a-function": "def stop():\n    pass\ndef run(stop):\n    if stop:\n        print(1)\nrun(stop)\n",
-    "own-publish": "class B:\n    def f(self):\n        a = 1\n        self.publish()\n    def publish(self):\n        pass\n",
+    "own": "class B:\n    def f(self):\n        a = 1\n        self.publish()\n    def publish(self):\n        pass\n",
     "heard-by-nobody": f"{NODE}def name(n):\n    return n\nrospy.Subscriber('a', A)\nrospy.spin()\n",
     "both-pythons": "try:\n    input = raw_input\nexcept:\n    pass\n",
     "asks-for-version": "import sys\nif sys.hexversion > 0x03000000:\n    texts = str\nelse:\n    texts = basestring\n",

@@ -549,6 +549,38 @@ class A:
     def __exit__(self, *why):
         self.pub.unregister()
 """),
+    "sleep-of-another-function": ("sleep-outside", """\
+def leave():
+    rospy.sleep(1)
+def burst():
+    for n in range(3):
+        pub.publish(n)
+"""),
+    "counter-of-an-inner-loop": ("set-in-loop", """\
+while not rospy.is_shutdown():
+    n = 0
+    while n < 4:
+        pub.publish(n)
+        n += 1
+"""),
+    "given-to-another-module": ("object", """\
+class A:
+    def __init__(self):
+        fill(self)
+        self.pub.publish(1)
+"""),
+    "class-in-a-method": ("object", """\
+class A:
+    def test(self):
+        class B:
+            def reset(self): pass
+        B().reset()
+"""),
+    "method-of-a-module": ("never-called", "class A:\n    def stop(self):\n        self.pub.publish(0)\n"),
+    "state-of-a-base": ("not-called", "class A(B):\n    def f(self):\n        if self.is_shutdown:\n            f()\n"),
+    "callback-of-a-base": ("callback-missing", "class A(B):\n    def hear(self, msg):\n        print(msg.data)\n"),
+    "next-axis": ("misspelt", "max_z = 1\nprint(max_x)\n"),
+    "asked-by-others": ("loop-left", "def send():\n    if not rospy.is_shutdown():\n        pub.publish(0)\n"),
     "called-by-name": ("never-called", """\
 class A:
     def __init__(self):

@@ -159,7 +159,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (node(LOOP + "        p.publish(1)\n        break\n") + CALLED, [("loop-left", 6, "at the break on line 6")]),
         (node("    for i in range(4):\n        t.angular.z = i\n        p.publish(t)\n") + CALLED,
          [("loop-left", 4, "call rospy.spin() below line 6")]),
-        ("def drive(x, y):\n    while on:\n        p.publish(x)\n",
+        ("def drive(x, y):\n    while on:\n        p.publish(x)\nmain()\n",
          [("never-called", 1, "call `drive(…)` with values for x, y")]),
         ("def side():\n    while on:\n        p.publish(1)\n        break\nside()\nside()\n", []),
         ("def side():\n    while on:\n        p.publish(1)\n        return\nfor i in range(4):\n    side()\n", []),
@@ -237,7 +237,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
           for end in ("!= 0", "== True", "is True")),
         (node("    for i in range(9):\n        p.publish(i)\n") + CALLED, [("loop-left", 4, "put it inside a `while")]),
         (node("    while not rospy.is_shutdown() and n < 9:\n        p.publish(1)\n") + CALLED,
-         [("loop-left", 4, "the loop on line 4 ends after a fixed number of rounds")]),
+         [("loop-left", 4, "the loop on line 4 ends as soon as its condition is false")]),
         (node(LOOP + "        p.publish(1)\n        # p.publish(2)\n        #rate.sleep()  # b\n        # sleep( a\n")
          + CALLED,
          [("commented-out", 6, "remove the `#` from line 6"), ("commented-out", 7, "`sleep(…)` is commented out")]),

@@ -474,6 +474,7 @@ def test_a_listener_that_each_turn_makes_again(tmp_path: Path) -> None:
         ("dist = (a - b) ** 2 + (c - d) ** 2\nif dist < near * near:\n    stop()\n", []),
         ("def dist(a, b):\n    return a ** 2 + b ** 2\nfar = self.dist(1, 2) ** 0.5\n", []),
         ("dist = (a - b) ** 2 + (c - d) ** 2\nif dist < near:\n    stop()\n", [1]),
+        ("dist = (a - b) ** 2 + (c - d) ** 2\nif dist < least:\n    least = dist\n", []),
         ("distance = a + b\n", []),
     ],
 )

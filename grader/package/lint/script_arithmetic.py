@@ -168,7 +168,8 @@ def without_root(tree):
 
 def squares_in_use(tree):
     """Return the last names of what a root is taken of elsewhere, or is compared as a square: with a square or a
-    product, or with each other, by `key=`."""
+    product, or with each other, by `key=` or with the least one so far."""
+    kept = {(dotted(t), dotted(n.value)) for n in all_of(tree, ast.Assign) for t in n.targets}
     used = [n for n in all_of(tree, ast.Call) if called_name(n) == "sqrt"]
     powers = [n for n in all_of(tree, ast.BinOp) if isinstance(n.op, ast.Pow)]
     used += [n for n in powers if getattr(n.right, "value", 0) == 0.5]
@@ -176,7 +177,8 @@ def squares_in_use(tree):
     for node in all_of(tree, ast.Compare):
         sides = [node.left, *node.comparators]
         products = [one for one in sides if isinstance(getattr(one, "op", None), (ast.Pow, ast.Mult))]
-        used += [node] if products or any(map(is_square, sides)) else []
+        pair = tuple(map(dotted, sides))
+        used += [node] if products or any(map(is_square, sides)) or kept & {pair, pair[::-1]} else []
     return {name.rpartition(".")[2] for one in used for name in names_in(one)}
 
 

@@ -163,8 +163,8 @@ def own_callbacks(tree, functions):
 
 
 def spare_callbacks(tree, functions):
-    """The only function that reads a message and that nothing names, in a script without a Subscriber, or one in which
-    two Subscribers of different types are given one function."""
+    """The only function that reads a message and that nothing names, where no Subscriber is made, or two of different
+    types are given one function."""
     read = {getattr(n, "attr", getattr(n, "id", "")) for n in walk(tree)}
     data = {dotted(n.value) for n in all_of(tree, ast.Attribute) if n.attr == "data"}
     spare = [f for name, f in functions.items() if name not in read and takes(f, "self" in read) == (1, 1)]
@@ -173,7 +173,7 @@ def spare_callbacks(tree, functions):
         return
     name = ("self." if len(spare[0].args.args) > 1 else "") + spare[0].name
     calls = calls_in(tree, "Subscriber")
-    if not calls:
+    if not calls and {"object"}.issuperset(map(dotted, getattr(parents_of(tree)[spare[0]], "bases", ()))):
         message, fix = "no Subscriber is given `%s`" % name, "pass it: `rospy.Subscriber(…, %s)`" % name
         yield slip(spare[0].lineno, "callback-missing", message, fix, name)
     given = [ast.dump(one.args[2]) for one in calls if len(one.args) > 2]

@@ -17,6 +17,7 @@ from script_names import (
     functions_in,
     is_call,
     lines_from,
+    loop_around,
     names_in,
     slip,
     text_of,
@@ -122,6 +123,8 @@ def counter_slips(tree):
             yield from reset_the_wrong_way([one for one in body if isinstance(one, ast.If)], name)
             set_at = [i for i, one in enumerate(body) if name in (dotted(t) for t in constants_in([one]))]
             reset_at = [i for i, one in enumerate(body) if isinstance(one, ast.If) and name in reset_in(one)]
+            if set_at and loop_around(node, tree) is not loop:
+                continue  # it counts the turns of a loop in this one
             if set_at:
                 one = body[set_at[0]]
                 message = "this sets `%s` again each time around the loop" % name

@@ -21,6 +21,7 @@ from script_names import (
     is_call,
     lines_from,
     listed,
+    loop_around,
     names_in,
     parents_of,
     published_type,
@@ -148,8 +149,10 @@ def stopped_loops(tree):
     """
     turned, called = dict(turns(tree)), calls_made(tree)
     for loop in walk(tree):
-        once = isinstance(loop, ast.If) and is_call(getattr(loop.test, "operand", None), "is_shutdown")
-        if once and not turned[loop][1] and calls_in(loop, "publish"):
+        asks = isinstance(loop, ast.If) and is_call(getattr(loop.test, "operand", None), "is_shutdown")
+        name = getattr(turned[loop][0], "name", None)
+        # what others call, or several lines, may run again
+        if asks and not turned[loop][1] and called[name] == 1 and calls_in(loop, "publish"):
             message = "the `if` on line %d runs what follows it once" % loop.lineno
             fix = "write `while` instead of `if` on line %d" % loop.lineno
             yield slip(loop.lineno, "loop-left", message, fix)
@@ -165,11 +168,12 @@ def stopped_loops(tree):
             message = "the loop stops at the spin() on line %d, which waits until the node ends" % spin.lineno
             fix = "remove spin(): the loop keeps the node alive"
             yield slip(spin.lineno, "spin-in-loop", message, fix)
-        name = getattr(turned[loop][0], "name", None)
-        is_part = called[name] > 1 and name != "publish"  # of what the node does
-        is_part = is_part or spins_after(loop, tree)
+        # of what the node does
+        is_part = (called[name] > 1 and name != "publish") or spins_after(loop, tree)
         if is_counted(loop) and ending is None and not turned[loop][1] and not is_part:
-            message = "the loop on line %d ends after a fixed number of rounds" % loop.lineno
+            counted = isinstance(loop, ast.For) or any(isinstance(n, ast.AugAssign) for n in ast.walk(loop))
+            message = "after a fixed number of rounds" if counted else "as soon as its condition is false"
+            message = "the loop on line %d ends %s" % (loop.lineno, message)
             used = {n.id for one in loop.body for n in ast.walk(one) if isinstance(n, ast.Name)}
             fix = "write `while not rospy.is_shutdown():` on line %d" % loop.lineno
             last = next((one for one in reversed(run_after(loop, tree)) if calls_in(one, "publish")), None)
@@ -210,6 +214,7 @@ def calls_made(tree):
         called.update(2 * [dotted(one).rpartition(".")[2] for one in given])
     for loop in walk(tree):
         called.update(map(called_name, ast.walk(loop)) if isinstance(loop, LOOPS) else ())
+    called[None] = 1  # what is outside of all functions
     return called
 
 
@@ -257,14 +262,19 @@ WAITS = ("sleep", "spin", "spin_once", "wait_for_message", "wait_for_service", "
 
 def sleepless_loops(tree):
     """Loops that publish and wait nowhere, where `rate.sleep()` stands outside of them or a Rate is made in them."""
-    loops, sleeps = all_of(tree, *LOOPS), calls_in(tree, "sleep")
+    loops, around = all_of(tree, *LOOPS), dict(turns(tree))
+    every = [(n, loop_around(n, tree)) for n in calls_in(tree, "sleep")]
     waiting = {name for name, one in functions_in(tree).items() if calls_in(one, *WAITS)}
     for loop in loops:
         if waiting.intersection(called_name(n) for n in ast.walk(loop)) or is_of_publishers(loop):
             continue
         inner = [n for n in ast.walk(loop) if n is not loop and n in loops and calls_in(n, "publish")]
-        before = [n for n in sleeps if n.lineno < loop.lineno and dotted(n.func) not in PAUSES]
-        outside = [n for n in sleeps if n.lineno > loop.lineno] or before
+        # a `sleep()` of another function or loop belongs to that one
+        function, outer = around[loop][0], loop_around(loop, tree)
+        sleeps = [n for n, own in every if own is outer and around[n][0] in (function, None)]
+        plain = [n for n in sleeps if dotted(n.func) not in PAUSES]
+        below = [n for n in sleeps if n.lineno > loop.lineno and (n in plain or around[n][0])]
+        outside = below or [n for n in plain if n.lineno < loop.lineno]
         yield from sleeps_in_if(loop)
         if calls_in(loop, *WAITS) or inner or not calls_in(loop, "publish"):
             continue
@@ -586,4 +596,5 @@ def goes_on(handler):
 
 
 def is_shutdown(node):
-    return getattr(node, "attr", getattr(node, "id", "")) == "is_shutdown"
+    """Whether it is `rospy.is_shutdown`, and no attribute that a base class may have."""
+    return dotted(node).rpartition(".")[2] == "is_shutdown" and dotted(node) != "self.is_shutdown"

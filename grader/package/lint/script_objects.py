@@ -71,6 +71,11 @@ class Members:
             elif given and dotted(n.value) == given[0].arg and not n.attr.startswith("__"):
                 self.reads.append((n, method))
         self.called = {called_name(n) for n in walk(tree)}
+        # a function of another module that is given the object may give it attributes
+        others = [
+            n for n, _ in inside if isinstance(n, ast.Call) and any(dotted(one) == "self" for one in n.args)
+        ]
+        self.is_handed = bool({called_name(n) for n in others} - set(functions_in(tree)) - set(dir(builtins)))
         self.calls = {m: {} for m in self.methods.values()}
         for m, lines in self.calls.items():
             for n in ast.walk(m):
@@ -106,7 +111,8 @@ def lacking_attributes(own):
     for node, method in own.reads:
         name, stores = node.attr, own.stores.get(node.attr, [])
         givers = [m.name if m is not None else "__init__" for _, m in stores]
-        if name in own.fixed or node in inside or (name in OF_ROS_2 and not stores):
+        given_elsewhere = not stores and (own.is_handed or name in OF_ROS_2)
+        if name in own.fixed or node in inside or given_elsewhere:
             continue
         if stores and inside.issuperset(n for n, _ in stores):
             message, fix = astray[1:]
@@ -169,6 +175,7 @@ def methods_inside(tree):
     for owner in all_of(tree, ast.ClassDef):
         for method in (n for n in owner.body if isinstance(n, ast.FunctionDef)):
             inner = [n for n in ast.walk(method) if isinstance(n, ast.FunctionDef) and n is not method]
+            inner = [n for n in inner if not isinstance(parents_of(tree)[n], ast.ClassDef)]
             for one in inner:
                 if one.name in reads and [arg.arg for arg in one.args.args[:1]] == ["self"]:
                     message = "`%s` on line %d is inside of `%s`" % (one.name, one.lineno, method.name)

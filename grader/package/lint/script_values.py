@@ -8,8 +8,10 @@ import ast
 from collections import Counter
 
 from script_names import (
+    LOOPS,
     USES_LIMIT,
     all_of,
+    bound_names,
     called_name,
     calls_in,
     dotted,
@@ -165,6 +167,33 @@ def function_around(node, tree):
     while node is not tree and not isinstance(node, ast.FunctionDef):
         node = parents_of(tree)[node]
     return getattr(node, "name", "")
+
+
+def assigned_late(tree):
+    """Names that a function reads above the line that first gives them a value, and that nothing outside of it has."""
+    outside = bound_names(tree) | {n for one in all_of(tree, ast.Global) for n in one.names}
+    for function in all_of(tree, ast.FunctionDef):
+        taken = {one.arg for one in ast.walk(function.args) if isinstance(one, ast.arg)} | outside
+        inside = list(walk_own(function))
+        stored = {}
+        for n in inside:
+            if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store):
+                stored[n.id] = min(n.lineno, stored.get(n.id, n.lineno))
+        for block in [function.body, *(n.body for n in inside if isinstance(n, LOOPS))]:
+            yield from assigned_late_in(block, {name: stored[name] for name in stored if name not in taken})
+
+
+def assigned_late_in(block, stored):
+    """Names that a block reads above its line that gives them their first value. `stored` are the lines of these."""
+    given = {one.lineno: one for one in block if isinstance(one, ast.Assign)}
+    late = {name: line for name, line in stored.items() if line in given}
+    for statement in block if late else ():
+        for n in walk_own(ast.Module([statement], [])):
+            if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load) and late.get(n.id, 0) > n.lineno:
+                line = late[n.id]
+                message = "line %d, which gives `%s` its value, comes after it" % (line, n.id)
+                fix = "move line %d above line %d" % (line, statement.lineno)
+                yield slip(n.lineno, "undefined", message, fix, n.id)
 
 
 def times_added_again(tree):

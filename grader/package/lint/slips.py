@@ -50,7 +50,7 @@ def slips(tree):
         loops.sleepless_loops, loops.sleeps_twice, loops.publishes_twice, callbacks.callbacks,
         loops.waiting_callbacks, objects.queue_sizes, objects.graph_names,
         objects.object_slips, said_texts, loops.deaf_loops, counters.clock_values, counters.counter_slips,
-        counters.counter_starts, without_effect, names.assigned_late, objects.hidden_names, objects.subscribed_again,
+        counters.counter_starts, without_effect, values.assigned_late, objects.hidden_names, objects.subscribed_again,
         imports, objects.taken_off, objects.unstarted_servers, values.wrong_values, values.decided_conditions,
         values.times_added_again, values.params_read_unset, values.overwritten_values, values.published_in_turn,
         arithmetic.arithmetic_slips, values.flagged_loops, values.kept_velocities,
@@ -76,7 +76,8 @@ def uncalled_and_asked(tree):
         name = uncalled(node, functions)
         if name and name.rpartition(".")[2] not in values:
             count += 1
-            message, fix = "`%s` is named but not called" % name, "write `%s()`" % name
+            takes = "…" if name.rpartition(".")[2] in TAKE_VALUES or name == "rospy.sleep" else ""
+            message, fix = "`%s` is named but not called" % name, "write `%s(%s)`" % (name, takes)
             yield slip(node.lineno, "not-called", message, fix, name)
         name = asked(node, functions)
         if name and count < SLIPS_LIMIT:  # each looks through the whole script
@@ -115,6 +116,9 @@ def never_run(tree):
     """
     named = {n.id for n in all_of(tree, ast.Name) if isinstance(n.ctx, ast.Load)}
     named |= {n.attr for n in all_of(tree, ast.Attribute)}
+    plain = [n for n in tree.body if not isinstance(n, (ast.FunctionDef, ast.ClassDef))]
+    calls = any(isinstance(n, ast.Call) for one in plain for n in ast.walk(one))
+    is_module = not calls and not does_something(tree)
     if any(called_name(n) in ("getattr", "globals", "locals", "eval", "exec") for n in walk(tree)):
         named |= {n.name for n in all_of(tree, ast.FunctionDef)}  # each may be called by its name
     made = [n for n in all_of(tree, ast.Assign) if isinstance(n.value, ast.Call)]
@@ -130,7 +134,9 @@ def never_run(tree):
         # A decorator may hand the function on to what calls it
         if isinstance(node, ast.FunctionDef) and node.name not in named and not node.decorator_list:
             # Python itself calls `__init__` and its like
-            if calls_in(node, *WORKS) and not node.name.startswith("__"):
+            # of a module that only defines names, others may call all but what makes the node
+            works = calls_in(node, *(WORKS[:1] if is_module else WORKS))
+            if works and not node.name.startswith("__"):
                 message, owner = "nothing calls `%s()`" % node.name, of_class.get(id(node), "")
                 owner = owner and (made_of.get(owner) or owner + "()") + "."
                 fix = handed_over(node, tree, owner)
@@ -162,6 +168,7 @@ METHODS = {
     "set_aborted", "set_preempted", "publish_feedback",
 }  # fmt: skip
 """Of rospy and of what it makes: called for what they do."""
+TAKE_VALUES = {"publish", "loginfo", "init_node", "signal_shutdown", "send_goal", "publish_feedback"}
 
 
 def uncalled(node, functions):
