@@ -79,6 +79,7 @@ class _Fault(NamedTuple):
     message: str
     line: int | None
     hint: str
+    renames: bool = False
 
 
 @check("definition", params=DefinitionParams)
@@ -122,6 +123,8 @@ def _fixes(faults: list[_Fault]) -> Iterator[str]:
     """Yield each fix once, with its line where there are several."""
     for fault in dict.fromkeys(faults):
         yield f"on line {fault.line}, {fault.hint}" if fault.line and len(faults) > 1 else fault.hint
+    if renamed := sum(fault.renames for fault in faults):
+        yield f"then write the new name{'s' if renamed > 1 else ''} in your programs too"
 
 
 def _words(fields: Iterator[InterfaceField] | list[InterfaceField] | tuple[InterfaceField, ...]) -> str:
@@ -168,13 +171,42 @@ def _faults(
     there = {(one.part, one.name): one for one in found.fields}
     asked = {(one.part, one.name) for one in wanted}
     others = {key: one for key, one in there.items() if key not in asked}
+    renamed = _renamed(wanted, there, others, package.name)
     for one in wanted:
-        yield from _differs(one, there.get((one.part, one.name)), others, package.name)
+        key = one.part, one.name
+        if key in renamed:
+            yield _other_name(one, renamed[key])
+        else:
+            yield from _differs(one, there.get(key), others, package.name)
     if params.text:
-        for one in others.values():
+        for one in (one for one in others.values() if one not in renamed.values()):
             yield _Fault(f"{shown(one.path)} (line {one.line}) is not asked for", one.line, "take it out")
     if (params.text or params.ordered) and asked <= there.keys():
         yield from _other_order(wanted, there)
+
+
+def _renamed(
+    wanted: list[InterfaceField],
+    there: Mapping[tuple[str, str], InterfaceField],
+    others: Mapping[tuple[str, str], InterfaceField],
+    package: str,
+) -> dict[tuple[str, str], InterfaceField]:
+    """Return the fields under other names, where a part has as many of them as it lacks, of the same types in order."""
+    lacking = [one for one in wanted if one.value is None and (one.part, one.name) not in there]
+    found = {}
+    for part in dict.fromkeys(one.part for one in lacking):
+        own = [one for one in lacking if one.part == part]
+        given = [one for one in others.values() if one.part == part and one.value is None]
+        types = [[_plain(one.type, package) for one in group] for group in (own, given)]
+        if types[0] == types[1] and not {one.name for one in given} & {one.name for one in wanted}:
+            found.update({(a.part, a.name): b for a, b in zip(own, given, strict=True)})
+    return found
+
+
+def _other_name(wanted: InterfaceField, found: InterfaceField) -> _Fault:
+    line = f"{wanted.type} {wanted.name}{_value(wanted)}".strip()
+    message = f"line {found.line} calls it {found.name}, but the handout calls it {wanted.name}"
+    return _Fault(message, found.line, f"write `{line}`", renames=True)
 
 
 def _unreadable(found: Interface, fault: Fault, wanted: list[InterfaceField]) -> _Fault:
@@ -208,8 +240,7 @@ def _differs(
         other = others.get((wanted.part, near))
         apart = next((one for one in others.values() if one.name == wanted.name), None)
         if other is not None:
-            message = f"line {other.line} calls it {near}, but the handout calls it {wanted.name}"
-            yield _Fault(message, other.line, f"write `{line}`")
+            yield _other_name(wanted, other)
         elif apart is not None:
             message = f"{wanted.name} is in the {apart.part} (line {apart.line}), not in the {wanted.part}"
             yield _Fault(message, apart.line, "--- separates the parts: put the field into the other part")

@@ -157,6 +157,8 @@ def _lost_file(package: PackageFacts, name: str) -> Slip:
 
 
 RUNTIME_KINDS = ("depend", "exec_depend", "run_depend")
+OF_BUILD = frozenset({"message_generation", "genmsg", "cmake_modules", "roslint"})
+"""Packages that only the build uses: `<build_depend>`, as the ROS wiki writes it, declares them too."""
 BUILD_TOOL_KINDS = ("buildtool_depend", "build_depend", "depend")
 PLACES_SHOWN = 6
 LEFT_AS_MADE = "@todo.todo"
@@ -275,7 +277,8 @@ def dependencies(package: PackageFacts, params: DependenciesParams) -> Verdict:
 
     How it is measured
         The names under `<depend>`, `<exec_depend>` and `<run_depend>` are compared with the names that the
-        lab needs. `<build_depend>` alone does not count: it is for building only.
+        lab needs. `<build_depend>` alone does not count, except for `message_generation` and others that
+        only the build uses.
 
     How to fix
         Add one `<exec_depend>` line for each package named (`<run_depend>` in a manifest of format 1).
@@ -375,11 +378,11 @@ def _declared_text(found: Manifest) -> str:
 
 def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
     """Return what the manifest does not declare as a run-time dependency; None where it declares all."""
-    declared = {d.name for d in found.dependencies if d.kind in RUNTIME_KINDS}
+    declared = {d.name for d in found.dependencies if d.kind in RUNTIME_KINDS or d.name in OF_BUILD}
     missing = [n for n in names if n not in declared]
     if not missing:
         return None
-    tag = "run_depend" if found.format == 1 else "exec_depend"
+    at_run = "run_depend" if found.format == 1 else "exec_depend"
     at_build = [d for d in found.dependencies if d.name in missing]
     only = (
         f"; {join_words(dict.fromkeys(d.name for d in at_build))} only as a build dependency"
@@ -398,11 +401,20 @@ def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
     if also := sorted(d.line for d in found.dependencies if d.name in names_too and d not in misspelt):
         hints.append(f"do the same on {on_lines(also)}")
     if absent := [n for n in missing if n not in slips]:
-        hints.append(f"add {' '.join(f'<{tag}>{n}</{tag}>' for n in absent)} below line {last}")
-    message = f"{found.file} does not declare {join_words(missing)} as a run-time dependency{slip or only}"
+        tags = {n: "build_depend" if n in OF_BUILD else at_run for n in absent}
+        hints.append(f"add {' '.join(f'<{tag}>{n}</{tag}>' for n, tag in tags.items())} below line {last}")
+    message = f"{found.file} does not declare {_as_dependencies(missing)}{slip or only}"
     cited = lines or (FileCitation(file=found.file, line=last),)
     verdict = failed(message, measured=_declared_text(found), hint="; ".join(hints), citations=cited)
     return verdict.seeking("dependency", missing[0]) if len(missing) == 1 else verdict
+
+
+def _as_dependencies(names: Sequence[str]) -> str:
+    kinds = {
+        "run-time": [n for n in names if n not in OF_BUILD],
+        "build": [n for n in names if n in OF_BUILD],
+    }
+    return join_words(f"{join_words(own)} as a {kind} dependency" for kind, own in kinds.items() if own)
 
 
 def _misspelt(found: Manifest, missing: Sequence[str], names: Sequence[str]) -> dict[str, list[Dependency]]:

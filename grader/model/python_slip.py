@@ -19,7 +19,7 @@ SlipKind = Literal[
     "hides-class", "float-index", "ranges-read",
     "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed", "printed-in-part",
     "published-in-part", "never-published", "takes-number", "typed-text", "goes-on",
-    "no-argument", "read-late",
+    "no-argument", "read-late", "debugger",
 ]  # fmt: skip
 
 
@@ -45,6 +45,7 @@ class PythonSlip(Placed, Record):
     - `input`: the node asks for input, and nodes get none; `name` is `once` where no loop does it again, and `paused`
       in a loop that sleeps.
     - `typed-text`: what is typed is kept as a text, in `name`: a slip only if a number is needed.
+    - `debugger`: a call of Python's debugger, `name`.
     - `no-init`: a script with topics, or that does more than define names, never calls `init_node`.
     - `never-called`: a function that makes a node, publishes or waits, and that nothing calls.
     - `main-guard`: `__name__` is compared with another word than `__main__`.

@@ -83,6 +83,13 @@ def test_a_callback_that_is_handed_to_nobody_is_to_be_handed_over(
     assert slip.fix == fix
 
 
+def test_the_line_that_calls_the_debugger_is_found(tmp_path):
+    text = "from pdb import set_trace\nimport ipdb\ndef f():\n    set_trace()\n    ipdb.set_trace()\n    breakpoint()\n"
+    (tmp_path / "a.py").write_text(text)
+    found = [(s.line, s.name) for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "debugger"]
+    assert found == [(4, "set_trace"), (5, "ipdb.set_trace"), (6, "breakpoint")]
+
+
 def test_slips_are_found_and_named(tmp_path):
     text = (
         "import rospy, sys\ndef main():\n    rate = rospy.Rate(10)\n    while not rospy.is_shutdown:\n"

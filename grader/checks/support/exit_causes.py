@@ -573,17 +573,19 @@ def _lines_added(package: PackageFacts, path: str) -> int:
 
 
 def _place(found: Traceback, package: PackageFacts) -> FileCitation | None:
-    """Return the innermost line that lies in a file of the package."""
+    """Return the innermost line that lies in a file of the package; the call of a debugger, which stops below it."""
     for frame in reversed(found.frames):
         path = None if frame.in_library else path_in_package(package, frame.file)
         if path is not None:
+            calls = [s.place for s in package.slips if (s.file, s.kind) == (path, "debugger")]
+            if calls and found.kind == "BdbQuit":
+                return calls[0]
             place = FileCitation(file=path, line=max(1, frame.line - _lines_added(package, path)))
             if not frame.marked:
                 return place
             begin, end = frame.marked
-            return place.model_copy(
-                update={"column": begin + 1, "end_column": end + 1, "source": frame.source}
-            )
+            mark = {"column": begin + 1, "end_column": end + 1, "source": frame.source}
+            return place.model_copy(update=mark)
     return None
 
 

@@ -57,6 +57,7 @@ def slips(tree):
         callbacks.unprinted_messages, counters.values_left_out, counters.published_unchanged,
         objects.unused_publishers, objects.unsent_messages, loops.loops_of_numbers,
         callbacks.finished_goals, callbacks.finished_in_loops, counters.sends_no_time, without_node,
+        debuggers,
     )  # fmt: skip
     found = [one for find in finders for one in find(tree)]
     # of two that say why a name is not there, the first is about the class that it belongs to
@@ -89,6 +90,13 @@ def uncalled_and_asked(tree):
             yield slip(node.lineno, "input", message, fix, how_often(node, tree))
             if name == "input" and not line and kept.get(id(node), "...") != "...":
                 yield slip(node.lineno, "typed-text", name, name=kept[id(node)])
+
+
+def debuggers(tree):
+    """Calls of Python's debugger, which waits for a keyboard."""
+    for node in all_of(tree, ast.Call):
+        if called_name(node) in ("set_trace", "breakpoint"):
+            yield slip(node.lineno, "debugger", "", "", dotted(node.func))
 
 
 def without_node(tree):
