@@ -201,7 +201,7 @@ def _not_printed(
     if other and not (lacking or (failing and is_number_alone)):
         near = f", within {significant(params.tolerance)}" if params.tolerance else ""
         message = f"it prints {shown(other[0].text)!r}, not {params.words}{near}{_slip(other[0], params)}"
-        return _of_client(asked, run)(message, hint=hint)
+        return _of_client(asked, run)(message, hint=hint).about(said=other[0].text)
     if failing:
         end = explain_end(one, run, package)
         return end.verdict(failed_or_blocked, f"it ended before it printed {params.words}: {end.cause}")
@@ -225,7 +225,8 @@ def _not_printed(
         return nothing.model_copy(update={"silent": True})
     meant = max(own, key=lambda line: SequenceMatcher(None, params.words, line.text[:LINE_CHARS_MAX]).ratio())
     hint = _of_whole_answer(meant, params) or unfilled(meant.text) or hint
-    return _of_client(asked, run)(f"{never}; it prints {shown(meant.text)!r}", hint=hint).if_repeated()
+    lost = _of_client(asked, run)(f"{never}; it prints {shown(meant.text)!r}", hint=hint)
+    return lost.about(said=meant.text).if_repeated()
 
 
 def _unseen(one: Life, package: PackageFacts, run: Run, params: PrintsParams, never: str) -> Verdict | None:

@@ -91,6 +91,8 @@ def _lines_to_blame(verdict: Verdict, criterion: Criterion, lines: list[SourceLi
             found = lines_that_say(lines, f"{verdict.measured} {verdict.said}")
             if not found and verdict.status is Status.PARTIAL:
                 found = [one for one in lines if re.search(SAYS[criterion.check], one.text)]
+        case "prints":
+            found = lines_that_say(lines, verdict.said)
         case "message":
             found = lines_that_say(lines, f"{verdict.measured} {verdict.said}")
             found = _published_of(found, lines, criterion)

@@ -61,6 +61,7 @@ def test_other_words_are_shown_where_the_script_makes_them(line: str, said: str,
 SENT = {"check": "message", "with": {"topic": "/chatter", "template": "hello world {seconds}"}}
 CALLS = {"check": "calls", "with": {"service": "/add"}}
 ANSWERS = {"check": "service-answers", "with": {"service": "/add", "expect": [{"sum": 3}]}}
+PRINTS = {"check": "prints", "with": {"process": "talker", "text": "hello world {number}"}}
 FRAMES = {"check": "transform", "with": {"parent": "base", "child": "laser"}}
 STAMPS = {"check": "stamps", "with": {"topic": "/reading"}}
 FIELD = {"check": "field-equals", "with": {"topic": "/cmd_vel", "field": "linear.x", "value": 1}}
@@ -103,6 +104,10 @@ FIELD = {"check": "field-equals", "with": {"topic": "/cmd_vel", "field": "linear
             4,
         ),
         (FRAMES, "b = TransformBroadcaster()\nb.sendTransform(t)", 2),
+        (PRINTS, 'ss << "hello world" << count;\nROS_INFO("%s", ss.str());', 1),
+        (PRINTS, "text = 'hello'\nprint(text, x)\nprint('bye world')", 1),
+        (PRINTS, "print('hello world')\nprint('hello world', x)", None),
+        (PRINTS, "print(text)", None),
         (STAMPS, "msg.header.stamp = start\npub.publish(msg)", 1),
         (STAMPS, "msg = Reading(data=1)\npub.publish(msg)", 2),
     ],

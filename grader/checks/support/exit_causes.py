@@ -583,9 +583,8 @@ def _place(found: Traceback, package: PackageFacts) -> FileCitation | None:
             place = FileCitation(file=path, line=max(1, frame.line - _lines_added(package, path)))
             if not frame.marked:
                 return place
-            begin, end = frame.marked
-            mark = {"column": begin + 1, "end_column": end + 1, "source": frame.source}
-            return place.model_copy(update=mark)
+            begin, end = (1 + column for column in frame.marked)
+            return place.model_copy(update={"column": begin, "end_column": end, "source": frame.source})
     return None
 
 
