@@ -463,15 +463,15 @@ class Later:
             yield Fix(f"write `def callback(msg):` above it, which prints '{in_words(template)}'")
             return
         said = [one for one in said if SAID_DATA in one.message]
+        right = [one for one in said if says(one.message, template)]
+        if right and other_type and of_text and (place := PLACES.search(self._text_of(right[0]))):
+            yield Fix(f"write %s instead of {place[0]} on {_line(right[0])}")
         unheard = not self._ran or not (isinstance(self._run, Run) and probes_on(self._run, self._topic))
         if not unheard or template == VALUE:
             yield from self._unprinted() if unheard and len(heard) <= 1 else ()
             return
-        right = [one for one in said if says(one.message, template)]
         if right and len(heard) == 1 and self._has_no_field(right[0]) and ".data`" not in self._verdict.hint:
             yield Fix(f"print the `data` of the message on {_line(right[0])}")
-        if right and other_type and of_text and (place := PLACES.search(self._text_of(right[0]))):
-            yield Fix(f"write %s instead of {place[0]} on {_line(right[0])}")
         if right:
             return
         # what else the callback does with a message may fail with the right type, if its fields are others
