@@ -311,12 +311,13 @@ def test_what_a_callback_does_besides_comes_after_the_print() -> None:
 def test_what_needs_a_number_gives_way_where_a_text_is_asked_for(given: dict[str, str]) -> None:
     heard = [NODE | ROOT, HEARS | {"requires": ["node"], "with": given}]
     loop = slip("takes-number", "line 7 needs a number", 6, fix="write `rospy.spin()` in place of the loop")
-    said, source = slip("prints", "I heard {data}", 2), "#\nlog('I heard %d', m.data)\n"
+    slips = [slip("subscriber", "chatter"), slip("prints", "I heard {data}", 2), loop]
     for kind, told in (("Int32", True), ("String", False)):
-        slips = [slip("subscriber", "chatter"), slip("subscriber-type", kind), said, loop]
-        hint = hint_of("node", DIES, heard, *slips, source=source)
-        assert hint.endswith("needs a number") == told
-        assert (f"write %s instead of %d on line 2 of {FILE}" in hint) == told
+        slips = [*slips[:3], slip("subscriber-type", kind)]
+        hint = hint_of("node", DIES, heard, *slips, source="#\nlog('%d', m.data)\n")
+        assert (
+            hint.endswith("needs a number") == told == (f"write %s instead of %d on line 2 of {FILE}" in hint)
+        )
 
 
 def test_a_text_that_another_function_prints_is_not_the_messages() -> None:
