@@ -55,7 +55,7 @@ from grader.checks.support.text import (
     unfilled,
     words_pattern,
 )
-from grader.checks.support.topics import cite, unheard
+from grader.checks.support.topics import cite, reads_keys, unheard
 from grader.evidence.events import UNNAMED, ConsoleLine
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
@@ -219,10 +219,10 @@ def _not_printed(
     ):
         return why
     if not own:
-        nothing = failed_or_blocked(
-            f"it prints nothing, not {params.words}", hint=f"{hint}, with flush=True"
-        ).if_repeated()
-        return nothing.model_copy(update={"silent": True})
+        keys = reads_keys(package, run)
+        why, hint = (f": {keys.message}", keys.fix) if keys else ("", both(f"{hint}, with flush=True", hint))
+        nothing = failed_or_blocked(f"it prints nothing, not {params.words}{why}", hint=hint)
+        return nothing.if_repeated().model_copy(update={"silent": True})
     meant = max(own, key=lambda line: SequenceMatcher(None, params.words, line.text[:LINE_CHARS_MAX]).ratio())
     hint = _of_whole_answer(meant, params) or unfilled(meant.text) or hint
     lost = _of_client(asked, run)(f"{never}; it prints {shown(meant.text)!r}", hint=hint)

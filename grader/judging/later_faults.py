@@ -303,7 +303,7 @@ class Later:
         if scenario is not None and scenario.typed_to:
             return set()
         files = [one for one in map(self._package.file, self._paths) if one is not None and one.python_fault]
-        asked = {(slip.file, slip.line) for slip in self._of("input")} | {
+        asked = {(s.file, s.line) for s in self._of("input") if not s.file.endswith(CPP_SUFFIXES)} | {
             (one.path, number)
             for one in files
             for number, line in enumerate(self._lines(one.path), 1)

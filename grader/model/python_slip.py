@@ -25,7 +25,8 @@ SlipKind = Literal[
 
 class PythonSlip(Placed, Record):
     """What is remarkable in a Python file. For a file that does not compile, only names, types and rates are known; for
-    one of C++, only `callback-waits`, `wrong-value`, `no-argument` and `deaf` (`name`: how long it sleeps at a time).
+    one of C++, only `callback-waits`, `wrong-value`, `no-argument`, `input` and `deaf` (`name`: how long it sleeps at a
+    time).
 
     `fix` says what to do where that is always the same. Slips, of which most show only when the node runs; `message`
     says what is wrong on that line, and `name` is the function or variable that both are about:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from itertools import islice
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
@@ -47,6 +48,8 @@ _OF_ANGLE = re.compile(
 _DEAF = re.compile(r"\bwhile\s*\(\s*(?:(?P<ok>(?:ros::|\w+(?:\.|->))ok)|true|1)\s*\)|\bfor\s*\(\s*;\s*;\s*\)")
 """A loop that asks nothing; `ok` without brackets is a function, which is always true."""
 _ENDS = re.compile(r"\b(?:break|return|throw|goto|exit)\b|\bok\s*\(")
+_SWITCH = re.compile(r"\bswitch\s*\([^;{}]{0,200}\)\s*{")
+SWITCHES_MAX = 50
 _LONG = re.compile(
     r"\bRate\s+\w+\s*[({]\s*(?P<hz>0?\.\d+)\s*[)}]|\bDuration\s*\(\s*(?P<s>\d+)(?:\.\d*)?\s*\)\s*\.\s*sleep\s*\("
     r"|(?<![.\w>])sleep\s*\(\s*(?P<n>\d+)\s*\)"
@@ -63,6 +66,11 @@ _COUNTED = re.compile(
     r"\bargc\s*(?:<|!=|==|>(?!=|\s*0)|>=(?!\s*[01]\b))|[<>=]\s*argc\b|\bswitch\s*\(\s*argc\b"
 )
 """A test whether there are arguments: there is always one, the program's name."""
+_KEYBOARD = re.compile(
+    r"\b(?:std::)?cin\s*>>|\bgetline\s*\(\s*(?:std::)?cin\b|\b(?:scanf|getchar|_?getch|_?kbhit)\s*\("
+    r"|\b(?:::)?read\s*\(\s*(?:0|STDIN_FILENO)\s*,|\bfgets\s*\([^;()]*\bstdin\s*\)"
+)
+_DECLARES = re.compile(r"\b(?:int|char|void|bool)\s*$")
 _TURNED = re.compile(r"180|rad|PI\b", re.IGNORECASE)
 """So an angle in degrees is made one in radians."""
 _BRACE, _BRACKET = re.compile(r"[{}]"), re.compile(r"[][(){},]")
@@ -101,6 +109,7 @@ def slips_of(path: str, text: str) -> Iterator[PythonSlip]:
     if _MAIN.search(code):
         yield from _endless(path, code)
         yield from _asleep(path, code)
+        yield from _typed(path, code)
     yield from _unasked_argument(path, code)
     yield from _whole_numbers(path, text, code)
 
@@ -150,11 +159,12 @@ def _unspun(path: str, code: str) -> Iterator[PythonSlip]:
 
 def _endless(path: str, code: str) -> Iterator[PythonSlip]:
     """Yield the loops that keep a program from ending on Ctrl-C, of which roscpp only makes a note."""
+    leaving = _without_switches(code)
     for match in _DEAF.finditer(code):
         opened = _OPENS.match(code, match.end())
         end = end_of_block(code, opened.end()) if opened else match.end()
         line = _line(code, match.start())
-        if match["ok"] or not _ENDS.search(code, match.end(), end):
+        if match["ok"] or not _ENDS.search(leaving, match.end(), end):
             message = (
                 f"`{match['ok']}` has no brackets on line {line} of {path}"
                 if match["ok"]
@@ -162,6 +172,14 @@ def _endless(path: str, code: str) -> Iterator[PythonSlip]:
             )
             fix = f"write `while ({match['ok'] or 'ros::ok'}())` on line {line}"
             yield PythonSlip(file=path, line=line, kind="deaf", message=message, fix=fix)
+
+
+def _without_switches(code: str) -> str:
+    """Return the code with blanks in place of each `break` of a `switch`, which leaves nothing else."""
+    for match in islice(_SWITCH.finditer(code), SWITCHES_MAX):
+        end = end_of_block(code, match.end())
+        code = code[: match.end()] + code[match.end() : end].replace("break", "     ") + code[end:]
+    return code
 
 
 def _asleep(path: str, code: str) -> Iterator[PythonSlip]:
@@ -173,6 +191,17 @@ def _asleep(path: str, code: str) -> Iterator[PythonSlip]:
             line, pause = _line(code, match.start()), f"{pause_s:g}"
             message = f"line {line} of {path} lets it sleep for {pause} s at a time"
             yield PythonSlip(file=path, line=line, kind="deaf", message=message, name=pause)
+
+
+def _typed(path: str, code: str) -> Iterator[PythonSlip]:
+    """Yield the first line that reads what is typed."""
+    calls = (m.start() for m in _KEYBOARD.finditer(code))
+    at = next((at for at in calls if not _DECLARES.search(code, max(0, at - BEFORE_CHARS), at)), None)
+    if at is not None:
+        line = _line(code, at)
+        message = f"line {line} of {path} reads what is typed, and a graded node gets no input"
+        fix = f"write a value in the code in place of what line {line} of {path} reads"
+        yield PythonSlip(file=path, line=line, kind="input", message=message, fix=fix)
 
 
 def _unasked_argument(path: str, code: str) -> Iterator[PythonSlip]:

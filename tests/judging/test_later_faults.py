@@ -311,13 +311,12 @@ def test_what_a_callback_does_besides_comes_after_the_print() -> None:
 def test_what_needs_a_number_gives_way_where_a_text_is_asked_for(given: dict[str, str]) -> None:
     heard = [NODE | ROOT, HEARS | {"requires": ["node"], "with": given}]
     loop = slip("takes-number", "line 7 needs a number", 6, fix="write `rospy.spin()` in place of the loop")
-    slips = [slip("subscriber", "chatter"), slip("prints", "I heard {data}", 2), loop]
+    own = [slip("subscriber", "chatter"), slip("prints", "I heard {data}", 2), loop]
     for kind, told in (("Int32", True), ("String", False)):
-        slips = [*slips[:3], slip("subscriber-type", kind)]
-        hint = hint_of("node", DIES, heard, *slips, source="#\nlog('%d', m.data)\n")
-        assert (
-            hint.endswith("needs a number") == told == (f"write %s instead of %d on line 2 of {FILE}" in hint)
+        hint = hint_of(
+            "node", DIES, heard, *own, slip("subscriber-type", kind), source="#\nlog('%d', m.data)\n"
         )
+        assert hint.endswith("needs a number") == told == (f"%s instead of %d on line 2 of {FILE}" in hint)
 
 
 def test_a_text_that_another_function_prints_is_not_the_messages() -> None:

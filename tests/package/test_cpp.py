@@ -182,6 +182,10 @@ def test_an_argument_that_may_not_be_there(text: str, told: list[str]) -> None:
         ("ros::Rate slow(0.1);\n", ["line 2 of a.cpp lets it sleep for 10 s at a time; "]),
         ("ros::Duration(4.0).sleep();\nsleep(3);\n",
          ["line 2 of a.cpp lets it sleep for 4 s at a time; ", "line 3 of a.cpp lets it sleep for 3 s at a time; "]),
+        ("while (1) {\n  switch (x) { case 1: { break; } }\n}\n",
+         [f"nothing in the loop on line 2 of a.cpp asks whether the node should end; {ASKS} on line 2"]),
+        ("while (1) {\n  switch (x) { case 1: return 0; }\n}\n", []),
+        ("while (1) {\n  switch (x) { case 1: break; }\n  if (x) break;\n}\n", []),
         ("while (true) { if (!ros::ok()) break; }\n", []),
         ("for (;;) { if (done) return 0; }\n", []),
         ("while (ros::ok()) { rate.sleep(); }\nros::Rate rate(0.5);\nsleep(1);\nros::Duration(0.1).sleep();\n", []),
@@ -192,6 +196,21 @@ def test_what_goes_on_after_ctrl_c(text: str, told: list[str]) -> None:
     found = slips_of("a.cpp", f"int main() {{\n{text}}}\n")
     assert [f"{one.message}; {one.fix}" for one in found if one.kind == "deaf"] == told
     assert all(one.kind != "deaf" for one in slips_of("a.cpp", text)), "of a class, without main()"
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("std::string s;\nstd::cin >> s;\n", 4),
+        ("while (kbhit()) {\n  c = getch();\n}\n", 3),
+        ("std::getline(std::cin, s);\n", 3),
+        ("read(STDIN_FILENO, &c, 1);\n", 3),
+        ("read(fd, &c, 1);\nports.getchars();\n// cin >> x\n", 0),
+    ],
+)
+def test_what_reads_the_keyboard(text: str, line: int) -> None:
+    found = slips_of("a.cpp", f"int kbhit(void);\nint main() {{\n{text}}}\n")
+    assert [one.line for one in found if one.kind == "input"] == [line] * bool(line)
 
 
 MAKES = 'ros::Publisher p = n.advertise<std_msgs::Int8>("/a", 1);'

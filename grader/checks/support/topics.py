@@ -258,9 +258,9 @@ def _judge_advertised(
     # A node that hears something may have good reason to publish on a condition only.
     kinds: tuple[SlipKind, ...] = ("never-published", *(() if _heard_topics(run) else ("published-in-part",)))
     unused = [s for s in run_slips(package, run, *kinds) if is_written_as(s.name, topic)]
-    if unused:
-        verdict = of_node(f"{message}: {unused[0].message}", measured="no message", hint=unused[0].fix)
-        return verdict.about(citations=(unused[0].place,))
+    if told := next(iter(unused), None) or reads_keys(package, run):
+        verdict = of_node(f"{message}: {told.message}", measured="no message", hint=told.fix)
+        return verdict.about(citations=(told.place,))
     return _by_what_is_heard(run, message, of_node)
 
 
@@ -469,6 +469,12 @@ def _files_that_run(package: PackageFacts, run: Run) -> set[str | None]:
     launched = {file.path for file in package.files if PurePosixPath(file.path).name in types}
     made = (one.call.args[1:] for one in programs(package) if one.name in scripts | types)
     return scripts.union(launched, *made)
+
+
+def reads_keys(package: PackageFacts, run: Run) -> PythonSlip | None:
+    """Return where a program of C++ reads what is typed: without any input it goes on, and may do nothing."""
+    files = _files_that_run(package, run) - run_scripts(run)
+    return next((s for s in package.slips if s.kind == "input" and s.file in files), None)
 
 
 def explain_by_waiting_callback(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
