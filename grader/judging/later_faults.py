@@ -40,7 +40,7 @@ from grader.installable import PYTHON_2
 from grader.judging.cited_lines import LINE_CHARS, LINES_READ, LOOPS, OF_DATA, PLACES, loop_spins, lost_fields
 from grader.judging.facts import Facts, is_other_rate, names_started, scripts_of, sources_of
 from grader.judging.repeats_and_repairs import text_as_handed_in
-from grader.model.package import PackageFacts
+from grader.model.package import CMAKE, PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.repair import Repair
 from grader.model.verdict import Verdict, cited_lines
@@ -261,16 +261,16 @@ class Later:
     def _built(self) -> Iterator[Fix]:
         """Sources of C++, and messages, that are not there: CMake asks for them only once it has found all packages."""
         calls = cmake_calls(self._package, "add_executable", "add_library", *INTERFACES)
-        asked = (call for call in calls if "DIRECTORY" not in call.args)
-        words = (f"{INTERFACES.get(call.name, '')}{word}" for call in asked for word in call.args)
+        words = (INTERFACES.get(c.name, "") + w for c in calls if "DIRECTORY" not in c.args for w in c.args)
         kinds = (*CPP_SUFFIXES, ".msg", ".srv", ".action")
         named = dict.fromkeys(word for word in words if PurePosixPath(word).suffix in kinds)
-        there = [one.path for one in self._package.files if PurePosixPath(one.path).suffix in kinds]
-        for path in (one for one in named if "$" not in one and self._package.file(one) is None):
+        beside = f"{self._package.folder_beside}/"  # what lies there is right once the build files do
+        there = [one.path.removeprefix(beside) for one in self._package.files if one.path.endswith(kinds)]
+        for path in (one for one in named if not ("$" in one or one in there)):
             near = near_names(path, there)
-            fix = f"add {path}, which is not there, and push it, since CMakeLists.txt names it"
+            absent = f"add {path}, which is not there, and push it, since {CMAKE} names it"
             if path not in self._verdict.message:
-                yield Fix(f"write {near[0]} instead of {path}" if near else fix)
+                yield Fix(f"write {near[0]} instead of {path}" if near else absent)
 
     def _function_at(self, slip: PythonSlip) -> int:
         """Return the line of the last `def` above the slip: what gives a name its value there is of use below it."""

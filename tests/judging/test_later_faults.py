@@ -18,21 +18,15 @@ from tests.support.timeline import build_runs
 FILE = SCRIPT["path"]
 DIES = {
     "processes": [{"name": "talker", "script": FILE, "exit_s": 0.5, "exit_code": 1}],
-    "console": [
-        {
-            "process": "talker",
-            "stream": "stderr",
-            "at_s": 0.4,
-            "every_s": 0.001,
-            "lines": [
-                "Traceback (most recent call last):",
-                f'  File "/ws/src/lab1/{FILE}", line 3, in <module>',
-                "NameError: name 'countmsg' is not defined",
-            ],
-        }
-    ],
+    "console": [{
+        "process": "talker", "stream": "stderr", "at_s": 0.4, "every_s": 0.001,
+        "lines": [
+            "Traceback (most recent call last):", f'  File "/ws/src/lab1/{FILE}", line 3, in <module>',
+            "NameError: name 'countmsg' is not defined",
+        ],
+    }],
     "outcome": "ended",
-}
+}  # fmt: skip
 STARTED = {"name": "talker", "script": FILE, "nodes": ["/talker"], "stopped_by": "INT", "exit_s": 6.8}
 ELSEWHERE = {"processes": [STARTED], "topics": [{"topic": "/hello", "count": 61}]}
 DEAF = {"processes": [STARTED], "subscribers": {"/hello": ["/talker"]}}
@@ -587,12 +581,16 @@ def test_arguments_without_a_value_are_named_behind_what_roslaunch_says_first() 
 
 
 def test_messages_that_are_not_there_are_named_where_catkin_sees_no_package() -> None:
-    package = {"cmake": {"calls": [["add_message_files", "FILES", "Note.msg"], ["catkin_package"]]}}
+    cmake = {"calls": [["add_message_files", "FILES", "Note.msg"], ["catkin_package"]]}
     built = {"processes": [{"name": "catkin_make", "role": "build", "exit_code": 0, "exit_s": 2}]}
     named = {"id": "manifest", "check": "manifest", "with": {"name": "lab1"}}
     asked = rubric(named, {"id": "build", "check": "build", "requires": ["manifest"]})
-    found = judge(asked, build_runs({"runs": {"package": built}, "package": package}))
-    assert "; then add msg/Note.msg, which is not there, and push it" in found[0].hint
+    beside = [{"path": "lab1/msg/Note.msg"}, {"path": "lab1/scripts/a.py"}]
+    for files, told in (([], True), ([{"path": "msg/Note.msg"}], False), (beside, False)):
+        runs = build_runs({"runs": {"package": built}, "package": {"cmake": cmake, "files": files}})
+        hint = judge(asked, runs)[0].hint
+        assert ("; then add msg/Note.msg, which is not there, and push it" in hint) == told
+        assert "instead of msg/Note.msg" not in hint
 
 
 def test_a_text_that_no_line_has_is_named() -> None:
