@@ -295,6 +295,7 @@ def not_offered(package: PackageFacts, run: Run, service: str) -> Verdict:
         return failed(f"no node offers {service}: {slip.message}", hint=hint, citations=(slip.place,))
     others = f"; it offers {join_words(found)}" if found else ""
     hint = f"add {service_call(service, '…, callback')} before the loop or {SPIN}"
+    hint += f", or rename {join_words(found, 'or')} if that is meant to be it" if found else ""
     return failed(f"no node offers {service}{others}", hint=hint)
 
 
