@@ -30,7 +30,7 @@ from grader.checks.support.text import RATE_SLOT, TYPE_SLOT, VALUE_SLOT, in_lang
 from grader.evidence.events import PACKAGE_RUN
 from grader.installable import noetic_messages
 from grader.judging.cited_lines import LINE_CHARS, LINES_READ
-from grader.judging.facts import Facts, language_of
+from grader.judging.facts import Facts, language_of, scripts_of
 from grader.model.package import LaunchFile, PackageFacts
 from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation, Status, Verdict, cited_lines
@@ -206,6 +206,28 @@ def fill_slots(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdic
     hz = float(str(asked.get("rate", {}).get("rate_hz", USUAL_RATE_HZ)))
     hint = verdict.hint.replace(VALUE_SLOT, value).replace(RATE_SLOT, f"rospy.Rate({significant(hz)})")
     return verdict.model_copy(update={"hint": hint})
+
+
+def name_same_file(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdict:
+    """Return the verdict; a loss goes on with the other script of the lab that has the very same code."""
+    package = facts.package_of(criterion)
+    if package is None or not verdict.status.is_lost or criterion.scenario is None:
+        return verdict
+    own = scripts_of(criterion, facts.rubric, package)
+    started = {
+        PurePosixPath(start.script).name
+        for scenario in facts.rubric.scenarios.values()
+        for start in scenario.start
+        if start.script
+    }
+    sums = {one.sha256: one.path for one in package.files if one.path in own and one.size_bytes}
+    for one in package.files:
+        path = sums.get(one.sha256, one.path)
+        other = PurePosixPath(one.path).name in started - {PurePosixPath(name).name for name in own}
+        if path != one.path and other and one.link is None:
+            same = f"{path} holds the same code as {one.path}, as if one were saved under the other's name"
+            return verdict.model_copy(update={"message": f"{verdict.message}; {same}"})
+    return verdict
 
 
 def name_other_lines(verdict: Verdict, facts: Facts) -> Verdict:

@@ -44,6 +44,7 @@ from grader.judging.annotate import (
     fill_slots,
     lab_names,
     name_other_lines,
+    name_same_file,
     with_lab_names,
     with_own_name,
 )
@@ -321,6 +322,7 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
             found = explain_by_build(package, facts.runs.get(PACKAGE_RUN), found, asked_for, beside)
         found = fill_slots(choose_hint_language(found, criterion, facts), criterion, facts.rubric)
         found = _with_package_name(name_other_lines(found, facts), criterion, facts)
+        found = name_same_file(found, criterion, facts)
         return _without_git(found, facts.package)
     except NotRecorded as missing:
         return missing.verdict

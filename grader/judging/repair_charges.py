@@ -148,8 +148,8 @@ def asks_for(found: Verdict | CriterionResult, repair: Repair) -> bool:
     if repair.kind in SEEN_IN_RUNS:
         return lost and (repair.file, repair.line) in cited_lines(found.citations)
     absent = found.mistake.name if found.mistake and found.mistake.is_absence else ""
-    if is_unmade(found):
-        return False  # the build's own criterion asks for it
+    if is_unmade(found) or repair.kind == "exchanged-files":
+        return False  # the build's own criterion asks for it, and none for what is in which file
     is_it = repair.kind == "file-name" and PurePosixPath(absent).name == PurePosixPath(repair.after).name
     is_told = repair.kind in OF_BUILDS and _is_told(repair, found.hint)
     return lost and (is_it or is_told or cites_file(found, repair))
@@ -290,7 +290,10 @@ def _what_was_done(repairs: Iterable[Repair]) -> str:
     """Return `a.py renamed and b.py line 6 repaired`."""
     done: dict[str, dict[str, None]] = {}
     for one in repairs:
-        done.setdefault("renamed" if one.kind == "file-name" else "repaired", {})[place_of(one)] = None
+        if one.kind == "exchanged-files":
+            done.setdefault("exchanged", {}).update(dict.fromkeys((one.before, one.after)))
+        else:
+            done.setdefault("renamed" if one.kind == "file-name" else "repaired", {})[place_of(one)] = None
     return " and ".join(f"{join_words(places)} {how}" for how, places in done.items())
 
 

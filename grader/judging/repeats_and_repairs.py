@@ -319,6 +319,7 @@ def is_used_by(
     """Return whether the scenario runs the repaired file, as far as the rubric says and as is known of what it has
     `launched`. A launch file that is not may run any, and a script may import what no launch file starts."""
     name = PurePosixPath(repair.after if repair.kind == "file-name" else repair.file).name
+    both = {name, PurePosixPath(repair.after).name} if repair.kind == "exchanged-files" else {name}
     launches = any(start.launch for start in scenario.start)
     known = any(name in _started_files(one) for one in rubric.scenarios.values())
     if repair.kind in DONE_BEFORE_RUNS:
@@ -330,7 +331,7 @@ def is_used_by(
         return made or not built or any(start.built for start in scenario.start)
     if repair.kind == "package-name" and repair.file in OF_PACKAGES:
         return True
-    if name in _started_files(scenario):
+    if both & _started_files(scenario):
         return True
     if name.endswith((".launch", ".launch.xml")):
         return launches and not known
@@ -382,13 +383,13 @@ LINES = re.compile(
     r"(?:(?P<before>[\w./-]+\.\w+),? )?\blines? (?P<numbers>\d+(?:(?:, | and | to )\d+)*)"
     r"(?: of (?P<behind>[\w./-]*\w))?"
 )
-WHOLE_FILES = ("encoding", "byte-order-mark", "line-ends", "file-name", "executable-bit")
+WHOLE_FILES = ("encoding", "byte-order-mark", "line-ends", "file-name", "executable-bit", "exchanged-files")
 """Repairs of these kinds change no line."""
 
 
 def with_lines_as_handed_in(verdict: Verdict, repairs: Sequence[Repair]) -> Verdict:
     """Return a verdict on a copy with these repairs, whose citations and texts name the lines before them."""
-    moving, renamed = _moving(repairs), _renamed(repairs)
+    moving, renamed = _moving(repairs), {**_renamed(repairs), **_exchanged(repairs)}
     if not moving:
         return verdict
     cited = tuple(
@@ -408,7 +409,7 @@ def with_lines_as_handed_in(verdict: Verdict, repairs: Sequence[Repair]) -> Verd
 
 def text_as_handed_in(text: str, repairs: Sequence[Repair], alone: str = "") -> str:
     """Return a text on the copy that names the lines before these repairs; a line without a file is of `alone`."""
-    moving, renamed = _moving(repairs), _renamed(repairs)
+    moving, renamed = _moving(repairs), {**_renamed(repairs), **_exchanged(repairs)}
 
     def counted(found: re.Match[str]) -> str:
         file = found["before"] or found["behind"] or alone
@@ -436,7 +437,9 @@ def repairs_as_handed_in(needed: Iterable[Repair], repairs: Sequence[Repair]) ->
 
 def with_names_as_handed_in(copy: Verdict, repairs: Iterable[Repair]) -> Verdict:
     """Return a verdict on the copy that cites files by the names that they have in the package as it is."""
+    repairs = tuple(repairs)
     names = {new: old for old, new in _renamed(repairs).items()}
+    names |= {file: names.get(held, held) for file, held in _exchanged(repairs).items()}
     cited = tuple(
         one.model_copy(update={"file": names.get(one.file, one.file)})
         if isinstance(one, FileCitation)
@@ -448,6 +451,16 @@ def with_names_as_handed_in(copy: Verdict, repairs: Iterable[Repair]) -> Verdict
 
 def _renamed(repairs: Iterable[Repair]) -> dict[str, str]:
     return {one.before: one.after for one in repairs if one.kind == "file-name"}
+
+
+def _exchanged(repairs: Iterable[Repair]) -> dict[str, str]:
+    """Return for each of two files on the copy in which one its lines were."""
+    return {
+        new: old
+        for one in repairs
+        if one.kind == "exchanged-files"
+        for new, old in ((one.before, one.after), (one.after, one.before))
+    }
 
 
 def _moving(repairs: Sequence[Repair]) -> list[Repair]:

@@ -17,6 +17,7 @@ RepairKind = Literal[
     "executable-bit", "encoding", "byte-order-mark", "line-ends", "shebang", "file-name", "python-syntax",
     "manifest-line", "build-line", "launch-syntax", "yaml-syntax", "package-name", "launch-type", "missing-import",
     "missing-call", "node-name", "topic-name", "service-name", "parameter-name", "ros-clock", "turn-sign",
+    "exchanged-files",
 ]  # fmt: skip
 """In the order in which a student would meet them."""
 
@@ -51,11 +52,16 @@ BY_HAND: dict[RepairKind, str] = {
     "parameter-name": "a misspelt parameter: rosparam list shows how it is called",
     "ros-clock": "time by the computer's clock: a simulator sets ROS's, which rospy.get_time() and rospy.sleep(…) use",
     "turn-sign": "a turn to the wrong side: a positive angular.z turns to the left",
+    "exchanged-files": "two scripts that hold each other's code: exchange the two files",
 }
 """How a mistake of this kind looks, and how it is repaired."""
 
 OF_LOGIC: frozenset[RepairKind] = frozenset({"ros-clock", "turn-sign"})
 """Kinds that no file shows to be mistakes: they count only where the copy passes, and nothing is made by itself."""
+
+
+MOVING: frozenset[RepairKind] = frozenset({"file-name", "exchanged-files"})
+"""Kinds whose `before` and `after` are paths."""
 
 
 class Repair(Record):
@@ -70,8 +76,8 @@ class Repair(Record):
     before: str = ""
     """The changed lines, after earlier repairs and before this one; for a rename, the path."""
     after: str = ""
-    """The same lines, repaired, or the new path. If a line is only added, both include the line next to
-    it."""
+    """The same lines, repaired, or the new path, or that of the other of two files. If a line is only added, both
+    include the line next to it."""
     message: str
     """What is wrong."""
     fix: str
@@ -81,7 +87,7 @@ class Repair(Record):
 
     def with_paths(self, path: Callable[[str], str]) -> Repair:
         """Return the repair with other paths of the file, and of what it is renamed to."""
-        renamed = {"before": path(self.before), "after": path(self.after)} if self.kind == "file-name" else {}
+        renamed = {"before": path(self.before), "after": path(self.after)} if self.kind in MOVING else {}
         return self.model_copy(update={"file": path(self.file), **renamed})
 
 
@@ -129,6 +135,8 @@ def as_code(line: str) -> str:
 def _where_and_how(repair: Repair) -> tuple[str, str]:
     """Return where and how it is done by hand: `package.xml`, ``below line 9 add `<depend>rospy</depend>` ``."""
     new, added = repair.after.split("\n"), _added(repair.before, repair.after)
+    if repair.kind == "exchanged-files":
+        return "", repair.fix  # it names both
     if repair.fix != "; ".join(added):
         # A fix that is a sentence: it mostly names the line itself.
         below = len(new) > 1 and new[0] == repair.before and repair.line is not None
@@ -170,7 +178,7 @@ def advice_on(repairs: Iterable[Repair]) -> list[str]:
             joined.append(repair)
     each = map(_where_and_how, joined)
     return [
-        f"{place}: {', and '.join(how for _, how in found)}"
+        f"{place}: {', and '.join(how for _, how in found)}".removeprefix(": ")
         for place, found in groupby(each, key=lambda one: one[0])
     ]
 

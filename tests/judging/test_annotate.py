@@ -13,7 +13,13 @@ from grader.checks.support.exit_causes import CAUSES
 from grader.checks.support.text import LOOP, in_language, init, publisher, set_param
 from grader.integrations.bundle import Bundle, add_lab
 from grader.judging import judge
-from grader.judging.annotate import add_advice, choose_hint_language, fill_slots, with_own_name
+from grader.judging.annotate import (
+    add_advice,
+    choose_hint_language,
+    fill_slots,
+    name_same_file,
+    with_own_name,
+)
 from grader.judging.facts import Facts
 from grader.judging.judge import judge_files
 from grader.model.package import PackageFacts
@@ -24,10 +30,21 @@ from grader.rubric.load import load_rubric, read_beside_rubric
 from tests.package.trees import CMAKE, MANIFEST, NODE, make_package
 from tests.rubric.samples import faults, spoiled
 from tests.support.a_class import criterion as criterion_of
-from tests.support.rubrics import ALL, CHATTER, CMAKE_CHECK, EXECUTABLE, GOOD_RUN, RATE, SCRIPT, rubric
+from tests.support.rubrics import (
+    ALL,
+    CHATTER,
+    CMAKE_CHECK,
+    EXECUTABLE,
+    GOOD_RUN,
+    RATE,
+    SCENARIO,
+    SCRIPT,
+    rubric,
+)
 from tests.support.rubrics import NODE as LIVES
 from tests.support.timeline import build_runs
 
+OTHER = [{"name": "other", "script": "src/other.py"}]
 OUT = "roslaunch leaves a <node> out: launch/x.launch, line 2:"
 NODES = '<launch>\n<node pkg="lab1" type="talker" name="a"/>\n<node pkg="lab1" type="plain.py" name="b"/></launch>'
 
@@ -35,6 +52,23 @@ NODES = '<launch>\n<node pkg="lab1" type="talker" name="a"/>\n<node pkg="lab1" t
 def facts(folder, **files: str) -> PackageFacts:
     tree = {"package.xml": MANIFEST, "CMakeLists.txt": CMAKE, **files}
     return read_package(make_package(folder / "lab1", tree, executable={"src/plain.py": False}))
+
+
+def test_a_loss_names_the_other_script_that_has_the_same_code(tmp_path: Path) -> None:
+    heard = rubric(*ALL, scenarios={"talker": SCENARIO, "other": {**SCENARIO, "start": OTHER}})
+    asked = heard.criteria[0].model_copy(update={"scenario": "talker"})
+    lost = failed("no message came")
+
+    def said(**files: str) -> str:
+        return name_same_file(
+            lost, asked, Facts(package=facts(tmp_path, **files), rubric=heard, runs={})
+        ).message
+
+    same = {SCRIPT["path"]: NODE, "src/other.py": NODE}
+    assert said(**same).startswith(
+        "no message came; src/numeric_talker.py holds the same code as src/other.py"
+    )
+    assert said(**{**same, "src/other.py": f"{NODE}#\n", "src/third.py": NODE}) == "no message came"
 
 
 def test_commands_have_the_name_that_the_package_has_as_handed_in(tmp_path: Path) -> None:

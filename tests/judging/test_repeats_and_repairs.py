@@ -17,6 +17,7 @@ from grader.judging.repeats_and_repairs import (
     never_run,
     repairs_as_handed_in,
     with_lines_as_handed_in,
+    with_names_as_handed_in,
 )
 from grader.model.repair import Repair
 from grader.model.verdict import FileCitation, failed
@@ -190,6 +191,7 @@ GLOBAL = Repair(
     fix="",
 )
 RENAME = Repair(kind="file-name", file="a.py", before="a.py", after="b.py", message="", fix="")
+EXCHANGE = Repair(kind="exchanged-files", file="a.py", before="a.py", after="c.py", message="", fix="")
 
 
 def test_a_copy_of_a_script_that_is_not_the_one_that_runs_explains_nothing() -> None:
@@ -210,6 +212,9 @@ def test_a_copy_of_a_script_that_is_not_the_one_that_runs_explains_nothing() -> 
         ((GLOBAL,), "a.py", 8, 9),
         ((IMPORT, RENAME), "b.py", 9, 8),
         ((RENAME,), "b.py", 9, 9),
+        ((IMPORT, EXCHANGE), "c.py", 9, 8),
+        ((IMPORT, EXCHANGE), "a.py", 9, 9),
+        ((IMPORT, RENAME, EXCHANGE.model_copy(update={"before": "b.py"})), "c.py", 9, 8),
     ],
 )
 def test_lines_of_the_copy_are_told_as_they_were_handed_in(repairs, file, on_copy, as_handed_in):
@@ -219,6 +224,14 @@ def test_lines_of_the_copy_are_told_as_they_were_handed_in(repairs, file, on_cop
     assert told.message == f"{file}, line {as_handed_in} asks"
     assert told.hint == f"on line {as_handed_in}, write it"
     assert told.citations == (FileCitation(file=file, line=as_handed_in),)
+
+
+def test_files_that_are_exchanged_are_told_by_where_the_lines_are_as_handed_in():
+    copy = failed("", citations=(FileCitation(file="c.py", line=9), FileCitation(file="a.py", line=3)))
+    placed = with_names_as_handed_in(copy, (EXCHANGE,))
+    assert [one.file for one in placed.citations] == ["a.py", "c.py"]
+    renamed = with_names_as_handed_in(copy, (RENAME, EXCHANGE.model_copy(update={"before": "b.py"})))
+    assert [one.file for one in renamed.citations] == ["a.py", "a.py"]
 
 
 def test_several_lines_and_those_of_other_files_in_one_text():

@@ -47,6 +47,39 @@ def making(kind: str, file: str) -> str:
 TWO_FIELDS = tuple(parse_definition("int64 a\n---\nint64 sum", ".srv"))
 GO_FIELDS = tuple(parse_definition("int32 n\n---\nbool there\n---\nint32 left\n", ".action"))
 # fmt: off
+BOTH = (TALKER, "src/listener.py")
+TWO_ENDS = (
+    (TALKER, "publisher", "/numeric_chatter"),
+    (TALKER, "node-name", "talker"),
+    ("src/listener.py", "subscriber", "/numeric_chatter"),
+)
+HEARS = """\
+#!/usr/bin/env python3
+import rospy
+from std_msgs.msg import Int8
+
+rospy.init_node('listener')
+rospy.Subscriber('numeric_chatter', Int8, print)
+rospy.spin()
+"""
+OFFERS = """\
+#!/usr/bin/env python3
+import rospy
+from rospy_tutorials.srv import AddTwoInts
+
+rospy.init_node('talker')
+rospy.Service('add', AddTwoInts, lambda request: request.a + request.b)
+rospy.spin()
+"""
+ASKS = """\
+#!/usr/bin/env python3
+import rospy
+from rospy_tutorials.srv import AddTwoInts
+
+rospy.init_node('asks')
+rospy.wait_for_service('add')
+print(rospy.ServiceProxy('add', AddTwoInts)(1, 2).sum)
+"""
 NAMES_OF_FILES = {
     "own-service-with-other-capitals": Case(
         {"srv/tWo.srv": "int64 a\n---\nint64 sum\n",
@@ -94,6 +127,30 @@ NAMES_OF_FILES = {
         {"srv/other.srv": "int64 b\n---\nint64 sum\n",
          "src/level.py": "from lab.srv import other\n", CMAKELISTS: making("service", "other.srv")},
         [], "", asking(definitions=(("srv/Two.srv", TWO_FIELDS),), files=("srv/Two.srv",)),
+    ),
+    "two-files-exchanged": Case(
+        {TALKER: HEARS, "src/listener.py": SCRIPT}, ["exchanged-files"],
+        "src/talker.py holds the code of listener.py, and src/listener.py that of talker.py",
+        asking(does=TWO_ENDS, scripts=BOTH), {TALKER: SCRIPT, "src/listener.py": HEARS},
+    ),
+    "two-files-exchanged-and-one-of-them-nearly-named": Case(
+        {TALKER: HEARS, "src/listner.py": SCRIPT}, ["file-name", "exchanged-files"], "",
+        asking(does=TWO_ENDS, scripts=BOTH), {TALKER: SCRIPT, "src/listener.py": HEARS},
+    ),
+    "server-and-client-exchanged": Case(
+        {TALKER: ASKS, "src/listener.py": OFFERS}, ["exchanged-files"], "",
+        asking(does=((TALKER, "server", "/add"),), scripts=BOTH), {TALKER: OFFERS, "src/listener.py": ASKS},
+    ),
+    "one-file-twice": Case(
+        {TALKER: HEARS, "src/listener.py": HEARS}, [], "", asking(does=TWO_ENDS, scripts=BOTH),
+    ),
+    "a-listener-in-both-by-the-name-of-its-own": Case(
+        {TALKER: HEARS.replace("'listener'", "'talker'"), "src/listener.py": SCRIPT}, [], "",
+        asking(does=TWO_ENDS, scripts=BOTH, nodes=()),
+    ),
+    "a-file-that-does-both": Case(
+        {TALKER: HEARS, "src/listener.py": SCRIPT.replace("main()\n", "rospy.Subscriber('numeric_chatter', Int8)\n")},
+        [], "", asking(does=TWO_ENDS, scripts=BOTH),
     ),
 }
 # fmt: on

@@ -29,6 +29,7 @@ from grader.package.repairs.editing import (
     UTF16,
     Files,
     NotRepairable,
+    exchange_contents,
     make_executable,
     read_data,
     rename_everywhere,
@@ -36,7 +37,14 @@ from grader.package.repairs.editing import (
     replace_lines,
     write_data,
 )
-from grader.package.repairs.files import find_renames, is_own, rename_files, repair_files, to_utf8
+from grader.package.repairs.files import (
+    exchange_files,
+    find_renames,
+    is_own,
+    rename_files,
+    repair_files,
+    to_utf8,
+)
 from grader.package.repairs.launch_files import repair_launch_files, repair_launch_names
 from grader.package.repairs.manifest import repair_manifest
 from grader.package.repairs.names import (
@@ -105,6 +113,7 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     repair_yaml_names(files, package, names, wanted)
     for script in names:
         repair_script_keys(files, package, script, names[script], wanted)
+    exchange_files(files, names, wanted)
     return tuple(sorted(files.repairs, key=lambda repair: KINDS.index(repair.kind)))
 
 
@@ -151,6 +160,8 @@ def apply_repair(folder: Path, repair: Repair) -> None:
         make_executable(folder, repair.file)
     elif repair.kind == "file-name":
         rename_file(folder, repair)
+    elif repair.kind == "exchanged-files":
+        exchange_contents(folder, repair.before, repair.after)
     else:
         data = read_data(folder, repair.file)
         if data is None:

@@ -361,6 +361,15 @@ def _rename(folder: Path, old: str, new: str) -> None:
         os.rename(name, target, src_dir_fd=parent, dst_dir_fd=parent)
 
 
+def exchange_contents(folder: Path, one: str, other: str) -> None:
+    """Give each of two files what the other one holds. Raises OSError or NotRepairable."""
+    data = [read_data(folder, file) for file in (one, other)]
+    for file, content in zip((other, one), data, strict=True):
+        if content is None:
+            raise NotRepairable(f"{one} and {other} are not files that can be exchanged")
+        write_data(folder, file, content)
+
+
 def rename_everywhere(folder: Path, old: str, new: str) -> None:
     """Write the new name where the build files and launch files have the old one, and the code a definition's."""
     for endings, rename in ((NAMING, rename_word), (CODE, rename_type)):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import codecs
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import combinations
 from pathlib import PurePosixPath
 
 from grader.model.package import CMAKE, MANIFEST, PackageFacts, SourceFile
@@ -24,6 +25,7 @@ from grader.package.repairs.editing import (
     rename_word,
 )
 from grader.package.repairs.names import Wanted, is_near
+from grader.package.repairs.python import Name
 from grader.portable import MODES_ON_DISK
 from grader.wording import has_role_of, join_words
 
@@ -180,7 +182,11 @@ def find_renames(package: PackageFacts, wanted: Wanted) -> dict[str, str]:
 def _meant_script(package: PackageFacts, wanted: Wanted, name: str, others: set[str]) -> str:
     """Return the only script that has all of the topics of the one of this name, and makes the lab's node or is called
     by another word for it; "" if there is none. One that has some of them, such as a handed out one, may be another."""
-    does = [(kind, used.lstrip("/")) for path, kind, used in wanted.does if PurePosixPath(path).name == name]
+    does = [
+        (kind, used.lstrip("/"))
+        for path, kind, used in wanted.does
+        if PurePosixPath(path).name == name and kind not in OF_SERVICES
+    ]
     topics = {one for one in does if one[0] != "node-name"}
     nodes = {one for one in does if one[0] == "node-name"}
     found: dict[str, set[tuple[str, str]]] = {}
@@ -249,6 +255,49 @@ def _put_word(
         return False
     files.put(file, changed)
     return True
+
+
+# ---- two files that hold each other's code
+
+OF_SERVICES = {"server": "client", "client": "server"}
+OTHER_END = {"publisher": "subscriber", "subscriber": "publisher", **OF_SERVICES}
+
+
+def exchange_files(files: Files, names: Mapping[str, Sequence[Name]], wanted: Wanted) -> None:
+    """Find two scripts of the lab each of which does just what the other should. Such a repair is the last one: the
+    others are told by the names that the files have."""
+    asked = {PurePosixPath(path).name for path in wanted.scripts}
+    scripts = [path for path in names if PurePosixPath(path).name in asked]
+    for one, other in combinations(scripts, 2):
+        if _holds(one, other, names, wanted) and _holds(other, one, names, wanted):
+            parts = PurePosixPath(one), PurePosixPath(other)
+            what = f"{one} holds the code of {parts[1].name}, and {other} that of {parts[0].name}"
+            away = parts[0].with_stem(f"{parts[0].stem}_other")
+            fix = f"exchange the two files: mv {one} {away} && mv {other} {one} && mv {away} {other}"
+            files.add(
+                Repair(kind="exchanged-files", file=one, before=one, after=other, message=what, fix=fix)
+            )
+            return
+
+
+def _doing(wanted: Wanted) -> dict[str, set[tuple[str, str]]]:
+    """Return what each script has to do, by its name."""
+    found: dict[str, set[tuple[str, str]]] = {}
+    for path, kind, used in wanted.does:
+        found.setdefault(PurePosixPath(path).name, set()).add((kind, used.strip("/")))
+    return found
+
+
+def _holds(path: str, other: str, names: Mapping[str, Sequence[Name]], wanted: Wanted) -> bool:
+    """Return whether a script does all that the other should, or at least the counterpart of what it should itself, and
+    nothing of that."""
+    doing = _doing(wanted)
+    own, meant = (doing.get(PurePosixPath(file).name, set()) for file in (path, other))
+    roles = {"node": "node-name"}
+    found = {(roles.get(one.role, one.role), one.value.strip("/")) for one in names[path]}
+    asked = {one for one in meant - own if one[0] != "node-name"}
+    ends = {(OTHER_END[role], name) for role, name in own if role != "node-name"}
+    return not found & (own - meant) and (asked or ends) != set() and (asked or ends) <= found
 
 
 def _wanted_files(wanted: Wanted) -> Iterator[str]:

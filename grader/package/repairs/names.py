@@ -9,13 +9,14 @@ from typing import Any, Literal
 
 from grader.model.message_definitions import parse_definition
 from grader.model.package import InterfaceField, PackageFacts
-from grader.model.python_slip import SlipKind
 from grader.model.record import Record
 from grader.model.repair import RepairKind, as_code
 from grader.package.repairs.editing import Files
 from grader.package.repairs.python import Name
 from grader.rubric.model import Criterion, Rubric
 from grader.wording import is_one_edit, plural
+
+Doing = Literal["node-name", "publisher", "subscriber", "server", "client"]
 
 
 class Wanted(Record):
@@ -47,8 +48,8 @@ class Wanted(Record):
     """Topics that the command line gives another name (`state:=light`), as the scripts have to write them."""
     started: tuple[tuple[str, str], ...] = ()
     """Launch files, and the names of the scripts that each has to start."""
-    does: tuple[tuple[str, SlipKind, str], ...] = ()
-    """Scripts that a scenario starts alone, each with a name that it has to use: of its node, or a topic's."""
+    does: tuple[tuple[str, Doing, str], ...] = ()
+    """Scripts that a scenario starts alone, each with a name that it has to use: of its node, a topic or a service."""
 
 
 ANONYMOUS = re.compile(r",\s*anonymous\s*=\s*True\b")
@@ -100,11 +101,13 @@ def _definitions(criteria: Iterable[Criterion]) -> Iterator[tuple[str, tuple[Int
         yield file, tuple(parse_definition(text, PurePosixPath(file).suffix) if text else named)
 
 
-def _of_scripts(rubric: Rubric, criteria: Sequence[Criterion]) -> Iterator[tuple[str, SlipKind, str]]:
+def _of_scripts(rubric: Rubric, criteria: Sequence[Criterion]) -> Iterator[tuple[str, Doing, str]]:
     for key, scenario in rubric.scenarios.items():
         if len(scenario.start) != 1 or (script := scenario.start[0].script) is None:
             continue
         yield from ((script, "subscriber", probe.topic) for probe in scenario.probes)
+        yield from ((script, "server", call.service) for call in scenario.calls)
+        yield from ((script, "client", one.service) for one in scenario.serves if one.service)
         for one in criteria:
             if one.scenario == key and one.check == "node-name":
                 yield from ((script, "node-name", name) for name in one.parameters["names"])
