@@ -3,31 +3,25 @@
 from __future__ import annotations
 
 import math
-import re
 from bisect import bisect
 from collections import Counter
 from collections.abc import Sequence
-from itertools import groupby
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, NamedTuple
 
 from pydantic import Field, model_validator
 
+from grader.checks.conditions import Condition, is_called, true_spans
 from grader.checks.registry import Refers, check
 from grader.checks.service_servers import exchanges, no_answer, not_offered, offers
 from grader.checks.support.clocks import excused, no_clock, run_seconds, why_late
 from grader.checks.support.fields import (
-    FieldPath,
     Reading,
-    bounds_text,
-    differences,
-    is_within,
+    changing_beside,
     no_field,
-    reading_of,
-    readings,
-    refuse_disorder,
+    set_beside,
     value_text,
 )
-from grader.checks.support.processes import GlobalName, observed_until_ns, run_slips
+from grader.checks.support.processes import observed_until_ns, run_slips
 from grader.checks.support.recorder_losses import losses
 from grader.checks.support.scans import looks_elsewhere
 from grader.checks.support.text import near_names
@@ -53,101 +47,6 @@ ORDER_S = 0.1
 TURNED_MIN, TURNED_SHARE = 2, 0.2
 """A node does the opposite if it did so at least so often each way, and was right in no more than this share of its
 messages: what it publishes may be a little older than what it has just heard."""
-
-
-class Condition(Record):
-    """The messages that count: any on the topic, or those whose `field` is from `min` to `max`, or `value`."""
-
-    topic: GlobalName
-    """The topic, with its slash: `/chatter`. As a cause also a service that the scenario calls, `/pause`: then the
-    fields are those of its request, and count once it is answered."""
-    field: FieldPath | None = None
-    """As `rostopic echo` shows it: `linear.x`, `ranges[0]`, or `ranges[*]` for every item. Null: any message counts."""
-    min: float | None = None
-    """The least value, in the field's own unit; null: no bound."""
-    max: float | None = None
-    """The greatest value, in the field's own unit; null: no bound."""
-    value: float | str | bool | None = None
-    """The value itself, in place of `min` and `max`."""
-    tolerance: Annotated[float, Field(ge=0)] = 0.0
-    """How much a number may differ from `value`, in the field's own unit."""
-    items: Literal["all", "any"] = "all"
-    """For a list (`ranges[*]`), whether `all` of its items have to match, or `any` of them."""
-
-    @model_validator(mode="after")
-    def _is_whole(self) -> Condition:
-        asks = (self.min is not None or self.max is not None, self.value is not None)
-        if (self.field is None and any(asks)) or (self.field is not None and sum(asks) != 1):
-            raise ValueError("give field with min, max or both, or field with value, or none of them")
-        refuse_disorder(self.min, self.max)
-        if self.tolerance and isinstance(self.value, bool):
-            raise ValueError("tolerance is for numbers, and true and false are none")
-        if self.tolerance and isinstance(self.value, str):
-            raise ValueError("tolerance is for numbers, and text has none: write a number without quotes")
-        return self
-
-    @property
-    def words(self) -> str:
-        """`linear.x of /cmd_vel at most 0.1`."""
-        if self.field is None:
-            return f"a message on {self.topic}"
-        return f"{'any of ' if self.items == 'any' else ''}{self.field} of {self.topic} {self._bounds()}"
-
-    @property
-    def absence(self) -> str:
-        """`no message on /cmd_vel with linear.x at least 0.1`."""
-        which = "any of " if self.items == "any" else ""
-        return f"no message on {self.topic}" + (
-            f" with {which}{self.field} {self._bounds()}" if self.field else ""
-        )
-
-    def _bounds(self) -> str:
-        if self.value is not None:
-            near = f", within {significant(self.tolerance)}" if self.tolerance else ""
-            return f"{value_text(self.value)}{near}"
-        return bounds_text(self.min, self.max)
-
-    def read(self, channels: Sequence[Channel]) -> list[Reading]:
-        """Return what of the messages is asked for, by time."""
-        if self.field is not None:
-            return readings(channels, self.field, numbers=self.value is None)
-        return sorted(Reading(t, (), "") for c in channels for t in c.times_ns)
-
-    def come_in(self, run: Run) -> list[Reading]:
-        """Return the same of all messages on the topic, from any node; or of the grader's calls of a service: one that
-        fits counts once it is answered, and ends when another one is made."""
-        if not is_called(run, self.topic):
-            return self.read([c for c in run.channels if c.topic == self.topic])
-        asked = []
-        for one in exchanges(run, self.topic):
-            found = Reading(one.at_ns, (), "")
-            if self.field is not None:
-                found = reading_of(one.at_ns, one.request, self.field, numbers=self.value is None)
-            if not self.holds(found):
-                asked.append(found)
-            elif one.answered_ns is not None and one.response is not None:
-                asked.append(found._replace(time_ns=one.answered_ns))
-        return asked
-
-    def holds(self, reading: Reading) -> bool:
-        if self.field is None:
-            return True
-        each = [self._fits(value) for value in reading.values]
-        return any(each) if self.items == "any" else bool(each) and all(each)
-
-    def _fits(self, value: object) -> bool:
-        if self.value is not None:
-            return next(differences(value, self.value, self.tolerance), None) is None
-        assert isinstance(value, int | float)  # noqa: S101 - what is not a number was left out
-        return is_within(value, self.min, self.max)
-
-
-def is_called(run: Run, name: str) -> bool:
-    """Return whether a name is that of a service which the grader calls, or would have called: a topic of the same name
-    is no cause then, unless the grader publishes on it."""
-    sent = any(c.topic == name and c.by_grader for c in run.channels)
-    called = (e for _, e in run.actors if e.topic == name and (e.action == "call" or e.detail == NOT_OFFERED))
-    return not sent and any(called)
 
 
 class ReactsParams(Record):
@@ -218,18 +117,18 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
     own = run.student_channels(params.effect.topic)
     effects = params.effect.read(own)
     answers = _answers(run, causes, effects, params)
-    instead = _instead(causes, effects, params) or _other_answer(answers, causes, effects, params)
+    instead = _instead(causes, effects, params) or _other_answer(answers, causes, effects, own, params)
     verdict = (
         # Whether an answer is missing can be said only where effects and causes were there to be seen.
         _nothing_to_judge(package, run, effects, own, params)
-        or _early(causes, effects, run, params)
+        or _early(causes, effects, own, run, params)
         or _unanswered(package, run, causes, params)
         or _never_caused(causes, run, params)
         or _judge_unanswered(answers, run, params, instead)
         or passed(f"{plural(len(answers), 'time')}, {params.effect.words} follows {params.trigger.words}")
     )
     if verdict.status is Status.FAIL:
-        verdict = _with_ranges(package, run, params, verdict)
+        verdict = _with_ranges(package, run, params, causes, verdict)
     times = [one.after_s for one in answers if one.after_s is not None]
     answered = f"{len(times)} of {plural(len(answers), 'answer')}"
     span = (answers[0].at_ns, answers[-1].at_ns) if answers else (None, None)
@@ -240,30 +139,30 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
     )
 
 
-def _with_ranges(package: PackageFacts, run: Run, params: ReactsParams, verdict: Verdict) -> Verdict:
+def _with_ranges(
+    package: PackageFacts, run: Run, params: ReactsParams, causes: Sequence[Reading], verdict: Verdict
+) -> Verdict:
     """Return the loss with what the script reads of a scan, where the range that is the cause is elsewhere."""
-    cause, reads = params.trigger, run_slips(package, run, "ranges-read")
-    index = re.fullmatch(r"ranges\[(\d+)\]", cause.field or "")
-    scans = [
-        c.values[0] for c in run.channels if c.topic == cause.topic and "LaserScan" in c.type and c.messages
-    ]
-    said = looks_elsewhere(scans[0], int(index[1]), reads) if index and scans and scans[0] else []
-    if not said or index is None:
+    scans = [c for c in run.channels if c.topic == params.trigger.topic and "LaserScan" in c.type]
+    reads = run_slips(package, run, "ranges-read") if scans else []
+    began = next((one for one in causes if params.trigger.holds(one)), None)
+    if not reads or began is None:
         return verdict
-    hint = f"read ranges[{index[1]}] too, and those around it"
-    return verdict.explained(join_words(said), hint, tuple(one.place for one in reads))
+    scan = next(
+        (one for c in scans for t, one in zip(c.times_ns, c.values, strict=True) if t == began.time_ns), None
+    )
+    index = params.trigger.first_in(began)
+    if scan is None or index is None or not (said := looks_elsewhere(scan, index, reads)):
+        return verdict
+    seen = f"the one that is near is ranges[{index}]; " if params.trigger.items == "any" else ""
+    around = "read all of them: `min(…)` is the smallest" if not scan["angle_increment"] else ""
+    hint = around or f"read ranges[{index}] too, and those around it"
+    return verdict.explained(seen + join_words(said), hint, tuple(one.place for one in reads))
 
 
 def _shown_on(run: Run, params: ReactsParams) -> str:
     """Return where the evidence has the causes: a service's calls are among what the grader did."""
     return "/grader/actor" if is_called(run, params.trigger.topic) else params.trigger.topic
-
-
-def how_shown(run: Run, cause: Condition) -> str:
-    """Return what shows a student whether the cause comes."""
-    command = "rosservice call" if is_called(run, cause.topic) else "rostopic echo"
-    command = f"{command} {cause.topic}"
-    return f"`{command}` shows what comes"
 
 
 def _causes(run: Run, params: ReactsParams) -> list[Reading]:
@@ -324,7 +223,11 @@ def _nothing_to_judge(
 
 
 def _early(
-    causes: Sequence[Reading], effects: Sequence[Reading], run: Run, params: ReactsParams
+    causes: Sequence[Reading],
+    effects: Sequence[Reading],
+    own: Sequence[Channel],
+    run: Run,
+    params: ReactsParams,
 ) -> Verdict | None:
     """The effect without its cause: between a first message that is not a cause, and the first that is one."""
     to_s = run_seconds(run)
@@ -342,6 +245,9 @@ def _early(
     if params.effect.field is not None and all(map(params.effect.holds, effects)):
         message = f"every message has {params.effect.words}, also those before {params.trigger.words}"
         hint = f"give {params.effect.field} another value until the message comes that calls for this one"
+        if beside := changing_beside(own, params.effect.field):
+            message += f"; what changes is {beside}"
+            hint = f"set {params.effect.field}, not {beside}"
     elif _is_turned_round(causes, effects, params):
         message = f"{params.effect.words} comes without {params.trigger.words}, and not with it"
         hint = "turn the condition around, or swap its two branches"
@@ -389,6 +295,8 @@ def _judge_silence(package: PackageFacts, run: Run, params: ReactsParams) -> Ver
         or _silent_without_reason(package, run, causes, spans, params)
         or _kept_silent(own, params)
     )
+    if verdict.status is Status.FAIL and params.cause:
+        verdict = _with_ranges(package, run, params, causes, verdict)
     expected = f"{params.effect.absence} {_silent_words(params)}"
     cited = (cite(run, params.effect.topic if effects else "/grader/graph"),)
     return verdict.about(expected=expected, measured=verdict.measured or "none", citations=cited)
@@ -418,18 +326,6 @@ def _silent_spans(causes: Sequence[Reading], run: Run, params: ReactsParams) -> 
     return true_spans(params.cause, causes, run)
 
 
-def true_spans(cause: Condition, causes: Sequence[Reading], run: Run) -> list[tuple[int, int]]:
-    """Return the stretches of time for which a condition is true of the last message on its topic."""
-    until_ns = observed_until_ns(run) or run.end_ns
-    stretches = [(held, next(group).time_ns) for held, group in groupby(causes, key=cause.holds)]
-    ends = [*(from_ns for _, from_ns in stretches[1:]), until_ns]
-    return [
-        (from_ns, min(end_ns, until_ns))
-        for (held, from_ns), end_ns in zip(stretches, ends, strict=False)
-        if held
-    ]
-
-
 def _disturbed(
     effects: Sequence[Reading], spans: Sequence[tuple[int, int]], run: Run, params: ReactsParams
 ) -> Verdict | None:
@@ -443,6 +339,12 @@ def _disturbed(
     when = f"{to_s(came[0]) - to_s(from_ns):.2f} s after {params.cause.words if params.cause else 'the run began'}"
     message = f"{params.effect.words} comes {when}, where none may come"
     hint = f"before you publish on {params.effect.topic}, check whether the node may do so now"
+    if params.cause and params.effect.field and all(map(params.effect.holds, effects)):
+        message += f"; all {plural(len(effects), 'message')} on {params.effect.topic} have it"
+        hint = (
+            f"in the callback of {params.cause.topic}, give {params.effect.field} another value as long as "
+        )
+        hint += f"{params.cause.words} comes"
     verdict = failed(message, hint=hint, measured=plural(count, "message"))
     # What comes again and again is not explained by a late machine, nor is what follows no cause.
     if len(wrong) > 1 or params.cause is None:
@@ -529,7 +431,11 @@ def _instead(
 
 
 def _other_answer(
-    answers: Sequence[Answer], causes: Sequence[Reading], effects: Sequence[Reading], params: ReactsParams
+    answers: Sequence[Answer],
+    causes: Sequence[Reading],
+    effects: Sequence[Reading],
+    own: Sequence[Channel],
+    params: ReactsParams,
 ) -> tuple[str, str] | None:
     """Return, in words, what comes upon the cause where the effect never does, and what to look at."""
     at_ns = answers[0].at_ns if answers else math.inf
@@ -545,8 +451,11 @@ def _other_answer(
         )
     field = params.effect.field
     hint = f"in the callback of {params.trigger.topic}, look at what you publish on {params.effect.topic}: "
-    fix = f"{hint}{field} has to be {value_text(params.effect.value)}"
-    return f"{field} is {value_text(came.values[0])} then", fix
+    fix, wanted = f"{hint}{field} has to be {value_text(params.effect.value)}", params.effect.value
+    beside = set_beside(own, came.time_ns, field or "", wanted, params.effect.tolerance)
+    also = f", and {beside} is {value_text(wanted)}" if beside else ""
+    fix = f"set {field} to {value_text(wanted)}, not {beside}" if beside else fix
+    return f"{field} is {value_text(came.values[0])} then{also}", fix
 
 
 def _judge_unanswered(

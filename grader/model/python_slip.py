@@ -105,7 +105,8 @@ class PythonSlip(Placed, Record):
     - `reset-value`, `reset-limit`: where a counter goes back, to the number `message`, or when it reaches it (`name`:
       `range`, where it is that of a loop).
     - `sets-parameter`: where it sets a parameter.
-    - `ranges-read`: which ranges of a scan it reads there (`90`, `0:45`, `-30:`); only where it reads no others.
+    - `ranges-read`: which ranges of a scan it reads there (`90`, `-30:`, `n//2-9:` with `n` for their count); only where
+      it reads no others.
     - `argument-text`: where an argument of the command line is kept as a text; `fix` is the line with a number in its
       place.
     - `no-argument`: where a program of C++ reads an argument, the `name`-th, whether there is one or not.

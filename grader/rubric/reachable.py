@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
-from grader.checks.reacts import Condition
+from grader.checks.conditions import Condition
 from grader.checks.registry import Check
 from grader.checks.support.fields import Reading, is_number
 from grader.rubric.definitions import PATH_PARTS, is_form

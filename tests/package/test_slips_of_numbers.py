@@ -320,6 +320,12 @@ def test_int_of_a_number_just_below_0(check: str, fixes: list[str], tmp_path: Pa
         ("print(msg.ranges[n], msg.ranges[0])", []),
         ("r = msg.ranges; print(nearest(r), r[0])", []),
         ("print(msg.ranges[::2])", []),
+        ("print(msg.ranges[len(msg.ranges) // 2])", ["n//2"]),
+        ("m = int(len(msg.ranges) / 2); print(msg.ranges[m - 45:m + 45])", ["n//2-45:n//2+45"]),
+        ("n = len(msg.ranges) - 1; print(msg.ranges[3 * n // 4], msg.ranges[n])", []),
+        ("if msg.ranges: print(msg.ranges[len(msg.ranges) * 3 // 4 + 1])", ["n*3//4+1"]),
+        ("i = 3; i = i + 1; print(msg.ranges[i])", []),
+        ("for i in range(9): print(msg.ranges[i])", []),
     ],
 )
 def test_which_ranges_of_a_scan_are_read(lines: str, read: list[str], tmp_path: Path) -> None:
@@ -347,6 +353,9 @@ def test_a_quaternion_of_a_whole_angle(lines: str, fixes: list[str], tmp_path: P
     assert [s.fix for s in slips if s.name == "half"] == fixes
 
 
+ASK = "ask whether `min(…)` of them is small, or whether any of them is"
+
+
 @pytest.mark.parametrize(
     ("lines", "fixes"),
     [
@@ -355,6 +364,18 @@ def test_a_quaternion_of_a_whole_angle(lines: str, fixes: list[str], tmp_path: P
         ("if max(msg.ranges) < 0.5: stop()", ["on line 2, write `min` for `max`"]),
         ("far = max(msg.ranges[:9])\nif far < 0.5: stop()", ["on line 2, write `min` for `max`"]),
         ("if max(msg.ranges) > 3: go()", []),
+        (
+            "a = [r for r in near if r]\nd = max(a) if a else 9\nif d < 0.5: print(min(a))",
+            ["on line 3, write `min` for `max`"],
+        ),
+        ("for r in near:\n    if r > 0.5:\n        wall = False", [f"on line 3, {ASK}"]),
+        ("if any(r > NEAR for r in near): go()", [f"on line 2, {ASK}"]),
+        ("if all([r < 0.5 for r in near]): stop()", [f"on line 2, {ASK}"]),
+        ("if all(r > 0.5 for r in near): go()", []),
+        ("if any(r < 0.5 for r in near): stop()", []),
+        ("for r in near:\n    if r < 0.5:\n        wall = True", []),
+        ("for r in near:\n    if r > far:\n        far = r", []),
+        ("for r in near:\n    if r > 0.5:\n        free = True\nif min(near) < 0.5: stop()", []),
     ],
 )
 def test_the_mean_of_ranges(lines: str, fixes: list[str], tmp_path: Path) -> None:

@@ -121,6 +121,16 @@ def set_beside(channels: Iterable[Channel], time_ns: int, path: str, wanted: obj
     return found[0] if len(found) == 1 else ""
 
 
+def changing_beside(channels: Iterable[Channel], path: str) -> str:
+    """Return the one other field of the messages whose values are not all the same; "" for none or several."""
+    seen: dict[str, set[str]] = {}
+    for message in (one for channel in channels for one in channel.values):
+        for name, value in _leaves(message):
+            seen.setdefault(name, set()).add(value_text(value))
+    found = [name for name, values in seen.items() if name != path and len(values) > 1]
+    return found[0] if len(found) == 1 else ""
+
+
 def _leaves(value: object, path: str = "") -> Iterator[tuple[str, object]]:
     if isinstance(value, Mapping):
         for name, inner in value.items():

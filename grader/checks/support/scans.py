@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -50,19 +51,43 @@ def scan_near(path: Sequence[Pose], out: Sequence[float], band: Band, run: Run) 
     return {**scan, "topic": scans[0].topic} if scan and nearest_seen(scan) else None
 
 
+def index_of(text: str, count: int) -> int | None:
+    """Return the number that an index is, `n` of it being the count of ranges: `n*3//4-45`; None where it is none."""
+    part = re.fullmatch(r"(?:(n)(?:\*(\d{1,6}))?(?://(\d{1,6}))?)?([+-]?\d{1,9})?", text)
+    if not text or part is None:
+        return None
+    times, by = (1 if part[1] else 0) * int(part[2] or 1), int(part[3] or 1)
+    return (count * times // by if by else 0) + int(part[4] or 0)
+
+
+def indexes_read(read: PythonSlip, count: int) -> range | None:
+    """Return which ranges of so many a line of a script reads; None where that is not known."""
+    first, to, last = read.message.partition(":")
+    start, end = index_of(first, count), index_of(last, count)
+    if (first and start is None) or (last and end is None):
+        return None
+    bounds = slice(start, end)
+    return range(*bounds.indices(count)) if to else range(count)[start : (start or 0) + 1 or None]
+
+
 def looks_elsewhere(scan: Mapping[str, Any], index: int, reads: Sequence[PythonSlip]) -> list[str]:
     """Return what a script reads of a LaserScan, and where that is, if none of it is near a range; else nothing."""
     said, count = [], len(scan["ranges"])
     for one in reads:
-        first, to, last = one.message.partition(":")
-        bounds = slice(int(first) if first else None, int(last) if last else None)
-        numbers = range(*bounds.indices(count)) if to else range(count)[int(first) : int(first) + 1 or None]
-        apart = (math.remainder(_degrees(scan, number) - _degrees(scan, index), 360) for number in numbers)
-        if any(abs(deg) < NEAR_DEG for deg in apart):
+        numbers = indexes_read(one, count)
+        if numbers is None:
             return []
-        places = dict.fromkeys(seen_at(scan, number) for number in [*numbers[:1], *numbers[-1:]])
-        said.append(f"ranges[{one.message}] on line {one.line} is {' to '.join(places) or 'empty'}")
-    return said
+        apart = (math.remainder(_degrees(scan, number) - _degrees(scan, index), 360) for number in numbers)
+        # a scan that the grader made up may be without angles
+        if index in numbers or (scan["angle_increment"] and any(abs(deg) < NEAR_DEG for deg in apart)):
+            return []
+        ends = [*numbers[:1], *numbers[-1:]]
+        places = [seen_at(scan, n) if scan["angle_increment"] else f"ranges[{n}]" for n in ends]
+        as_written = f"ranges[{one.message.replace('n', 'len(…)')}]"
+        where = " to ".join(dict.fromkeys(places)) or "empty"
+        said.append(f"{as_written} on line {one.line} is {where}")
+    # `ranges[2]` says by itself which one it is
+    return [re.sub(r"^(ranges\[\d+\]) on line (\d+) is \1$", r"line \2 reads \1 alone", one) for one in said]
 
 
 def with_scan(verdict: Verdict, scan: Mapping[str, Any], reads: Sequence[PythonSlip]) -> Verdict:
