@@ -484,4 +484,8 @@ def _judge_unanswered(
         return verdict.if_repeated() if len(answers) == 1 else verdict
     how = "does not follow" if late is None else f"comes up to {late:.2f} s after"
     verdict = failed(f"{len(slow)} of {times} {reaction.format(how)}", hint=hint).late(due).if_repeated()
+    # once the first answer that is missing was due, none comes any more
+    since = next(number for number, one in enumerate(answers) if one in slow)
+    if since and all(one.after_s is None for one in answers[since:]):
+        verdict = verdict.stuck()
     return excused(verdict, run, slow[0].at_ns, run.end_ns, why_late)

@@ -54,6 +54,7 @@ LATE_P95_MS = 5.0
 LATE_TURNS = 4
 """Each turn may be late: at 1.6 rad/s, 25 ms in each of four are 0.16 rad, and 0.3 m beside a line of 2 m."""
 ORIGIN = (0.0, 0.0)
+STOPPED = "look at the condition that stops it: the distance is math.hypot(dx, dy), which is never below 0"
 DRIVE = "publish a velocity that is not 0, again and again for as long as it should drive"
 DEGREES_FROM = 20.0
 """Radians a second that no robot of a lab turns with, and that small angles in degrees come to."""
@@ -237,7 +238,8 @@ def drives_too_little(path: Sequence[Pose], region: Region, least_m: float) -> V
             message += f", at least {metres(free_m)} from any wall"
         why = "look at the condition under which it drives: it does not hold there"
         hint = f"{hint}; {why}" if turns else why
-    return failed(message, hint=hint)
+    verdict = failed(message, hint=hint)
+    return verdict.stuck() if stands(recent) and not turns else verdict
 
 
 AHEAD = "drive on where the way is clear: look at the ranges in front alone, by their angles in radians"

@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from grader.checks.registry import Refers, check
 from grader.checks.robot_path import (
     DRIVE,
+    STOPPED,
     TURNS_S,
     drives_too_little,
     metres,
@@ -349,10 +350,9 @@ def _never_moves(
     if any(command.forward for command in sent):
         return failed_or_blocked(f"{message}, though it is told to drive", hint=IN_ITS_WAY)
     if not sent or any(command.speed or command.turn for command in sent):
-        return why_still(failed_or_blocked(message, hint=DRIVE), run)
+        return why_still(failed_or_blocked(message, hint=DRIVE).stuck(params.number), run)
     message += f": {plural(len(sent), 'velocity', 'velocities')} came, and {'all are' if len(sent) > 1 else 'it is'} 0"
-    hint = "look at the condition that stops it: the distance is math.hypot(dx, dy), which is never below 0"
-    return failed_or_blocked(message, hint=hint)
+    return failed_or_blocked(message, hint=STOPPED)
 
 
 def _fell_silent(

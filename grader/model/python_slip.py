@@ -87,8 +87,8 @@ class PythonSlip(Placed, Record):
       or what each turn of a loop adds or sets again (`name`: `nan`, `degrees`, `return`, `empty`, `unsent`, `kept`,
       `nanoseconds`, `bounds`, `added`); a grid's index that steps by its height, a cell that `int(…)` works out of a
       number below 0, a quaternion of a whole angle, a float for the seconds of a time, the mean of a scan's ranges, a
-      distance without its square root, and a parameter that is read where it is not set (`step`, `cut`, `half`,
-      `secs`, `mean`, `rootless`, `unset`).
+      distance without its square root, a parameter that is read where it is not set, and what nothing sets back
+      (`step`, `cut`, `half`, `secs`, `mean`, `rootless`, `unset`, `stuck`).
 
     No slips, but what a line says, for checks that compare it with what the lab asks; `message` is a name, a number or
     a text:
@@ -105,8 +105,8 @@ class PythonSlip(Placed, Record):
     - `reset-value`, `reset-limit`: where a counter goes back, to the number `message`, or when it reaches it (`name`:
       `range`, where it is that of a loop).
     - `sets-parameter`: where it sets a parameter.
-    - `ranges-read`: which ranges of a scan it reads there (`90`, `-30:`, `n//2-9:` with `n` for their count); only where
-      it reads no others.
+    - `ranges-read`: which ranges of a scan it reads there (`90`, `-30:`, `n//2-9:` with `n` for their count); only
+      where it reads no others.
     - `argument-text`: where an argument of the command line is kept as a text; `fix` is the line with a number in its
       place.
     - `no-argument`: where a program of C++ reads an argument, the `name`-th, whether there is one or not.

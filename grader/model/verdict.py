@@ -175,9 +175,10 @@ class Verdict(Record):
     """What a node printed, logged or published in place of what was asked: its lines in the sources are cited."""
     sought: tuple[Sought, ...] = ()
     """Names whose lines are cited."""
-    wrong: Literal["", "value", "nan", "nothing", "order", "place"] = ""
+    wrong: Literal["", "value", "nan", "nothing", "order", "place", "stuck"] = ""
     """A value is another one, or NaN is in its place, or nothing came (no answer of a service, no feedback), or the
-    items of a list are in another order, or one of them is set that is not to be."""
+    items of a list are in another order, or one of them is set that is not to be, or what was right at first
+    never is again."""
     callbacks: Literal["", "late", "before"] = ""
     """A callback came too `late` to what was sent, or never; or it is about what came `before` any callback could keep
     the node waiting."""
@@ -248,6 +249,10 @@ class Verdict(Record):
     def of_value(self, *, nan: bool) -> Verdict:
         """Return the verdict marked as one on a wrong value; `nan`: it is NaN, or should be."""
         return self.model_copy(update={"wrong": "nan" if nan else "value"})
+
+    def stuck(self, number: int = 2) -> Verdict:
+        """Return the verdict marked as one on what is not done again, from its second time on."""
+        return self.model_copy(update={"wrong": "stuck"}) if number > 1 else self
 
     def late(self, due: Iterable[Span] = ()) -> Verdict:
         """Return the verdict marked as one that shows a callback which came too late, or never, when it was `due`."""

@@ -7,7 +7,18 @@ Nothing is executed. Python 3.8, standard library only.
 import ast
 from collections import Counter
 
-from script_names import all_of, called_name, dotted, key_of, listed, names_in, parents_of, slip, text_of
+from script_names import (
+    USES_LIMIT,
+    all_of,
+    called_name,
+    dotted,
+    key_of,
+    listed,
+    names_in,
+    parents_of,
+    slip,
+    text_of,
+)
 
 SIDES = ("width", "height")
 
@@ -312,7 +323,7 @@ def ranges_read(tree):
         if isinstance(around, ast.Assign) or called_name(around) == "len" or is_truth(node, around):
             continue
         index = index_text(around, once) if isinstance(around, ast.Subscript) and around.value is node else ""
-        if not index:
+        if not index or len(found) >= USES_LIMIT:
             return  # here it may read any of them
         found.append(slip(node.lineno, "ranges-read", index, name=dotted(node)))
     yield from found

@@ -410,3 +410,80 @@ def zeros_in(choice):
     """Return what an `if` gives the value 0."""
     given = [n for n in ast.walk(choice) if isinstance(n, ast.Assign) and getattr(n.value, "value", 1) == 0]
     return {dotted(target) for n in given for target in n.targets}
+
+
+def values_never_set_back(tree):
+    """Yield each `if` that gives a name, or a speed of a Twist that is kept, a fixed value which nothing takes back:
+    `stopped = True`, where all other lines that set `stopped` run once, at the beginning."""
+    given = {}
+    for node in all_of(tree, ast.Assign, ast.AugAssign, ast.AnnAssign, ast.For):
+        for target in getattr(node, "targets", None) or [node.target]:
+            given.setdefault(dotted(target), []).append(node)
+    shared = {name for n in all_of(tree, ast.Global) for name in n.names}
+    tests = [n.test for n in all_of(tree, ast.If, ast.While, ast.IfExp)][: 10 * USES_LIMIT]
+    asked = {name for test in tests for name in names_in(test)}
+    sent = {dotted(n.args[0]) for n in calls_in(tree, "publish") if n.args}
+    made = {one for one in sent - {"..."} if len(given.get(one, ())) == 1}
+    for name, nodes in given.items():
+        is_speed = name.count(".") > 1 and name.rsplit(".", 2)[0] in made
+        if 1 < len(nodes) < USES_LIMIT and (is_speed or (name in asked and is_kept(name, nodes, shared))):
+            yield from never_back(name, nodes, tree, is_speed)
+
+
+def is_kept(name, nodes, shared):
+    """Whether a name keeps its value from call to call, and is given nothing but True and False."""
+    fixed = all(getattr(getattr(n, "value", None), "value", None) in (True, False) for n in nodes)
+    return fixed and (name.startswith("self.") or name in shared)
+
+
+def never_back(name, nodes, tree, is_speed):
+    """Yield the one `if` in which a name gets another value than at the beginning."""
+    at_first, later = [], []
+    for node in nodes:
+        choice = choice_around(node, tree)
+        is_first = choice is None and function_around(node, tree) in ("", "__init__", "main")
+        if is_first and not in_loop(node, tree):
+            at_first.append(node.value)
+        elif choice is not None and isinstance(node, ast.Assign):
+            later.append((choice, node))
+        else:
+            return
+    values = {repr(getattr(node.value, "value", node)) for _, node in later}
+    if len(at_first) != 1 or len({choice for choice, _ in later}) != 1 or len(values) != 1:
+        return
+    (choice, node), before = later[0], at_first[0]
+    value, back = getattr(node.value, "value", None), dotted(before)
+    if isinstance(before, ast.Constant):
+        back = repr(before.value)
+    is_other = value in ((0,) if is_speed else (True, False)) and back not in (repr(value), "0", "0.0")
+    # `if not started: started = True` is to happen once
+    if is_other and "..." not in back and name not in names_in(choice.test):
+        message = "`%s` is %r from line %d on, and no line sets it back" % (name, value, node.lineno)
+        fix = "write `%s = %s` %s" % (name, back, where_it_is_over(choice, node))
+        yield slip(node.lineno, "wrong-value", message, fix, "stuck")
+
+
+def where_it_is_over(choice, node):
+    """Return in words where to take back what a statement does in an `if`."""
+    if node in choice.body and len(choice.orelse) <= 1:
+        return "in an `else` of the `if` on line %d" % choice.lineno
+    return "in the `else` of line %d" % choice.lineno if node in choice.body else "where that is over"
+
+
+def choice_around(node, tree):
+    """Return the `if` around a statement, but not that of `__name__`; None where it stands in none."""
+    parents = parents_of(tree)
+    while node is not tree and not isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+        node = parents[node]
+        if isinstance(node, ast.If) and "__name__" not in names_in(node.test):
+            return node
+    return None
+
+
+def in_loop(node, tree):
+    parents = parents_of(tree)
+    while node is not tree and not isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+        node = parents[node]
+        if isinstance(node, (ast.While, ast.For)):
+            return True
+    return False

@@ -1,0 +1,115 @@
+"""What `lint/` finds in scripts that read a scan, and in what they keep of it."""
+
+from pathlib import Path
+
+import pytest
+
+from grader.package.python import check_syntax
+
+ASK = "ask whether `min(…)` of them is small, or whether any of them is"
+
+
+@pytest.mark.parametrize(
+    ("lines", "read"),
+    [
+        ("a = min(msg.ranges[0:45] + msg.ranges[-45:])", ["0:45", "-45:"]),
+        ("r = msg.ranges; n = len(r); print(r[90], r[:3])", ["90", ":3"]),
+        ("print(msg.ranges[0], min(msg.ranges))", []),
+        ("print(msg.ranges[n], msg.ranges[0])", []),
+        ("r = msg.ranges; print(nearest(r), r[0])", []),
+        ("print(msg.ranges[::2])", []),
+        ("print(msg.ranges[len(msg.ranges) // 2])", ["n//2"]),
+        ("m = int(len(msg.ranges) / 2); print(msg.ranges[m - 45:m + 45])", ["n//2-45:n//2+45"]),
+        ("n = len(msg.ranges) - 1; print(msg.ranges[3 * n // 4], msg.ranges[n])", []),
+        ("if msg.ranges: print(msg.ranges[len(msg.ranges) * 3 // 4 + 1])", ["n*3//4+1"]),
+        ("i = 3; i = i + 1; print(msg.ranges[i])", []),
+        ("for i in range(9): print(msg.ranges[i])", []),
+    ],
+)
+def test_which_ranges_of_a_scan_are_read(lines: str, read: list[str], tmp_path: Path) -> None:
+    text = f"def heard(msg):\n    {lines}\n"
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.message for s in slips if s.kind == "ranges-read"] == read
+
+
+@pytest.mark.parametrize(
+    ("lines", "fixes"),
+    [
+        ("far = sum(near) / len(near)", ["on line 2, write `min(near)` in its place"]),
+        ("far = sum(near) / len(near)\nfirst = min(near)", []),
+        ("if max(msg.ranges) < 0.5: stop()", ["on line 2, write `min` for `max`"]),
+        ("far = max(msg.ranges[:9])\nif far < 0.5: stop()", ["on line 2, write `min` for `max`"]),
+        ("if max(msg.ranges) > 3: go()", []),
+        (
+            "a = [r for r in near if r]\nd = max(a) if a else 9\nif d < 0.5: print(min(a))",
+            ["on line 3, write `min` for `max`"],
+        ),
+        ("for r in near:\n    if r > 0.5:\n        wall = False", [f"on line 3, {ASK}"]),
+        ("if any(r > NEAR for r in near): go()", [f"on line 2, {ASK}"]),
+        ("if all([r < 0.5 for r in near]): stop()", [f"on line 2, {ASK}"]),
+        ("if all(r > 0.5 for r in near): go()", []),
+        ("if any(r < 0.5 for r in near): stop()", []),
+        ("for r in near:\n    if r < 0.5:\n        wall = True", []),
+        ("for r in near:\n    if r > far:\n        far = r", []),
+        ("for r in near:\n    if r > 0.5:\n        free = True\nif min(near) < 0.5: stop()", []),
+    ],
+)
+def test_the_mean_of_ranges(lines: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"near = msg.ranges[:9]\n{lines}\n", encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.fix for s in slips if s.name == "mean"] == fixes
+
+
+KEPT = """\
+class Stop:
+    def __init__(self):
+        self.stopped = False
+        self.cmd = Twist()
+        self.cmd.linear.x = 0.2
+    def heard(self, msg):
+        if min(msg.ranges) < 0.5:
+            SET
+        OTHER
+        if self.stopped:
+            self.pub.publish(Twist())
+        else:
+            self.pub.publish(self.cmd)
+"""
+
+
+@pytest.mark.parametrize(
+    ("given", "other", "fixes"),
+    [
+        ("self.stopped = True", "pass", ["write `self.stopped = False` in an `else` of the `if` on line 7"]),
+        (
+            "self.cmd.linear.x = 0",
+            "pass",
+            ["write `self.cmd.linear.x = 0.2` in an `else` of the `if` on line 7"],
+        ),
+        ("pass", "self.stopped = len(msg.ranges) > 0", []),
+        ("self.stopped = True", "self.stopped = self.stopped and near", []),
+        ("self.stopped = True", "if free: self.stopped = False", []),
+        ("self.cmd.linear.x = 0", "self.cmd = Twist()", []),
+        ("self.cmd.linear.x = 0.1", "pass", []),
+        ("self.cmd.angular.z = 1", "pass", []),
+    ],
+)
+def test_what_nothing_sets_back(given: str, other: str, fixes: list[str], tmp_path: Path) -> None:
+    text = KEPT.replace("SET", given).replace("OTHER", other)
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "stuck"] == fixes
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "started = False\ndef heard(msg):\n    global started\n    if not started:\n        started = True\n",
+        "near = False\ndef heard(msg):\n    if msg.data:\n        near = True\n    if near:\n        stop()\n",
+        "while go:\n    near = False\n    if wall:\n        near = True\n    if near:\n        stop()\n",
+        "v = Twist()\nv.linear.x = 1\nwhile a:\n    v.linear.x = 1\n    if b: v.linear.x = 0\n    p.publish(v)",
+    ],
+)  # fmt: skip
+def test_what_need_not_be_set_back(text: str, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    assert not [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "stuck"]
