@@ -6,6 +6,29 @@ import pytest
 
 from grader.package.python import check_syntax
 
+HELPER = """\
+def get(self, degrees):
+    return self.scan.ranges[int(degrees) % 360]
+"""
+
+
+@pytest.mark.parametrize(
+    ("calls", "read"),
+    [
+        ("a = self.get(90)\nb = min(self.get(d) for d in range(-25, 26))\n", ["90", "-25:", ":26"]),
+        ("a = self.get(90)\nb = self.get(angle)\n", []),
+        ("def near(self, d):\n    return self.get(d)\na = self.near(270)\n", ["270"]),
+        ("def near(self, d):\n    d += 1\n    return self.get(d)\na = self.near(270)\n", []),
+        ("def near(self, d):\n    return self.get(d) + self.near(d)\n", []),
+        ("", []),
+    ],
+)
+def test_which_ranges_a_function_is_asked_for(calls: str, read: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(HELPER + calls, encoding="utf-8")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.message for s in slips if s.kind == "ranges-read"] == read
+
+
 ASK = "ask whether `min(…)` of them is small, or whether any of them is"
 
 
@@ -23,7 +46,11 @@ ASK = "ask whether `min(…)` of them is small, or whether any of them is"
         ("n = len(msg.ranges) - 1; print(msg.ranges[3 * n // 4], msg.ranges[n])", []),
         ("if msg.ranges: print(msg.ranges[len(msg.ranges) * 3 // 4 + 1])", ["n*3//4+1"]),
         ("i = 3; i = i + 1; print(msg.ranges[i])", []),
-        ("for i in range(9): print(msg.ranges[i])", []),
+        ("for i in range(9): print(msg.ranges[i])", ["0:9"]),
+        ("print([msg.ranges[i] for i in range(-9, 10)])", ["-9:", ":10"]),
+        ("print(min(msg.ranges[d % 360] for d in [0, 90, -5]))", ["0", "90", "-5"]),
+        ("for i in range(len(msg.ranges)): print(msg.ranges[i])", []),
+        ("for i in range(0, 90, 5): print(msg.ranges[i])", []),
     ],
 )
 def test_which_ranges_of_a_scan_are_read(lines: str, read: list[str], tmp_path: Path) -> None:
@@ -113,3 +140,48 @@ def test_what_nothing_sets_back(given: str, other: str, fixes: list[str], tmp_pa
 def test_what_need_not_be_set_back(text: str, tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(text, encoding="utf-8")
     assert not [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "stuck"]
+
+
+TURNED = """\
+front = msg.ranges[:45]
+d = min(front)
+if TEST:
+    cmd.linear.x = 0.2
+else:
+    cmd.linear.x = 0
+    cmd.angular.z = 0.5
+"""
+
+
+@pytest.mark.parametrize(
+    ("test", "fixes"),
+    [
+        ("d < 0.5", ["on line 3, write `>` in place of `<`, or swap the two branches"]),
+        ("min(front) <= NEAR", ["on line 3, write `>` in place of `<`, or swap the two branches"]),
+        ("d > 0.5", []),
+        ("speed < 0.5", []),
+        ("d < 0.5 and free", []),
+    ],
+)
+def test_conditions_that_are_the_wrong_way_round(test: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(TURNED.replace("TEST", test), encoding="utf-8")
+    assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "bounds"] == fixes
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        ("for r in msg.ranges:\n    if r == float('inf'):\n        r = 0\n    a.append(r)\n", [3]),
+        ("def at(i):\n    r = msg.ranges[i]\n    if math.isinf(r):\n        return 0.0\n    return r\n", [4]),
+        ("a = [0 if r >= msg.range_max else r for r in msg.ranges]\n", [1]),
+        ("a = np.array(msg.ranges)\na[np.isinf(a)] = 0\n", [2]),
+        ("a = [0 if math.isinf(r) else r for r in msg.ranges]\nb = [r for r in a if r > 0]\n", []),
+        ("a = [10 if math.isinf(r) else r for r in msg.ranges]\n", []),
+        ("a = [r if math.isinf(r) else 0 for r in msg.ranges]\n", []),
+        ("a = [0 if r < msg.range_max else r for r in msg.ranges]\n", []),
+        ("if math.isinf(x):\n    x = 0\n", []),
+    ],
+)
+def test_inf_that_is_made_0(text: str, lines: list[int], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    assert [s.line for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "bounds"] == lines

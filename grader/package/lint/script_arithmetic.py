@@ -1,21 +1,17 @@
-"""Finds wrong arithmetic in a student's Python, of indexes, angles, distances and times, for `slips.py`, and with which
-indexes it reads a scan.
+"""Finds wrong arithmetic in a student's Python, of indexes, angles, distances and times, for `slips.py`.
 
 Nothing is executed. Python 3.8, standard library only.
 """
 
 import ast
-from collections import Counter
 
 from script_names import (
-    USES_LIMIT,
     all_of,
     called_name,
     dotted,
     key_of,
     listed,
     names_in,
-    parents_of,
     slip,
     text_of,
 )
@@ -24,7 +20,7 @@ SIDES = ("width", "height")
 
 
 def arithmetic_slips(tree):
-    """Numbers that are worked out wrongly, and which ranges of a scan are read."""
+    """Numbers that are worked out wrongly."""
     sides, cells = grid_sides(tree), names_of_cells(tree)
     for node in all_of(tree, ast.Subscript):
         key, line = key_of(node), getattr(node, "lineno", 0)
@@ -37,8 +33,6 @@ def arithmetic_slips(tree):
     yield from cut_to_zero(tree)
     yield from whole_angles(tree)
     yield from float_seconds(tree)
-    yield from not_the_smallest(tree)
-    yield from ranges_read(tree)
     yield from without_root(tree)
 
 
@@ -133,97 +127,6 @@ def float_seconds(tree):
             yield slip(node.lineno, "wrong-value", message, fix, "secs")
 
 
-SMALLEST = ("min", "nanmin", "amin", "sorted", "sort", "argmin")
-PRINTS = ("print", "loginfo", "logwarn", "logdebug", "logerr", "write")
-
-
-def not_the_smallest(tree):
-    """`sum(front) / len(front)`, `max(front) < 0.5`, or `any(r > 0.5 for r in front)`, in a script that reads a scan
-    and looks for no smallest one, but to print it."""
-    held = names_of_ranges(tree)
-    every = all_of(tree, ast.Call)
-    printed = {id(n) for call in every if called_name(call) in PRINTS for n in ast.walk(call)}
-    if not held or any(called_name(n) in SMALLEST and id(n) not in printed for n in every):
-        return
-    for node in all_of(tree, ast.BinOp):
-        is_mean = (
-            isinstance(node.op, ast.Div)
-            and called_name(node.left) == "sum"
-            and called_name(node.right) == "len"
-        )
-        if is_mean and node.left.args and node.right.args and names_in(node.left) & held:
-            name = dotted(node.right.args[0])
-            message = "the mean of many ranges is large even where one of them is small"
-            fix = "on line %d, write `min(%s)` in its place" % (node.lineno, "…" if "..." in name else name)
-            yield slip(node.lineno, "wrong-value", message, fix, "mean")
-    made = {dotted(n.targets[0]): n.value for n in all_of(tree, ast.Assign) if calls_of(n.value, "max")}
-    tests = [n for n in all_of(tree, ast.Compare) if isinstance(n.ops[0], (ast.Lt, ast.LtE))]
-    for value in (made.get(dotted(n.left), n.left) for n in tests):
-        for call in (one for one in calls_of(value, "max") if names_in(one) & held):
-            message = "the largest of these ranges is small only where all of them are"
-            fix = "on line %d, write `min` for `max`" % call.lineno
-            yield slip(call.lineno, "wrong-value", message, fix, "mean")
-    yield from far_decides(tree, held)
-
-
-def calls_of(node, *names):
-    """Return the calls of these functions in a value."""
-    return [n for n in ast.walk(node) if called_name(n) in names] if node is not None else []
-
-
-def names_of_ranges(tree):
-    """Return the names in a script that stand for ranges of a scan: the field's own, and what is made of them."""
-    held = {dotted(n) for n in all_of(tree, ast.Attribute) if is_ranges(n)}
-    for node in all_of(tree, ast.Assign) if held else ():
-        if names_in(node.value) & held and not calls_of(node.value, "len", "min", "max", "sum"):
-            held |= {
-                dotted(target) for target in node.targets if isinstance(target, (ast.Name, ast.Attribute))
-            }
-    return held - {"..."}
-
-
-FAR = (ast.Gt, ast.GtE)
-
-
-def far_decides(tree, held):
-    """`for r in ranges: if r > 0.5: near = False`, and the same in one line: a single range that is large decides."""
-    found = {}
-    for loop in all_of(tree, ast.For):
-        only = loop.body[0] if len(loop.body) == 1 else None
-        if not isinstance(only, ast.If) or only.orelse or not names_in(loop.iter) & held:
-            continue
-        flags = {dotted(n.targets[0]) for n in only.body if is_flag(n)}
-        if flags and len(flags) == len(only.body):
-            found[only.lineno] = (only.test, names_in(loop.target))
-    for node in all_of(tree, ast.Call):
-        each = node.args[0] if node.args and called_name(node) in ("any", "all") else None
-        if isinstance(each, (ast.GeneratorExp, ast.ListComp)) and names_in(each.generators[0].iter) & held:
-            # `all(r < 0.5 …)` is another one, and `all(r > 0.5 …)` is right
-            names, turned = names_in(each.generators[0].target), called_name(node) == "all"
-            found[node.lineno] = (each.elt, names, turned)
-    for line, (test, names, *turned) in found.items():
-        kinds = (ast.Lt, ast.LtE) if any(turned) else FAR
-        is_bound = isinstance(test, ast.Compare) and len(test.ops) == 1 and isinstance(test.ops[0], kinds)
-        if is_bound and dotted(test.left) in names and number_in(test.comparators[0]) is not None:
-            message = (
-                "this is decided by the largest of the ranges, and a wall is near where the smallest one is"
-            )
-            fix = "on line %d, ask whether `min(…)` of them is small, or whether any of them is" % line
-            yield slip(line, "wrong-value", message, fix, "mean")
-
-
-def is_flag(node):
-    """Whether a statement gives a name True or False."""
-    return isinstance(node, ast.Assign) and getattr(node.value, "value", None) in (True, False)
-
-
-def number_in(node):
-    """Return the number, or the name of one in capitals, that something is compared with; None of all else."""
-    name = dotted(node).rpartition(".")[2]
-    value = getattr(node, "value", None)
-    return name if name.isupper() else value if type(value) in (int, float) and value else None
-
-
 def without_root(tree):
     """`distance = dx ** 2 + dy ** 2`: a sum of two squares that is called a distance."""
     named = [(dotted(n.targets[0]), n.value) for n in all_of(tree, ast.Assign)]
@@ -306,88 +209,3 @@ def whole_angle(node, sides, halves):
     angles = {dotted(one.args[0]) for one in parts if one.args} - {"...", *halves}
     angles = {one for one in angles if "half" not in one.lower()}
     return (angles.pop(), sorted({one.lineno for one in parts})) if len(angles) == 1 else None
-
-
-def ranges_read(tree):
-    """Which ranges of a scan a script reads (`0:45`), where each index is a number, or a part of their count."""
-    parents, found = parents_of(tree), []
-    held = {dotted(t) for n in all_of(tree, ast.Assign) if is_ranges(n.value) for t in n.targets} - {"..."}
-    stored = [n for n in all_of(tree, ast.Name, ast.Attribute) if isinstance(n.ctx, ast.Store)]
-    counts = Counter([dotted(n) for n in stored] + [n.arg for n in all_of(tree, ast.arg)])
-    given = [(dotted(target), n.value) for n in all_of(tree, ast.Assign) for target in n.targets]
-    once = {name: value for name, value in given if counts[name] == 1}
-    for node in all_of(tree, ast.Name, ast.Attribute):
-        if not isinstance(node.ctx, ast.Load) or not (is_ranges(node) or dotted(node) in held):
-            continue
-        around = parents[node]
-        if isinstance(around, ast.Assign) or called_name(around) == "len" or is_truth(node, around):
-            continue
-        index = index_text(around, once) if isinstance(around, ast.Subscript) and around.value is node else ""
-        if not index or len(found) >= USES_LIMIT:
-            return  # here it may read any of them
-        found.append(slip(node.lineno, "ranges-read", index, name=dotted(node)))
-    yield from found
-
-
-def is_truth(node, around):
-    """Whether it is only asked whether there is anything: `if ranges`, `not ranges`."""
-    return getattr(around, "test", None) is node or isinstance(getattr(around, "op", None), ast.Not)
-
-
-def is_ranges(node):
-    return getattr(node, "attr", "") == "ranges"
-
-
-def index_text(subscript, once):
-    """Return what stands in the brackets, where it is a number, a part of the count, or a slice of these; else "".
-    `once` are the values of the names that get only one."""
-    key = key_of(subscript)
-    parts = [key.lower, key.upper] if isinstance(key, ast.Slice) and key.step is None else [key]
-    numbers = ["" if one is None else index_in(one, once) for one in parts]
-    return "" if None in numbers else ":".join(numbers)
-
-
-DEEP = 8
-
-
-def index_in(node, once):
-    """Return the text of an index that is a whole number, or a part of the count `n` of ranges: `n*3//4-45`; None of
-    all else."""
-    found = part_of_count(node, once)
-    if found is None:
-        return None
-    times, by, more = found
-    text = "n" + ("*%d" % times if times != 1 else "") + ("//%d" % by if by != 1 else "") if times else ""
-    return text + ("%+d" % more if text and more else "" if text else str(more))
-
-
-def part_of_count(node, once, depth=0):
-    """Return the numbers a, b and c where a value is `a * count // b + c`, `count` being that of ranges; else None."""
-    sign = -1 if isinstance(getattr(node, "op", None), ast.USub) else 1
-    value = getattr(node.operand if sign < 0 else node, "value", None)
-    if type(value) is int and abs(value) < 1e6:
-        return (0, 1, sign * value)
-    if depth >= DEEP or node is None:
-        return None
-    if isinstance(node, ast.Call):
-        name, given = called_name(node), node.args[0] if len(node.args) == 1 else None
-        is_count = name == "len" and "ranges" in dotted(given)
-        return (1, 1, 0) if is_count else part_of_count(given, once, depth + 1) if name == "int" else None
-    if isinstance(node, ast.BinOp):
-        left, right = (part_of_count(one, once, depth + 1) for one in (node.left, node.right))
-        return None if left is None or right is None else computed(left, node.op, right)
-    return part_of_count(once.get(dotted(node)), once, depth + 1)
-
-
-def computed(left, op, right):
-    """Return the same of a sum, a product or a quotient of two."""
-    (times, by, more), (other, _, number) = left, right
-    if isinstance(op, (ast.Add, ast.Sub)) and not other:
-        return (times, by, more + number if isinstance(op, ast.Add) else more - number)
-    if isinstance(op, (ast.Add, ast.Mult)) and not times and other:
-        return computed(right, op, left)
-    if other or number <= 0 or (times and more):
-        return None
-    if isinstance(op, (ast.Div, ast.FloorDiv)):
-        return (times, by * number, 0) if times else (0, 1, more // number)
-    return (times * number, by, more * number) if isinstance(op, ast.Mult) else None

@@ -2,9 +2,9 @@
 
 What nothing calls, statements without an effect, imports. Names are for `script_names.py`, texts for
 `script_texts.py`, objects for `script_objects.py`, callbacks for `script_callbacks.py`, loops for `script_loops.py`,
-their rates for `script_rates.py`, values for `script_values.py`, arithmetic for `script_arithmetic.py`, counters and
-clocks for `script_counters.py`. Nothing is executed. A file has to be parsed by ROS's own Python, which is to run it:
-Python 3.8, standard library only.
+their rates for `script_rates.py`, values for `script_values.py`, arithmetic for `script_arithmetic.py`, scans for
+`script_scans.py`, counters and clocks for `script_counters.py`. Nothing is executed. A file has to be parsed by ROS's
+own Python, which is to run it: Python 3.8, standard library only.
 """
 
 import ast
@@ -21,6 +21,7 @@ import script_loops as loops
 import script_names as names
 import script_objects as objects
 import script_rates as rates
+import script_scans as scans
 import script_values as values
 from script_names import (
     LOOPS,
@@ -53,7 +54,7 @@ def slips(tree):
         counters.counter_starts, without_effect, values.assigned_late, objects.hidden_names, objects.subscribed_again,
         imports, objects.taken_off, objects.unstarted_servers, values.wrong_values, values.decided_conditions,
         values.times_added_again, values.params_read_unset, values.overwritten_values, values.published_in_turn,
-        arithmetic.arithmetic_slips, values.flagged_loops, values.kept_velocities,
+        arithmetic.arithmetic_slips, scans.scan_slips, values.flagged_loops, values.kept_velocities,
         values.values_never_set_back,
         callbacks.unprinted_messages, counters.values_left_out, counters.published_unchanged,
         objects.unused_publishers, objects.unsent_messages, loops.loops_of_numbers,

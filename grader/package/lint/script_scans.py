@@ -1,0 +1,345 @@
+"""Finds what a student's Python makes of a scan, for `slips.py`: which of its ranges it reads, and whether a single one
+that is small counts.
+
+Nothing is executed. Python 3.8, standard library only.
+"""
+
+import ast
+from collections import Counter
+
+from script_names import (
+    FUNCTIONS,
+    USES_LIMIT,
+    all_of,
+    called_name,
+    dotted,
+    key_of,
+    names_in,
+    parents_of,
+    slip,
+    statements_of,
+)
+
+
+def scan_slips(tree):
+    """Which ranges of a scan are read, and what is not decided by the smallest of them."""
+    yield from not_the_smallest(tree)
+    yield from nothing_taken_for_near(tree)
+    yield from drives_where_near(tree)
+    yield from ranges_read(tree)
+
+
+SMALLEST = ("min", "nanmin", "amin", "sorted", "sort", "argmin")
+PRINTS = ("print", "loginfo", "logwarn", "logdebug", "logerr", "write")
+
+
+def not_the_smallest(tree):
+    """`sum(front) / len(front)`, `max(front) < 0.5`, or `any(r > 0.5 for r in front)`, in a script that reads a scan
+    and looks for no smallest one, but to print it."""
+    held = names_of_ranges(tree)
+    every = all_of(tree, ast.Call)
+    printed = {id(n) for call in every if called_name(call) in PRINTS for n in ast.walk(call)}
+    if not held or any(called_name(n) in SMALLEST and id(n) not in printed for n in every):
+        return
+    for node in all_of(tree, ast.BinOp):
+        is_mean = (
+            isinstance(node.op, ast.Div)
+            and called_name(node.left) == "sum"
+            and called_name(node.right) == "len"
+        )
+        if is_mean and node.left.args and node.right.args and names_in(node.left) & held:
+            name = dotted(node.right.args[0])
+            message = "the mean of many ranges is large even where one of them is small"
+            fix = "on line %d, write `min(%s)` in its place" % (node.lineno, "…" if "..." in name else name)
+            yield slip(node.lineno, "wrong-value", message, fix, "mean")
+    made = {dotted(n.targets[0]): n.value for n in all_of(tree, ast.Assign) if calls_of(n.value, "max")}
+    tests = [n for n in all_of(tree, ast.Compare) if isinstance(n.ops[0], (ast.Lt, ast.LtE))]
+    for value in (made.get(dotted(n.left), n.left) for n in tests):
+        for call in (one for one in calls_of(value, "max") if names_in(one) & held):
+            message = "the largest of these ranges is small only where all of them are"
+            fix = "on line %d, write `min` for `max`" % call.lineno
+            yield slip(call.lineno, "wrong-value", message, fix, "mean")
+    yield from far_decides(tree, held)
+
+
+def calls_of(node, *names):
+    """Return the calls of these functions in a value."""
+    return [n for n in ast.walk(node) if called_name(n) in names] if node is not None else []
+
+
+def names_of_ranges(tree):
+    """Return the names in a script that stand for ranges of a scan: the field's own, and what is made of them."""
+    held = {dotted(n) for n in all_of(tree, ast.Attribute) if is_ranges(n)}
+    for node in all_of(tree, ast.Assign) if held else ():
+        if names_in(node.value) & held and not calls_of(node.value, "len", "min", "max", "sum"):
+            held |= {
+                dotted(target) for target in node.targets if isinstance(target, (ast.Name, ast.Attribute))
+            }
+    return held - {"..."}
+
+
+FAR = (ast.Gt, ast.GtE)
+
+
+def far_decides(tree, held):
+    """`for r in ranges: if r > 0.5: near = False`, and the same in one line: a single range that is large decides."""
+    found = {}
+    for loop in all_of(tree, ast.For):
+        only = loop.body[0] if len(loop.body) == 1 else None
+        if not isinstance(only, ast.If) or only.orelse or not names_in(loop.iter) & held:
+            continue
+        flags = {dotted(n.targets[0]) for n in only.body if is_flag(n)}
+        if flags and len(flags) == len(only.body):
+            found[only.lineno] = (only.test, names_in(loop.target))
+    for node in all_of(tree, ast.Call):
+        each = node.args[0] if node.args and called_name(node) in ("any", "all") else None
+        if isinstance(each, (ast.GeneratorExp, ast.ListComp)) and names_in(each.generators[0].iter) & held:
+            # `all(r < 0.5 …)` is another one, and `all(r > 0.5 …)` is right
+            names, turned = names_in(each.generators[0].target), called_name(node) == "all"
+            found[node.lineno] = (each.elt, names, turned)
+    for line, (test, names, *turned) in found.items():
+        kinds = (ast.Lt, ast.LtE) if any(turned) else FAR
+        is_bound = isinstance(test, ast.Compare) and len(test.ops) == 1 and isinstance(test.ops[0], kinds)
+        if is_bound and dotted(test.left) in names and number_in(test.comparators[0]) is not None:
+            message = (
+                "this is decided by the largest of the ranges, and a wall is near where the smallest one is"
+            )
+            fix = "on line %d, ask whether `min(…)` of them is small, or whether any of them is" % line
+            yield slip(line, "wrong-value", message, fix, "mean")
+
+
+def is_flag(node):
+    """Whether a statement gives a name True or False."""
+    return isinstance(node, ast.Assign) and getattr(node.value, "value", None) in (True, False)
+
+
+def number_in(node):
+    """Return the number, or the name of one in capitals, that something is compared with; None of all else."""
+    name = dotted(node).rpartition(".")[2]
+    value = getattr(node, "value", None)
+    return name if name.isupper() else value if type(value) in (int, float) and value else None
+
+
+def nothing_taken_for_near(tree):
+    """`if math.isinf(r): r = 0`, in a script that reads a scan and does not leave out what is 0."""
+    compared = [n for n in all_of(tree, ast.Compare) if isinstance(n.ops[0], (ast.Gt, ast.NotEq, ast.GtE))]
+    filtered = [
+        n for n in compared if getattr(n.comparators[0], "value", None) == 0 or "range_min" in ast.dump(n)
+    ]
+    if filtered or not any(is_ranges(n) for n in all_of(tree, ast.Attribute)):
+        return
+    for node in all_of(tree, ast.If, ast.IfExp, ast.Assign):
+        values = [getattr(one, "value", None) for one in statements_of(node)]
+        if isinstance(node, ast.IfExp):
+            values = [node.body]
+        elif isinstance(node, ast.Assign):  # `ranges[np.isinf(ranges)] = 0`
+            values = [node.value] if isinstance(node.targets[0], ast.Subscript) else []
+        zeros = [one for one in values if is_number(one) and one.value == 0]
+        asked = (
+            key_of(node.targets[0])
+            if values and isinstance(node, ast.Assign)
+            else getattr(node, "test", None)
+        )
+        if zeros and asked is not None and asks_for_inf(asked):
+            message = "inf says that nothing is in reach, and this makes 0 of it, as if a wall were touched"
+            fix = "on line %d, write `10.0` in place of 0" % zeros[0].lineno
+            yield slip(zeros[0].lineno, "wrong-value", message, fix, "bounds")
+
+
+def is_number(node):
+    return isinstance(node, ast.Constant) and type(node.value) in (int, float)
+
+
+def asks_for_inf(test):
+    """Whether a condition is that a value is inf."""
+    if called_name(test) == "isinf":
+        return True
+    sides = [test.left, *test.comparators] if isinstance(test, ast.Compare) and len(test.ops) == 1 else []
+    is_inf = [called_name(n) == "float" or getattr(n, "attr", "") in ("inf", "range_max") for n in sides]
+    return any(is_inf) and not isinstance(test.ops[0], (ast.NotEq, ast.Lt, ast.LtE))
+
+
+def drives_where_near(tree):
+    """`if min(front) > 0.5: cmd.angular.z = 1` with `else: cmd.linear.x = 0.2`, which is the wrong way round."""
+    held = names_of_ranges(tree)
+    made = [n for n in all_of(tree, ast.Assign) if held and is_smallest(n.value, held)]
+    near = {dotted(n.targets[0]) for n in made}
+    for node in all_of(tree, ast.If) if held else ():
+        test = node.test if isinstance(node.test, ast.Compare) and len(node.test.ops) == 1 else None
+        if test is None or not (is_smallest(test.left, held) or dotted(test.left) in near):
+            continue
+        is_far = isinstance(test.ops[0], FAR)
+        is_bound = is_far or isinstance(test.ops[0], (ast.Lt, ast.LtE))
+        free, wall = (node.body, node.orelse) if is_far else (node.orelse, node.body)
+        if (
+            is_bound
+            and number_in(test.comparators[0]) is not None
+            and speeds_in(wall)
+            and not speeds_in(free)
+        ):
+            signs = ("<", ">") if is_far else (">", "<")
+            message = "this drives where something is near, and stops or turns where the way is free"
+            fix = "on line %d, write `%s` in place of `%s`, or swap the two branches" % (node.lineno, *signs)
+            yield slip(node.lineno, "wrong-value", message, fix, "bounds")
+
+
+def is_smallest(node, held):
+    return called_name(node) in SMALLEST[:3] and bool(names_in(node) & held)
+
+
+def speeds_in(block):
+    """Return the statements of a block that make a robot drive forward."""
+    given = [n for one in block for n in ast.walk(one) if isinstance(n, ast.Assign)]
+    return [
+        n
+        for n in given
+        if dotted(n.targets[0]).endswith(".linear.x")
+        and not isinstance(n.value, ast.UnaryOp)
+        and getattr(n.value, "value", 1) != 0
+    ]
+
+
+def ranges_read(tree):
+    """Which ranges of a scan a script reads (`0:45`), where each index is a number, or a part of their count."""
+    parents, found = parents_of(tree), []
+    held = {dotted(t) for n in all_of(tree, ast.Assign) if is_ranges(n.value) for t in n.targets} - {"..."}
+    stored = [n for n in all_of(tree, ast.Name, ast.Attribute) if isinstance(n.ctx, ast.Store)]
+    counts = Counter([dotted(n) for n in stored] + [n.arg for n in all_of(tree, ast.arg)])
+    given = [(dotted(target), n.value) for n in all_of(tree, ast.Assign) for target in n.targets]
+    once = {name: value for name, value in given if counts[name] == 1}
+    for node in all_of(tree, ast.Name, ast.Attribute):
+        if not isinstance(node.ctx, ast.Load) or not (is_ranges(node) or dotted(node) in held):
+            continue
+        around = parents[node]
+        if isinstance(around, ast.Assign) or called_name(around) == "len" or is_truth(node, around):
+            continue
+        indexes = []
+        if isinstance(around, ast.Subscript) and around.value is node:
+            indexes = indexes_in(around, once, tree)
+        if not indexes or len(found) >= USES_LIMIT:
+            return  # here it may read any of them
+        found += [slip(line, "ranges-read", index, name=dotted(node)) for line, index in indexes]
+    yield from found
+
+
+def is_truth(node, around):
+    """Whether it is only asked whether there is anything: `if ranges`, `not ranges`."""
+    return getattr(around, "test", None) is node or isinstance(getattr(around, "op", None), ast.Not)
+
+
+def is_ranges(node):
+    return getattr(node, "attr", "") == "ranges"
+
+
+def indexes_in(subscript, once, tree):
+    """Return what stands in the brackets, each with its line, where it is a number, a part of the count, or a slice of
+    these, also as a variable of a loop or of a function; else nothing. `once` are the values of the names that get only
+    one."""
+    key = key_of(subscript)
+    if isinstance(key, ast.Slice):
+        numbers = ["" if one is None else index_in(one, once) for one in (key.lower, key.upper)]
+        return [] if key.step is not None or None in numbers else [(subscript.lineno, ":".join(numbers))]
+    number = index_in(key, once)
+    return [(subscript.lineno, number)] if number is not None else counted_in(key, subscript, once, tree)
+
+
+def counted_in(key, node, once, tree, depth=0):
+    """Return the same of a variable of a loop over `range(-5, 5)`, or of a function that is called with such ones, or
+    with numbers: `ranges[int(degrees) % 360]`."""
+    while True:
+        if called_name(key) in ("int", "round") and len(key.args) == 1:
+            key = key.args[0]
+        elif isinstance(getattr(key, "op", None), ast.Mod):
+            key = key.left
+        else:
+            break
+    name, parents = getattr(key, "id", None), parents_of(tree)
+    around = node
+    while name and around is not tree and not isinstance(around, FUNCTIONS):
+        around = parents[around]
+        for loop in getattr(around, "generators", [around]):
+            if getattr(getattr(loop, "target", None), "id", None) == name:
+                return range_of(loop.iter, once)
+    given = [one.arg for one in around.args.args] if isinstance(around, ast.FunctionDef) else []
+    stored = (
+        [n for n in ast.walk(around) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+        if given
+        else []
+    )
+    if name not in given or name in {n.id for n in stored} or depth > 1:
+        return []
+    place = given.index(name) - (given[0] == "self")
+    calls = [n for n in all_of(tree, ast.Call) if called_name(n) == around.name]
+    found = []
+    for call in calls if len(calls) < USES_LIMIT else ():
+        value = call.args[place] if 0 <= place < len(call.args) else None
+        number = index_in(value, once)
+        one = (
+            [(call.lineno, number)] if number is not None else counted_in(value, call, once, tree, depth + 1)
+        )
+        if not one:
+            return []
+        found += one
+    return found
+
+
+def range_of(call, once):
+    """Return the slices that have the numbers of `range(first, last)`, or those of a list, with its line; nothing of
+    all else."""
+    if isinstance(call, (ast.List, ast.Tuple)):
+        numbers = [index_in(one, once) for one in call.elts[:USES_LIMIT]]
+        return [] if None in numbers else [(call.lineno, one) for one in numbers]
+    given = [part_of_count(one, once) for one in call.args] if called_name(call) == "range" else []
+    if not 1 <= len(given) <= 2 or None in given or any(times for times, _, _ in given):
+        return []
+    first, last = given[0][2] if len(given) > 1 else 0, given[-1][2]
+    if first >= 0:
+        return [(call.lineno, "%d:%d" % (first, last))]
+    below = (call.lineno, "%d:%s" % (first, last if last < 0 else ""))
+    return [below, (call.lineno, ":%d" % last)] if last > 0 else [below]
+
+
+DEEP = 8
+
+
+def index_in(node, once):
+    """Return the text of an index that is a whole number, or a part of the count `n` of ranges: `n*3//4-45`; None of
+    all else."""
+    found = part_of_count(node, once)
+    if found is None:
+        return None
+    times, by, more = found
+    text = "n" + ("*%d" % times if times != 1 else "") + ("//%d" % by if by != 1 else "") if times else ""
+    return text + ("%+d" % more if text and more else "" if text else str(more))
+
+
+def part_of_count(node, once, depth=0):
+    """Return the numbers a, b and c where a value is `a * count // b + c`, `count` being that of ranges; else None."""
+    sign = -1 if isinstance(getattr(node, "op", None), ast.USub) else 1
+    value = getattr(node.operand if sign < 0 else node, "value", None)
+    if type(value) is int and abs(value) < 1e6:
+        return (0, 1, sign * value)
+    if depth >= DEEP or node is None:
+        return None
+    if isinstance(node, ast.Call):
+        name, given = called_name(node), node.args[0] if len(node.args) == 1 else None
+        is_count = name == "len" and "ranges" in dotted(given)
+        return (1, 1, 0) if is_count else part_of_count(given, once, depth + 1) if name == "int" else None
+    if isinstance(node, ast.BinOp):
+        left, right = (part_of_count(one, once, depth + 1) for one in (node.left, node.right))
+        return None if left is None or right is None else computed(left, node.op, right)
+    return part_of_count(once.get(dotted(node)), once, depth + 1)
+
+
+def computed(left, op, right):
+    """Return the same of a sum, a product or a quotient of two."""
+    (times, by, more), (other, _, number) = left, right
+    if isinstance(op, (ast.Add, ast.Sub)) and not other:
+        return (times, by, more + number if isinstance(op, ast.Add) else more - number)
+    if isinstance(op, (ast.Add, ast.Mult)) and not times and other:
+        return computed(right, op, left)
+    if other or number <= 0 or (times and more):
+        return None
+    if isinstance(op, (ast.Div, ast.FloorDiv)):
+        return (times, by * number, 0) if times else (0, 1, more // number)
+    return (times * number, by, more * number) if isinstance(op, ast.Mult) else None
