@@ -15,8 +15,11 @@ from grader.checks.support.console_output import (
     Level,
     Line,
     Logged,
+    filled,
     in_summary,
+    line_that_prints,
     logged_by,
+    not_reached,
     split_log_line,
     stream_lines,
     tracebacks,
@@ -222,6 +225,8 @@ def _not_printed(
         keys = reads_keys(package, run)
         why, hint = (f": {keys.message}", keys.fix) if keys else ("", both(f"{hint}, with flush=True", hint))
         nothing = failed_or_blocked(f"it prints nothing, not {params.words}{why}", hint=hint)
+        could = line_that_prints(package, run, lambda text: any(params.found_in(Line(0, text))))
+        nothing = not_reached(nothing, could) if could and not why else nothing
         return nothing.if_repeated().model_copy(update={"silent": True})
     meant = max(own, key=lambda line: SequenceMatcher(None, params.words, line.text[:LINE_CHARS_MAX]).ratio())
     hint = _of_whole_answer(meant, params) or unfilled(meant.text) or hint
@@ -242,8 +247,7 @@ def _unseen(one: Life, package: PackageFacts, run: Run, params: PrintsParams, ne
     for node in (node for file in files for node in file.brings if node.output != "screen"):
         script = own_script(package, node)
         said = [s for s in package.slips if script and s.file == script.path and s.kind == "prints"]
-        # A place that the script fills in may hold any number.
-        printed = (re.sub(r"\{\w*\}", "0", s.message) for s in said if s.name == "print")
+        printed = (filled(s) for s in said if s.name == "print")
         if any(any(params.found_in(Line(0, text))) for text in printed):
             why = f'the <node> {node.name} lacks output="screen", so what it prints goes to a log file'
             hint = f'on line {node.line} of {node.file}, write output="screen" in the <node>'

@@ -14,8 +14,12 @@ from functools import partial
 from itertools import accumulate
 from typing import Literal, NamedTuple
 
+from grader.checks.support.processes import run_slips
 from grader.checks.support.text import VALUE, line_pattern, words_pattern
 from grader.evidence.run import Run, once_for_each_run
+from grader.model.package import PackageFacts
+from grader.model.python_slip import PythonSlip
+from grader.model.verdict import Verdict
 from grader.untrusted_text import without_colours
 
 OTHER_NUMBERS_PER_LINE = 6
@@ -468,3 +472,20 @@ def _followed_by_syntax_error(lines: Sequence[str]) -> list[bool]:
         if line and not line[0].isspace():
             named = line.startswith(("SyntaxError", "IndentationError", "TabError"))
     return found
+
+
+def filled(slip: PythonSlip) -> str:
+    """Return the text that a line prints; a place that the script fills in may hold any number."""
+    return re.sub(r"\{\w*\}", "0", slip.message)
+
+
+def line_that_prints(package: PackageFacts, run: Run, could_be: Callable[[str], bool]) -> PythonSlip | None:
+    """Return the line of a script that runs which prints such a text, if it is reached."""
+    return next((s for s in run_slips(package, run, "prints") if could_be(filled(s))), None)
+
+
+def not_reached(verdict: Verdict, slip: PythonSlip) -> Verdict:
+    """Return a loss with the line that prints what is missing, and was never reached."""
+    why = f"line {slip.line} of {slip.file} does, and is never reached"
+    hint = f"see what keeps line {slip.line} from being reached: print what the condition above it compares"
+    return verdict.explained(why, hint, (slip.place,))
