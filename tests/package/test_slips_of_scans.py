@@ -185,3 +185,21 @@ def test_conditions_that_are_the_wrong_way_round(test: str, fixes: list[str], tm
 def test_inf_that_is_made_0(text: str, lines: list[int], tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(text, encoding="utf-8")
     assert [s.line for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "bounds"] == lines
+
+
+@pytest.mark.parametrize(
+    ("index", "found"),
+    [
+        ("int(math.radians(90))", True),
+        ("int(math.radians(d) % (2 * math.pi))", True),
+        ("int(math.pi / 2)", True),
+        ("int(math.radians(90) / msg.angle_increment)", False),
+        ("int((math.pi / 2 - msg.angle_min) / step)", False),
+        ("int(math.degrees(math.pi / 2))", False),
+        ("int(math.pi / 2 * 57.3)", False),
+        ("90", False),
+    ],
+)
+def test_angles_that_are_taken_for_indexes(index: str, found: bool, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"d = 9\nr = msg.ranges[{index}]\n", encoding="utf-8")
+    assert any(s.name == "bounds" for s in check_syntax(tmp_path, ["a.py"]).slips) is found

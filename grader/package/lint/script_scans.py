@@ -26,6 +26,7 @@ def scan_slips(tree):
     yield from not_the_smallest(tree)
     yield from nothing_taken_for_near(tree)
     yield from drives_where_near(tree)
+    yield from angles_for_indexes(tree)
     yield from ranges_read(tree)
 
 
@@ -181,6 +182,28 @@ def drives_where_near(tree):
             message = "this drives where something is near, and stops or turns where the way is free"
             fix = "on line %d, write `%s` in place of `%s`, or swap the two branches" % (node.lineno, *signs)
             yield slip(node.lineno, "wrong-value", message, fix, "bounds")
+
+
+FULL = 6.3
+"""More than any angle in radians."""
+
+
+def angles_for_indexes(tree):
+    """`ranges[int(math.radians(90))]`, and `ranges[int(math.pi / 2)]`: an index is a number of steps."""
+    for node in all_of(tree, ast.Subscript):
+        key = key_of(node) if is_ranges(node.value) else None
+        inside = list(ast.walk(key)) if key is not None and not isinstance(key, ast.Slice) else []
+        angles = [
+            n for n in inside if called_name(n) in ("radians", "deg2rad") or getattr(n, "attr", "") == "pi"
+        ]
+        steps = [n.right for n in inside if isinstance(getattr(n, "op", None), (ast.Div, ast.FloorDiv))]
+        # `angle * 57.3` is in degrees
+        products = [n for n in inside if isinstance(getattr(n, "op", None), ast.Mult)]
+        turned = any(is_number(one) and one.value > FULL for n in products for one in (n.left, n.right))
+        if angles and not turned and all(map(is_number, steps)) and not calls_of(key, "degrees", "len"):
+            message = "this takes an angle in radians for an index, which counts the ranges"
+            fix = "on line %d, write `int((angle - msg.angle_min) / msg.angle_increment)`, with your angle and message"
+            yield slip(node.lineno, "wrong-value", message, fix % node.lineno, "bounds")
 
 
 def is_smallest(node, held):
