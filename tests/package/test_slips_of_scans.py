@@ -180,6 +180,9 @@ def test_conditions_that_are_the_wrong_way_round(test: str, fixes: list[str], tm
         ("a = [r if math.isinf(r) else 0 for r in msg.ranges]\n", []),
         ("a = [0 if r < msg.range_max else r for r in msg.ranges]\n", []),
         ("if math.isinf(x):\n    x = 0\n", []),
+        ("def turn(r):\n    if math.isinf(r):\n        return 0\n    return 2 * r\nprint(msg.ranges)\n", []),
+        ("r = msg.ranges[0]\nif math.isinf(r) or math.isnan(r):\n    r = 0\n", [3]),
+        ("r = msg.ranges[0]\nif math.isinf(r):\n    turn = 0\n", []),
     ],
 )
 def test_inf_that_is_made_0(text: str, lines: list[int], tmp_path: Path) -> None:

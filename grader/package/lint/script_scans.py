@@ -130,21 +130,33 @@ def nothing_taken_for_near(tree):
     if filtered or not any(is_ranges(n) for n in all_of(tree, ast.Attribute)):
         return
     for node in all_of(tree, ast.If, ast.IfExp, ast.Assign):
-        values = [getattr(one, "value", None) for one in statements_of(node)]
-        if isinstance(node, ast.IfExp):
-            values = [node.body]
-        elif isinstance(node, ast.Assign):  # `ranges[np.isinf(ranges)] = 0`
-            values = [node.value] if isinstance(node.targets[0], ast.Subscript) else []
-        zeros = [one for one in values if is_number(one) and one.value == 0]
-        asked = (
-            key_of(node.targets[0])
-            if values and isinstance(node, ast.Assign)
-            else getattr(node, "test", None)
-        )
-        if zeros and asked is not None and asks_for_inf(asked):
+        line, asked = zero_given(node, tree)
+        parts = asked.values if isinstance(asked, ast.BoolOp) and isinstance(asked.op, ast.Or) else [asked]
+        if line and any(map(asks_for_inf, parts)):
             message = "inf says that nothing is in reach, and this makes 0 of it, as if a wall were touched"
-            fix = "on line %d, write `10.0` in place of 0" % zeros[0].lineno
-            yield slip(zeros[0].lineno, "wrong-value", message, fix, "bounds")
+            yield slip(
+                line, "wrong-value", message, "on line %d, write `10.0` in place of 0" % line, "bounds"
+            )
+
+
+def zero_given(node, tree):
+    """Return the line on which a value becomes 0, and the condition on that value under which it does; 0 for none."""
+    if isinstance(node, ast.IfExp):
+        value, test, names = node.body, node.test, {dotted(node.orelse)}
+    elif isinstance(node, ast.Assign):  # `ranges[np.isinf(ranges)] = 0`
+        target = node.targets[0]
+        if not isinstance(target, ast.Subscript):
+            return 0, None
+        value, test, names = node.value, key_of(target), {dotted(target.value)}
+    else:
+        only, test = node.body[0] if len(node.body) == 1 else None, node.test
+        value = getattr(only, "value", None)
+        names = {dotted(one) for one in getattr(only, "targets", ())}
+        if isinstance(only, ast.Return):
+            block = parents_of(tree)[node]
+            names = {dotted(n.value) for n in statements_of(block) if isinstance(n, ast.Return)}
+    is_zero = is_number(value) and value.value == 0
+    return (value.lineno, test) if is_zero and names & names_in(test) else (0, None)
 
 
 def is_number(node):
