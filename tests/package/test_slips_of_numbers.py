@@ -288,12 +288,23 @@ class Mapper:
         ("p.x >= 0 and column > 0", "self.h * row + column", ["on line 10, write `self.w` in place of `self.h`"]),
         ("0 <= p.x and 0 <= p.y and 0 <= column", "row * self.w + column", []),
         ("column < 9", "row * self.w + column", []),
+        ("column < 9", "column * self.w + row", ["on line 10, write `row * self.w + column` for the index"]),
+        ("column < 9", "column * self.h + row", ["on line 10, write `row * self.w + column` for the index"]),
+        ("column < 9", "row + self.h * column", ["on line 10, write `row * self.w + column` for the index"]),
     ],
 )  # fmt: skip
 def test_the_index_of_a_cell(check: str, index: str, fixes: list[str], tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(GRID.replace("CHECK", check).replace("INDEX", index), encoding="utf-8")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
     assert [s.fix for s in slips if s.name == "step"] == fixes
+
+
+def test_rows_that_are_worked_out_from_an_x(tmp_path: Path) -> None:
+    text = GRID.replace("CHECK", "row < 9").replace("INDEX", "row * self.w + column")
+    text = text.replace("p.x", "p.z").replace("p.y", "p.x").replace("p.z", "p.y")
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "step"]
+    assert [s.fix for s in slips] == ["on lines 7 and 8, write y for x, and x for y"]
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ SIDES = ("width", "height")
 
 def arithmetic_slips(tree):
     """Numbers that are worked out wrongly."""
-    sides, cells = grid_sides(tree), names_of_cells(tree)
+    sides, cells, axes = grid_sides(tree), names_of_cells(tree), axes_of(tree)
     for node in all_of(tree, ast.Subscript):
         key, line = key_of(node), getattr(node, "lineno", 0)
         if is_quotient(key):
@@ -29,7 +29,7 @@ def arithmetic_slips(tree):
             fix = "on line %d, write `//` instead of `/` in the index" % line
             yield slip(line, "float-index", message, fix, dotted(node.value))
         if dotted(node.value).rpartition(".")[2] in cells:
-            yield from wrong_step(node, key, sides)
+            yield from wrong_step(node, key, sides, axes)
     yield from cut_to_zero(tree)
     yield from whole_angles(tree)
     yield from float_seconds(tree)
@@ -69,21 +69,47 @@ def names_of_cells(tree):
     return {dotted(one).rpartition(".")[2] for one in held} | {"data"}
 
 
-def wrong_step(node, key, sides):
-    """`data[row * height + column]`, where a row has as many cells as the grid is wide."""
+def wrong_step(node, key, sides, axes):
+    """`data[row * height + column]`, where a row has as many cells as it is wide, and `data[column * width + row]`.
+    `axes` says which names are made of an x, and which of a y."""
     parts = [key.left, key.right] if isinstance(getattr(key, "op", None), ast.Add) else []
     steps = [part for part in parts if is_product(part)]
     if len(steps) != 1:
         return
     factors = [dotted(steps[0].left), dotted(steps[0].right)]
+    added = dotted(parts[1 - parts.index(steps[0])])
     high = [name for name in factors if sides.get(name) == "height"]
     wide = [name for name in sides if sides[name] == "width"]
     # the one that is written as the other is: `self.width` beside `self.height`
     wide.sort(key=lambda name: name.rpartition(".")[0] != high[0].rpartition(".")[0]) if high else None
-    if len(high) == 1 and wide:
+    width = next((name for name in factors if name in wide), wide[0] if high and wide else "")
+    column = next((name for name in factors if name not in sides), "")
+    if width and axes.get(column, ("",))[0] == "x" and axes.get(added, ("",))[0] == "y":
+        message = "the index of a cell is `row * width + column`, and here the column is multiplied"
+        fix = "on line %d, write `%s * %s + %s` for the index" % (node.lineno, added, width, column)
+        if (
+            column.rpartition(".")[2].lower().startswith(("row", "r", "y", "j"))
+        ):  # they have each other's value
+            message = "`%s` is worked out from an x, and `%s` from a y" % (column, added)
+            lines = sorted((axes[column][1], axes[added][1]))
+            fix = "on lines %d and %d, write y for x, and x for y" % tuple(lines)
+        yield slip(node.lineno, "wrong-value", message, fix, "step")
+    elif len(high) == 1 and wide:
         message = "a row of the grid has as many cells as it is wide, and this steps by its height"
         fix = "on line %d, write `%s` in place of `%s`" % (node.lineno, wide[0], high[0])
         yield slip(node.lineno, "wrong-value", message, fix, "step")
+
+
+def axes_of(tree):
+    """Return the names that are made of an x alone, or of a y alone, each with the line."""
+    found, twice = {}, set()
+    for node in all_of(tree, ast.Assign):
+        read = {n.attr for n in ast.walk(node.value) if isinstance(n, ast.Attribute)} & {"x", "y"}
+        name = dotted(node.targets[0])
+        twice |= {name} & set(found)
+        if len(read) == 1:
+            found[name] = (read.pop(), node.lineno)
+    return {name: of for name, of in found.items() if name not in twice}
 
 
 def cut_to_zero(tree):
