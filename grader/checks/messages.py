@@ -25,6 +25,7 @@ from grader.checks.support.fields import (
     join_items,
     made_of,
     no_field,
+    one_for_another,
     readings,
     refuse_disorder,
     set_beside,
@@ -532,6 +533,7 @@ def _other_value(
     seen = f"it is {shown(why)}" if first.values else f"it is not there ({first.fault})"
     where = f"in the {params.when} message that" if params.when in {"first", "last"} else "when"
     hint = f"{params.field} has to be {params.words} {where} you publish"
+    hint = one_for_another(first.values, params.value) or hint
     own = sent_by(run, params.topic, params.of)
     beside = "" if other else set_beside(own, first.time_ns, params.field, params.value, params.tolerance)
     if beside:
@@ -594,6 +596,5 @@ def _waited_without_message(run: Run, topic: str, before_ns: int) -> bool:
 
 
 def _values(asked: Sequence[Reading]) -> str:
-    each = dict.fromkeys(value_text(value) for one in asked for value in one.values)
-    more = ", …" if len(each) > VALUES_SHOWN else ""
-    return shown(join_words(list(each)[:VALUES_SHOWN]) + more) or "no value"
+    each = [*dict.fromkeys(value_text(value) for one in asked for value in one.values)]
+    return shown(join_words(each[:VALUES_SHOWN]) + ", …" * (len(each) > VALUES_SHOWN)) or "no value"

@@ -87,8 +87,9 @@ class PythonSlip(Placed, Record):
       or what each turn of a loop adds or sets again (`name`: `nan`, `degrees`, `return`, `empty`, `unsent`, `kept`,
       `nanoseconds`, `bounds`, `added`); a grid's index that steps by its height, a cell that `int(…)` works out of a
       number below 0, a quaternion of a whole angle, a float for the seconds of a time, the mean of a scan's ranges, a
-      distance without its square root, a parameter that is read where it is not set, and what nothing sets back
-      (`step`, `cut`, `half`, `secs`, `mean`, `rootless`, `unset`, `stuck`).
+      distance without its square root, a parameter that is read where it is not set, what nothing sets back,
+      and a cell that is compared with a grid's side as if it had one more (`step`, `cut`, `half`, `secs`, `mean`,
+      `rootless`, `unset`, `stuck`, `edge`).
 
     No slips, but what a line says, for checks that compare it with what the lab asks; `message` is a name, a number or
     a text:

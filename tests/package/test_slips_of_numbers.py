@@ -299,6 +299,21 @@ def test_the_index_of_a_cell(check: str, index: str, fixes: list[str], tmp_path:
     assert [s.fix for s in slips if s.name == "step"] == fixes
 
 
+@pytest.mark.parametrize(
+    ("check", "fixes"),
+    [
+        ("not column > self.w", ["on line 9, write `>=` in place of `>` between `column` and `self.w`"]),
+        ("0 <= row <= self.h", ["on line 9, write `<` in place of `<=` between `row` and `self.h`"]),
+        ("self.w >= column", ["on line 9, write `>` in place of `>=` between `self.w` and `column`"]),
+        ("column < self.w and row <= self.h - 1", []),
+        ("not (column >= self.w or row > self.h - 1)", []),
+    ],
+)
+def test_cells_at_the_edge(check: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(GRID.replace("CHECK", check).replace("INDEX", "0"), encoding="utf-8")
+    assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "edge"] == fixes
+
+
 def test_rows_that_are_worked_out_from_an_x(tmp_path: Path) -> None:
     text = GRID.replace("CHECK", "row < 9").replace("INDEX", "row * self.w + column")
     text = text.replace("p.x", "p.z").replace("p.y", "p.x").replace("p.z", "p.y")

@@ -325,6 +325,19 @@ def made_of(found: Sequence[Reading], channels: Iterable[Channel], wanted: _Want
     return None
 
 
+def one_for_another(values: Sequence[object], wanted: object) -> str:
+    """Return what to write where all wrong items of a list have one number in place of another one; "" elsewhere."""
+    got = values[0] if len(values) == 1 else None
+    if not isinstance(got, list | tuple) or not isinstance(wanted, list | tuple) or len(got) != len(wanted):
+        return ""
+    pairs = {(a, b) for a, b in zip(got, wanted, strict=True) if a != b and is_number(a) and is_number(b)}
+    if len(pairs) != 1 or sorted(map(str, got)) == sorted(map(str, wanted)):
+        return ""
+    ((other, right),) = pairs
+    still = value_text(other) in map(value_text, wanted)
+    return "" if still else f"write {value_text(right)} in place of {value_text(other)} in the list"
+
+
 def turned_wrong(found: Sequence[Reading], wanted: object) -> int:
     """Return when an item of a list first got a wrong value that it still has in the last message (ns); 0 where none
     did, and was left wrong alone."""

@@ -30,6 +30,7 @@ def arithmetic_slips(tree):
             yield slip(line, "float-index", message, fix, dotted(node.value))
         if dotted(node.value).rpartition(".")[2] in cells:
             yield from wrong_step(node, key, sides, axes)
+    yield from past_the_edge(tree, sides, axes)
     yield from cut_to_zero(tree)
     yield from whole_angles(tree)
     yield from float_seconds(tree)
@@ -101,15 +102,38 @@ def wrong_step(node, key, sides, axes):
 
 
 def axes_of(tree):
-    """Return the names that are made of an x alone, or of a y alone, each with the line."""
+    """Return the names that are made of an x alone, or of a y alone, each with the line, and whether they are whole."""
     found, twice = {}, set()
     for node in all_of(tree, ast.Assign):
         read = {n.attr for n in ast.walk(node.value) if isinstance(n, ast.Attribute)} & {"x", "y"}
         name = dotted(node.targets[0])
         twice |= {name} & set(found)
         if len(read) == 1:
-            found[name] = (read.pop(), node.lineno)
+            is_whole = any(
+                called_name(n) in WHOLE or isinstance(n, ast.FloorDiv) for n in ast.walk(node.value)
+            )
+            found[name] = (read.pop(), node.lineno, is_whole)
     return {name: of for name, of in found.items() if name not in twice}
+
+
+WHOLE = ("int", "floor", "trunc", "round")
+
+
+def past_the_edge(tree, sides, axes):
+    """`if column > width: return`, and `if column <= width:`: the last column is `width - 1`."""
+    wrong = {ast.Gt: ">=", ast.LtE: "<", ast.Lt: "<=", ast.GtE: ">"}
+    for node in all_of(tree, ast.Compare):
+        each = [node.left, *node.comparators]
+        for at, op in enumerate(node.ops):
+            left, right = each[at], each[at + 1]
+            turned = isinstance(op, (ast.Lt, ast.GtE))
+            cell, side = (dotted(right), dotted(left)) if turned else (dotted(left), dotted(right))
+            if type(op) in wrong and side in sides and cell in axes and axes[cell][2]:
+                shown = {ast.Gt: ">", ast.LtE: "<=", ast.Lt: "<", ast.GtE: ">="}[type(op)]
+                message = "the last `%s` is `%s - 1`, and this takes `%s` for one, too" % (cell, side, side)
+                fix = "on line %d, write `%s` in place of `%s` between `%s` and `%s`"
+                fix %= (node.lineno, wrong[type(op)], shown, dotted(left), dotted(right))
+                yield slip(node.lineno, "wrong-value", message, fix, "edge")
 
 
 def cut_to_zero(tree):
