@@ -25,7 +25,7 @@ from grader.model.result import Progress
 from grader.model.submission import Submission
 from grader.package.facts import read_packages
 from grader.ros_env import look_for, why_nodes_cannot_run
-from grader.rubric.load import LoadedRubric, cancels_of, needs_ros, rates_of, select_started, watched_of
+from grader.rubric.load import LoadedRubric, goals_of, needs_ros, rates_of, select_started, watched_of
 from grader.rubric.made_up import KEY
 from grader.rubric.model import Rubric
 from grader.wording import join_words
@@ -105,7 +105,7 @@ def make_recorder(
         beside=job.rubric.path.parent,
         rates=rates_of(rubric),
         watched=watched_of(rubric),
-        cancels=cancels_of(rubric),
+        goals=goals_of(rubric),
         mode=options.sandbox,
         progress=job.progress,
         recorded=options.reused,

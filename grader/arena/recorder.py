@@ -78,7 +78,7 @@ class Recorder:
         beside: Path | None = None,
         rates: Mapping[str, tuple[RateBounds, ...]] | None = None,
         watched: Mapping[str, float] | None = None,
-        cancels: Mapping[str, Mapping[str, float]] | None = None,
+        goals: Mapping[str, Mapping[tuple[str, int], float]] | None = None,
         recorded: Mapping[str, Path] | None = None,
         stop: Stop | None = None,
         about: Mapping[str, str] | None = None,
@@ -89,7 +89,7 @@ class Recorder:
         self._stop = stop
         self._rates = rates or {}
         self._watched = watched or {}
-        self._cancels = cancels or {}
+        self._goals = goals or {}
         self._rubric, self._whole = rubric, whole or rubric
         self._beside = beside
         self._progress = progress
@@ -274,7 +274,7 @@ class Recorder:
                     tell=tell,
                     rates=self._rates.get(name, ()),
                     watched_s=self._watched.get(name, 0.0),
-                    cancels=self._cancels.get(name),
+                    goals=self._goals.get(name),
                     admission=self._admission,
                     last_run=self._runs[name] == RETRIES,
                     beside=self._beside,

@@ -121,7 +121,7 @@ async def run_scenario(
     tell: Tell,
     rates: tuple[RateBounds, ...] = (),
     watched_s: float = 0.0,
-    cancels: Mapping[str, float] | None = None,
+    goals: Mapping[tuple[str, int], float] | None = None,
     admission: Admission | None = None,
     last_run: bool = False,
     beside: Path | None = None,
@@ -130,8 +130,7 @@ async def run_scenario(
 
     Processes are started when `admission` lets them: others wait until they are up. A window in which nothing but
     `rates` is to be seen ends when they are clear. For `watched_s`, nodes are watched even where nothing more can come.
-    `cancels` says for how many seconds the result of an action's last goal is waited for once it is cancelled. `beside`
-    is the rubric's folder.
+    `goals` are those that criteria judge (`goals_of` in `rubric/load.py`). `beside` is the rubric's folder.
     """
     admission = admission or Admission(None)
     warp = scenario.warp if scenario.clock == "warped" else 1.0
@@ -150,7 +149,7 @@ async def run_scenario(
                 arena.course(ScenarioEvent(event="begin"))
                 at_once = {spec["name"] for start, spec in starts if start.name not in scenario.started_later}
                 async with release_when_up(leave, at_once, arena):
-                    steps = StepRunner(scenario, starts, arena, tell, beside=beside, cancels=cancels)
+                    steps = StepRunner(scenario, starts, arena, tell, beside=beside, goals=goals)
                     outcome, detail = await _run(scenario, starts, arena, tell, steps)
                     if outcome == "complete":
                         await _watch_on(arena, watched_s)

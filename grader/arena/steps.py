@@ -12,6 +12,7 @@ import asyncio
 import base64
 import math
 import time
+from collections import Counter
 from collections.abc import Callable, Coroutine, Mapping
 from collections.abc import Set as AbstractSet
 from contextlib import suppress
@@ -67,20 +68,18 @@ class StepRunner:
         tell: Tell,
         *,
         beside: Path | None = None,
-        cancels: Mapping[str, float] | None = None,
+        goals: Mapping[tuple[str, int], float] | None = None,
     ) -> None:
         self._scenario = scenario
         self._starts = starts
         self._results: dict[str, MessageType] = {}
-        self._goals = 0
+        self._goals: Counter[str] = Counter()
         self._asked: dict[str, tuple[float, float]] = {}
         self._unended: dict[str, float] = {}
-        self._cancels = cancels or {}
-        self._beside = beside or Path()
+        self._judged, self._beside = goals or {}, beside or Path()
         self._bags: dict[str, tuple[Channel, ...]] = {}
         self._stopped: set[str] = set()
-        self._may_start = False
-        self._arena = arena
+        self._arena, self._may_start = arena, False
         self._services = ServedServices(scenario.serves, arena)
         self._actions = [ServedAction(one, arena) for one in scenario.serves if one.action]
         self._live = arena.live
@@ -515,8 +514,8 @@ class StepRunner:
         is_heard = goal in self._types and await self._has_subscriber(goal)
         if not is_heard or not await self._has_subscriber(cancel):
             return
-        self._goals += 1
-        name = f"grader-{self._goals}"
+        self._goals[action.name] += 1
+        name = f"grader-{sum(self._goals.values())}"
         value = {"header": {"stamp": "now"}, "goal_id": {"stamp": "now", "id": name}, "goal": action.goal}
         about = {"topic": action.name, "type": action.type}
         try:
@@ -534,9 +533,10 @@ class StepRunner:
                 self._asked[name] = time.monotonic(), self._live.lost_s
                 left_s, since = self._patience_s(action), " after it was cancelled"
         found = found or await self._result(action, name, left_s)
-        # A short wait for a goal that goes on is the rubric's own: the server may rightly work on it for longer.
-        if found is None and (since or action.limit_s >= ANSWER_S):
-            self._unended[name] = AGAIN_S if since else ANSWER_S
+        # A short wait for a goal whose end nothing asks for is the rubric's own: the server may rightly go on with it.
+        is_overdue = bool(since) or self._judged.get((action.name, self._goals[action.name]), 0.0) > 0
+        if found is None and (is_overdue or action.limit_s >= ANSWER_S):
+            self._unended[name] = AGAIN_S if is_overdue else ANSWER_S
         late = BEHIND if self._is_behind(action, name) else f"no result within {left_s:g} s{since}"
         value_, detail = found or (None, late)
         self._arena.note(ActorEvent(action="result", actor="grader", **about, value=value_, detail=detail))
@@ -544,8 +544,8 @@ class StepRunner:
     def _patience_s(self, action: Action) -> float:
         """Return how long the result of a cancelled goal is waited for. Before another goal, the server must end it."""
         last = [s.action for s in self._scenario.steps if s.action and s.action.name == action.name][-1]
-        cancelled_s = self._cancels.get(action.name, math.inf) if action is last else math.inf
-        return min(action.limit_s, cancelled_s)
+        judged_s = self._judged.get((action.name, self._goals[action.name]), math.inf)
+        return min(action.limit_s, judged_s if action is last else math.inf)
 
     async def _result(self, action: Action, name: str, limit_s: float) -> tuple[Any, str] | None:
         """Return the result of that goal and the word for its status."""

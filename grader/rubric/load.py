@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import re
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
@@ -346,20 +347,17 @@ def watched_of(rubric: Rubric) -> dict[str, float]:
     return dict(found)
 
 
-def cancels_of(rubric: Rubric) -> dict[str, dict[str, float]]:
-    """Return, by scenario and action, for how many seconds the result of the last goal is waited for once that is
-    cancelled, where the criteria say how soon it has to come."""
-    found: dict[str, dict[str, float]] = defaultdict(dict)
-    for name, scenario in rubric.scenarios.items():
-        goals = Counter(step.action.name for step in scenario.steps if step.action is not None)
-        for action, number in goals.items():
-            own = [c.parameters for c in rubric.criteria if (c.check, c.scenario) == ("action-result", name)]
-            params = [ActionResultParams.model_validate(one) for one in own]
-            asked = [one.after_cancel_s for one in params if (one.action, one.goal) == (action, number)]
-            known = [seconds for seconds in asked if seconds is not None]
-            # One criterion without a bound may still judge what comes later.
-            if known and len(known) == len(asked):
-                found[name][action] = max(known)
+def goals_of(rubric: Rubric) -> dict[str, dict[tuple[str, int], float]]:
+    """Return, by scenario, the goals that criteria judge, by action and number, and for how many seconds after a cancel
+    the result still matters: 0 if no criterion asks for it, infinite if one says nothing of how soon it has to come."""
+    found: dict[str, dict[tuple[str, int], float]] = defaultdict(dict)
+    for criterion in rubric.criteria:
+        if criterion.check == "action-result" and criterion.scenario:
+            one = ActionResultParams.model_validate(criterion.parameters)
+            own, goal = found[criterion.scenario], (one.action, one.goal)
+            own[goal] = max(
+                own.get(goal, 0.0), math.inf if one.after_cancel_s is None else one.after_cancel_s
+            )
     return dict(found)
 
 

@@ -108,10 +108,10 @@ def run(
     *,
     beside: Path | None = None,
     watched_s: float = 0.0,
-    cancels: Mapping[str, float] | None = None,
+    goals: Mapping[tuple[str, int], float] | None = None,
 ) -> Run:
     """Record a scenario and read it back. `beside` is the rubric's folder."""
-    about = {"beside": beside, "watched_s": watched_s, "cancels": cancels}
+    about = {"beside": beside, "watched_s": watched_s, "goals": goals}
     asyncio.run(_bounded(repaired(place), scenario, path, about))
     return load_run(path)
 

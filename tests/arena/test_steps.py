@@ -32,14 +32,20 @@ ECHO = (
 
 
 def _run(
-    tmp_path: Path, files: dict[str, str], steps: list[dict[str, Any]], *, sandbox: str = "auto", **more: Any
+    tmp_path: Path,
+    files: dict[str, str],
+    steps: list[dict[str, Any]],
+    *,
+    sandbox: str = "auto",
+    goals: dict[tuple[str, int], float] | None = None,
+    **more: Any,
 ) -> Run:
     """Do the steps with each of the scripts, which are processes by their names."""
     start = tuple(Start(name=Path(file).stem, script=file) for file in files if file.endswith(".py"))
     about = {"title": "steps", "start": start, "until": Until(messages={}, first_message_s=10), **more}
     scenario = Scenario.model_validate({**about, "steps": steps})
     with make_place(files, sandbox=sandbox) as place:
-        return run(place, scenario, tmp_path / "run.mcap", beside=tmp_path)
+        return run(place, scenario, tmp_path / "run.mcap", beside=tmp_path, goals=goals)
 
 
 def _did(seen: Run, action: str) -> list[tuple[str | None, Any, str]]:
@@ -298,7 +304,7 @@ def test_the_last_goal_that_is_cancelled_is_waited_for_no_longer_than_it_is_judg
         }
     )
     with make_place({"scripts/server.py": heedless, "action/Count.action": COUNT}) as place:
-        seen = run(place, scenario, tmp_path / "run.mcap", cancels={"/count": 1.0})
+        seen = run(place, scenario, tmp_path / "run.mcap", goals={("/count", goals): 1.0})
     assert _did(seen, "result")[0] == ("/count", None, f"no result within {since}")
     assert len(_did(seen, "result")) == goals
 
@@ -311,9 +317,23 @@ rospy.Timer(rospy.Duration(0.2), tell)
 """
 
 
-@pytest.mark.parametrize(("status", "detail"), [(0, BEHIND), (1, "no result within 5 s")])
+@pytest.mark.parametrize(
+    ("status", "limit_s", "judged_s", "detail"),
+    [
+        (0, 2, None, BEHIND),
+        (0, 1, 5.0, BEHIND),
+        (0, 1, None, "no result within 6 s"),  # the rubric does not ask for the first one's end
+        (1, 2, None, "no result within 6 s"),
+    ],
+)
 def test_a_goal_behind_one_that_never_ends_is_waited_for_until_that_shows(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, status: int, detail: str
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    *,
+    status: int,
+    limit_s: int,
+    judged_s: float,
+    detail: str,
 ) -> None:
     monkeypatch.setattr("grader.arena.steps.ANSWER_S", 2.0)
     find = action_texts("lab/Count", COUNT).get
@@ -321,13 +341,15 @@ def test_a_goal_behind_one_that_never_ends_is_waited_for_until_that_shows(
     server = SERVER.format(goal=goal, result=result).replace("end(m.id, 2, -1)", "None")
     server = server.replace("def goal(message):\n", "def goal(message):\n    goals.append(message.goal_id)\n")
     server = server.replace("rospy.Subscriber", TELLS.replace("NEXT", str(status)) + "rospy.Subscriber", 1)
-    about = {"name": "/count", "type": "lab/Count", "goal": {"target": -1}, "limit_s": 2}
+    about = {"name": "/count", "type": "lab/Count", "goal": {"target": -1}}
     seen = _run(
         tmp_path,
         {"scripts/server.py": server, "action/Count.action": COUNT},
-        [{"action": about}, {"action": {**about, "limit_s": 5}}],
+        [{"action": {**about, "limit_s": limit_s}}, {"action": {**about, "limit_s": 6}}],
+        goals={("/count", 1): judged_s} if judged_s else None,
     )
-    assert [detail for _, _, detail in _did(seen, "result")] == ["no result within 2 s", detail]
+    results = [detail for _, _, detail in _did(seen, "result")]
+    assert results == [f"no result within {limit_s} s", detail]
 
 
 @pytest.mark.parametrize(("first_s", "answer_s"), [(4, 4.0), (1, 2.0)])

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
 
 from grader.errors import RubricError
 from grader.rubric.find import rubrics_folder
-from grader.rubric.load import cancels_of, load_rubric
+from grader.rubric.load import goals_of, load_rubric
 from tests.rubric.samples import faults, spoiled
 
 
@@ -110,28 +111,24 @@ def test_what_a_run_does_makes_sense(old, new, fault, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "waited_s"),
+    ("old", "new", "goals"),
     [
-        ("", "", None),
-        ("      - action: {name: /count, type: counting/Count, goal: {target: -1}, limit_s: 5}\n", "", 5.5),
-        (", goal: {target: -1}, limit_s: 5}", ", goal: {target: -1}, cancel_after_s: 2, limit_s: 5}", None),
-        (", goal: 3, status: ABORTED", ", goal: 3, within_s: 8, status: ABORTED", 16),
+        ("", "", {1: 6.5, 2: 5.5, 3: math.inf}),
+        (", within_s: 1.5}", "}", {1: math.inf, 2: 5.5, 3: math.inf}),
+        (", goal: 3, status: ABORTED", ", goal: 3, within_s: 8, status: ABORTED", {1: 6.5, 2: 5.5, 3: 16}),
+        (", result: {total: 5}, within_s: 1.5}", ", feedback: 3}", {1: 0, 2: 5.5, 3: math.inf}),
     ],
-    ids=["the last is not bounded", "the last one", "the last has no within_s", "twice"],
+    ids=["as it is", "no within_s", "twice", "of feedback alone"],
 )
-def test_how_long_the_result_of_a_goal_is_waited_for_once_that_is_cancelled(
-    old: str, new: str, waited_s: float | None, tmp_path: Path
+def test_how_long_the_result_of_a_goal_matters_once_that_is_cancelled(
+    old: str, new: str, goals: dict[int, float], tmp_path: Path
 ) -> None:
-    text = (
-        (rubrics_folder() / "examples" / "action-server.yaml").read_text(encoding="utf-8").replace(old, new)
-    )
-    if "target: -1" not in text:
-        text = text[: text.index("  - {id: aborts")].replace(
-            "points: 20, check: action-result", "points: 30, check: action-result"
-        )
+    text = (rubrics_folder() / "examples" / "action-server.yaml").read_text(encoding="utf-8")
+    assert old in text
     path = tmp_path / "lab.yaml"
-    path.write_text(text.replace("target: -1}, limit_s: 5", "target: -1}, limit_s: 10"), encoding="utf-8")
-    assert cancels_of(load_rubric(str(path)).rubric).get("goals", {}).get("/count") == waited_s
+    path.write_text(text.replace(old, new).replace("limit_s: 5}", "limit_s: 20}"), encoding="utf-8")
+    found = goals_of(load_rubric(str(path)).rubric)["goals"]
+    assert found == {("/count", number): matters_s for number, matters_s in goals.items()}
 
 
 CALL = "{service: /reset, type: std_srvs/Empty}"
