@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from grader.checks.registry import NoParams, check
 from grader.checks.support.build_errors import UNKNOWN_COMMAND, explain_error_of_build
-from grader.checks.support.build_output import FIRST_ERROR_HINT, first_error
+from grader.checks.support.cpp_errors import FIRST_ERROR_HINT, first_error
 from grader.checks.support.exit_causes import RUN_IT, explain_end
 from grader.checks.support.launch import IGNORE
 from grader.checks.support.processes import NO_SCRIPT_HINT, Life, lives

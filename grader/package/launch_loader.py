@@ -18,8 +18,8 @@ from pydantic import Field
 from grader.installable import known_packages
 from grader.model.package import Fault, LateRemap, LaunchArg, LaunchLine, LaunchLoad, LaunchNode, LaunchParam
 from grader.model.record import Record
+from grader.package.line_corrections import ATTRIBUTES
 from grader.package.xml import line_of
-from grader.package.xml_corrections import ATTRIBUTES
 from grader.wording import PAIR, is_one_edit
 
 INCLUDES_MAX = 50

@@ -17,9 +17,9 @@ from catkin_pkg.package import InvalidPackage, Package, parse_package_string
 from lxml import etree
 
 from grader.model.package import MANIFEST, Dependency, Fault, Manifest, Person
+from grader.package.line_corrections import TAGS
 from grader.package.reading import read_markup
 from grader.package.xml import find_strange, line_of, parse_xml
-from grader.package.xml_corrections import TAGS
 from grader.syntax_fixes import Reason
 
 _TEXT_CHARS_MAX = 4_000

@@ -8,8 +8,8 @@ from collections.abc import Callable
 import pytest
 
 from grader.arena.limits import RunLimits
-from grader.checks.support.build_output import first_error
 from grader.checks.support.console_output import printed_lines, printed_times, split_log_line, tracebacks
+from grader.checks.support.cpp_errors import first_error
 from grader.checks.support.exit_causes import _refused_name
 from grader.checks.support.launch import died, finished, name_pattern, refusal
 from grader.checks.support.processes import lives

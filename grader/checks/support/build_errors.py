@@ -8,20 +8,18 @@ from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import PurePosixPath
 
-from grader.checks.support.build_output import (
+from grader.checks.support.cpp_errors import (
+    CPP_ERRORS,
     FIRST_ERROR_HINT,
     BuildError,
     Explain,
     Explained,
     folder_names,
-    told,
-)
-from grader.checks.support.cpp_errors import (
-    CPP_ERRORS,
     missing_header,
     missing_link,
     other_namespace,
     programs_without,
+    told,
 )
 from grader.checks.support.scripts import CPP_SUFFIXES, OF_FILES, OF_INTERFACES, cmake_calls, installed
 from grader.checks.support.text import near_names, shown
