@@ -18,7 +18,7 @@ from cmake_parser import ast as nodes
 from cmake_parser.interpreter import Context
 
 from grader.model.package import CMAKE, CMakeCall, CMakeFacts, Fault
-from grader.package.line_corrections import find_slip, is_open
+from grader.package.cmake_corrections import find_slip, is_open
 from grader.package.reading import printable, read_markup
 from grader.syntax_fixes import MERGE_MARKER, MERGED
 from grader.wording import lines_text

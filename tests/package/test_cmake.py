@@ -18,8 +18,8 @@ from grader.package.cmake import (
     split_lists,
     written_calls,
 )
+from grader.package.cmake_corrections import find_slip
 from grader.package.cmake_parse import parse_tree_of
-from grader.package.line_corrections import find_slip
 
 
 def facts_of(tmp_path, text, *, trace=None, root=None):

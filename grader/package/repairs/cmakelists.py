@@ -12,8 +12,8 @@ from cmake_parser.ast import Token
 from grader.installable import is_no_package, known_packages, noetic_messages
 from grader.model.package import CMAKE, MANIFEST, PackageFacts, meant_command
 from grader.model.repair import RepairKind
+from grader.package.cmake_corrections import find_slip, is_open
 from grader.package.cmake_parse import commands_of, join_half_comment, parse_tree_of
-from grader.package.line_corrections import find_slip, is_open
 from grader.package.manifest import parse_manifest
 from grader.package.repairs.cmake_calls import (
     CALLS_MAX,
