@@ -18,11 +18,11 @@ from grader.checks.support.console_output import (
     filled,
     in_summary,
     line_that_prints,
+    lines_and_errors,
     logged_by,
     not_reached,
     split_log_line,
     stream_lines,
-    tracebacks,
 )
 from grader.checks.support.exit_causes import (
     explain_end,
@@ -67,8 +67,8 @@ from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, failed_or_blocked, grade_again, passed
 from grader.wording import join_words, plural, significant
 
-LINES_MAX, LINE_CHARS_MAX = 20_000, 1_000
-"""A text is looked for in so much of each stream."""
+LINE_CHARS_MAX = 1_000
+"""A text is looked for in so much of a line."""
 # Decimal numbers are not exact as floats: 0.4 differs from 0.3 by more than 0.1.
 ROUNDING = 1e-9
 CAUSES = frozenset({"publish", "call", "goal", "set_param", "play"})
@@ -138,7 +138,7 @@ def prints(package: PackageFacts, run: Run, params: PrintsParams) -> Verdict:
     expected = f"{params.words} printed{code}"
     if one is None:
         return not_started(params.process).about(expected=expected)
-    lines, errors = _read(run, one.name)
+    lines, errors = lines_and_errors(run, one.name)
     right = next((line for line in (*lines, *errors) if _fits(line, params)), None)
     if right is None:
         verdict = _not_printed(one, lines, package, run, params)
@@ -152,21 +152,6 @@ def prints(package: PackageFacts, run: Run, params: PrintsParams) -> Verdict:
     measured = verdict.measured or plural(len(lines), "line")
     cited = verdict.citations or (cite(run, "/grader/console", *span),)
     return verdict.about(expected=expected, measured=measured, citations=cited)
-
-
-def _read(run: Run, process: str) -> tuple[list[Line], list[Line]]:
-    """Return the lines that a process prints, and the last line of each traceback, which says what was raised. The
-    other lines of a traceback are Python's: the number in `line 40` is no output."""
-    lines: list[Line] = []
-    errors: list[Line] = []
-    for stream in stream_lines(run, process):
-        listed = in_summary(line.text for line in stream[:LINES_MAX])
-        read = [line for line, is_listed in zip(stream, listed, strict=False) if not is_listed]
-        found = tracebacks([line.text for line in read])
-        hidden = {index for one in found for index in range(one.first, one.last + 1)}
-        lines += [line for index, line in enumerate(read) if index not in hidden and line.text.strip()]
-        errors += [read[one.last] for one in found]
-    return lines, errors
 
 
 def _too_often(run: Run, process: str, params: PrintsParams) -> Verdict | None:
@@ -222,16 +207,20 @@ def _not_printed(
     ):
         return why
     if not own:
-        keys = reads_keys(package, run)
-        why, hint = (f": {keys.message}", keys.fix) if keys else ("", both(f"{hint}, with flush=True", hint))
-        nothing = failed_or_blocked(f"it prints nothing, not {params.words}{why}", hint=hint)
-        could = line_that_prints(package, run, lambda text: any(params.found_in(Line(0, text))))
-        nothing = not_reached(nothing, could) if could and not why else nothing
-        return nothing.if_repeated().model_copy(update={"silent": True})
+        return _nothing_printed(package, run, params, hint).if_repeated().model_copy(update={"silent": True})
     meant = max(own, key=lambda line: SequenceMatcher(None, params.words, line.text[:LINE_CHARS_MAX]).ratio())
     hint = _of_whole_answer(meant, params) or unfilled(meant.text) or hint
     lost = _of_client(asked, run)(f"{never}; it prints {shown(meant.text)!r}", hint=hint)
     return lost.about(said=meant.text).if_repeated()
+
+
+def _nothing_printed(package: PackageFacts, run: Run, params: PrintsParams, hint: str) -> Verdict:
+    nothing = f"it prints nothing, not {params.words}"
+    if keys := reads_keys(package, run):
+        return failed_or_blocked(f"{nothing}: {keys.message}", hint=keys.fix)
+    verdict = failed_or_blocked(nothing, hint=both(f"{hint}, with flush=True", hint))
+    could = line_that_prints(package, run, lambda text: any(params.found_in(Line(0, text))))
+    return not_reached(verdict, could) if could else verdict
 
 
 def _unseen(one: Life, package: PackageFacts, run: Run, params: PrintsParams, never: str) -> Verdict | None:

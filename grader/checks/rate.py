@@ -56,8 +56,7 @@ NEAR_SHARE = 0.25
 """A rate that is wrong by less than this share is measured once more before it costs anything."""
 SLEEPLESS = ("not-called", "sleep-outside", "undefined", "misspelt")
 """Slips that keep a loop from sleeping."""
-LATE_P95_SHARE = 0.2
-LATE_MAX_SHARE = 0.5
+LATE_P95_SHARE, LATE_MAX_SHARE = 0.2, 0.5
 SILENT_PERIODS = 1.5
 STALLS_SHARE = 0.1
 """Of the gaps: who is kept waiting by a full machine is so now and then, and keeps its rate otherwise."""

@@ -402,12 +402,6 @@ def test_the_next_name_of_a_series_means_none_of_the_others(given, used, kind, t
     assert [s.kind for s in slips if s.name == used] == [kind]
 
 
-def test_a_sum_of_numbers_is_no_text(tmp_path: Path) -> None:
-    (tmp_path / "a.py").write_text("a = n * 2 + 10\nt = 'n is ' + str(n)\np.publish(a)\np.publish(t)\n")
-    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "publishes"]
-    assert [one.message for one in slips if any(map(str.isalnum, one.message))] == ["n is {}"]
-
-
 def test_where_names_of_the_graph_are_written_is_known(tmp_path):
     (tmp_path / "a.py").write_text(
         "rospy.init_node('talker')\nrospy.Publisher(\n    name='/chatter', data_class=String)\n"

@@ -405,3 +405,9 @@ def test_fields_of_an_attribute_that_is_always_none(tmp_path: Path) -> None:
         ("a.py", 6, "on line 3, write `self.p = Pose()`", "x"),
         ("a.py", 8, "on line 3, write `self.p = Pose()`", "y"),
     ]
+
+
+def test_a_sum_of_numbers_is_no_text(tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text("a = n * 2 + 10\nt = 'n is ' + str(n)\np.publish(a)\np.publish(t)\n")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "publishes"]
+    assert [one.message for one in slips if any(map(str.isalnum, one.message))] == ["n is {}"]

@@ -26,6 +26,8 @@ OTHER_NUMBERS_PER_LINE = 6
 """Besides those that were sent: a line with more of them hears nothing."""
 LINES_PER_PROBE = 8
 LINES_SPARE = 20
+LINES_MAX = 20_000
+"""A text is looked for in so much of each stream."""
 NAMES_MAX = 100
 """Of the student's nodes, those whose names are left out of lines."""
 CLOCK_SLACK_NS = 50_000_000
@@ -120,6 +122,21 @@ def stream_lines(run: Run, process: str, *, with_names: bool = False) -> tuple[t
     streams = (*console, _logged_lines(run, nodes))
     plain = without_colours if with_names else partial(_bare, names=nodes)
     return tuple(tuple(Line(t, plain(text)) for t, text in stream) for stream in streams)
+
+
+def lines_and_errors(run: Run, process: str) -> tuple[list[Line], list[Line]]:
+    """Return the lines that a process prints, and the last line of each traceback, which says what was raised. The
+    other lines of a traceback are Python's: the number in `line 40` is no output."""
+    lines: list[Line] = []
+    errors: list[Line] = []
+    for stream in stream_lines(run, process):
+        listed = in_summary(line.text for line in stream[:LINES_MAX])
+        read = [line for line, is_listed in zip(stream, listed, strict=False) if not is_listed]
+        found = tracebacks([line.text for line in read])
+        hidden = {index for one in found for index in range(one.first, one.last + 1)}
+        lines += [line for index, line in enumerate(read) if index not in hidden and line.text.strip()]
+        errors += [read[one.last] for one in found]
+    return lines, errors
 
 
 def _logged_lines(run: Run, nodes: Collection[str] | None = None) -> list[tuple[int, str]]:

@@ -480,8 +480,8 @@ def _without_callback(call: ast.Call, tree: ast.Module) -> Iterator[Argument]:
     if len(call.args) != len(("topic", "type")) or any(k.arg in {None, "callback"} for k in call.keywords):
         return
     used = {last_name(n) for n in nodes_in(tree) if isinstance(n, ast.Name | ast.Attribute)}
-    parts = [tree, *(n for n in tree.body if isinstance(n, ast.ClassDef))]
-    own = (n for part in parts for n in part.body if isinstance(n, ast.FunctionDef))
+    bodies = [tree.body, *(n.body for n in tree.body if isinstance(n, ast.ClassDef))]
+    own = (n for body in bodies for n in body if isinstance(n, ast.FunctionDef))
     taking = [n for n in own if n.name not in used and len([a for a in n.args.args if a.arg != "self"]) == 1]
     taking = [n for n in taking if _reads_part(n, n.args.args[-1].arg)]
     if len(taking) == 1:
