@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from typing import NamedTuple
+
+from grader.wording import join_words
 
 YAML_LINES_MAX = 2_000
 YAML_CHARS_MAX = 500
@@ -54,6 +57,23 @@ def slip_of_yaml(text: str, until: int) -> YamlSlip | None:
         if found := _slip_of_key(code, is_above_block=is_above_block) or _slip_of_value(code):
             return YamlSlip(number, *found)
     return None
+
+
+def levels_of(names: Iterable[str]) -> str:
+    """Return how to nest `/details/name/first` and more of three levels; "" for others, and for one block."""
+    below: dict[str, list[str]] = {}
+    roots = set()
+    for name in names:
+        root, *parts = name.strip("/").split("/")
+        if len(parts) != 2:
+            return ""
+        roots.add(root)
+        below.setdefault(parts[0], []).append(f"`{parts[1]}:`")
+    if len(below) < 2 or len(roots) > 1:
+        return ""
+    blocks = [f"`{block}:` with {join_words(keys)} below it" for block, keys in below.items()]
+    told = f"write the keys in levels, each two spaces further in than the one above: `{roots.pop()}:`, below it "
+    return told + join_words(blocks)
 
 
 def _indent(line: str) -> int:

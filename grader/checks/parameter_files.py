@@ -33,6 +33,7 @@ from grader.model.record import Record
 from grader.model.verdict import Citation, FileCitation, Verdict, failed, grade_again, passed
 from grader.syntax_fixes import LFS_BEGINS, LFS_POINTER
 from grader.wording import join_words, plural, there_is
+from grader.yaml_fixes import levels_of
 
 
 class ParamsLoadedParams(Record):
@@ -180,20 +181,13 @@ def _missing(
 def _levels(missing: list[str], found: dict[str, object]) -> str:
     """Return how to nest keys that the file has flat, as `details_name_first` or `first`; "" where it is one block, or
     the lab asks for other levels than three."""
-    below: dict[str, list[str]] = {}
     for name in missing:
         _, *parts = name.split("/")
         flat = {sign.join(parts[first:]) for sign in "_.-" for first in range(len(parts))}
         root = {f"{parts[0]}/{parts[-1]}"}
-        if len(parts) != 3 or not any(
-            f"/{one}" in found for one in flat | root
-        ):  # a root, its blocks, their keys
+        if not any(f"/{one}" in found for one in flat | root):
             return ""
-        below.setdefault(parts[1], []).append(f"`{parts[2]}:`")
-    blocks = [f"`{block}:` with {join_words(keys)} below it" for block, keys in below.items()]
-    above = missing[0].split("/")[1]
-    told = f"write the keys in levels, each two spaces further in than the one above: `{above}:`, below it "
-    return told + join_words(blocks) if len(blocks) > 1 else ""
+    return levels_of(missing)
 
 
 def _readers(package: PackageFacts, build: Run, name: str, not_below: str) -> Iterator[str]:

@@ -92,6 +92,10 @@ def asking(**more: object) -> Wanted:
     return WANTED.model_copy(update=more)
 
 
+LEVELS = "a:\n  b:\n    x: 1\n  y: 2\n  c:\n    z: 3\n"
+NESTED = asking(files=("config/my.yaml",), params=("/a/b/x", "/a/b/y", "/a/c/z"))
+
+
 @dataclass(frozen=True)
 class Case:
     """`changes` to the correct package, the kinds of repair found, a part of their words, and of the repaired files."""

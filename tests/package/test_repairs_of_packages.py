@@ -14,7 +14,9 @@ from tests.package.repairing import (
     CMAKELISTS,
     LAUNCH,
     LAUNCHED,
+    LEVELS,
     MANIFEST,
+    NESTED,
     SCRIPT,
     TALKER,
     XML,
@@ -71,9 +73,7 @@ TEMPLATE = """\
 #   DEPENDENCIES
 #   std_msgs
 # )"""
-LEVELS = "a:\n  b:\n    x: 1\n  y: 2\n  c:\n    z: 3\n"
 STARTED = asking(launch_files=("activity1.launch",), started=(("activity1.launch", "talker.py"),))
-NESTED = asking(files=("config/my.yaml",), params=("/a/b/x", "/a/b/y", "/a/c/z"))
 CONSTRUCTOR = """\
 Node::Node() : n_(1)
 {

@@ -12,8 +12,8 @@ import yaml
 from grader.model.package import PackageFacts
 from grader.package.repairs.editing import Files, keep_first_version
 from grader.package.repairs.names import Wanted
-from grader.wording import plural
-from grader.yaml_fixes import YAML_LINES_MAX, slip_of_yaml
+from grader.wording import on_lines, plural
+from grader.yaml_fixes import YAML_LINES_MAX, levels_of, slip_of_yaml
 
 SUFFIXES = (".yaml", ".yml")
 LINES_MAX = 4
@@ -35,6 +35,8 @@ def repair_yaml_files(files: Files, package: PackageFacts, wanted: Wanted) -> No
         name = PurePosixPath(path).name
         if name in named or any(name in text for text in launches):
             _repair_file(files, path, wanted)
+        if name in named:
+            _nest_keys(files, path, wanted)
 
 
 def _repair_file(files: Files, path: str, wanted: Wanted) -> None:
@@ -50,6 +52,83 @@ def _repair_file(files: Files, path: str, wanted: Wanted) -> None:
         text = one.text
     for one in steps:
         files.change("yaml-syntax", path, one.text, one.why.format(path=path), one.fix)
+
+
+def _nest_keys(files: Files, path: str, wanted: Wanted) -> None:
+    """Write the lab's parameters in levels, where the file has just these and has them in lists, or flat."""
+    text = files.text(path)
+    if text is None or text.count("\n") > YAML_LINES_MAX or _fault_in(text) is not None:
+        return
+    names = [tuple(name.strip("/").split("/")) for name in wanted.params]
+    if not _without_lists(files, path, text, names):
+        _in_levels(files, path, text, names)
+
+
+def _without_lists(files: Files, path: str, text: str, names: list[tuple[str, ...]]) -> bool:
+    lines = text.split("\n")
+    changed = [_LISTED.sub(r"\1  ", line) for line in lines]
+    after = "\n".join(changed)
+    missing = [name for name in names if name not in _paths(text)]
+    if after == text or _fault_in(after) is not None or _paths(after).isdisjoint(missing):
+        return False
+    numbers = [n for n, (one, other) in enumerate(zip(lines, changed, strict=True), 1) if one != other]
+    new = next(name for name in missing if name in _paths(after))
+    why = f"line {numbers[0]} of {path}: the `-` makes a list, in which there is no {'/'.join(new)}"
+    fix = f"start {on_lines(numbers)} with a space in place of the `-`"
+    files.change("parameter-name", path, after, why, fix)
+    return True
+
+
+_LISTED = re.compile(r"""^( *)- (?=["']?[A-Za-z_][\w-]*["']?:(?:\s|$))""")
+"""What begins a `name: value` that is an entry of a list."""
+
+
+def _in_levels(files: Files, path: str, text: str, names: list[tuple[str, ...]]) -> None:
+    """Write a file anew that has all names of one root, and nothing else, by names that are too short."""
+    values = _values(text)
+    found = {name: [one for one in values if one[-1] in _flat(name)] for name in names if len(name) > 1}
+    root = next((name[0] for name, own in found.items() if own), "")
+    meant = {name: own for name, own in found.items() if name[0] == root}
+    used = [one for own in meant.values() for one in own]
+    fix = levels_of("/".join(name) for name in meant)
+    if not fix or sorted(used) != sorted(values) or any(len(own) != 1 for own in meant.values()):
+        return
+    if any(name in values for name in meant):
+        return  # which is moved by itself
+    lines = text.split("\n")
+    nested = [*(line for line in lines if line.startswith("#")), f"{root}:"]
+    for block in dict.fromkeys(name[1] for name in meant):
+        nested.append(f"  {block}:")
+        for name in (one for one in meant if one[1] == block):
+            line, column = values[meant[name][0]]
+            nested.append(f"    {name[-1]}: {lines[line][column:]}")
+    first = next(iter(meant))
+    old = meant[first][0]
+    why = f"line {values[old][0] + 1} of {path}: {'/'.join(old)} should be {'/'.join(first)}"
+    files.change("parameter-name", path, "\n".join([*nested, ""]), why, fix)
+
+
+def _flat(name: tuple[str, ...]) -> set[str]:
+    return {sign.join(name[first:]) for sign in "_.-" for first in range(len(name))}
+
+
+def _values(text: str) -> dict[tuple[str, ...], tuple[int, int]]:
+    """Return the line and column, from 0, at which each value begins; nothing where one goes on in the next line."""
+    found: dict[tuple[str, ...], tuple[int, int]] = {}
+
+    def collect(node: yaml.Node | None, above: tuple[str, ...]) -> bool:
+        if isinstance(node, yaml.MappingNode) and len(above) < YAML_DEPTH and not node.flow_style:
+            return all(collect(value, (*above, str(key.value))) for key, value in node.value)
+        is_plain = isinstance(node, yaml.ScalarNode) or (
+            isinstance(node, yaml.SequenceNode) and node.flow_style
+        )
+        mark = node.start_mark if is_plain and node is not None else None
+        if mark is None or node is None or node.end_mark.line != mark.line or above in found:
+            return False
+        found[above] = (mark.line, mark.column)
+        return True
+
+    return found if collect(yaml.compose(text, Loader=yaml.SafeLoader), ()) else {}
 
 
 def _without_fault(text: str, at: int, wanted: Wanted) -> _Repaired | None:
