@@ -40,7 +40,7 @@ ALLOWED = {
     "wording": set[str](),
     "installable": {"errors", "wording"},
     "syntax_fixes": {"wording"},
-    "yaml_fixes": set[str](),
+    "yaml_fixes": {"wording"},
     "portable": {"errors"},
     "ros_env": {"errors", "host_programs", "installable", "model", "portable", "wording"},
     "host_programs": set[str](),

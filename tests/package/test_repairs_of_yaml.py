@@ -12,7 +12,7 @@ from tests.package.repairing import LEVELS, NESTED, Case, check
 CASES = {
     "keys-that-are-flat": Case(
         {"config/my.yaml": "# mine\nx: 1  # one\na_b_y: [2]\nz: 'three'\n"}, ["parameter-name"],
-        "config/my.yaml: write the keys in levels, each two spaces further in than the one above: `a:`, below it `b:` with", NESTED,
+        "config/my.yaml: write the keys in levels,", NESTED,
         {"config/my.yaml": "# mine\na:\n  b:\n    x: 1  # one\n    y: [2]\n  c:\n    z: 'three'\n"},
     ),
     "keys-one-level-down": Case(
