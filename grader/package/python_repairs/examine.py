@@ -14,7 +14,6 @@ import re
 import sys
 import warnings
 from collections.abc import Iterator
-from difflib import get_close_matches
 from itertools import pairwise
 from pathlib import PurePosixPath
 from typing import Any
@@ -43,6 +42,7 @@ from grader.package.python_repairs.names import (
     with_parameters,
     with_self,
 )
+from grader.package.python_repairs.rospy_names import ROSPY, with_attributes, with_rospy
 from grader.package.python_repairs.syntax import (
     Step,
     as_python3,
@@ -59,19 +59,6 @@ from grader.package.python_repairs.syntax import (
 from grader.wording import is_one_edit
 
 OLD_NAMES = {"raw_input": "input", "xrange": "range", "unicode": "str", "basestring": "str", "unichr": "chr"}
-NAMES_OF_ROSPY = (
-    "AnyMsg DEBUG Duration ERROR FATAL Header INFO MasterProxy Message Publisher ROSException ROSInitException "
-    "ROSInternalException ROSInterruptException ROSSerializationException ROSTimeMovedBackwardsException Rate Service "
-    "ServiceException ServiceProxy SubscribeListener Subscriber Time Timer TransportException TransportInitError "
-    "TransportTerminated WARN client core delete_param exceptions get_caller_id get_master get_name get_namespace "
-    "get_node_uri get_param get_param_cached get_param_names get_published_topics get_ros_root get_rostime get_time "
-    "get_topic_class has_param impl init_node is_shutdown logdebug logdebug_once logdebug_throttle logerr logerr_once "
-    "logerr_throttle logfatal logfatal_once logfatal_throttle loginfo loginfo_once loginfo_throttle logout logwarn "
-    "logwarn_once logwarn_throttle msg msproxy myargv names numpy_msg on_shutdown parse_rosrpc_uri remap_name "
-    "resolve_name rostime search_param service set_param signal_shutdown sleep spin timer topics wait_for_message "
-    "wait_for_service"
-)
-ROSPY = frozenset(NAMES_OF_ROSPY.split())
 WAITING = frozenset({"Subscriber", "Service", "Timer", "SimpleActionServer"})
 """What a node that only waits is made of."""
 LOOPED = frozenset({"is_shutdown", "sleep", "spin"})
@@ -124,6 +111,7 @@ def _steps(text: str, types: list[str], known: Known, *, is_run: bool = True) ->
         for repair in (
             _without_old_names,
             _without_old_print,
+            with_rospy,
             lambda t: without_suffixes(t, types),
             lambda t: with_classes(t, types),
             lambda t: with_imports(t, types),
@@ -133,7 +121,7 @@ def _steps(text: str, types: list[str], known: Known, *, is_run: bool = True) ->
             with_names,
             with_methods,
             with_parameters,
-            _with_attributes,
+            with_attributes,
             with_message_classes,
             with_values_called,
             with_calls,
@@ -247,27 +235,6 @@ def _keys_of_parameters(tree: ast.Module) -> Iterator[ast.Name]:
         of_call = isinstance(root, ast.Call) and last_name(root.func) == "get_param"
         if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Name) and root is not None:
             yield from [node.slice] if of_call or ast.unparse(root) in read else []
-
-
-def _with_attributes(text: str) -> Iterator[Step]:
-    """`rospy.subscriber(…)`, for `rospy.Subscriber(…)`: what rospy lacks, and has nearly under that name."""
-    lines = text.split("\n")
-    for node in nodes_in(tree_of(text)):
-        if not isinstance(node, ast.Attribute) or last_name(node.value) != "rospy" or node.attr in ROSPY:
-            continue
-        plain = {name.lower(): name for name in ROSPY}
-        if isinstance(node.ctx, ast.Store):
-            continue  # a value is given to it: `rospy.rate = 10`
-        near = get_close_matches(node.attr, ROSPY, 1, 0.85)
-        near += [one for one in ROSPY if is_one_edit(node.attr, one)]
-        meant = plain.get(node.attr.lower()) or next(iter(near), "")
-        span = span_of(lines, node)
-        if meant and span is not None and not node.attr.startswith("_"):
-            line, _, end = span
-            after = edited(text, [(line, end - len(node.attr), end, meant)])
-            for step in step_to("attribute", line + 1, text, after, f"rospy.{node.attr}"):
-                text, lines = step["text"], step["text"].split("\n")
-                yield step
 
 
 def _with_start(text: str) -> Iterator[Step]:

@@ -35,15 +35,16 @@ ATTEMPTS = 3
 
 Cause = Literal[
     "merged", "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
-    "old-name", "module", "import", "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument",
-    "unbound", "kept", "guard", "inside", "start", "main", "server", "spin", "line", "twice", "turned",
+    "old-name", "module", "other-module", "import", "name", "quotes", "attribute", "value", "call", "quoted",
+    "callback", "argument", "unbound", "kept", "guard", "inside", "start", "main", "server", "spin", "line", "twice",
+    "turned",
 ]  # fmt: skip
 CALLS = (
     "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument", "unbound", "kept", "guard",
     "inside", "start", "main", "server", "spin",
 )  # fmt: skip
 KINDS: dict[str, RepairKind] = {
-    **dict.fromkeys(("module", "import"), "missing-import"),
+    **dict.fromkeys(("module", "other-module", "import"), "missing-import"),
     **dict.fromkeys(CALLS, "missing-call"),
 }
 
@@ -379,6 +380,8 @@ WORDS: dict[Cause, tuple[str, str]] = {
      "put a value in the code in place of `raw_input(…)`: a node cannot ask for input"),
     "import": ("{place} uses {word}, which is not imported", ""),
     "module": ("{place}: {word}", ""),
+    "other-module": ("{place}: {word} has no `init_node`: rospy is meant",
+     "write `rospy` in place of `{word}`, wherever it stands"),
     "name": ("{place}: {word} is not defined", ""),
     "quotes": ("{place}: quotes are missing around {word}", ""),
     "attribute": ("{place}: there is no {word}", ""),

@@ -1,0 +1,153 @@
+"""Repairs of names that rospy lacks: its own in other letters, and those of ROS 2 and roscpp.
+
+The text of a script that parses comes in, and the steps go out that repair it, as in `examine.py`. It runs in a
+child process: the standard library only, and nothing is executed.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Sequence
+from difflib import get_close_matches
+
+from grader.package.python_repairs.names import bound_in
+from grader.package.python_repairs.syntax import (
+    Step,
+    edited,
+    last_name,
+    nodes_in,
+    span_of,
+    step_to,
+    tree_of,
+)
+from grader.wording import is_one_edit
+
+NAMES_OF_ROSPY = (
+    "AnyMsg DEBUG Duration ERROR FATAL Header INFO MasterProxy Message Publisher ROSException ROSInitException "
+    "ROSInternalException ROSInterruptException ROSSerializationException ROSTimeMovedBackwardsException Rate Service "
+    "ServiceException ServiceProxy SubscribeListener Subscriber Time Timer TransportException TransportInitError "
+    "TransportTerminated WARN client core delete_param exceptions get_caller_id get_master get_name get_namespace "
+    "get_node_uri get_param get_param_cached get_param_names get_published_topics get_ros_root get_rostime get_time "
+    "get_topic_class has_param impl init_node is_shutdown logdebug logdebug_once logdebug_throttle logerr logerr_once "
+    "logerr_throttle logfatal logfatal_once logfatal_throttle loginfo loginfo_once loginfo_throttle logout logwarn "
+    "logwarn_once logwarn_throttle msg msproxy myargv names numpy_msg on_shutdown parse_rosrpc_uri remap_name "
+    "resolve_name rostime search_param service set_param signal_shutdown sleep spin timer topics wait_for_message "
+    "wait_for_service"
+)
+ROSPY = frozenset(NAMES_OF_ROSPY.split())
+OTHER_CALLS = {
+    **dict.fromkeys(("advertise", "create_publisher", "pub", "publish"), "Publisher"),
+    **dict.fromkeys(("create_subscription", "create_subscriber", "sub", "subscribe", "listen"), "Subscriber"),
+    **dict.fromkeys(("advertise_service", "create_service"), "Service"),
+    **dict.fromkeys(("service_client", "create_client"), "ServiceProxy"),
+    **dict.fromkeys(("create_timer",), "Timer"),
+    **dict.fromkeys(("create_rate", "loop_rate"), "Rate"),
+    **dict.fromkeys(("init", "node", "create_node"), "init_node"),
+    **dict.fromkeys(("info", "log", "print", "log_info"), "loginfo"),
+    **dict.fromkeys(("warn", "warning", "log_warning", "logwarning"), "logwarn"),
+    **dict.fromkeys(("error", "log_error", "logerror"), "logerr"),
+    **dict.fromkeys(("debug",), "logdebug"),
+    **dict.fromkeys(("param",), "get_param"),
+}
+"""Calls of ROS 2 and roscpp, and such as students make up, in small letters with a `_` between their words."""
+TYPE_FIRST = {
+    "create_publisher": "rospy.Publisher({1}, {0}, queue_size={2})",
+    "create_subscription": "rospy.Subscriber({1}, {0}, {2})",
+    "create_service": "rospy.Service({1}, {0}, {2})",
+    "create_client": "rospy.ServiceProxy({1}, {0})",
+    "create_timer": "rospy.Timer(rospy.Duration({0}), {1})",
+}
+"""Calls of ROS 2 that take their arguments in another order: the call of rospy with them."""
+OTHER_MODULES = ("rclpy", "ros", "roscpp", "ros2", "rospy2")
+
+
+def with_rospy(text: str) -> Iterator[Step]:
+    """`import rospy` in place of `import rclpy`, in a script that takes all its calls from rospy."""
+    tree, lines = tree_of(text), text.split("\n")
+    for node in (n for n in tree.body if isinstance(n, ast.Import) and len(n.names) == 1):
+        module, name = node.names[0].name, node.names[0].asname or node.names[0].name
+        named = {n.id for n in nodes_in(tree) if isinstance(n, ast.Name)}
+        uses = [n for n in nodes_in(tree) if isinstance(n, ast.Attribute) and last_name(n.value) == name]
+        spans = [span for n in uses if (span := span_of(lines, n.value)) is not None]
+        of_rospy = "init_node" in {n.attr for n in uses} and {n.attr for n in uses} <= ROSPY
+        if module not in OTHER_MODULES or not of_rospy or len(spans) != len(uses):
+            continue
+        if name != "rospy" and ("rospy" in named or bound_in(tree) & {"rospy", "*"}):
+            continue
+        at = node.lineno - 1
+        edits = [(line, start, end, "rospy") for line, start, end in spans]
+        changed = edited(text, edits).split("\n")
+        changed[at] = changed[at][: node.col_offset] + "import rospy"
+        yield from step_to("other-module", node.lineno, text, "\n".join(changed), module)
+        return
+
+
+def with_attributes(text: str) -> Iterator[Step]:
+    """`rospy.subscriber(…)` and `rospy.create_subscription(…)`, for `rospy.Subscriber(…)`."""
+    tree, lines = tree_of(text), text.split("\n")
+    calls = {id(n.func): n for n in nodes_in(tree) if isinstance(n, ast.Call)}
+    alone = {id(n.value) for n in nodes_in(tree) if isinstance(n, ast.Expr)}
+    for node in nodes_in(tree):
+        is_lacking = (
+            isinstance(node, ast.Attribute)
+            and isinstance(node.ctx, ast.Load)  # a value may be given to it: `rospy.rate = 10`
+            and last_name(node.value) == "rospy"
+            and node.attr not in ROSPY
+            and not node.attr.startswith("_")
+        )
+        if not is_lacking or not isinstance(node, ast.Attribute):
+            continue
+        call = calls.get(id(node))
+        edit = _of_call(lines, node.attr, call, alone=id(call) in alone) if call is not None else None
+        span = span_of(lines, node)
+        meant = _near(node.attr, is_called=call is not None)
+        if edit is None and meant and span is not None:
+            line, _, end = span
+            edit = (line, end - len(node.attr), end, meant)
+        for step in (
+            step_to("attribute", node.lineno, text, edited(text, [edit]), f"rospy.{node.attr}")
+            if edit
+            else ()
+        ):
+            yield step
+            yield from with_attributes(step["text"])
+            return
+
+
+def _near(name: str, *, is_called: bool) -> str:
+    """Return the name of rospy's that is written so in other letters; "" where there is none."""
+    known = [one for one in sorted(ROSPY) if not (is_called and one.isupper())]
+    plain = {_plain(one): one for one in known}
+    near = get_close_matches(name, known, 1, 0.85) + [one for one in known if is_one_edit(name, one)]
+    return plain.get(_plain(name)) or next(iter(near), "")
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", "").lower()
+
+
+def _of_call(
+    lines: Sequence[str], name: str, call: ast.Call, *, alone: bool
+) -> tuple[int, int, int, str] | None:
+    """Return the edit that makes the call one of rospy's; None where it is not sure which is meant."""
+    words = {_plain(one): new for one, new in OTHER_CALLS.items()}
+    new = words.get(_plain(name), "")
+    span, of_name = span_of(list(lines), call), span_of(list(lines), call.func)
+    if span is None or of_name is None or _plain(name) in {_plain(one) for one in ROSPY if not one.isupper()}:
+        return None
+    if name == "ok" and not call.args and f"not {ast.unparse(call)}" not in lines[span[0]]:
+        return (*span, "not rospy.is_shutdown()")
+    first = call.args[0] if call.args else None
+    is_text = isinstance(first, ast.Constant) and isinstance(first.value, str)
+    template, given = TYPE_FIRST.get(name, ""), [ast.unparse(one) for one in call.args]
+    values = given + [
+        ast.unparse(one.value) for one in call.keywords if one.arg in ("qos_profile", "queue_size")
+    ]
+    if template and (not is_text or name == "create_timer"):
+        wanted = template.count("{")
+        return (*span, template.format(*values)) if len(values) >= wanted else None
+    if not new or not call.args or (new == "init_node" and not (alone and is_text)):
+        return None
+    if new in ("Publisher", "Subscriber", "Service", "ServiceProxy") and (not is_text or len(given) < 2):
+        return None  # `rospy.publish(msg)` is a method's
+    return (of_name[0], of_name[2] - len(name), of_name[2], new)

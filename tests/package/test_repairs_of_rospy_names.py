@@ -1,0 +1,83 @@
+"""Names that rospy lacks, and the calls of ROS 2 and roscpp that stand for one of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.package.repairing import TALKER, Case, check, swapped
+
+PUBLISHER = "rospy.Publisher('numeric_chatter', Int8, queue_size=10)"
+LOOP = "        publisher.publish(1)"
+MADE = "    rate = rospy.Rate("
+RENAMED = {
+    PUBLISHER: (
+        PUBLISHER.replace("Publisher", "create_publisher"),
+        "rospy.create_publisher(Int8, 'numeric_chatter', 10)",
+        "rospy.create_publisher(Int8, 'numeric_chatter', qos_profile=10)",
+        PUBLISHER.replace("Publisher", "Pub"),
+        PUBLISHER.replace("Publisher", "advertise"),
+    ),
+    "rospy.init_node('talker')": ("rospy.init('talker')", "rospy.initNode('talker')", "rospy.Node('talker')"),
+    "rospy.get_param(": ("rospy.getParam(", "rospy.param("),
+    "rospy.Rate(rospy": ("rospy.create_rate(rospy", "rospy.loop_rate(rospy"),
+    "while not rospy.is_shutdown()": ("while rospy.ok()",),
+}
+ADDED = {
+    f"    rospy.Subscriber('x', Int8, print)\n{MADE}": (
+        f"    rospy.subscribe('x', Int8, print)\n{MADE}",
+        f"    rospy.create_subscription(Int8, 'x', print, 10)\n{MADE}",
+    ),
+    f"    rospy.Timer(rospy.Duration(1), print)\n{MADE}": (f"    rospy.create_timer(1, print)\n{MADE}",),
+    f"        rospy.loginfo('x')\n{LOOP}": tuple(
+        f"        rospy.{name}('x')\n{LOOP}" for name in ("log", "info", "print", "logInfo")
+    ),
+    f"        rospy.logerr('x')\n{LOOP}": (f"        rospy.error('x')\n{LOOP}",),
+}
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"), [(right, one) for right, some in RENAMED.items() for one in some]
+)
+def test_a_call_that_rospy_lacks_is_written_as_its_own(right: str, wrong: str, tmp_path: Path) -> None:
+    case = Case(
+        swapped(TALKER, (right, wrong)), ["missing-call"], "there is no rospy.", after={TALKER: right}
+    )
+    check(case, tmp_path)
+
+
+@pytest.mark.parametrize(("right", "wrong"), [(right, one) for right, some in ADDED.items() for one in some])
+def test_so_is_one_beside_the_others(right: str, wrong: str, tmp_path: Path) -> None:
+    place = MADE if right.endswith(MADE) else LOOP
+    check(Case(swapped(TALKER, (place, wrong)), ["missing-call"], "", after={TALKER: right}), tmp_path)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        f"        rospy.publish(1)\n{LOOP}",  # which publisher's?
+        f"        rospy.sub(3)\n{LOOP}",
+        f"        node = rospy.create_node('x')\n{LOOP}",
+        f"        assert not rospy.ok()\n{LOOP}",
+        f"        rospy.shut('x')\n{LOOP}",
+    ],
+)
+def test_what_may_be_meant_otherwise_is_left_alone(wrong: str, tmp_path: Path) -> None:
+    check(Case(swapped(TALKER, (LOOP, wrong)), []), tmp_path)
+
+
+def test_the_module_of_ros_2_is_none_of_a_script_that_calls_rospy(tmp_path: Path) -> None:
+    every = swapped(TALKER, ("import rospy", "import rclpy"), ("rospy.", "rclpy."))
+    says = "write `rospy` in place of `rclpy`, wherever it stands"
+    check(Case(every, ["missing-import"], says, after={TALKER: "import rospy\n"}), tmp_path / "one")
+    named = swapped(TALKER, ("import rospy", "import rclpy as rospy"))
+    says = "rclpy has no `init_node`: rospy is meant"
+    check(Case(named, ["missing-import"], says, after={TALKER: "import rospy\n"}), tmp_path / "two")
+    of_ros_2 = swapped(
+        TALKER,
+        ("import rospy", "import rclpy"),
+        ("rospy.", "rclpy."),
+        ("rclpy.init_node(", "rclpy.create_node("),
+    )
+    check(Case(of_ros_2, []), tmp_path / "three")
