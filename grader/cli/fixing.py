@@ -20,6 +20,7 @@ from grader.cli.select_rubric import Chosen
 from grader.errors import OutputError, UsageError
 from grader.files import temporary_folder
 from grader.intake.open import open_submission
+from grader.model.package import PackageFacts
 from grader.model.repair import Repair
 from grader.model.submission import SourcePackage
 from grader.package.facts import read_package
@@ -63,27 +64,37 @@ def fix_packages(chosen: Sequence[Chosen], *, dry_run: bool, yes: bool) -> bool:
 def _fix_package(chosen: Chosen, *, dry_run: bool, yes: bool) -> bool:
     rubric = chosen.rubric.rubric
     with temporary_folder("source") as work:
-        found = {
-            package.folder: [
-                repair
-                for repair in find_repairs(
-                    package.folder, read_package(package), wanted_of(rubric, package.asked)
-                )
-                if is_fixed(package.folder, repair)
-            ]
-            for package in _packages(chosen, work)
-        }
+        found: dict[Path, list[Repair]] = {}
+        of_git: list[Repair] = []
+        for package in _packages(chosen, work):
+            facts = read_package(package)
+            repairs = find_repairs(package.folder, facts, wanted_of(rubric, package.asked))
+            fixed = [one for one in repairs if is_fixed(package.folder, one)]
+            found[package.folder] = [*_bits_of_git(package.folder, facts), *fixed]
+            bits = (one for one in repairs if one.kind == "executable-bit" and one not in fixed)
+            of_git += [one for one in bits if is_executable(package.folder, one.file)]
         found = {folder: repairs for folder, repairs in found.items() if repairs}
         for number, (folder, repairs) in enumerate(found.items()):
             preview = work / f"preview-{number}"
             emit(open_console(sys.stdout), _parts(repairs, _diff(folder, repairs, preview)))
-        if not found:
+        for one in of_git:
+            say(f"{one.file} is executable on this disk but not in git: {one.fix}")
+        if not found and not of_git:
             say("There is nothing here that --fix repairs.")
     if found and not dry_run and (yes or _ask_agreement(sum(map(len, found.values())))):
         for folder, repairs in found.items():
             for repair in repairs:
                 _apply(folder, repair)
     return bool(found)
+
+
+def _bits_of_git(folder: Path, facts: PackageFacts) -> Iterator[Repair]:
+    """Yield the bits of scripts that git has and this disk has not: no mark is lost by them, but nothing runs here."""
+    for file in facts.files if MODES_ON_DISK else ():
+        is_script = file.shebang is not None and file.link is None and file.mode_source == "git"
+        if is_script and file.executable and not is_executable(folder, file.path):
+            what = f"{file.path} is executable in git but not on this disk"
+            yield Repair(kind="executable-bit", file=file.path, message=what, fix=f"chmod +x {file.path}")
 
 
 def _packages(chosen: Chosen, work: Path) -> tuple[SourcePackage, ...]:

@@ -150,6 +150,14 @@ def test_a_bit_that_git_lacks_is_told_below_the_report(folder, monkeypatch, caps
     )  # the build may still make programs of them
     assert "git update-index --chmod=+x basic_comms/scripts/talker.py" in capsys.readouterr().out
     assert run(["check", str(folder), "--fix", "--dry-run"]) == 0
+    told = "scripts/talker.py is executable on this disk but not in git: git update-index --chmod=+x"
+    assert told in capsys.readouterr().out
+    git("update-index", "--chmod=+x", "basic_comms/scripts/talker.py")
+    git("config", "core.fileMode", "false")
+    (folder / "scripts/talker.py").chmod(0o644)
+    assert run(["check", str(folder), "--fix", "--yes", "--static"]) == 0
+    assert "scripts/talker.py is executable in git but not on this disk" in capsys.readouterr().out
+    assert (folder / "scripts/talker.py").stat().st_mode & 0o777 == 0o755
 
 
 @pytest.mark.parametrize(
