@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import combinations
 from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
@@ -113,6 +114,8 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
     made = exchanges(run, params.service)
     pairs = list(zip(made, params.expect, strict=False))
     faults = [(one, v) for one, w in pairs if (v := _fault(one, w, package, run, params))]
+    if faults and (hint := _exchanged(pairs, params)):
+        faults = [(one, verdict.model_copy(update={"hint": hint})) for one, verdict in faults]
     wrong = faults[0] if faults else None
     right = len(pairs) - len(faults)
     share = right / len(params.expect)
@@ -182,6 +185,27 @@ def _fault(
     )
     verdict = failed(message, hint=f"see what the callback computes: {_by_hand(params.service, one)}")
     return verdict.of_value(nan=any(one.nan for one in found))
+
+
+def _exchanged(pairs: Sequence[tuple[Exchange, dict[str, Any]]], params: ServiceAnswersParams) -> str:
+    """Return what to do where two fields of all answers have each other's values, and the rest is right; else ""."""
+    for first, second in combinations(dict.fromkeys(name for _, wanted in pairs for name in wanted), 2):
+        turned = {first: second, second: first}
+        if all(
+            one.response is not None
+            and {first, second} <= {*wanted}
+            and not isinstance(
+                wanted[first], bool
+            )  # two that are both turned around may each be wrong by itself
+            and not any(
+                differences(one.response, {turned.get(k, k): v for k, v in wanted.items()}, params.tolerance)
+            )
+            for one, wanted in pairs
+        ):
+            kind = pairs[0][0].type.partition("/")[2]
+            fields = f"{first}=…, {second}=…"
+            return f"{first} and {second} have each other's values: write each by its name, {kind}Response({fields})"
+    return ""
 
 
 def _by_hand(service: str, one: Exchange) -> str:
