@@ -387,6 +387,7 @@ def test_the_first_line_of_a_block_that_is_commented_out(tmp_path, comment, hint
     ("lines", "hint"),
     [
         ("    a()\nb()\n    c()", "line 3: begin it with 4 spaces"),
+        ("    try:\n        a()\n    b()\n    except E:\n        c()", "line 4: begin it with 8 spaces"),
         ("\tif x:\n\t\ta()\nb()\n# and\nc()\n\td()", "line 4: begin it with 1 tab"),
         ("    a()\nb()\nc()\nd()\ne()\n    f()", "line 7: start it exactly below that one"),
         ("    a()\nimport b\n    c()", "line 4: start it exactly below that one"),

@@ -335,6 +335,7 @@ if __name__ == '__main__':
         ("self.rate.sleep", "self.rate,sleep", "a dot belongs between `rate` and `sleep`"),
         ("self.hear)", "self,hear)", "a dot belongs between `self` and `hear`"),
         ("self.hear)", "selg.hear)", "selg is not defined"),
+        ("self.hear)", "hear)", "`hear` belongs to the class Talker"),
         ("message.data", "mesage.data", "mesage is not defined"),
         ("message.data", "message,data", ""),
         ("hear(self, ", "hear(Self, ", ""),

@@ -327,6 +327,7 @@ def test_an_exception_gets_the_name_that_is_used(caught: str, is_told: bool, tmp
             ["indent line 4 like the lines of the method above it, or delete it"],
         ),
         ("class A:\n    print('made')\n", []),
+        ("twist = Twist()\n", []),
         ("from a import *\ncounter = 0\nprint(conter)\n", []),
         ("counter = 0\nprint(unlike)\n", []),
         ("try:\n    pass\nexcept Exception as error:\n    print(error, __file__)\n", []),

@@ -285,6 +285,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("queue-size", 4, "write `queue_size=5`, without quotes")]),
         ("def f():\n    pass\nrospy.Subscriber('a', A, callback=f)\n",
          [("callback-values", 1, "`f` takes 0 arguments")]),
+        ("class A:\n    def f(self, m):\n        self.s = rospy.Subscriber('a', A, f)\n", []),
         ("def f():\n    print(d)\nrospy.Subscriber('a', A, f)\n", [("callback-values", 1, "write `def f(d):`")]),
         ("class T:\n    def f(self):\n        self.get_logger().info('of ROS 2')\nT().f()\n", []),
         ("def f(m):\n    pass\nrospy.Subscriber('a', A, f)\n", []),

@@ -49,9 +49,8 @@ OTHER_VALUES = {"on_shutdown": "nothing", "signal": "the signal's number and a f
 def answers_in_some_cases(tree):
     """A service's callback that returns an answer where an `if` or its `elif` holds, and nothing where none does."""
     functions = functions_in(tree)
-    given = (
-        argument(node, 2, "handler") for node in all_of(tree, ast.Call) if called_name(node) == "Service"
-    )
+    services = (n for n in all_of(tree, ast.Call) if called_name(n) == "Service")
+    given = (argument(n, 2, "handler") for n in services)
     for name in {dotted(one[0]).rpartition(".")[2] for one in given if one}:
         last = functions[name].body[-1] if name in functions else None
         ends, answer = [last], ""
@@ -106,6 +105,7 @@ def callbacks(tree):
     froms = [n for n in all_of(tree, ast.ImportFrom) if n.module not in ("rospy", "actionlib", "signal")]
     of_others = {a.asname or a.name for n in froms for a in n.names} | {"threading.Timer"}
     of_others |= {n.name for n in all_of(tree, ast.ClassDef)}
+    plain = {name: f for name, f in functions.items() if not isinstance(parents_of(tree)[f], ast.ClassDef)}
     for node in walk(tree):
         name = called_name(node)
         if name not in CALLBACKS or dotted(node.func) in of_others:
@@ -125,7 +125,7 @@ def callbacks(tree):
                 yield slip(one.lineno, "callback-called", message, fix, text)
             called = isinstance(one, ast.Call)
             meant = one.func if called else one
-            own = functions.get(dotted(meant).rpartition(".")[2])
+            own = (plain if isinstance(meant, ast.Name) else functions).get(dotted(meant).rpartition(".")[2])
             least, most = takes(own, isinstance(meant, ast.Attribute)) if own else (values, values)
             if own and called and (least or not gives_value(own)) and not gives_function(own):
                 message, fix = "`%s()` is called here", "write `%s`, without brackets"

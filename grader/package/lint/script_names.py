@@ -170,11 +170,13 @@ def misspelt(tree):
     stored = {n.id for n in names if isinstance(n.ctx, ast.Store)}
     functions = {n.name for n in all_of(tree, *FUNCTIONS[:2])} - stored
     odd = {*keys, *unbound, *outside}
+    made = {dotted(n.targets[0]): dotted(getattr(n.value, "func", None)) for n in all_of(tree, ast.Assign)}
     unknown = [n for n in names if n.id not in known or id(n) in odd]
     for node in unknown[:USES_LIMIT]:
         kind, line, message = "undefined", node.lineno, ""
         fitting = stored if id(node) in texts else own - functions if is_value(node, tree) else own
         near = "" if node.id in known | OLD_NAMES else spelt_alike(node.id, fitting, attributes)
+        near = "" if made.get(near) == node.id else near  # `twist = Twist()` lacks an import
         if id(node) in outside and (node.id == "self" or node.id not in known):
             message = "line %d is in the class, but in none of its methods, so it runs before them" % line
             fix = "indent line %d like the lines of the method above it, or delete it" % line

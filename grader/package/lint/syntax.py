@@ -305,15 +305,9 @@ def syntax_fault(error, data):
     if first is not None and lines[first][:1] not in "=>|":
         at = lines[first].find("{") + 1 or 1
         return fault("SyntaxError", first + 1, at, "invalid syntax", text=lines[first])
-    indented = known and "unexpected indent" in str(error)
-    head = commented_head(lines, line) if indented else None
-    if head is not None:
-        at, text = lines[head].index("#") + 1, lines[head]
-        return fault("IndentationError", head + 1, at, "block commented out" + moved(lines, head), text=text)
-    odd = out_of_block(lines, line) if indented else None
-    if odd is not None:
-        message = "ends its block too early: " + begin_with(blanks_of(lines[line - 1]))
-        return fault("IndentationError", odd + 1, 1, message, text=lines[odd])
+    of_block = block_fault(lines, line, "unexpected indent" in str(error)) if known else None
+    if of_block is not None:
+        return of_block
     begins = {text[0] for text in lines if text[:1] in ("\t", " ") and text.strip()}
     return fault(
         type(error).__name__,
@@ -325,6 +319,21 @@ def syntax_fault(error, data):
         mixed=len(begins) > 1,
         tab_size=tab_size(lines) if len(begins) > 1 else None,
     )
+
+
+def block_fault(lines, line, indented):
+    """Return the fault of a block whose first line is a comment, or which some of its lines are out of; None else."""
+    head = commented_head(lines, line) if indented else None
+    if head is not None:
+        at, text = lines[head].index("#") + 1, lines[head]
+        return fault("IndentationError", head + 1, at, "block commented out" + moved(lines, head), text=text)
+    odd = out_of_block(lines, line) if indented else None
+    inner = blanks_of(lines[line - 1]) if odd is not None else block_cut(lines, line)
+    if inner is None:
+        return None
+    at = line - 1 if odd is None else odd
+    message = "ends its block too early: " + begin_with(inner)
+    return fault("IndentationError", at + 1, 1, message, text=lines[at])
 
 
 def tab_size(lines):
@@ -386,6 +395,19 @@ def out_of_block(lines, line):
     before = next((width for width in widths[odd:] if width <= own), None)
     fits = 0 < odd <= ODD_LINES_MAX and before == own
     return code[odd - 1] if fits and not any(OUTERMOST.match(lines[n]) for n in code[:odd]) else None
+
+
+def block_cut(lines, line):
+    """Return with what the lines of a `try:` begin, where that line is as far out as the `try:` and as the `except`
+    below it; None else."""
+    own = blanks_of(lines[line - 1])
+    above = [n for n in range(line - 1) if is_code(lines[n])]
+    tried = next((n for n in reversed(above) if blanks_of(lines[n]) == own), None)
+    below = [lines[n] for n in range(line, len(lines)) if is_code(lines[n])][:ODD_LINES_MAX]
+    ends = any(re.match(re.escape(own) + r"(except|finally)\b", text) for text in below)
+    if tried is None or not ends or not re.match(r"try\s*:", lines[tried].lstrip()) or tried == above[-1]:
+        return None
+    return blanks_of(lines[above[above.index(tried) + 1]])
 
 
 def never_closed(data, line):

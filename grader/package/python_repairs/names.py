@@ -160,6 +160,9 @@ def _only_as_callback(tree: ast.Module, given: ast.expr | None) -> ast.FunctionD
     """Return the function that a call is given to call back; None where there is not one, or the script calls it."""
     name, nodes = last_name(given), nodes_in(tree)
     found = [n for n in nodes if isinstance(n, ast.FunctionDef) and n.name == name]
+    methods = {m for n in nodes if isinstance(n, ast.ClassDef) for m in n.body}
+    if isinstance(given, ast.Name) and methods.intersection(found):
+        return None  # without `self.`, it is no method's name
     called = any(isinstance(n, ast.Call) and last_name(n.func) == name for n in nodes)
     if len(found) != 1 or called or found[0].decorator_list:
         return None

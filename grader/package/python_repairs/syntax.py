@@ -186,6 +186,8 @@ def _in_their_blocks(lines: list[str], at: int, message: str) -> Iterator[tuple[
         yield "level", with_line(lines, at - 1, lines[at - 1].lstrip())
     if message.startswith(("expected an indented block", "unindent does not match")):
         yield from (("indent", candidate) for candidate in _with_body_indented(lines, at))
+    if message.startswith("expected 'except' or 'finally'"):
+        yield from (("level", candidate) for candidate in _with_lines_in_try(lines, at))
     yield from (("line", candidate) for candidate in _with_line_back(lines, at, message))
     if message.startswith(("unexpected indent", "unindent does not match")):
         yield from (("commented", candidate) for candidate in _with_head_uncommented(lines, at))
@@ -247,6 +249,17 @@ def _with_line_back(lines: list[str], at: int, message: str) -> Iterator[str]:
     elif message.startswith(("unexpected indent", "unindent does not match")):
         yield from _with_try(lines, at)
         yield from _with_def(lines, at)
+
+
+def _with_lines_in_try(lines: list[str], at: int) -> Iterator[str]:
+    """Yield the text with lines in a `try:` that stand between it and its `except`, and are as far out as these."""
+    own = _indentation(lines[at])
+    end = next((n for n, line in enumerate(lines[at:], at) if CONTINUES.match(line.strip())), len(lines))
+    first = max((n for n, line in enumerate(lines[:at]) if line.rstrip() == f"{own}try:"), default=at)
+    if 0 < end - at <= ODD_LINES_MAX and first < at - 1 and _indentation(lines[end]) == own:
+        more = len(_indentation(lines[first + 1])) - len(own)
+        moved = [_indentation(lines[first + 1])[:more] + line for line in lines[at:end]]
+        yield "\n".join([*lines[:at], *moved, *lines[end:]])
 
 
 def _with_try(lines: list[str], at: int) -> Iterator[str]:
