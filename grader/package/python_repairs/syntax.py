@@ -256,7 +256,8 @@ def _with_lines_in_try(lines: list[str], at: int) -> Iterator[str]:
     own = _indentation(lines[at])
     end = next((n for n, line in enumerate(lines[at:], at) if CONTINUES.match(line.strip())), len(lines))
     first = max((n for n, line in enumerate(lines[:at]) if line.rstrip() == f"{own}try:"), default=at)
-    if 0 < end - at <= ODD_LINES_MAX and first < at - 1 and _indentation(lines[end]) == own:
+    is_near = at < end < min(len(lines), at + 1 + ODD_LINES_MAX)
+    if is_near and first < at - 1 and _indentation(lines[end]) == own:
         more = len(_indentation(lines[first + 1])) - len(own)
         moved = [_indentation(lines[first + 1])[:more] + line for line in lines[at:end]]
         yield "\n".join([*lines[:at], *moved, *lines[end:]])
