@@ -20,7 +20,16 @@ from grader.checks.support.scripts import (
     names_script,
 )
 from grader.checks.support.text import near_names, shown
-from grader.model.package import CMAKE, CMakeCall, CMakeFacts, Fault, PackageFacts, meant_command
+from grader.model.package import (
+    CMAKE,
+    MAKES_PACKAGE,
+    SIMPLE,
+    CMakeCall,
+    CMakeFacts,
+    Fault,
+    PackageFacts,
+    meant_command,
+)
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, failed_or_blocked, inconclusive, passed
 from grader.wording import is_one_edit, join_words
@@ -177,7 +186,7 @@ def _wrong(package: PackageFacts, facts: CMakeFacts, names: tuple[str, str]) -> 
     packages = [c for c in facts.calls if c.name == "find_package"]
     if slip := _misspelt(facts, "find_package"):
         yield _respell(slip, "find_package")
-    elif not any(c.args[:1] == ("catkin",) for c in packages):
+    elif not any(c.args[:1] in (("catkin",), (SIMPLE,)) for c in packages):
         slip = next((c for c in packages if c.args and _stands_for_catkin(c.args[0])), None)
         why = "find_package(catkin …) is missing"
         if slip is None:
@@ -189,7 +198,7 @@ def _wrong(package: PackageFacts, facts: CMakeFacts, names: tuple[str, str]) -> 
             yield Wrong(why, f"write catkin {place} {slip.args[0]}", slip.line)
     if slip := _misspelt(facts, "catkin_package"):
         yield _respell(slip, "catkin_package")
-    elif _first(facts, "catkin_package") is None:
+    elif all(c.name not in MAKES_PACKAGE for c in facts.calls):
         above = next((c for c in packages if c.args[:1] == ("catkin",)), project)
         above = _first(facts, "generate_messages") or above  # catkin refuses it the other way round
         why = "catkin_package(…) is missing"

@@ -22,8 +22,8 @@ from grader.files import temporary_folder
 from grader.intake.open import open_submission
 from grader.model.package import PackageFacts
 from grader.model.repair import Repair
-from grader.model.submission import SourcePackage
-from grader.package.facts import read_package
+from grader.model.submission import Submission
+from grader.package.facts import read_packages
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs, wanted_of
 from grader.package.repairs.editing import is_executable, naming_files, read_data
 from grader.pipeline import wanted_package
@@ -64,10 +64,12 @@ def fix_packages(chosen: Sequence[Chosen], *, dry_run: bool, yes: bool) -> bool:
 def _fix_package(chosen: Chosen, *, dry_run: bool, yes: bool) -> bool:
     rubric = chosen.rubric.rubric
     with temporary_folder("source") as work:
+        submission = _submission(chosen, work)
+        read = read_packages(submission, ())
         found: dict[Path, list[Repair]] = {}
         of_git: list[Repair] = []
-        for package in _packages(chosen, work):
-            facts = read_package(package)
+        packages = (submission.package, *submission.also)
+        for package, facts in zip(packages, (read, *read.also), strict=True):
             repairs = find_repairs(package.folder, facts, wanted_of(rubric, package.asked))
             fixed = [one for one in repairs if is_fixed(package.folder, one)]
             found[package.folder] = [*_bits_of_git(package.folder, facts), *fixed]
@@ -97,8 +99,8 @@ def _bits_of_git(folder: Path, facts: PackageFacts) -> Iterator[Repair]:
             yield Repair(kind="executable-bit", file=file.path, message=what, fix=f"chmod +x {file.path}")
 
 
-def _packages(chosen: Chosen, work: Path) -> tuple[SourcePackage, ...]:
-    """Return the lab's packages in the student's own folder. Raises UsageError for an archive or an address."""
+def _submission(chosen: Chosen, work: Path) -> Submission:
+    """Return what is in the student's own folder. Raises UsageError for an archive or an address."""
     submission = None
     if Path(chosen.source).is_dir():
         wanted = wanted_package(chosen.rubric.rubric, "")
@@ -108,7 +110,7 @@ def _packages(chosen: Chosen, work: Path) -> tuple[SourcePackage, ...]:
         raise UsageError(
             f"{chosen.source} is not a folder on your disk", hint="give your package's folder to --fix"
         )
-    return (submission.package, *submission.also)
+    return submission
 
 
 def is_fixed(folder: Path, repair: Repair) -> bool:

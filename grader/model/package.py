@@ -112,13 +112,19 @@ CMAKE_COMMANDS = (
     "target_link_libraries", "target_sources",
 )  # fmt: skip
 """Of CMake and catkin, those that a beginner's package calls."""
+SIMPLE = "catkin_simple"
+"""Finds catkin and what the manifest names, makes messages, and links: its calls `cs_…` stand for many of catkin's."""
+OTHER_COMMANDS = frozenset({"cs_add_executable", "cs_add_library", "cuda_include_directories"})
+"""Commands that have nearly the name of another one and are meant."""
+MAKES_PACKAGE = ("catkin_package", "catkin_metapackage", "cs_export")
+"""Any of these calls makes it a package of catkin."""
 ALIKE, SHORT = 0.88, 5
 """How alike two names of commands are that differ by one slip; in names of so few letters that says nothing."""
 
 
 def meant_command(name: str) -> str:
     """Return the command of CMake or catkin that a name, in small letters, is a slip of; empty where it is none."""
-    if name in CMAKE_COMMANDS or len(name) <= SHORT:
+    if name in CMAKE_COMMANDS or name in OTHER_COMMANDS or len(name) <= SHORT:
         return ""
     # The same words in another order: `package_catkin`.
     turned = [known for known in CMAKE_COMMANDS if sorted(known.split("_")) == sorted(name.split("_"))]
@@ -165,12 +171,13 @@ class CMakeFacts(Record):
 
     @property
     def executables(self) -> tuple[Executable, ...]:
-        """The programs of `add_executable`, under the names that the targets' properties give them."""
+        """The programs of `add_executable`, or of another library's command (`cs_add_executable`), under the names that
+        the targets' properties give them."""
         given: dict[str, dict[str, tuple[str, CMakeCall]]] = {}
         for call in self.calls:
             for target, name, value in _properties(call):
                 given.setdefault(target, {})[name] = (value, call)
-        made = (call for call in self.calls if call.name == "add_executable" and call.args)
+        made = (call for call in self.calls if call.name.endswith("add_executable") and call.args)
         return tuple(_executable(call, given.get(call.args[0], {})) for call in made)
 
 
@@ -504,6 +511,8 @@ class PackageFacts(Record):
     also: tuple[PackageFacts, ...] = Field(default=(), exclude_if=lambda value: not value)
     """The other packages that the lab asks for, as far as they were handed in. Their paths are relative to
     their own folders."""
+    beside: tuple[str, ...] = Field(default=(), exclude_if=lambda value: not value)
+    """The names of all other packages that were handed in."""
 
     def as_launched(self, commands: Iterable[tuple[str, ...]]) -> PackageFacts:
         """Return the facts with the launch files as these commands of roslaunch read them."""
@@ -518,6 +527,12 @@ class PackageFacts(Record):
             return self
         files = tuple(read.get(file.path, file) for file in self.launch_files)
         return self.model_copy(update={"launch_files": files})
+
+    @property
+    def others(self) -> set[str]:
+        """The names of packages that are not this one: handed in with it, or named by its manifest."""
+        needed = self.manifest.dependencies if self.manifest is not None else ()
+        return {*self.beside, *(one.name for one in self.also), *(one.name for one in needed)}
 
     def way_to(self, other: PackageFacts) -> str:
         """Return the path of another package's folder from this one's, `.` for the same: `../lab_msgs`."""

@@ -264,11 +264,12 @@ def read_package(
     *,
     hints: tuple[str, ...] = (),
     commands: Collection[tuple[str, tuple[str, ...]]] = (),
+    others: tuple[str, ...] = (),
 ) -> PackageFacts:
     """Return the facts of one package, as they are before a build (`with_build_facts`).
 
     A parser reads `CMakeLists.txt`, and this Python looks at the sources, in a process of its own. `commands` are
-    launch files with the arguments that scenarios give them.
+    launch files with the arguments that scenarios give them, `others` the names of other packages.
     """
     entries = read_files(package)
     with ThreadPoolExecutor(1) as beside:
@@ -283,7 +284,8 @@ def read_package(
         cmake = read_cmake(package.folder, package.name)
         names = (manifest.name if manifest else package.name, package.name)
         readable = [(entry.file.path, entry.path) for entry in _readable(entries)]
-        launch_files = read_launch_files(package.folder, readable, names, commands)
+        needed = (one.name for one in manifest.dependencies) if manifest else ()
+        launch_files = read_launch_files(package.folder, readable, names, commands, {*others, *needed})
         report = asked.result()
     files = tuple(entry.file for entry in entries)
     return PackageFacts(
@@ -299,13 +301,19 @@ def read_package(
         slips=(*report.slips, *cpp_slips(package.folder, (e.path for e in _readable(entries)))),
         interfaces=_interfaces(package.folder, _readable(entries)),
         asked=package.asked,
+        beside=others,
     )
 
 
 def read_packages(submission: Submission, commands: Collection[tuple[str, tuple[str, ...]]]) -> PackageFacts:
     """Return the facts of a submission's main package, with those of the others; `commands` as in `read_package`."""
-    facts = read_package(submission.package, hints=submission.hints, commands=commands)
-    also = tuple(read_package(one, commands=commands) for one in submission.also)
+    names = {one.name for one in (*submission.packages, *submission.also, submission.package)}
+
+    def read(one: SourcePackage, hints: tuple[str, ...] = ()) -> PackageFacts:
+        return read_package(one, hints=hints, commands=commands, others=tuple(sorted(names - {one.name})))
+
+    facts = read(submission.package, submission.hints)
+    also = tuple(map(read, submission.also))
     return facts.model_copy(update={"also": also})
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from lxml import etree
 
 from grader.model.package import LAUNCH_TAGS, Fault, LaunchFile, LaunchNode
-from grader.package.launch_loader import KEPT_AS_WRITTEN, Find, Scope, load, unknown_attributes, wanted
+from grader.package.launch_loader import KEPT_AS_WRITTEN, Scope, load, unknown_attributes, wanted
 from grader.package.reading import read_markup
 from grader.package.xml import line_of, parse_what_is_left, parse_xml
 from grader.wording import is_one_edit
@@ -45,16 +45,17 @@ def read_launch_files(
     paths: Iterable[tuple[str, str]],
     names: Iterable[str] = (),
     commands: Collection[tuple[str, tuple[str, ...]]] = (),
+    others: Collection[str] = (),
 ) -> tuple[LaunchFile, ...]:
     """Return each launch file; `paths` are pairs of the name to show and the path on disk relative to `folder`.
 
-    `names` are the package's own, as `$(find …)` calls it. After them come the files of `commands`, by their names,
-    as roslaunch reads them with these arguments.
+    `names` are the package's own, as `$(find …)` calls it, `others` those of packages that are there besides ROS's.
+    After them come the files of `commands`, by their names, as roslaunch reads them with these arguments.
     """
     places, own = dict(paths), tuple(dict.fromkeys(names))
-    library = _Library(places, lambda path: read_markup(folder, places[path]))
+    library = _Library(places, lambda path: read_markup(folder, places[path]), others)
     launched = (
-        _record(path, library.parsed(path), own, library.find, given)
+        _record(path, library, own, given)
         for name, given in commands
         for path in library.paths
         if PurePosixPath(path).name == name
@@ -69,20 +70,23 @@ def parse_launch_files(texts: Mapping[str, bytes], names: Iterable[str] = ()) ->
 
 def parse_launch(data: bytes, path: str) -> LaunchFile:
     """Return one launch file from its bytes. Never raises: what is wrong with it is the record's `fault`."""
-    return _record(path, _parse(data, path), (), lambda _: (None, None))
+    return _record(path, _Library({}, lambda _: data), ())
 
 
 def _records(library: _Library, names: Iterable[str]) -> tuple[LaunchFile, ...]:
     own = tuple(dict.fromkeys(names))
     paths = list(filter(is_launch_file, library.paths))[:_FILES_MAX]
-    return tuple(_record(path, library.parsed(path), own, library.find) for path in paths)
+    return tuple(_record(path, library, own) for path in paths)
 
 
 class _Library:
     """The package's files as launch files, each parsed once."""
 
-    def __init__(self, paths: Collection[str], read: Callable[[str], bytes | Fault]) -> None:
+    def __init__(
+        self, paths: Collection[str], read: Callable[[str], bytes | Fault], others: Collection[str] = ()
+    ) -> None:
         self.paths = paths
+        self.others = frozenset(others)
         self._read = read
         self._parsed: dict[str, _Parsed] = {}
         self._tags = 0
@@ -127,9 +131,8 @@ def _parse(data: bytes, path: str) -> _Parsed:
     return _Parsed(element, None, root)
 
 
-def _record(
-    path: str, parsed: _Parsed, own: tuple[str, ...], find: Find, given: tuple[str, ...] = ()
-) -> LaunchFile:
+def _record(path: str, library: _Library, own: tuple[str, ...], given: tuple[str, ...] = ()) -> LaunchFile:
+    parsed = library.parsed(path)
     nodes: list[LaunchNode] = []
     includes: list[str] = []
     if parsed.element is None:
@@ -141,7 +144,7 @@ def _record(
     if wanted(parsed.element):
         _walk(parsed.element, (), nodes, includes)
     args = dict(one.split(":=", 1) for one in given)
-    loaded = load(parsed.element, Scope(file=path, own=own, args=args), find)
+    loaded = load(parsed.element, Scope(file=path, own=own, args=args), library.find, library.others)
     return LaunchFile(
         path=path,
         root=parsed.root,

@@ -71,9 +71,10 @@ class Loaded:
         return self.work > WORK_MAX
 
 
-def load(root: etree._Element, scope: Scope, find: Find) -> Loaded:
-    """Walk the file. `find` gives the root of another launch file of the package by its path, or its fault."""
-    loader = _Loader(find)
+def load(root: etree._Element, scope: Scope, find: Find, others: frozenset[str] = frozenset()) -> Loaded:
+    """Walk the file. `find` gives the root of another launch file of the package by its path, or its fault; `others`
+    are packages that are there besides ROS's."""
+    loader = _Loader(find, others)
     if wanted(root, scope):
         loader.walk(root, scope, 0)
     return loader.loaded
@@ -104,9 +105,10 @@ def node_of(element: etree._Element, scope: Scope, remapping: Sequence[etree._El
 
 
 class _Loader:
-    def __init__(self, find: Find) -> None:
+    def __init__(self, find: Find, others: frozenset[str]) -> None:
         self.loaded = Loaded()
         self._find = find
+        self._others = others
 
     def walk(self, parent: etree._Element, scope: Scope, depth: int) -> None:
         """Read tag by tag: each changes the scope for those that follow it."""
@@ -221,12 +223,16 @@ class _Loader:
                 fix = f'write file="{written.replace(slip, scope.own[0], 1)}"'
                 self.loaded.faults.append(_fault(element, scope, message, fix))
             return
+        if "$(" in path:  # which file it is, only roslaunch can tell
+            return
         self.loaded.included += 1
         if depth >= DEPTH_MAX or self.loaded.included > INCLUDES_MAX:
             message = "launch files that include each other endlessly"
             self.loaded.faults.append(_fault(element, scope, message))
             return
         root, fault = self._find(path)
+        if root is None and scope.uncertain:
+            return
         if root is None:
             reason = f"it is not well-formed: {fault.explanation}" if fault else "it is not in the package"
             fix = f"first fix {path}" if fault else f"write {path}, or push it"
@@ -238,9 +244,12 @@ class _Loader:
         """Return the package that `$(find …)/…` names for this one: a slip of its name, or one that nobody knows where
         this package has the file."""
         found = _FOUND.fullmatch(path.strip())
+        if found is not None and found[1] in self._others:
+            return ""
         unknown = found is not None and found[1] not in known_packages()
         inside = _plain(found[2]) if found is not None and unknown else None
-        is_here = inside is not None and self._find(inside)[0] is not None
+        # A file that stands in for one of the same name includes that one.
+        is_here = inside not in (None, scope.file) and self._find(str(inside))[0] is not None
         return found[1] if found is not None and is_here else scope.misspelt_package(path)
 
 

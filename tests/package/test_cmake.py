@@ -349,6 +349,7 @@ def test_what_other_languages_write_is_put_right_on_all_lines(text, fix, after):
         ("catkinpackage", "catkin_package"),
         ("catkin_install_python", ""),
         ("my_macro", ""),
+        ("cs_add_executable", ""),
     ],
 )
 def test_a_command_with_its_words_in_another_order_is_a_slip_of_it(name, meant):

@@ -11,11 +11,13 @@ from grader.package.launch import parse_launch, read_launch_files
 from grader.package.launch_loader import _is_slip
 
 
-def loaded(folder: Path, files: dict[str, str], name: str = "launch/a.launch") -> LaunchFile:
+def loaded(
+    folder: Path, files: dict[str, str], name: str = "launch/a.launch", others: tuple[str, ...] = ()
+) -> LaunchFile:
     for path, text in files.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, encoding="utf-8")
-    found = read_launch_files(folder, [(p, p) for p in files], ("pkg", "folder"))
+    found = read_launch_files(folder, [(p, p) for p in files], ("pkg", "folder"), others=others)
     return next(f for f in found if f.path == name)
 
 
@@ -113,6 +115,28 @@ def test_includes_that_fail(tmp_path: Path, other: str, text: str, message: str)
     assert "/x" in [n.full_name for n in file.brings]
     (fault,) = [f for f in file.include_faults if f.file == "launch/a.launch"][:1] or file.include_faults[:1]
     assert message in fault.message
+
+
+@pytest.mark.parametrize(
+    ("path", "condition", "others", "faults"),
+    [
+        ("$(find pkg)/launch/c_$(env ARM).launch", "", (), 0),
+        ("$(find pkg)/launch/$(arg arm)/c.launch", "", (), 0),
+        ("$(dirname)/c.launch", ' if="$(eval 1 == 1)"', (), 0),
+        ("$(dirname)/c.launch", "", (), 1),
+        ("$(find arm_sim)/launch/a.launch", "", (), 0),
+        ("$(find arm_sim)/launch/b.launch", "", (), 1),
+        ("$(find arm_sim)/launch/b.launch", "", ("arm_sim",), 0),
+    ],
+)
+def test_a_file_that_may_be_there_is_no_fault(
+    tmp_path: Path, path: str, condition: str, others: tuple[str, ...], faults: int
+) -> None:
+    files = {
+        "launch/a.launch": f'<launch><include file="{path}"{condition}/></launch>',
+        "launch/b.launch": "<launch/>",
+    }
+    assert len(loaded(tmp_path, files, others=others).include_faults) == faults
 
 
 def test_includes_that_multiply_come_to_an_end(tmp_path: Path) -> None:

@@ -505,6 +505,29 @@ RIGHT_BUILDS = {
         CMAKELISTS: CMAKE + f"catkin_install_python(programs {TALKER} b.py DESTINATION "
         "${CATKIN_PACKAGE_BIN_DESTINATION} OPTIONAL)\n"
     },
+    "metapackage": swapped(CMAKELISTS, ("catkin_package", "catkin_metapackage")),
+    "catkin-simple": {
+        CMAKELISTS: "cmake_minimum_required(VERSION 3.0.2)\nproject(lab)\nfind_package(catkin_simple REQUIRED)\n"
+        "catkin_simple()\ncs_add_executable(a src/a.cpp)\ncs_install()\ncs_export()\n",
+        "msg/Own.msg": "int8 a\n",
+        "src/b.cpp": "#include <lab/Own.h>\n",
+    },
+    "another-library-s-program": {CMAKELISTS: CMAKE + "cuda_add_executable(a src/a.cpp)\n"},
+    "found-by-another-package": {
+        CMAKELISTS: CMAKE.replace("rospy", "rospy message_generation").replace(
+            "catkin_p", "add_message_files(FILES Own.msg)\ngenerate_messages(DEPENDENCIES nav_msgs)\ncatkin_p"),
+        "msg/Own.msg": "Header header\ngeometry_msgs/Pose pose\n",
+    },
+    "found-by-what-nobody-knows": {
+        CMAKELISTS: CMAKE.replace("rospy", "rospy message_generation").replace(
+            "catkin_p", "add_message_files(FILES Own.msg)\ngenerate_messages(DEPENDENCIES arm_msgs)\ncatkin_p"),
+        "msg/Own.msg": "geometry_msgs/Pose pose\n",
+    },
+    "another-package-s-node": {
+        LAUNCHED: FILES[LAUNCHED].replace(
+            "</", '<node pkg="lab2" type="talker.py" name="b"/>\n<!-- $(find labs) --></'),
+        **swapped(XML, ("<depend>", "<depend>lab2</depend>\n  <depend>")),
+    },
     "version-of-a-dependency": swapped(XML, ("<depend>", '<depend version_gte="1.11.0">')),
     "quoted-manifest": swapped(XML, (">x<", "><![CDATA[<version>one</version> & <depend>]]><")),
 }  # fmt: skip
@@ -515,3 +538,31 @@ def test_what_a_right_build_says_in_another_way_is_left_alone(name: str, tmp_pat
     folder = package(tmp_path, {"src/a.cpp": "int main() {}\n", "b.in": "", **RIGHT_BUILDS[name]})
     needs = asking(installed=(TALKER,) if "catkin_install" in str(RIGHT_BUILDS[name]) else ())
     assert find_repairs(folder, facts_of(folder), needs) == ()
+
+
+RIGHT_NODES = {
+    "a handle goes first": (
+        "  message_filters::Subscriber<Int8> of_a;\n  of_a.subscribe(nh, topic, 10);\n  ros::spin();\n"
+    ),
+    "of images": '  image_transport::ImageTransport it(nh);\n  it.subscribe("a", 1, see);\n  ros::spin();\n',
+    "tests": '  auto sub = nh.subscribe("a", 1, hear);\n  return RUN_ALL_TESTS();\n',
+    "kept while it waits": (
+        '  ros::spin();\n}\nvoid other() {\n  ros::Subscriber sub = nh.subscribe("a", 1, hear);\n  waitForMessage();\n'
+    ),
+    "kept by a test": (
+        '  ros::spin();\n}\nTEST(A, b) {\n  ros::Subscriber sub = nh.subscribe("a", 1, hear);\n  EXPECT_TRUE(heard());\n'
+    ),
+}
+
+
+@pytest.mark.parametrize("name", RIGHT_NODES)
+def test_a_right_node_of_cpp_is_left_alone(name: str, tmp_path: Path) -> None:
+    begin = 'int main(int argc, char** argv) {\n  ros::init(argc, argv, "a");\n  ros::NodeHandle nh;\n'
+    folder = package(tmp_path, {"src/a.cpp": f"{begin}{RIGHT_NODES[name]}}}\n"})
+    assert find_repairs(folder, facts_of(folder), WANTED) == ()
+
+
+def test_a_subscription_by_a_variable_is_kept(tmp_path: Path) -> None:
+    node = "int main() {\n  ros::NodeHandle nh;\n  nh.subscribe(topic, 1, hear);\n  ros::spin();\n}\n"
+    folder = package(tmp_path, {"src/a.cpp": node})
+    assert [one.line for one in find_repairs(folder, facts_of(folder), WANTED)] == [3]

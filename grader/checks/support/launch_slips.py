@@ -22,6 +22,7 @@ from grader.checks.support.scripts import (
     script_of_role,
 )
 from grader.checks.support.text import near_names, shown
+from grader.installable import known_packages
 from grader.model.package import Executable, LaunchFile, LaunchLine, LaunchNode, PackageFacts, SourceFile
 from grader.model.verdict import FileCitation, MistakeKind, Verdict, failed, failed_or_blocked
 from grader.wording import has_role_of, join_words, on_lines, there_is
@@ -241,7 +242,9 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
     if owner := owner_of(package, node):
         there = has_program(owner, name)
         return None if there else _no_program(owner, node, (package, *package.also))._replace(lacks=name)
-    if near_names(package.name, [pkg]) or f"[{pkg}/{name}]" in said or _folder(package) == pkg:
+    unfound = f"[{pkg}/{name}]" in said
+    near = bool(near_names(package.name, [pkg])) or _folder(package) == pkg
+    if unfound or (near and pkg not in package.others and pkg not in known_packages()):
         fix = f'write pkg="{package.name}"'
         then = "" if has_program(package, name) else _no_program(package, node, (package,)).fix
         of_type = then.startswith("write type=")

@@ -10,7 +10,7 @@ from pathlib import PurePosixPath
 from cmake_parser.ast import Token
 
 from grader.installable import is_no_package, known_packages, noetic_messages
-from grader.model.package import CMAKE, MANIFEST, PackageFacts, meant_command
+from grader.model.package import CMAKE, MAKES_PACKAGE, MANIFEST, SIMPLE, PackageFacts, meant_command
 from grader.model.repair import RepairKind
 from grader.package.cmake_corrections import find_slip, is_open
 from grader.package.cmake_parse import commands_of, join_half_comment, parse_tree_of
@@ -98,6 +98,9 @@ def repair_cmake(
     _close_bracket(files)
     if commands_of(cmake_text(files).encode()) is None or _is_of_another(files):
         return
+    if has_call(files, package, SIMPLE):  # what it makes by itself is lacking nowhere
+        _name_project(files, package, name, wanted.package)
+        return
     _spell_commands(files)
     _spell_keywords(files)
     _correct_version(files)
@@ -111,7 +114,7 @@ def repair_cmake(
     if not _calls_catkin(files, package):
         line = f"find_package(catkin REQUIRED COMPONENTS {needs})"
         add_call(files, "find_package(catkin …)", line, ("project",))
-    if not has_call(files, package, "catkin_package"):
+    if not any(has_call(files, package, name) for name in MAKES_PACKAGE):
         below = (GENERATE, "find_package", "project")
         add_call(files, "catkin_package()", "catkin_package()", below)
     wait_for_headers(files, package, name)

@@ -10,11 +10,15 @@ from grader.package.repairs.editing import Files
 SPIN = "ros::spin();"
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 _WAITS = re.compile(r"\b(?:subscribe|advertiseService|createTimer)\s*(?:<[^;()]*>)?\s*\(")
-_STAYS = re.compile(r"\b(?:spin|spinOnce|waitForShutdown|ok|while)\b|\bfor\s*\(\s*;\s*;")
+_STAYS = re.compile(r"\b(?:spin|spinOnce|waitForShutdown|ok|while|RUN_ALL_TESTS)\b|\bfor\s*\(\s*;\s*;")
+_LASTS = re.compile(r"\b(?:spin|ok|while|for|do|sleep|wait)[A-Z]?\w*\b")
+"""A function that waits itself keeps its variables for as long."""
 _END = re.compile(r"(?P<indent>[ \t]*)(?:return\b[^;\n]*;|(?P<brace>\}))")
 
 
-_DROPPED = re.compile(r"(?P<indent>\s*)(?P<call>\w+\.(?P<name>subscribe|advertiseService)\b.*)")
+_DROPPED = re.compile(
+    r"(?P<indent>\s*)(?P<call>(?P<of>\w+)\.(?P<name>subscribe|advertiseService)\b[^(]*\(?\s*(?P<text>\")?.*)"
+)
 KEPT = {"subscribe": ("ros::Subscriber", "sub"), "advertiseService": ("ros::ServiceServer", "server")}
 """What a call returns, and a name for it: without one it is gone at once."""
 
@@ -44,9 +48,8 @@ def _keep_locals(files: Files, path: str) -> None:
     for found in _LOCAL.finditer(code):
         function = _function_around(code, found.start())
         body = code[found.end() : end_of_block(code, found.end())]
-        # A function that waits itself keeps its variables for as long.
-        used = re.search(rf"\b{found['name']}\b|\b(?:spin|ok|while|waitForShutdown)\b", body)
-        if function in ("", "main") or used:
+        used = re.search(rf"\b{found['name']}\b", body) or _LASTS.search(body)
+        if function in ("", "main") or function.startswith("TEST") or used:
             continue
         number = code.count("\n", 0, found.start()) + 1
         line = lines[number - 1]
@@ -79,7 +82,7 @@ def _keep_subscribers(files: Files, path: str) -> None:
         found = _DROPPED.fullmatch(line)
         # What the line above begins may keep it: `sub =`, or another call's brackets.
         before = _COMMENT.sub("", lines[number - 1]).rstrip() if number else ""
-        if found is None or (before and not before.endswith((";", "{", "}"))):
+        if found is None or (before and not before.endswith((";", "{", "}"))) or not _is_of_node(found, text):
             continue
         kind, name = KEPT[found["name"]]
         name = name if not re.search(rf"\b{name}\b", text) else f"{name}_{number + 1}"
@@ -89,6 +92,15 @@ def _keep_subscribers(files: Files, path: str) -> None:
             f"line {number + 1} of {path}: what {found['name']}(…) returns is dropped, and with it the {what}"
         )
         files.change("missing-call", path, "\n".join(lines), message)
+
+
+def _is_of_node(call: re.Match[str], text: str) -> bool:
+    """Return whether it is the call of a NodeHandle, which begins with a topic's name. The subscribers of
+    message_filters and image_transport keep what they are given, and begin with a handle."""
+    of = re.escape(call["of"])
+    if call["text"]:
+        return re.search(rf"\bImageTransport\s*[&*]?\s*{of}\b", text) is None
+    return re.search(rf"\bNodeHandle\s*[&*]?\s*{of}\b", text) is not None
 
 
 def _repair_spin(files: Files, path: str) -> None:

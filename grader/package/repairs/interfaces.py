@@ -36,6 +36,8 @@ from grader.wording import is_one_edit, join_words, lines_text, numbers_text
 
 OF_GENERATION = re.compile(r"_generate_messages|_gen(cpp|py)$")
 """Targets that generate_messages(…) makes."""
+OF_PACKAGE = re.compile(r"^MSG: (\w+)/", re.MULTILINE)
+"""What stands above each further type in a full definition."""
 GENERATE, GENERATION = "generate_messages", "message_generation"
 EXPORTED = "${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS}"
 GENERATORS = {GENERATION, "genmsg", "actionlib_msgs"}
@@ -348,12 +350,10 @@ def _name_definitions(files: Files, name: str, made: Sequence[str], needed: Coll
             change_word(files, token, new, why, fix, call=call)
 
 
-def _bring_std_msgs(names: Iterable[str]) -> bool:
-    """Return whether generate_messages(…) finds std_msgs by one of these packages, whose messages need it."""
-    needing = {
-        full.partition("/")[0] for full, (text, _) in noetic_definitions().items() if "std_msgs/" in text
-    }
-    return not needing.isdisjoint(names)
+def _brought_by(names: Collection[str]) -> set[str]:
+    """Return the packages that generate_messages(…) finds by those that it names, since their messages need them."""
+    texts = (text for full, (text, _) in noetic_definitions().items() if full.partition("/")[0] in names)
+    return {package for text in texts for package in OF_PACKAGE.findall(text)}
 
 
 def _is_left_out(files: Files, path: PurePosixPath, needed: Collection[str]) -> bool:
@@ -392,9 +392,10 @@ def _generate(files: Files, package: PackageFacts, used: Collection[str]) -> lis
         _move_above(files, calls[0], of_catkin[0], "catkin_package")
     call = calls_of(files, GENERATE)[0]
     named = {token.value for token in words_of(call)}
-    found = {"std_msgs"} if _bring_std_msgs(named) else set[str]()
-    missing = sorted(needed - named - found)
-    if missing and not any("$" in token.value for token in words_of(call)):
+    missing = sorted(needed - named - _brought_by(named))
+    # What the messages of another package need, and a variable holds, is for CMake to say.
+    others = (word for word in named if word not in noetic_messages() and not word.isupper())
+    if missing and not any(not is_near(word, name) for word in others for name in missing):
         text, listed = cmake_text(files), " ".join(missing)
         token = next((t for t in words_of(call) if t.value == "DEPENDENCIES"), None)
         at = token.span.stop if token else text.index("(", call.span.start) + 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import PurePosixPath
 
 from grader.installable import known_packages, noetic_messages
@@ -12,10 +12,12 @@ from grader.model.repair import RepairKind
 from grader.package.launch import parse_launch
 from grader.package.manifest import parse_manifest
 from grader.package.repairs.editing import Files, keep_first_version, repair_xml
+from grader.package.repairs.manifest import OF_ROS
 from grader.package.repairs.names import CPP, Wanted, is_near
 from grader.wording import the_same_on
 
 TAG_LINES_MAX = 20
+_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 NO_SCRIPTS = (".launch", ".xml", ".txt", ".yaml", ".yml", ".md", ".test", *CPP)
 
 
@@ -45,7 +47,7 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
     nodes = [(launch, node) for launch in package.launch_files for node in launch.nodes]
     for launch, node in nodes:
         _complete_node(files, launch.path, node, own, scripts)
-    others = {*known_packages(), *noetic_messages(), *(one.name for one in package.also), "", own}
+    others = {*known_packages(), *noetic_messages(), *OF_ROS, *package.others, "", own}
     for launch, node in nodes:
         pkg, kind = node.pkg or "", node.type or ""
         runs_own = bool({kind, f"{kind}.py"} & (scripts if pkg in ours else programs))
@@ -53,11 +55,12 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
         if (
             pkg != own
             and "$(" not in pkg
-            and (is_near(pkg, own) or ((pkg in ours or pkg not in others) and runs_own))
+            and (pkg in ours or pkg not in others)
+            and (is_near(pkg, own) or runs_own)
         ):
             _set_attribute(files, launch.path, node.line, ("pkg", pkg, own), kind="package-name")
     for launch in package.launch_files:
-        _repair_find(files, launch.path, own)
+        _repair_find(files, launch.path, own, others)
     for launch, node in nodes:
         kind = node.type or ""
         if kind and kind not in programs and (node.pkg in ours or is_near(node.pkg or "", own)):
@@ -89,11 +92,11 @@ def _complete_node(files: Files, file: str, node: LaunchNode, own: str, scripts:
         files.change("launch-syntax", file, "\n".join(lines), message)
 
 
-def _repair_find(files: Files, file: str, own: str) -> None:
-    """Replace what is nearly the package's name in each `$(find …)` of a launch file."""
-    text = files.text(file) or ""
+def _repair_find(files: Files, file: str, own: str, others: Collection[str]) -> None:
+    """Replace what is nearly the package's name in each `$(find …)` of a launch file, and is none of the `others`."""
+    text = _COMMENT.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), files.text(file) or "")
     for place in re.finditer(r"\$\(find +([\w-]+) *\)", text):
-        if is_near(found := place[1], own):
+        if is_near(found := place[1], own) and found not in others:
             after = re.sub(rf"(\$\(find +){re.escape(found)}(?= *\))", rf"\g<1>{own}", files.text(file) or "")
             line = text[: place.start()].count("\n") + 1
             message = f"line {line} of {file}: $(find {found}) should be $(find {own})"
