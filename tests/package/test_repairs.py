@@ -550,7 +550,7 @@ RIGHT_NODES = {
         '  ros::spin();\n}\nvoid other() {\n  ros::Subscriber sub = nh.subscribe("a", 1, hear);\n  waitForMessage();\n'
     ),
     "kept by a test": (
-        '  ros::spin();\n}\nTEST(A, b) {\n  ros::Subscriber sub = nh.subscribe("a", 1, hear);\n  EXPECT_TRUE(heard());\n'
+        '  ros::spin();\n}\nTEST(A, b) {\n  ros::Subscriber sub = nh.subscribe("a", 1, hear);\n  EXPECT_EQ(1, n);\n'
     ),
 }
 
