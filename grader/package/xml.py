@@ -408,5 +408,6 @@ def _strange_things(root: etree._Element, name: str) -> int:
             strange += (one not in known) + bool(re.search(r"[\"'>]|<(?![\s=\d])", str(value)))
         holds_tags = element is root or (name == "launch" and tag not in _OF_TEXT)
         texts = [element.text or "", *(child.tail or "" for child in element)]
-        strange += sum(bool(one.strip()) if holds_tags else ">" in one for one in texts)
+        # `>` or `-->` alone, where tags belong, is nothing to who reads the file.
+        strange += sum(re.search(r"\w", one) is not None if holds_tags else ">" in one for one in texts)
     return strange

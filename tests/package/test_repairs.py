@@ -523,6 +523,9 @@ RIGHT_BUILDS = {
             "catkin_p", "add_message_files(FILES Own.msg)\ngenerate_messages(DEPENDENCIES arm_msgs)\ncatkin_p"),
         "msg/Own.msg": "geometry_msgs/Pose pose\n",
     },
+    "bracket-of-no-tag": {
+        **swapped(XML, ('"2">', '"2">>')), **swapped(LAUNCHED, ("<launch>", "<launch>\n  <!-- one --> -->"))
+    },
     "another-package-s-node": {
         LAUNCHED: FILES[LAUNCHED].replace(
             "</", '<node pkg="lab2" type="talker.py" name="b"/>\n<!-- $(find labs) --></'),
@@ -566,3 +569,11 @@ def test_a_subscription_by_a_variable_is_kept(tmp_path: Path) -> None:
     node = "int main() {\n  ros::NodeHandle nh;\n  nh.subscribe(topic, 1, hear);\n  ros::spin();\n}\n"
     folder = package(tmp_path, {"src/a.cpp": node})
     assert [one.line for one in find_repairs(folder, facts_of(folder), WANTED)] == [3]
+
+
+@pytest.mark.parametrize("first", ["", "#!/usr/bin/env python\r\n", "\ufeff#!/usr/bin/env python2\n"])
+def test_a_module_that_a_script_imports_needs_no_bit_and_no_first_line(tmp_path: Path, first: str) -> None:
+    script = FILES[TALKER].replace("import rospy\n", "import rospy\nimport steps\n")
+    folder = package(tmp_path, {TALKER: script, "src/steps.py": f"{first}ONE = 1\n"})
+    (folder / "src" / "steps.py").chmod(0o644)
+    assert find_repairs(folder, facts_of(folder), WANTED) == ()

@@ -85,8 +85,9 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     """
     files = Files(folder=folder.resolve())
     renames = find_renames(package, wanted)
-    scripts = _scripts(files, package, wanted, renames)
-    repair_files(files, scripts)
+    started = _started(package, wanted, renames)
+    scripts = [*started, *_imported(files, package, started)][:SCRIPTS_MAX]
+    repair_files(files, scripts, {file.path for file in started})
     # Renamed first: whatever follows looks for a file where it will be.
     rename_files(files, renames)
     sources = (f.path for f in scripts if f.python and f.link is None and not f.is_no_script)
@@ -188,13 +189,14 @@ def _rename_package(folder: Path, repair: Repair) -> None:
         rename_everywhere(folder, old[1], new[1])
 
 
-def _scripts(
-    files: Files, package: PackageFacts, wanted: Wanted, renames: dict[str, str]
-) -> list[SourceFile]:
-    """Return the files that are run: those of the lab in its order, then those of its launch files, then what they
-    import."""
+def _readable(package: PackageFacts) -> list[SourceFile]:
     own = [f for f in package.files if is_own(f.path) and not f.link_problem]
-    python = [f for f in own if f.python_fault is None or f.python_fault.kind not in UNREAD]
+    return [f for f in own if f.python_fault is None or f.python_fault.kind not in UNREAD]
+
+
+def _started(package: PackageFacts, wanted: Wanted, renames: dict[str, str]) -> list[SourceFile]:
+    """Return the files that are run: those of the lab in its order, then those of its launch files."""
+    python = _readable(package)
     named = [PurePosixPath(path).name for path in (*wanted.scripts, *wanted.installed)]
     asked = {PurePosixPath(path).name for path in wanted.launch_files}
     launches = [f for f in package.launch_files if PurePosixPath(renames.get(f.path, f.path)).name in asked]
@@ -209,9 +211,16 @@ def _scripts(
         for file in python:
             if name in (PurePosixPath(file.path).name, PurePosixPath(renames.get(file.path, "")).name):
                 found[file.path] = file
-    texts = "\n".join(filter(None, map(files.text, found)))
+    return list(found.values())
+
+
+def _imported(files: Files, package: PackageFacts, started: Sequence[SourceFile]) -> list[SourceFile]:
+    """Return what these files import, which no one starts."""
+    texts = "\n".join(filter(None, (files.text(file.path) for file in started)))
     modules = {part for module in IMPORTED.findall(texts) for part in module.split(".")}
-    for file in python:
-        if file.python and PurePosixPath(file.path).stem in modules:
-            found.setdefault(file.path, file)
-    return list(found.values())[:SCRIPTS_MAX]
+    paths = {file.path for file in started}
+    return [
+        file
+        for file in _readable(package)
+        if file.python and file.path not in paths and PurePosixPath(file.path).stem in modules
+    ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import codecs
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 from pathlib import PurePosixPath
 
@@ -35,40 +35,42 @@ COOKIE = re.compile(r"^[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+).*$")
 SHOWN_BYTES = 200
 
 
-def repair_files(files: Files, scripts: Iterable[SourceFile]) -> None:
-    """Find what keeps the scripts from being started or read: bit, line ends, first line, mark, encoding."""
+def repair_files(files: Files, scripts: Iterable[SourceFile], started: Collection[str]) -> None:
+    """Find what keeps the scripts from being started or read: bit, line ends, first line, mark, encoding. A script that
+    others import and that is none of the `started` needs no bit and no first line: Python reads it."""
     for script in scripts:
-        if script.executable is False:
+        is_started = script.path in started
+        if is_started and script.executable is False:
             on_disk = not MODES_ON_DISK or is_executable(files.folder, script.path)
             only_git_lacks_it = script.mode_source == "git" and on_disk
             how = chmod_hint(script.mode_source, script.path, only_git_lacks_it=only_git_lacks_it)
             message = f"{script.path} is not executable"
             files.add(Repair(kind="executable-bit", file=script.path, message=message, fix=how))
         if script.link is None and not script.binary:
-            _repair_bytes(files, script)
+            _repair_bytes(files, script, is_started=is_started)
 
 
-def _repair_bytes(files: Files, script: SourceFile) -> None:
+def _repair_bytes(files: Files, script: SourceFile, *, is_started: bool) -> None:
     data = read_data(files.folder, script.path)
     if not data:
         return
     if data.startswith(UTF16) or (script.encoding == "unknown-8bit" and as_text(data) is None):
         data = _repair_encoding(files, script, data)
-    if data.startswith(BOM) and data[3:5] == b"#!":
+    if is_started and data.startswith(BOM) and data[3:5] == b"#!":
         message = (
             f"{script.path} begins with an invisible byte order mark (BOM), so it does not begin with #!"
         )
         fix = "save it as UTF-8 without BOM"
         _add_bytes(files, "byte-order-mark", script.path, data, message=message, fix=fix)
         data = data.removeprefix(BOM)
-    if b"\r\n" in data and (data.startswith(b"#!") or script.path.endswith(".sh")):
+    if is_started and b"\r\n" in data and (data.startswith(b"#!") or script.path.endswith(".sh")):
         message = f"{script.path} has Windows line endings (CR LF)"
         _add_bytes(files, "line-ends", script.path, data, message=message, fix=f"dos2unix {script.path}")
     text = as_text(data)
     files.put(script.path, text)
     if text is not None and script.python:
         _repair_cookie(files, script, text)
-    if text is not None and script.shebang_problem:
+    if text is not None and is_started and script.shebang_problem:
         _repair_shebang(files, script, text)
 
 
