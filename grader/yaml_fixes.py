@@ -19,6 +19,8 @@ _NO_COLON = re.compile(
     r"""(?P<key>\s*(?:- )?[A-Za-z_][\w-]*)(?:\s*(?P<sign>[=;,.])\s*|\s+)(?P<value>["'\w].*)"""
 )
 _KEY_ALONE = re.compile(r"(?P<key>\s*[A-Za-z_][\w-]*)\s*")
+_DASH_ALONE = re.compile(r"(?P<above>\s*)- .*")
+_NO_SPACE_AFTER_DASH = re.compile(r"(?P<above>\s*)-(?P<value>[^\s-].*)")
 _OPEN_QUOTE = re.compile(
     r"""(?P<key>\s*(?:- )?[A-Za-z_][\w-]*): +(?P<value>(?P<quote>["'])(?:(?!(?P=quote)).)*)"""
 )
@@ -52,6 +54,9 @@ def slip_of_yaml(text: str, until: int) -> YamlSlip | None:
         # the lines below it are no `name: value`, and nothing is known of them
         if code.endswith(_GOES_ON):
             return None
+        above = next((one for one in reversed(lines[: number - 1]) if one.strip()), "")
+        if found := _slip_of_item(code, above):
+            return YamlSlip(number, *found)
         below = next((one for one in lines[number:] if one.strip()), "")
         is_above_block = _indent(below) > _indent(code)
         if found := _slip_of_key(code, is_above_block=is_above_block) or _slip_of_value(code):
@@ -78,6 +83,14 @@ def levels_of(names: Iterable[str]) -> str:
 
 def _indent(line: str) -> int:
     return len(line) - len(line.lstrip())
+
+
+def _slip_of_item(code: str, above: str) -> tuple[str, str] | None:
+    """Return what an item of a list lacks below another one in its column, and the line as it should be."""
+    found, other = _NO_SPACE_AFTER_DASH.fullmatch(code), _DASH_ALONE.fullmatch(above)
+    if found is None or other is None or found["above"] != other["above"]:
+        return None
+    return "has no space after its `-`", f"- {found['value']}"
 
 
 def _slip_of_key(code: str, *, is_above_block: bool) -> tuple[str, str] | None:

@@ -334,6 +334,10 @@ def _lack(
     if blurred is not None:
         why = f"only CMake knows which scripts {blurred.path} holds, and it did not finish"
         return Lack(why, "build the package with catkin_make", _line(blurred), unsure=True)
+    unread = package.cmake.fault if package.cmake else None
+    if unread is not None and not by_python:
+        why = "CMake cannot read it, so nothing installs {}"
+        return Lack(why, f"first fix {unread.file}: {repair_of_file(unread)}", None)
     if not hits and not any(one.call.name == PYTHON for one in all_named):
         return _without_call(package, all_named, paths[0], {PurePosixPath(one).name for one in wanted})
     return _why_unnamed(package, all_named, hits, paths[0])

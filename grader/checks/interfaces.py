@@ -239,7 +239,11 @@ def _differs(
         near = closest(wanted.name, [one.name for one in others.values() if one.part == wanted.part])
         other = others.get((wanted.part, near))
         apart = next((one for one in others.values() if one.name == wanted.name), None)
-        if other is not None:
+        turned = next((one for one in others.values() if one.type == wanted.name), None)
+        if turned is not None and turned.name == wanted.type:
+            message = f"line {turned.line} has the name {turned.type} before its type {turned.name}"
+            yield _Fault(message, turned.line, f"write `{line}`")
+        elif other is not None:
             yield _other_name(wanted, other)
         elif apart is not None:
             message = f"{wanted.name} is in the {apart.part} (line {apart.line}), not in the {wanted.part}"

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from grader.checks.executable import ExecutableParams, executable
 from grader.checks.registry import LaunchName, ProgramName, check
+from grader.checks.support.build_errors import repair_of_file
 from grader.checks.support.launch import (
     console_lines,
     died,
@@ -144,6 +145,9 @@ def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdic
         return None
     if not _exists(package, name) and not any(name in {one.target, one.name} for one in programs(package)):
         message = f"there is no {name} in the package that a <node> could start"
+        if unread := package.cmake and package.cmake.fault if not PurePosixPath(name).suffix else None:
+            message = f"{message}, as far as {unread.file} can be read"
+            return failed_or_blocked(message, hint=f"first fix {unread.file}: {repair_of_file(unread)}")
         hint = "; then ".join((add_hint(package, script), *later_fixes(file, name)))
         return failed_or_blocked(message, hint=hint).lost_by("file-missing", script)
     meant = (_slip_for(package, node, name) for node in file.brings if _is_meant(node, name))

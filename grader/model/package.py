@@ -62,7 +62,7 @@ class Fault(Record):
     def advice(self) -> str:
         """What to do on which line; "" if that is not known."""
         # Such a fix says its line itself.
-        named = self.line is None or re.match(r"(below|delete|write|make) line \d", self.fix)
+        named = self.line is None or re.match(r"(above|below|delete|write|make) line \d", self.fix)
         where = "" if named else f"line {self.line}: "
         return f"{where}{self.fix}" if self.fix else ""
 

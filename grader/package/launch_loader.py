@@ -15,7 +15,7 @@ from typing import Any, Protocol
 from lxml import etree
 from pydantic import Field
 
-from grader.installable import known_packages
+from grader.installable import TUTORIALS, known_packages
 from grader.model.package import Fault, LateRemap, LaunchArg, LaunchLine, LaunchLoad, LaunchNode, LaunchParam
 from grader.model.record import Record
 from grader.package.line_corrections import ATTRIBUTES
@@ -241,8 +241,8 @@ class _Loader:
             self.walk(root, _included(element, scope, path), depth + 1)
 
     def _misnamed_package(self, scope: Scope, path: str) -> str:
-        """Return the package that `$(find …)/…` names for this one: a slip of its name, or one that nobody knows where
-        this package has the file."""
+        """Return the package that `$(find …)/…` names for this one: a slip of its name; or, where this package has the
+        file, a handout's name, or one that nobody knows and that has a word of this one's."""
         found = _FOUND.fullmatch(path.strip())
         if found is not None and found[1] in self._others:
             return ""
@@ -250,7 +250,22 @@ class _Loader:
         inside = _plain(found[2]) if found is not None and unknown else None
         # A file that stands in for one of the same name includes that one.
         is_here = inside not in (None, scope.file) and self._find(str(inside))[0] is not None
-        return found[1] if found is not None and is_here else scope.misspelt_package(path)
+        meant = found is not None and is_here and (found[1] in TUTORIALS or _shares_word(found[1], scope.own))
+        return found[1] if found is not None and meant else scope.misspelt_package(path)
+
+
+USUAL = frozenset(
+    {"bringup", "config", "control", "description", "gazebo", "launch", "msgs", "navigation", "robot"}
+)
+"""Words in the names of many packages."""
+
+
+def _shares_word(name: str, own: Sequence[str]) -> bool:
+    words, others = (
+        {word for one in names for word in re.split(r"[\W\d_]+", one.lower()) if len(word) > PAIR} - USUAL
+        for names in ((name,), own)
+    )
+    return bool(words & others) or any(is_one_edit(name, one) for one in own)
 
 
 def _included(element: etree._Element, scope: Scope, path: str) -> Scope:

@@ -158,7 +158,12 @@ def _misspelt(line: str, root: str) -> Iterator[Slip]:
             yield Slip(f"there is no tag `<{word}>`: it is called `<{right}>`", changed)
     for tag, attributes in ATTRIBUTES.get(root, {}).items():
         given = re.findall(r"\s([\w-]+)\s*=", line) if re.search(rf"<{tag}\b", line) else []
-        for word in given:
+        others = ATTRIBUTES[root]
+        owner = next((o for o in others if tag in o and o != tag and {*given} <= {*others[o]}), "")
+        if owner and not {*given} <= {*attributes}:
+            changed = re.sub(rf"(</?){tag}(?=[\s/>])", rf"\1{owner}", line)
+            yield Slip(f"`<{tag}>` has no such attributes: this is a `<{owner}>`", changed)
+        for word in given if not owner else ():
             right = _meant(word, [one for one in attributes if one not in given])
             if word not in attributes and right:
                 changed = re.sub(rf"(\s){re.escape(word)}(?=\s*=)", rf"\1{right}", line, count=1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from difflib import get_close_matches
 from itertools import islice
 
@@ -168,6 +168,7 @@ def _fault(error: etree.XMLSyntaxError, parser: etree.XMLParser, data: bytes, fi
     # the error's own log holds what went wrong with other files before, too
     log = [str(entry.message)[:_MESSAGE_CHARS_MAX] for entry in islice(parser.error_log, _MESSAGES)]
     reason, opened = _closed_early(message, data, root) or _explain(message, log, text, root=root)
+    reason = _by_columns(reason, data, opened) if opened else reason
     if opened and opened != line:
         line, text = opened, _line(data, opened)
         column = text.find("<") + 1
@@ -279,6 +280,27 @@ def _mismatch(opened: str, line: int, closed: str, root: str) -> tuple[Reason, i
         return Reason(why, f"delete `</{closed}>`"), None
     fix = f"end it with `/>` or with `</{opened}>`"
     return Reason(f"{tag} is still open where `</{closed}>` comes", fix), line
+
+
+def _by_columns(reason: Reason, data: bytes, line: int) -> Reason:
+    """Return the reason for a tag that is not closed with the place where that belongs, where its columns show it."""
+    end = end_of_children(data.decode("utf-8", "replace").split("\n"), line)
+    tag = re.search(r"or with `(</\w+>)`$", reason.fix)
+    return reason._replace(fix=f"above line {end}, write `{tag[1]}`") if end and tag else reason
+
+
+def end_of_children(lines: Sequence[str], line: int) -> int | None:
+    """Return the line above which a tag belongs closed that begins in `line`, both from 1, and has other tags below it,
+    as their columns show; None where it has none."""
+    begun = re.match(r"(\s*)<(?:node|group|include|test|export)\b", lines[line - 1])
+    tags = [(n, one) for n, one in enumerate(lines[line:], line + 1) if re.match(r"\s*<(?!!)", one)]
+    if begun is None or not tags:
+        return None
+    column = len(begun[1].expandtabs())
+    ends = next(
+        (n for n, one in tags if len(one.expandtabs()) - len(one.expandtabs().lstrip()) <= column), None
+    )
+    return ends if ends != tags[0][0] else None
 
 
 # ---- slips of one line

@@ -17,7 +17,7 @@ def loaded(
     for path, text in files.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, encoding="utf-8")
-    found = read_launch_files(folder, [(p, p) for p in files], ("pkg", "folder"), others=others)
+    found = read_launch_files(folder, [(p, p) for p in files], ("pkg", "folder", "arm_lab"), others=others)
     return next(f for f in found if f.path == name)
 
 
@@ -127,6 +127,7 @@ def test_includes_that_fail(tmp_path: Path, other: str, text: str, message: str)
         ("$(find arm_sim)/launch/a.launch", "", (), 0),
         ("$(find arm_sim)/launch/b.launch", "", (), 1),
         ("$(find arm_sim)/launch/b.launch", "", ("arm_sim",), 0),
+        ("$(find camera_launch)/launch/b.launch", "", (), 0),
     ],
 )
 def test_a_file_that_may_be_there_is_no_fault(

@@ -577,3 +577,44 @@ def test_a_module_that_a_script_imports_needs_no_bit_and_no_first_line(tmp_path:
     folder = package(tmp_path, {TALKER: script, "src/steps.py": f"{first}ONE = 1\n"})
     (folder / "src" / "steps.py").chmod(0o644)
     assert find_repairs(folder, facts_of(folder), WANTED) == ()
+
+
+OF_OWN = CMAKE.replace("rospy", "rospy geometry_msgs message_generation").replace(
+    "catkin_p", "add_message_files(FILES Own.msg)\ngenerate_messages(DEPENDENCIES geometry_msgs)\ncatkin_p"
+)
+WALKER = CPP_CMAKE.replace("(a ", "(walker ")
+NODE_OF_CPP = ("</", '<node pkg="lab" type="walkr" name="a"/>\n</')
+WHOLE = {
+    "link": ({CMAKELISTS: f"{WALKER}target_link_libraries(walkr x)\n"}, "walker instead of"),
+    "column": (
+        {"config/a.yaml": "details:\nname:\n    first: Ann\n    last: Lee\n  phone: 1\n"},
+        "begin the line with 2 spaces",
+    ),
+    "list": ({"config/a.yaml": "limits:\n  - 1.0\n  -2.0\n"}, "write `- 2.0`"),
+    "program": (
+        {CMAKELISTS: f"{WALKER}target_link_libraries(walker x)\n", **swapped(LAUNCHED, NODE_OF_CPP)},
+        'type="walker"',
+    ),
+    "turned": (
+        {CMAKELISTS: OF_OWN, "msg/Own.msg": "level float64\n", "src/a.cpp": "#include <lab/Own.h>\n"},
+        "float64 level",
+    ),
+    "package": (
+        {CMAKELISTS: OF_OWN, "msg/Own.msg": "geometry_msg/Point a\n"},
+        "write `geometry_msgs/Point a`",
+    ),
+    "asked": ({CMAKELISTS: OF_OWN, "msg/Own.msg": "float64 b\nint a\n"}, "write `int64 a`"),
+}
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_one_repair_puts_it_right(name: str, tmp_path: Path) -> None:
+    """What came before it made the file no better: a second fault, or another wrong value."""
+    changes, fix = WHOLE[name]
+    fields = {"package": "geometry_msgs/Point a", "asked": "float64 b\nint64 a"}.get(name, "")
+    definitions = (("msg/Own.msg", tuple(parse_definition(fields, ".msg"))),) if fields else ()
+    params = ("/details/name/first", "/details/name/last", "/details/phone") if name == "column" else ()
+    wanted = asking(files=("config/a.yaml",), definitions=definitions, params=params)
+    folder = package(tmp_path, {"src/a.cpp": "int main() {}\n", **changes})
+    assert [fix in (one.fix or one.after) for one in repair_all(folder, wanted)] == [True]
+    assert find_repairs(folder, facts_of(folder), wanted) == ()

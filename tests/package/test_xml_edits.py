@@ -89,3 +89,31 @@ def test_a_root_that_is_opened_where_it_is_to_end_is_told_so() -> None:
     fault = parse_launch(RIGHT.replace("</launch>", "<launch>").encode(), "a.launch").fault
     assert fault is not None
     assert (fault.line, fault.advice) == (4, "line 4: write `</launch>`")
+
+
+@pytest.mark.parametrize(
+    ("lost", "place"),
+    [("    </node>\n", "above line 6, write `</node>`"), ("  </group>\n", "above line 7, write `</group>`")],
+)
+def test_a_tag_with_tags_in_it_is_closed_below_them(lost: str, place: str) -> None:
+    whole = """\
+<launch>
+  <group ns="arm">
+    <node pkg="lab" type="a.py" name="a">
+      <param name="rate" value="10"/>
+      <remap from="in" to="out"/>
+    </node>
+  </group>
+  <node pkg="lab" type="b.py" name="b"/>
+</launch>
+"""
+    text = whole.replace(lost, "")
+    fault = parse_launch(text.encode(), "a.launch").fault
+    assert fault is not None
+    assert fault.advice == place
+    assert well_formed(text, "a.launch", root="launch") == [whole]
+
+
+def test_the_attributes_of_another_tag_make_it_that_tag() -> None:
+    text = '<launch>\n  <param command="load" file="a.yaml"/>\n</launch>\n'
+    assert well_formed(text, "a.launch", root="launch") == [text.replace("param", "rosparam")]

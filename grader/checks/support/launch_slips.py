@@ -214,22 +214,8 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
 
     `said` is what roslaunch said: a package that it does not find is a slip, any other is not this package's.
     """
-    missing = [a for a in ATTRIBUTES if not (getattr(node, a) or "").strip()]
-    if missing:
-        known = {
-            name: OTHER_ATTRIBUTES[name] for name in node.unknown if OTHER_ATTRIBUTES.get(name) in missing
-        }
-        slips = {name: meant[0] for name in node.unknown if (meant := near_names(name, missing))} | known
-        told = "".join(f"; it has no attribute {name}" for name in slips)
-        fix = "; ".join(f"write {right}= instead of {name}=" for name, right in slips.items())
-        stem = PurePosixPath(node.type or "<file>.py").stem
-        program = f"{node.name or '<file>'}.py"
-        if node.pkg and owner_of(package, node) is None:  # another package's: the name that it has is its own
-            program = next((one for one in PROGRAMS_OF.get(node.pkg, ()) if one == node.name), "…")
-        own = {"pkg": package.name, "type": program, "name": stem}
-        add = " ".join(f'{name}="{own[name]}"' for name in missing)
-        why = f"<node> has no {join_words(missing)}{told}"
-        return _slip(node, why, fix or f"add {add} to the <node>")._replace(refused=True)
+    if missing := [a for a in ATTRIBUTES if not (getattr(node, a) or "").strip()]:
+        return _lacking(package, node, missing)
     pkg, name = str(node.pkg), str(node.type)
     if path := next((a for a in ("pkg", "type") if "$(find" in str(getattr(node, a))), None):
         return _slip(
@@ -253,6 +239,24 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
         # Where the launch file has the name of the folder or of project(…), the manifest is at fault.
         return slip._replace(of_manifest=pkg in {_folder(package), *_projects(package)}, lacks=name)
     return None
+
+
+def _lacking(package: PackageFacts, node: LaunchNode, missing: Sequence[str]) -> Slip | None:
+    """Return the slip of a node without one of the attributes that each has."""
+    if node.uncertain and None not in (node.pkg, node.type, node.name):
+        return None  # `if="$(eval …)"` may leave the node out where an <arg> is empty
+    known = {name: OTHER_ATTRIBUTES[name] for name in node.unknown if OTHER_ATTRIBUTES.get(name) in missing}
+    slips = {name: meant[0] for name in node.unknown if (meant := near_names(name, missing))} | known
+    told = "".join(f"; it has no attribute {name}" for name in slips)
+    fix = "; ".join(f"write {right}= instead of {name}=" for name, right in slips.items())
+    stem = PurePosixPath(node.type or "<file>.py").stem
+    program = f"{node.name or '<file>'}.py"
+    if node.pkg and owner_of(package, node) is None:  # another package's: the name that it has is its own
+        program = next((one for one in PROGRAMS_OF.get(node.pkg, ()) if one == node.name), "…")
+    own = {"pkg": package.name, "type": program, "name": stem}
+    add = " ".join(f'{name}="{own[name]}"' for name in missing)
+    why = f"<node> has no {join_words(missing)}{told}"
+    return _slip(node, why, fix or f"add {add} to the <node>")._replace(refused=True)
 
 
 def at_its_lines(slip: Slip, slips: Sequence[Slip]) -> Slip:
@@ -364,9 +368,9 @@ def _nothing_like_it(package: PackageFacts, node: LaunchNode, why: str) -> Slip:
     plain = PurePosixPath(str(node.type)).name
     suffix = PurePosixPath(plain).suffix
     beside = {one.type for file in package.launch_files for one in file.brings if one.file == node.file}
-    names = [
-        n for n in _program_names(package) if n not in beside
-    ]  # what another <node> starts is not meant here
+    built = (one.name for one in programs(package) if "$" not in one.name)
+    # What another <node> starts is not meant here.
+    names = [n for n in dict.fromkeys((*_program_names(package), *built)) if n not in beside]
     near = near_names(plain, names) or [n for n in names if suffix and suffix != ".py" and n.endswith(suffix)]
     if near:
         return _slip(node, f"{why}; {there_is(near)}", f'write type="{near[0]}"')

@@ -208,7 +208,7 @@ def _started(package: PackageFacts, wanted: Wanted, renames: dict[str, str]) -> 
     named += [right for name in named if name not in there for right in names if is_near(name, right)]
     found: dict[str, SourceFile] = {}
     for name in dict.fromkeys(named):
-        for file in python:
+        for file in (one for one in python if not one.path.endswith(CPP)):
             if name in (PurePosixPath(file.path).name, PurePosixPath(renames.get(file.path, "")).name):
                 found[file.path] = file
     return list(found.values())

@@ -119,7 +119,7 @@ def repair_cmake(
         add_call(files, "catkin_package()", "catkin_package()", below)
     wait_for_headers(files, package, name)
     if needs_interfaces(files, package, name, scripts):
-        make_interfaces(files, package, name, scripts)
+        make_interfaces(files, package, name, scripts, wanted)
         define_as_asked(files, package, wanted)
         depend_on_exported(files, package, name)
     name_programs(files, wanted)

@@ -26,6 +26,7 @@ from grader.package.reading import LEFT_OUT
 from grader.package.xml import (
     NO_END,
     TYPOGRAPHIC,
+    end_of_children,
     find_slip,
     find_strange,
     first_tag,
@@ -126,6 +127,9 @@ def _closed(lines: list[str], tag: str, line: int, root: str) -> Iterator[str]:
         if f"<{root}" in above and not below.strip():
             yield f"{above}</{root}>{below}"
         yield f"{text.rstrip()}\n</{root}>\n"
+    elif 0 <= line < len(lines) and (at := end_of_children(lines, line + 1)):
+        closing = f"{lines[line][: len(lines[line]) - len(lines[line].lstrip())]}</{tag}>"
+        yield "\n".join([*lines[: at - 1], closing, *lines[at - 1 :]])
     elif tag == "group" and (end := text.rfind(f"</{root}>")) >= 0:
         yield f"{text[:end]}</{tag}>\n{text[end:]}"
     if tag in {root, "group"}:

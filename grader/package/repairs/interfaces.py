@@ -10,6 +10,7 @@ from cmake_parser.ast import Command
 
 from grader.installable import noetic_definitions, noetic_messages
 from grader.model.message_definitions import (
+    BUILT_IN,
     DIVIDER,
     DIVIDING,
     FULL_NAMES,
@@ -52,7 +53,9 @@ def needs_interfaces(files: Files, package: PackageFacts, name: str, scripts: Co
     return asked or bool(calls_of(files, GENERATE)) or bool(_used_kinds(files, package, name, run))
 
 
-def make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Collection[str]) -> None:
+def make_interfaces(
+    files: Files, package: PackageFacts, name: str, scripts: Collection[str], wanted: Wanted
+) -> None:
     """Find what CMakeLists.txt lacks to make the package's own messages, services and actions, where code uses them.
 
     One that only other scripts than those that are run would use is not added to those that the file names already.
@@ -66,7 +69,7 @@ def make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Col
     if not any(made.values()):
         _delete_generation(files, package)
         return
-    _correct_types(files, package)
+    _correct_types(files, package, wanted)
     _correct_dividers(files, package)
     _call_by_kind(files)
     run = [path for path in code if path in scripts or path.endswith(CPP)]
@@ -274,17 +277,36 @@ def _divide(files: Files, own: Interface, fields: Sequence[InterfaceField], text
     files.change("build-line", own.path, "\n".join(lines), f"{own.path}: {fault}", fix)
 
 
-def _correct_types(files: Files, package: PackageFacts) -> None:
-    """Give fields of which there is no type the one that is meant."""
+def _correct_types(files: Files, package: PackageFacts, wanted: Wanted) -> None:
+    """Give fields of which there is no type the one that is meant: what the lab asks for is told where that is."""
     own = {PurePosixPath(one.path).stem for one in package.interfaces}
+    asked = {(path, one.part, one.name) for path, fields in wanted.definitions for one in fields}
     for one in package.interfaces:
+        others = own - {PurePosixPath(one.path).stem}  # no message holds itself
         for field in one.fields:
-            right = meant_type(field.type, own, noetic_messages())
+            if (one.path, field.part, field.name) in asked:
+                continue
+            right = meant_type(field.type, others, noetic_messages())
             lines = (files.text(one.path) or "").split("\n")
+            if (
+                field.name in BUILT_IN
+                and field.type not in {*BUILT_IN, *FULL_NAMES, *own}
+                and field.value is None
+            ):
+                _turn_around(files, one.path, field)
+                continue
             if right != field.type and field.line <= len(lines):
                 lines[field.line - 1] = lines[field.line - 1].replace(field.type, right, 1)
                 message = f"line {field.line} of {one.path}: there is no field type `{field.type}`"
                 files.change("build-line", one.path, "\n".join(lines), message)
+
+
+def _turn_around(files: Files, path: str, field: InterfaceField) -> None:
+    """Write the type before the name."""
+    lines = (files.text(path) or "").split("\n")
+    lines[field.line - 1] = re.sub(r"^(\s*)(\S+)(\s+)(\w+)", r"\1\4\3\2", lines[field.line - 1])
+    message = f"line {field.line} of {path}: the name {field.type} stands before its type"
+    files.change("build-line", path, "\n".join(lines), message)
 
 
 def _correct_dividers(files: Files, package: PackageFacts) -> None:
@@ -369,6 +391,10 @@ def _is_left_out(files: Files, path: PurePosixPath, needed: Collection[str]) -> 
     return "FILES" in words and path.name not in words and path.stem not in needed and not meant
 
 
+def _is_slip_of_messages(name: str) -> bool:
+    return any(is_near(name, known) for known in noetic_messages())
+
+
 def _generate(files: Files, package: PackageFacts, used: Collection[str]) -> list[str]:
     """Call generate_messages(…) where nothing does, with the packages whose types are used, above catkin_package(…).
     Return those that find_package(catkin …) has to name with it."""
@@ -377,7 +403,9 @@ def _generate(files: Files, package: PackageFacts, used: Collection[str]) -> lis
     types = {field.type for one in made for field in one.fields}
     needed = {"std_msgs"} if types & {"Header", "Header[]"} else set[str]()
     needed |= {"actionlib_msgs"} if any(one.path.endswith(".action") for one in made) else set()
-    needed |= {name.partition("/")[0] for name in types if "/" in name} - {package.name}
+    named = {name.partition("/")[0] for name in types if "/" in name} - {package.name}
+    # A slip of a package's name is corrected in the definition.
+    needed |= {one for one in named if one in noetic_messages() or not _is_slip_of_messages(one)}
     if not calls:
         line = f"{GENERATE}({' '.join(['DEPENDENCIES', *sorted(needed)] if needed else [])})"
         lines = {name: max((c.line for c in calls_of(files, name)), default=0) for name in INTERFACE_FOLDERS}

@@ -67,7 +67,7 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
             plain = PurePosixPath(kind).name
             there = [one for one in (f"{kind}.py", plain, f"{plain}.py") if one in scripts]
             there = there or [one for one, sources in made.items() if _is_among(plain, sources)]
-            near = there or [s for s in sorted(scripts) if is_near(kind, s)]
+            near = there or [s for s in sorted(programs) if is_near(kind, s)]
             for right in near[:1]:
                 _set_attribute(files, launch.path, node.line, ("type", kind, right), kind="launch-type")
     _repair_nodes(files, package, wanted)

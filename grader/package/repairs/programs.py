@@ -41,12 +41,27 @@ def link_programs(files: Files, package: PackageFacts) -> None:
     linked |= {call.args[0] for call in told if call.name == "target_link_libraries" and call.args}
     if has_call(files, package, "link_libraries"):
         return
+    made = {
+        words[0].value for c in calls_of(files, "add_executable", "add_library") if (words := words_of(c))
+    }
     for call in reversed(calls_of(files, "add_executable")):  # places above stay
         words = words_of(call)
-        if words and words[0].value not in linked and not _is_elsewhere(words):
+        slips = [one for one in linked - made if words and is_near(one, words[0].value)]
+        if words and words[0].value not in linked and len(slips) == 1:
+            _correct_target(files, slips[0], words[0].value)
+        elif words and words[0].value not in linked and not _is_elsewhere(words):
             text, line = cmake_text(files), f"target_link_libraries({words[0].value} ${{catkin_LIBRARIES}})"
             changed = f"{text[: call.span.stop]}\n{line}{text[call.span.stop :]}"
             change_line(files, call, changed, f"nothing is linked to the program {words[0].value}")
+
+
+def _correct_target(files: Files, slip: str, target: str) -> None:
+    """Link to the program what is linked to a target that is not there and has nearly its name."""
+    for call in calls_of(files, "target_link_libraries"):
+        if (words := words_of(call)) and words[0].value == slip:
+            why = f"there is no target {slip}: it is called {target}"
+            change_word(files, words[0], target, why, f"write {target} instead of {slip}", call=call)
+            return
 
 
 def _is_elsewhere(words: Sequence[Token]) -> bool:

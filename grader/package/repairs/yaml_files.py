@@ -19,6 +19,8 @@ SUFFIXES = (".yaml", ".yml")
 LINES_MAX = 4
 """So many lines of a file are repaired."""
 COLUMNS_MAX = 6
+FURTHER_MAX, FILE_MAX = 6, 60
+"""So far above the line where YAML's parser stops a line is moved, in files of so many lines."""
 
 
 class _Repaired(NamedTuple):
@@ -145,7 +147,9 @@ def _without_fault(text: str, at: int, wanted: Wanted) -> _Repaired | None:
         repaired = "\n".join([*lines[: slip.number - 1], changed, *lines[slip.number :]])
         return _Repaired(repaired, f"line {slip.number} of {{path}} {slip.why}", f"write `{slip.right}`")
     why = "line {} of {{path}} does not line up with the lines beside it"
-    moved = [(number, one) for number in (at, at - 1) for one in _moved(lines, number)]
+    # Where the lab's names tell which line is meant, it may be one further up.
+    further = range(at - 2, max(0, at - FURTHER_MAX), -1) if wanted.params and len(lines) <= FILE_MAX else ()
+    moved = [(number, one) for number in (at, at - 1, *further) for one in _moved(lines, number)]
     return _best([_Repaired(one, why.format(n), _begin(one, lines, n)) for n, one in moved], wanted)
 
 
