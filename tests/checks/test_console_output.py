@@ -22,7 +22,8 @@ FORMS = [
 
 
 def status(topic: str, sent: list[Any], lines: list[str], **params: Any) -> Status:
-    kind = "std_msgs/Int8" if isinstance(sent[0], int) else "std_msgs/String"
+    kinds = {bool: "Bool", int: "Int8", float: "Float64", str: "String"}
+    kind = f"std_msgs/{kinds[type(sent[0])]}"
     run = {
         "processes": [{"name": "listener", "stopped_by": "INT", "exit_s": 9}],
         "actors": [
@@ -119,6 +120,32 @@ def test_a_template_s_own_words(sent: list[str], words: str) -> None:
     assert status("/chatter", sent, lines, template="I heard {value}") is expected
     swapped = [words.format(text.swapcase()) for text in sent]
     assert status("/chatter", sent, swapped, template="I heard {value}") is Status.FAIL
+
+
+@pytest.mark.parametrize(
+    ("sent", "form", "right"),
+    [
+        ([0.5, -7.25, 3.0], "{}", True),
+        ([0.5, -7.25, 3.0], "I heard: [{:.2f}] at 12.5", True),
+        ([0.5, -7.25, 3.0], "{:f}", True),
+        ([0.1, 123.456], "data: {:.17g}", True),
+        ([0.1, 123.456], "got {:.2f}.", True),
+        ([0.5, 7.25], "* RESULT: SUCCESS. 1.2.3", False),
+        ([0.5, 7.25], "1{}", False),
+        ([0.5, 7.25], "-{}", False),
+        ([0.001, 7.25], "{:.1f}", False),
+        ([True, False], "{}", True),
+        ([True, False], "heard: {:d}", True),
+        ([True, False], "{}ly false", False),
+    ],
+)
+def test_floats_and_truth_values(sent: list[Any], form: str, right: bool) -> None:
+    lines = [form.format(value) for value in sent]
+    expected = Status.PASS if right else Status.FAIL
+    assert status("/heard", sent, lines) is expected
+    if form == "{}":
+        words = [f"I heard {line}" for line in lines]
+        assert status("/heard", sent, words, template="I heard {value}") is Status.PASS
 
 
 def test_nothing_printed_fails() -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import re
+import struct
 from bisect import bisect_right
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
@@ -59,6 +60,11 @@ _FRAME = re.compile(r'^\s+File "([^"]+)", line (\d+)')
 _CARETS = re.compile(r"    \s*([~^]*\^[~^]*)")
 _LAST = re.compile(r"^([A-Za-z_][\w.]*)(?:: ?(.*))?$")
 _LIBRARY = ("/dist-packages/", "/site-packages/", "/usr/lib/python", "<frozen", "/opt/ros/")
+
+
+FLOAT32_MAX = 3e38
+ROUNDED = 0.01
+"""The share by which a float that is printed with fewer digits may differ."""
 
 
 class Probe(NamedTuple):
@@ -210,14 +216,13 @@ def places_of(
 
 def line_finder(probes: Sequence[Probe], lines: Sequence[Line], template: str) -> Callable[[int], Line]:
     """Return a function from a place of `places_of` to the line that begins there, or before it."""
-    starts = (
-        _starts(lines) if _are_numbers(probes) else [offset for _, offset in _join_lines(lines, template)[1]]
-    )
+    joined = () if _are_numbers(probes) else _join_lines(lines, _between(probes, template))[1]
+    starts = [offset for _, offset in joined] or _starts(lines)
     return lambda place: lines[bisect_right(starts, place) - 1]
 
 
 def _are_numbers(probes: Sequence[Probe]) -> bool:
-    return all(isinstance(p.value, int) for p in probes)
+    return all(isinstance(p.value, int) and not isinstance(p.value, bool) for p in probes)
 
 
 def _starts(lines: Sequence[Line]) -> list[int]:
@@ -262,23 +267,41 @@ def text_places(probes: Sequence[Probe], lines: Sequence[Line], template: str) -
 
     The template's own words may be in capitals or not; the text itself stands letter by letter.
     """
-    # A text alone may be split anywhere, so that blanks do not count; a template's words stay apart.
-    blank = "" if template == VALUE else " "
-    blob, starts = _join_lines(lines, template)
+    blank = _between(probes, template)
+    blob, starts = _join_lines(lines, blank)
     places = []
     for probe in probes:
         begin = next((at for t, at in starts if t >= probe.at_ns - CLOCK_SLACK_NS), len(blob))
-        # In a printed list or message, a text has its escapes.
-        spellings = {blank.join(text.split()) for text in (str(probe.value), repr(probe.value)[1:-1])}
-        patterns = [line_pattern(template, text) for text in spellings if text]
+        alone = isinstance(probe.value, bool | float)
+        spellings = {blank.join(text.split()) for text in _spellings(probe.value)}
+        patterns = [line_pattern(template, text, alone=alone) for text in spellings if text]
         found = {m.start() for pattern in patterns for m in pattern.finditer(blob, begin)}
         places.append(tuple(sorted(found)))
     return places
 
 
-def _join_lines(lines: Sequence[Line], template: str) -> tuple[str, list[tuple[int, int]]]:
+def _spellings(value: object) -> set[str]:
+    """Return how a value may be printed: a float also as a shorter one, or by C++ as its type rounds it."""
+    match value:
+        case bool():
+            return {str(value), str(value).lower(), str(int(value))}
+        case float():
+            single = struct.unpack("f", struct.pack("f", value))[0] if abs(value) < FLOAT32_MAX else value
+            texts = {f"{x:.{digits}f}" for x in (value, single) for digits in range(1, 10)}
+            near = {text for text in texts if abs(float(text) - value) <= ROUNDED * abs(value)}
+            return {str(value), str(single), f"{value:g}", f"{value:.17g}", *near}
+        case _:  # in a printed list or message, a text has its escapes
+            return {str(value), repr(value)[1:-1]}
+
+
+def _between(probes: Sequence[Probe], template: str) -> str:
+    """Return what stands for blanks. A text alone may be split anywhere, so that they do not count; the words of a
+    template, and numbers, stay apart."""
+    return "" if template == VALUE and all(isinstance(p.value, str) for p in probes) else " "
+
+
+def _join_lines(lines: Sequence[Line], blank: str) -> tuple[str, list[tuple[int, int]]]:
     """Return all that was printed, and when and at which offset each line begins."""
-    blank = "" if template == VALUE else " "
     parts, starts, offset = [], [], 0
     for line in lines:
         starts.append((line.at_ns, offset))

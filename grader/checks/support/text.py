@@ -127,9 +127,11 @@ def message_pattern(template: str, value: str) -> re.Pattern[str]:
     return re.compile(rf"\s*{words_pattern(first)}{inner}\s*", re.DOTALL)
 
 
-def line_pattern(template: str, value: str) -> re.Pattern[str]:
-    """Return the template's words around `value`, which has to stand there letter by letter, blanks squeezed."""
+def line_pattern(template: str, value: str, *, alone: bool = False) -> re.Pattern[str]:
+    """Return the template's words around `value`, which has to stand there letter by letter, blanks squeezed; `alone`,
+    if it must be no part of a longer word or number."""
     squeezed = re.escape(" ".join(value.split()))
+    squeezed = rf"(?<![\w.-]){squeezed}(?!\w|\.\d)" if alone else squeezed
     return re.compile(squeezed.join(words_pattern(words) for words in template.strip().split(VALUE)))
 
 
