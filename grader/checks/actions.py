@@ -275,7 +275,15 @@ def _other_end(package: PackageFacts, run: Run, goal: Goal, params: ActionResult
     unset = any("did not set the goal to a terminal status" in line.line for _, line in run.console)
     if status == "ABORTED" and unset:
         message += ": the callback returns without saying how the goal ends"
-    return failed(message, hint=HINTS[params.status])
+    verdict = failed(message, hint=HINTS[params.status])
+    # As soon after the cancelling, it may have been over before the server had to look
+    limit_ns = round(1e9 * (params.within_s or SOON_S))
+    soon = goal.cancelled_ns and goal.ended_ns and goal.ended_ns - goal.cancelled_ns <= limit_ns
+    return _excused(verdict.if_repeated(), run, goal) if soon and status == "SUCCEEDED" else verdict
+
+
+SOON_S = 1.0
+"""A server may take so long to see that its goal is cancelled, if the lab does not say."""
 
 
 def _long_wait(package: PackageFacts, run: Run, limit_s: float) -> Ending | None:
