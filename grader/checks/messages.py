@@ -62,8 +62,8 @@ from grader.model.verdict import (
 from grader.wording import join_words, plural, significant
 
 ENOUGH = 3
-_CLOCK_FACE = re.compile(r"\d:[0-5]\d:[0-5]\d")
-"""Hours, minutes and seconds: a time, and not one in seconds."""
+_HOURS = re.compile(r"\d:[0-5]\d:$")
+"""Hours and minutes before the seconds: a time, and not one in seconds."""
 _LAST_NUMBER = re.compile(rf".*?({NUMBER})\D*", re.DOTALL)
 SECONDS_CHARS_MAX = 60
 TIMED = both(" % rospy.get_time()", " with ros::Time::now().toSec() for %s")
@@ -167,10 +167,10 @@ def _tells_time(package: PackageFacts, run: Run, heard: Sequence[Channel]) -> bo
     """Whether each publisher's texts end with a time that grows as it should, whatever their words are. What a script
     without a clock counts grows so at one a second."""
     for channel in heard:
-        is_face = all(map(_CLOCK_FACE.search, channel.data))
+        found = [_LAST_NUMBER.fullmatch(text[-SECONDS_CHARS_MAX:]) for text in channel.data]
+        is_face = all(one and _HOURS.search(one.string, 0, one.start(1)) for one in found)
         if is_face or slips_of(package, run, channel.callerid, "no-clock"):
             return False
-        found = [_LAST_NUMBER.fullmatch(text[-SECONDS_CHARS_MAX:]) for text in channel.data]
         told = [float(one[1]) for one in found if one]
         clocks = clocks_at(run, channel.times_ns)
         enough = ENOUGH <= len(told) == len(found)
