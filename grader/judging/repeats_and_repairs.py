@@ -334,7 +334,8 @@ def is_used_by(
     if both & _started_files(scenario):
         return True
     if name.endswith((".launch", ".launch.xml")):
-        return launches and not known
+        included = any(ANY in launched.get(one, {ANY}) for one in _started_files(scenario))
+        return launches and not known and included
     a_program = any(name in found for file, found in launched.items() if not file.endswith(".py"))
     imported = [launched.get(one, {name}) for one in _started_files(scenario)]
     unused = name.endswith(".py") and imported != [] and not any(name in found for found in imported)

@@ -92,6 +92,11 @@ def test_a_repair_concerns_the_runs_that_use_its_file(file: str, runs: set[str])
     asked = rubric(*ALL, scenarios={"talker": SCENARIO, **launched})
     name = Repair(kind="node-name", file=file, line=1, before="a", after="b", message="m", fix="b")
     assert {s for s, one in asked.scenarios.items() if is_used_by(one, name, asked, built=True)} == runs
+    known = {"lab.launch": {"a.py"}, "other.launch": {"*"}}  # the second includes what is not known
+    used = {
+        s for s, one in asked.scenarios.items() if is_used_by(one, name, asked, built=True, launched=known)
+    }
+    assert used == runs - ({"lab"} if "included" in file else set())
 
 
 @pytest.mark.parametrize(
