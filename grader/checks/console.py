@@ -34,15 +34,15 @@ from grader.checks.support.exit_causes import (
 from grader.checks.support.fields import unit_slip
 from grader.checks.support.launch_slips import own_script
 from grader.checks.support.processes import (
-    LOGGERS,
     Life,
-    are_noted,
+    asked_services,
     early_end,
     first_interrupt_ns,
     life,
     lives,
     nodes_of,
     not_started,
+    offered_services,
     run_slips,
 )
 from grader.checks.support.text import (
@@ -59,7 +59,7 @@ from grader.checks.support.text import (
     words_pattern,
 )
 from grader.checks.support.topics import cite, reads_keys, unheard
-from grader.evidence.events import UNNAMED, ConsoleLine
+from grader.evidence.events import ConsoleLine
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
@@ -181,8 +181,8 @@ def _not_printed(
     other = [line for line in lines if any(params.found_in(line)) and not refused]
     hint = f"print {params.words} where it happens"
     failing = one.ended_early and (one.end is None or one.end.exit_code != 0)
-    asked = _asked_services(one, run)
-    absent = [name for name, is_there in asked.items() if not is_there and name not in _offered(run)]
+    asked = asked_services(one, run)
+    absent = [name for name, is_there in asked.items() if not is_there and name not in offered_services(run)]
     lacking = absent[0] if absent and not one.ended_early else ""
     is_number_alone = not re.search(r"\w", params.text.replace(PLACE, ""))  # then any number is no answer
     # Where the call failed or the program crashed, a number on a line need not be an answer.
@@ -191,8 +191,9 @@ def _not_printed(
         message = f"it prints {shown(other[0].text)!r}, not {params.words}{near}{_slip(other[0], params)}"
         return _of_client(asked, run)(message, hint=hint).about(said=other[0].text)
     if failing:
-        end = explain_end(one, run, package)
-        return end.verdict(failed_or_blocked, f"it ended before it printed {params.words}: {end.cause}")
+        end, ended = explain_end(one, run, package), f"it ended before it printed {params.words}"
+        early = _called_early(one, asked, run)
+        return _early_call(ended, early) if early else end.verdict(failed_or_blocked, f"{ended}: {end.cause}")
     if error := explain_error(package, run):
         return error.verdict(failed_or_blocked, f"it never prints {params.words}: {error.cause}")
     # What comes after Ctrl-C says how the program stops, not what it does.
@@ -263,20 +264,6 @@ def _of_whole_answer(line: Line, params: PrintsParams) -> str:
     return ""
 
 
-def _offered(run: Run) -> set[str]:
-    return {name for _, e in run.graph for name in e.services if not name.endswith(LOGGERS)}
-
-
-def _asked_services(one: Life, run: Run) -> dict[str, bool]:
-    """Return the services for which a process asked, each with whether it was there at once. A program that is no node
-    asks by the name that rospy gives to all of these: it counts where there is one such program alone."""
-    unnamed = [other.name for other in lives(run) if not run.student_nodes(other.name)]
-    is_no_node = unnamed == [one.name] and (are_noted(run) or not run.student_nodes())
-    names = {UNNAMED} if is_no_node else {*nodes_of(run, one.name)}
-    looked = [e for _, e in run.actors if e.action == "lookup" and e.actor in names and e.topic]
-    return {e.topic or "": not e.detail for e in looked}
-
-
 def _unserved(
     asked: Mapping[str, bool], lacking: str, own: Sequence[Line], run: Run, never: str
 ) -> Verdict | None:
@@ -289,7 +276,7 @@ def _unserved(
         if any(said in line.text for line in own):
             hint = "end the service's callback with `return …Response(…)`"
             return failed_or_blocked(f"{never}: the service's callback returns {wrong}", hint=hint)
-    offered = _offered(run)
+    offered = offered_services(run)
     absent = lacking or next((n for n, is_there in asked.items() if not is_there and n not in offered), "")
     # The only service that there is will be the one that is meant, whatever its name.
     near = near_names(absent, offered) or (tuple(offered) if len(offered) == 1 else ())
@@ -301,11 +288,22 @@ def _unserved(
         return failed_or_blocked(f"{never}: it asks for {lacking}, which no node offers", hint=hint)
     asked_early = [name for name, is_there in asked.items() if not is_there]
     early = next((n for n in asked_early if any(f"service [{n}] unavailable" in one.text for one in own)), "")
-    if early in offered:
-        hint = f"wait for it before the call: `rospy.wait_for_service('{early}')`"
-        # Which of the two comes first may differ from run to run.
-        return failed(f"{never}: it calls {early} before a node offers it", hint=hint).if_repeated()
-    return None
+    return _early_call(never, early) if early in offered else None
+
+
+def _called_early(one: Life, asked: Mapping[str, bool], run: Run) -> str:
+    """Return the service that a program calls before a node offers it, where it ends by itself without a traceback."""
+    by_itself = one.end is None or one.end.signal is None
+    early = next((n for n, is_there in asked.items() if not is_there and n in offered_services(run)), "")
+    return early if by_itself and not process_tracebacks(run, one.name) else ""
+
+
+def _early_call(lost: str, service: str) -> Verdict:
+    wait = both(f"rospy.wait_for_service('{service}')", f'ros::service::waitForService("{service}");')
+    verdict = failed(
+        f"{lost}: it calls {service} before a node offers it", hint=f"wait for it before the call: `{wait}`"
+    )
+    return verdict.if_repeated()  # which of the two comes first may differ from run to run
 
 
 def _slip(line: Line, params: PrintsParams) -> str:

@@ -16,7 +16,7 @@ from pydantic import AfterValidator, Field
 
 from grader.checks.registry import Refers
 from grader.checks.support.text import ANONYMOUS, init
-from grader.evidence.events import ProcessEvent
+from grader.evidence.events import UNNAMED, ProcessEvent
 from grader.evidence.run import Run, once_for_each_run
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
@@ -310,6 +310,21 @@ def nodes_of(run: Run, process: str) -> tuple[str, ...]:
 def are_noted(run: Run) -> bool:
     """Return whether the graph says which process each of the student's nodes belongs to."""
     return any(run.is_student_node(node) for _, event in run.graph for node in event.processes)
+
+
+def offered_services(run: Run) -> set[str]:
+    """Return the names of the services of all nodes, without those that every node has."""
+    return {name for _, e in run.graph for name in e.services if not name.endswith(LOGGERS)}
+
+
+def asked_services(one: Life, run: Run) -> dict[str, bool]:
+    """Return the services for which a process asked, each with whether it was there at once. A program that is no node
+    asks by the name that rospy gives to all of these: it counts where there is one such program alone."""
+    unnamed = [other.name for other in lives(run) if not run.student_nodes(other.name)]
+    is_no_node = unnamed == [one.name] and (are_noted(run) or not run.student_nodes())
+    names = {UNNAMED} if is_no_node else {*nodes_of(run, one.name)}
+    looked = [e for _, e in run.actors if e.action == "lookup" and e.actor in names and e.topic]
+    return {e.topic or "": not e.detail for e in looked}
 
 
 def is_named(node: str, names: Iterable[str], anonymous: Anonymous) -> bool:
