@@ -91,8 +91,8 @@ def _lines_to_blame(verdict: Verdict, criterion: Criterion, lines: list[SourceLi
             found = lines_that_say(lines, f"{verdict.measured} {verdict.said}")
             if not found and verdict.status is Status.PARTIAL:
                 found = [one for one in lines if re.search(SAYS[criterion.check], one.text)]
-        case "prints":
-            found = lines_that_say(lines, verdict.said)
+        case "prints" | "topic-type":
+            found = _that_name(verdict.said, criterion.check, lines)
         case "message":
             found = lines_that_say(lines, f"{verdict.measured} {verdict.said}")
             found = _published_of(found, lines, criterion)
@@ -103,6 +103,14 @@ def _lines_to_blame(verdict: Verdict, criterion: Criterion, lines: list[SourceLi
         case _:
             found = []
     return found
+
+
+def _that_name(said: str, check: str, lines: list[SourceLine]) -> list[SourceLine]:
+    """Return the lines that print a text, or the one of C++ that advertises a topic."""
+    made = re.compile(rf"""\badvertise\b[^"]*"/?{re.escape(said.strip("/"))}\"""")
+    return (
+        lines_that_say(lines, said) if check == "prints" else [one for one in lines if made.search(one.text)]
+    )
 
 
 def _published_of(found: list[SourceLine], lines: list[SourceLine], criterion: Criterion) -> list[SourceLine]:

@@ -62,6 +62,7 @@ SENT = {"check": "message", "with": {"topic": "/chatter", "template": "hello wor
 CALLS = {"check": "calls", "with": {"service": "/add"}}
 ANSWERS = {"check": "service-answers", "with": {"service": "/add", "expect": [{"sum": 3}]}}
 PRINTS = {"check": "prints", "with": {"process": "talker", "text": "hello world {number}"}}
+NAMED = {"check": "topic-type", "with": {"topic": "/chatter", "type": "std_msgs/String"}}
 FRAMES = {"check": "transform", "with": {"parent": "base", "child": "laser"}}
 STAMPS = {"check": "stamps", "with": {"topic": "/reading"}}
 FIELD = {"check": "field-equals", "with": {"topic": "/cmd_vel", "field": "linear.x", "value": 1}}
@@ -108,6 +109,12 @@ FIELD = {"check": "field-equals", "with": {"topic": "/cmd_vel", "field": "linear
         (PRINTS, "text = 'hello'\nprint(text, x)\nprint('bye world')", 1),
         (PRINTS, "print('hello world')\nprint('hello world', x)", None),
         (PRINTS, "print(text)", None),
+        (
+            NAMED,
+            'ros::init(argc, argv, "hello world");\np = n.advertise<std_msgs::String>("hello world", 1);',
+            2,
+        ),
+        (NAMED, 'p = n.advertise<std_msgs::String>("hello", 1);', None),
         (STAMPS, "msg.header.stamp = start\npub.publish(msg)", 1),
         (STAMPS, "msg = Reading(data=1)\npub.publish(msg)", 2),
     ],

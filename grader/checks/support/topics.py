@@ -232,7 +232,7 @@ def _not_advertised(
     )
     hint += "" if topic in TF_TOPICS else f", or rename {join_words(meant, 'or')} if that is meant to be it"
     verdict = of_node(f"{what}; the node publishes on {join_words(published)}", measured=measured, hint=hint)
-    return verdict.about(citations=named_at(package, run, "publisher", meant[0]))
+    return verdict.about(citations=named_at(package, run, "publisher", meant[0]), said=meant[0])
 
 
 def _with_others(absent: Verdict, published: Collection[str]) -> Verdict:
