@@ -168,23 +168,41 @@ def _fault(package: PackageFacts, run: Run, goal: Goal, params: ActionResultPara
     found = list(differences(goal.end.value, params.result, params.tolerance))
     if found:
         message = f"{goal.name} of {params.action} ends {status} with {join_words(map(str, found))}"
-        return failed(message, hint=_how_to_fill(goal.end.value, params.result, hint))
+        verdict = failed(message, hint=_how_to_fill(goal.end.value, params.result, hint))
+        return _without_result(package, run, goal, params, verdict)
     return (
-        _unlike_last_report(run, goal, params)
+        _unlike_last_report(package, run, goal, params)
         or _too_late(package, run, goal, params)
         or _no_feedback(run, goal, params)
         or _other_reports(run, goal, params)
     )
 
 
-def _unlike_last_report(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | None:
+def _without_result(
+    package: PackageFacts, run: Run, goal: Goal, params: ActionResultParams, verdict: Verdict
+) -> Verdict:
+    """Return the loss with the line that ends the goal without a result, where it is an empty one."""
+    call = f"set_{params.status.lower()}"
+    slip = next((s for s in run_slips(package, run, "no-result") if s.name == call), None)
+    if slip is None or goal.end is None or not _is_empty(goal.end.value):
+        return verdict
+    why = f"line {slip.line} of {slip.file} gives it no result"
+    return verdict.explained(
+        why, f"on line {slip.line}, write `{slip.message}(…)` with the result", (slip.place,)
+    )
+
+
+def _unlike_last_report(
+    package: PackageFacts, run: Run, goal: Goal, params: ActionResultParams
+) -> Verdict | None:
     last, end = next(iter(_feedback(run, goal, params)[-1:]), {}), goal.end.value if goal.end else None
     for name, field in params.as_reported.items():
         wanted = {name: last[field]} if field in last else {}
         if end is not None and any(differences(end, wanted, params.tolerance)):
             ends = f"{goal.name} of {params.action} ends {params.status} with {name}: {end.get(name)}"
             hint = f"set {name} of the result before you call {ENDS[params.status]}"
-            return failed(f"{ends}, but the last feedback has {field}: {last[field]}", hint=hint)
+            verdict = failed(f"{ends}, but the last feedback has {field}: {last[field]}", hint=hint)
+            return _without_result(package, run, goal, params, verdict)
     return None
 
 

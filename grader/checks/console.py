@@ -23,6 +23,7 @@ from grader.checks.support.console_output import (
     not_reached,
     split_log_line,
     stream_lines,
+    unprinted_result,
 )
 from grader.checks.support.exit_causes import (
     explain_end,
@@ -205,6 +206,7 @@ def _not_printed(
         why := _unserved(asked, lacking, own, run, never)
         or unheard_of
         or _unseen(one, package, run, params, never)
+        or unprinted_result(package, one.start.script or "", never, params.words, params.found_in)
     ):
         return why
     if not own:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
 from typing import Annotated, Any, NamedTuple
 
@@ -10,7 +11,7 @@ from pydantic import Field
 
 from grader.checks.registry import Refers, check
 from grader.checks.support.console_output import Traceback
-from grader.checks.support.exit_causes import explain_end, explain_traceback, process_tracebacks
+from grader.checks.support.exit_causes import Ending, explain_end, explain_traceback, process_tracebacks
 from grader.checks.support.fields import differences, fields_text, value_text
 from grader.checks.support.processes import (
     LOGGERS,
@@ -25,6 +26,7 @@ from grader.checks.support.topics import cite, no_node, why_unreached
 from grader.evidence.events import MISFIT, NO_ANSWER
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
+from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
 from grader.model.verdict import (
     EvidenceCitation,
@@ -119,15 +121,11 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
     wrong = faults[0] if faults else None
     right = len(pairs) - len(faults)
     share = right / len(params.expect)
-    verdict = (
-        (
-            wrong[1].in_part(share, f"{right} of {plural(len(params.expect), 'answer')} right")
-            if wrong
-            else None
-        )
-        or _judge_uncalled(made, package, run, params)
-        or passed(f"{params.service} answers {plural(len(pairs), 'call')} as it should")
-    )
+    if wrong:
+        verdict = wrong[1].in_part(share, f"{right} of {plural(len(params.expect), 'answer')} right")
+    else:
+        answered = f"{params.service} answers {plural(len(pairs), 'call')} as it should"
+        verdict = _judge_uncalled(made, package, run, params) or passed(answered)
     call = wrong[0] if wrong else next(reversed(made), None)
     expected = join_words(f"call {n}: {fields_text(w)}" for n, w in enumerate(params.expect, 1))
     measured = verdict.measured or _measured_text(call)
@@ -183,6 +181,10 @@ def _fault(
     message = (
         f"{params.service}, called with {fields_text(one.request)}, answers {join_words(map(str, found))}"
     )
+    unset = _unset_field([one.path for one in found], plain_type(one.type), package)
+    if unset is not None:
+        hint = f"set {unset.fix} of the {unset.name} that the callback returns"
+        return failed(f"{message}: the script never sets {unset.fix}", hint=hint, citations=(unset.place,))
     verdict = failed(message, hint=f"see what the callback computes: {_by_hand(params.service, one)}")
     return verdict.of_value(nan=any(one.nan for one in found))
 
@@ -194,18 +196,28 @@ def _exchanged(pairs: Sequence[tuple[Exchange, dict[str, Any]]], params: Service
         if all(
             one.response is not None
             and {first, second} <= {*wanted}
-            and not isinstance(
-                wanted[first], bool
-            )  # two that are both turned around may each be wrong by itself
-            and not any(
-                differences(one.response, {turned.get(k, k): v for k, v in wanted.items()}, params.tolerance)
-            )
+            # two truth values that are both turned around may each be wrong by itself
+            and not isinstance(wanted[first], bool)
+            and not any(differences(one.response, _renamed(wanted, turned), params.tolerance))
             for one, wanted in pairs
         ):
             kind = pairs[0][0].type.partition("/")[2]
             fields = f"{first}=…, {second}=…"
             return f"{first} and {second} have each other's values: write each by its name, {kind}Response({fields})"
     return ""
+
+
+def _renamed(fields: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, Any]:
+    return {names.get(name, name): value for name, value in fields.items()}
+
+
+def _unset_field(paths: Iterable[str], kind: str, package: PackageFacts) -> PythonSlip | None:
+    """Return where the response is made, its `fix` being the first of these fields that no line sets; else None."""
+    name = f"{kind.partition('/')[2]}Response"
+    made = [s for s in package.slips if (s.kind, s.name) == ("fills", name)]
+    given = {field for s in made for field in s.message.split()}
+    unset = [path for path in paths if path and re.split(r"\W", path)[0] not in given]
+    return made[0].model_copy(update={"fix": unset[0]}) if made and given and unset else None
 
 
 def _by_hand(service: str, one: Exchange) -> str:
@@ -345,7 +357,9 @@ def handler_traceback(run: Run, service: str, call: Exchange) -> Traceback | Non
     later = [other.at_ns for other in exchanges(run, service) if other.at_ns > call.at_ns]
     before_ns = min(later, default=None) if call.detail.startswith(NO_ANSWER) else None
     ended_ns = before_ns or one.interrupt_ns
-    return next(iter(process_tracebacks(run, one.name, after_ns=call.at_ns, before_ns=ended_ns)), None)
+    found = process_tracebacks(run, one.name, after_ns=call.at_ns, before_ns=ended_ns)
+    # what is raised while another exception is handled says more: rospy's names the field
+    return next((one for one in found if not one.is_handled), found[0] if found else None)
 
 
 def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> Verdict:
@@ -353,7 +367,7 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
     asked = f"{service}, called with {fields_text(one.request)},"
     found = handler_traceback(run, service, one)
     if found is not None:
-        end = explain_traceback(found, package)
+        end = _in_other_order(found, one, package) or explain_traceback(found, package)
         return end.verdict(failed, f"{asked} fails: {end.cause}")
     kind = one.type.partition("/")[2]
     if one.detail.startswith(MISFIT):
@@ -374,6 +388,27 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
     why = shown(one.detail) or "the call was not answered"
     verdict = failed(f"{asked} gives no answer: {why}", hint=f"try it by hand: {_by_hand(service, one)}")
     return verdict.late() if one.detail.startswith(NO_ANSWER) else verdict
+
+
+def _in_other_order(found: Traceback, one: Exchange, package: PackageFacts) -> Ending | None:
+    """Return the cause, the hint and the line where a callback returns a list whose values do not fit the fields."""
+    name = f"/{one.type.partition('/')[2]}.srv"
+    own = next((i for i in package.interfaces if f"/{i.path}".endswith(name)), None)
+    fields = [f.name for f in own.fields if f.part == "response"] if own is not None else []
+    lists = [s for s in package.slips if s.kind == "returns-list" and s.message.count(",") + 1 == len(fields)]
+    if found.kind != "SerializationError" or len(lists) != 1:
+        return None
+    slip, values = lists[0], lists[0].message.split(", ")
+    cause = (
+        f"{shown(found.message)}, and a {slip.name} gives its values to {join_words(fields)}, in this order"
+    )
+    rest = [value for value in values if value not in fields]
+    by_name = {value: value for value in values if value in fields}
+    if not by_name or len(rest) > 1 or "..." in rest or values == fields:
+        return Ending(cause, "put the values in that order, each of its field's type", (slip.place,))
+    right = ", ".join(by_name.get(field, rest[0] if rest else field) for field in fields)
+    right = f"[{right}]" if slip.name == "list" else right
+    return Ending(cause, f"on line {slip.line}, write `return {shown(right)}`", (slip.place,))
 
 
 def _undivided(package: PackageFacts, kind: str, one: Exchange) -> Verdict | None:

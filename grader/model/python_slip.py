@@ -19,7 +19,8 @@ SlipKind = Literal[
     "hides-class", "float-index", "ranges-read",
     "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed", "printed-in-part",
     "published-in-part", "never-published", "takes-number", "typed-text", "goes-on",
-    "no-argument", "read-late", "debugger",
+    "no-argument", "read-late", "debugger", "drops-result", "returns-list", "fills", "catches",
+    "no-result",
 ]  # fmt: skip
 
 
@@ -111,6 +112,13 @@ class PythonSlip(Placed, Record):
     - `argument-text`: where an argument of the command line is kept as a text; `fix` is the line with a number in its
       place.
     - `no-argument`: where a program of C++ reads an argument, the `name`-th, whether there is one or not.
+    - `drops-result`: where the function `name` is called, and what it returns on line `fix` is not kept; `{}` for a
+      value.
+    - `returns-list`: where a service's callback returns a list or a tuple (`name`), and the names in it.
+    - `fills`: which fields a message of the class `name` gets that is made there, if all of this class can be told.
+    - `catches`: which errors the `except`s of a `try` catch, where its last one stands; `name` has the first and the
+      last line of the `try`'s block, `fix` the name that the `except` gives the error.
+    - `no-result`: where an action's goal is ended by the call `name` without a result.
     - `unused-import`, `lacking-import`: an import of the module `message` whose names nothing in the script uses, or
       that Python did not find where the files were read (`fix`: the name of a module in it, as `lab_msgs.msg`).
     """

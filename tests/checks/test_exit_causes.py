@@ -407,3 +407,25 @@ def test_a_parameter_that_is_read_where_it_is_not_set_is_told_with_its_condition
     frame = ("node.py", 3, "a = rospy.get_param('~a')")
     found = explained(tmp_path, {"node.py": text}, frame, error="KeyError: '~a'")
     assert found.hint == "on line 2, write the condition without its `not`"
+
+
+@pytest.mark.parametrize(
+    ("caught", "error", "hint"),
+    [
+        ("rospy.ROSException as e", "rospy.service.ServiceException: service [/add] responded with an error: b'no'",
+         "on line 4, write `except rospy.ServiceException as e:`"),
+        ("rospy.ServiceException", "rospy.exceptions.ROSException: timeout exceeded while waiting for service /add",
+         "on line 4, write `except rospy.ROSException:`"),
+        ("tf2_ros.LookupException", "tf2_ros.ExtrapolationException: Lookup would require extrapolation",
+         "on line 4, write `except tf2_ros.TransformException:`"),
+        ("(tf.LookupException, tf.ConnectivityException)", "tf2_ros.ExtrapolationException: into the future",
+         "on line 4, write `except tf.Exception:`"),
+        ("rospy.ROSInterruptException", "rospy.service.ServiceException: service [/add] responded with an error: b'no'",
+         "put the call below `try:`, and write `except rospy.ServiceException as error:` for it"),
+        ("rospy.ServiceException", "rospy.service.ServiceException: service [/add] responded with an error: b'no'",
+         "put the call below `try:`, and write `except rospy.ServiceException as error:` for it"),
+    ],
+)  # fmt: skip
+def test_an_except_for_another_exception_is_told_with_its_line(tmp_path, caught, error, hint):
+    files = {"node.py": f"import rospy\ntry:\n    ask()\nexcept {caught}:\n    pass\n"}
+    assert explained(tmp_path, files, ("node.py", 3, "ask()"), error=error).hint == hint

@@ -331,6 +331,14 @@ def test_what_comes_behind_a_function_that_never_ends_is_never_reached(text, fou
         ("    if g.n < 0:\n        s.set_aborted(r)\n    else:\n        s.set_succeeded(r)\n", []),
         ("    if ok:\n        s.set_succeeded(r)\n    print('done')\n", []),
         ("    if stop:\n        s.set_preempted()\n        ok = False\n    if ok:\n        s.set_succeeded(r)\n", []),
+        (("    for i in range(9):\n        if s.is_preempt_requested():\n            s.set_preempted(r)\n"
+         "            ok = False\n    if ok:\n        s.set_succeeded(r)\n"), ["below line 5, write `return`"]),
+        (("    for i in range(9):\n        if s.is_preempt_requested():\n            s.set_preempted(r)\n"
+         "            ok = False\n        if not ok:\n            break\n"), []),
+        (("    for i in range(9):\n        if s.is_preempt_requested():\n            s.set_preempted(r)\n"
+         "            ok = False\n            break\n"), []),
+        (("    while ok:\n        if s.is_preempt_requested():\n            s.set_preempted(r)\n"
+         "            ok = False\n"), []),
         ("    while not done:\n        if near(g):\n            done = True\n            s.set_succeeded()\n", []),
         ("    while s.is_active():\n        if near(g):\n            s.set_succeeded()\n", []),
         ("    if not ok:\n        s.set_aborted()\n    if ok:\n        s.set_succeeded()\n", []),
@@ -411,3 +419,42 @@ def test_a_sum_of_numbers_is_no_text(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text("a = n * 2 + 10\nt = 'n is ' + str(n)\np.publish(a)\np.publish(t)\n")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "publishes"]
     assert [one.message for one in slips if any(map(str.isalnum, one.message))] == ["n is {}"]
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "said"),
+    [
+        ("def f(a):\n    return 'sum: %d' % a\nf(3)\n", "drops-result", [(3, "sum: {}", "2", "f")]),
+        ("def f(a):\n    try:\n        return ask(a)\n    except E as e:\n        return 'no: %s' % e\nf(3)\n",
+         "drops-result", [(6, "no: {}", "5", "f"), (6, "{}", "3", "f")]),
+        ("def f(a):\n    return a\nprint(f(3))\nf(4)\n", "drops-result", []),
+        ("def f(a):\n    return True\nf(4)\n", "drops-result", []),
+        ("def f(a):\n    return a\nrospy.Service('/a', A, f)\nf(4)\n", "drops-result", []),
+        ("def f(q):\n    return [b, a]\nrospy.Service('/a', A, f)\n", "returns-list", [(2, "b, a", "", "list")]),
+        ("def f(q):\n    return b, 1\nrospy.Service('a', A, handler=f)\n", "returns-list",
+         [(2, "b, ...", "", "tuple")]),
+        ("def f(q):\n    return [b, a]\nf(3)\n", "returns-list", []),
+        ("def f(q):\n    m = A()\n    m.x = 1\n    m.p.y += 2\n    return m\n", "fills", [(2, "p x", "", "A")]),
+        ("def f(q):\n    pub.publish(A(x=1))\n", "fills", [(2, "x", "", "A")]),
+        ("m = A()\nm.x = 1\npub.publish(m)\n", "fills", [(1, "x", "", "A")]),
+        ("def f(q):\n    m = A()\n    m.x = 1\n    fill(m)\n    return m\n", "fills", []),
+        ("def f(q):\n    m = A()\n    def g():\n        m.y = 2\n    m.x = 1\n    return m\n", "fills", []),
+        ("def f(q):\n    m = A()\n    m.x = 1\n    return m\ndef g(q):\n    return A(1, 2)\n", "fills", []),
+        ("m = A()\ndef f(q):\n    m.x = 1\n    return m\n", "fills", []),
+        ("class B:\n    m = A()\n    def f(self):\n        return self.m\n", "fills", []),
+        ("class B:\n    def f(self):\n        self.m = A()\n        self.m.x = 1\n", "fills", []),
+        ("try:\n    a()\n    b()\nexcept X as e:\n    pass\nexcept (Y, q.Z):\n    pass\n", "catches",
+         [(6, "X Y q.Z", "", "2-3")]),
+        ("try:\n    a()\nexcept X:\n    pass\nexcept Exception:\n    pass\n", "catches", []),
+        ("try:\n    a()\nexcept:\n    pass\n", "catches", []),
+        ("s.set_preempted()\ns.set_succeeded(r)\n", "no-result", [(1, "s.set_preempted", "", "set_preempted")]),
+    ],
+)  # fmt: skip
+def test_what_becomes_of_results(
+    text: str, kind: str, said: list[tuple[int, str, str, str]], tmp_path: Path
+) -> None:
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    found = [
+        (s.line, s.message, s.fix, s.name) for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == kind
+    ]
+    assert sorted(found) == sorted(said)

@@ -20,7 +20,7 @@ from grader.checks.support.text import VALUE, line_pattern, words_pattern
 from grader.evidence.run import Run, once_for_each_run
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
-from grader.model.verdict import Verdict
+from grader.model.verdict import Verdict, failed
 from grader.untrusted_text import without_colours
 
 OTHER_NUMBERS_PER_LINE = 6
@@ -56,6 +56,7 @@ _CONSOLE = re.compile(r"^\s*\[\s*(DEBUG|INFO|WARN|ERROR|FATAL)\s*\]\s*\[[^\]]*\]
 
 
 HEADING = "Traceback (most recent call last):"
+HANDLING = "During handling of the above exception, another exception occurred:"
 _FRAME = re.compile(r'^\s+File "([^"]+)", line (\d+)')
 _CARETS = re.compile(r"    \s*([~^]*\^[~^]*)")
 _LAST = re.compile(r"^([A-Za-z_][\w.]*)(?:: ?(.*))?$")
@@ -446,6 +447,8 @@ class Traceback(NamedTuple):
     frames: tuple[Frame, ...]
     first: int
     last: int
+    is_handled: bool = False
+    """Whether another one was raised while it was handled."""
 
     @property
     def text(self) -> str:
@@ -473,6 +476,8 @@ def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
         frame = _FRAME.match(line)
         if HEADING in line:
             first, frames = index, []
+        elif found and line == HANDLING:
+            found[-1] = found[-1]._replace(is_handled=True)
         elif frame and (first is not None or bare[index]):
             first = index if first is None else first
             frames.append(Frame(frame[1], int(frame[2])))
@@ -529,3 +534,21 @@ def not_reached(verdict: Verdict, slip: PythonSlip) -> Verdict:
     why = f"line {slip.line} of {slip.file} does, and is never reached"
     hint = f"see what keeps line {slip.line} from being reached: print what the condition above it compares"
     return verdict.explained(why, hint, (slip.place,))
+
+
+def unprinted_result(
+    package: PackageFacts, script: str, never: str, words: str, found_in: Callable[[Line], Iterable[object]]
+) -> Verdict | None:
+    """Return the loss where a function of the script returns the words, or the number in them, and nothing prints what
+    it returns; `never` begins the message."""
+    own = [s for s in package.slips if (s.kind, s.file) == ("drops-result", script)]
+    texts = [s for s in own if any(found_in(Line(0, filled(s))))]
+    numbers = [s for s in own if s.message == "{}" and re.search(r"\d|<number>", words)]
+    slip = next(iter(texts or numbers), None)
+    if slip is None:
+        return None
+    call = f"`{slip.name}(…)` on line {slip.line}"
+    why = f"line {slip.fix} of {slip.file} returns {'it' if texts else 'the number'}"
+    hint = f"print what {call} returns" if texts else f"print {words} above line {slip.fix}"
+    message = f"{never}: {why}, and nothing keeps what {call} returns"
+    return failed(message, hint=hint, citations=(slip.place,))

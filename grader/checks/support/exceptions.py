@@ -24,6 +24,7 @@ from grader.checks.support.rospy_calls import (
 from grader.checks.support.text import shown
 from grader.installable import noetic_messages
 from grader.model.package import PackageFacts
+from grader.model.verdict import FileCitation
 from grader.syntax_fixes import parsed
 from grader.wording import join_words, plural
 
@@ -498,6 +499,41 @@ def _service(message: str, _source: str, _marked: tuple[int, int] | None) -> Mea
         hint = "put the call below `try:`, and write `except rospy.ServiceException as error:` for it"
         return "the server refuses, and no `except` of the script is for that", hint
     return None
+
+
+_TO_CATCH = {
+    "ServiceException": "rospy.ServiceException",
+    "ROSException": "rospy.ROSException",
+    **dict.fromkeys(
+        ("LookupException", "ExtrapolationException", "ConnectivityException"), "tf2_ros.TransformException"
+    ),
+}
+
+
+def explain_narrow_handler(found: Traceback, place: FileCitation, package: PackageFacts) -> Meaning | None:
+    """Return the `except` around a line that is for other exceptions, and what to write there."""
+    wanted = _TO_CATCH.get(found.kind, "")
+    # such a call only fails for a reason that has to be removed
+    if not wanted or re.search(
+        r"unavailable|md5sum|error processing|handler returned|init_node", found.message
+    ):
+        return None
+    tries = [s for s in package.slips if (s.kind, s.file) == ("catches", place.file)]
+    around = [s for s in tries if place.line and _spans(s.name, place.line)]
+    slip = max(around, key=lambda s: int(s.name.partition("-")[0]), default=None)
+    names = slip.message.split() if slip else []
+    if slip is None or any(re.search(rf"Interrupt|SystemExit|{found.kind}$", name) for name in names):
+        return None
+    if all(name.startswith("tf.") for name in names):
+        wanted = wanted.replace("tf2_ros.TransformException", "tf.Exception")
+    caught = f"{wanted}{f' as {slip.fix}' if slip.fix else ''}"
+    why = f"the `except` on line {slip.line} is for {join_words(names, 'or')}"
+    return why, f"on line {slip.line}, write `except {shown(caught)}:`"
+
+
+def _spans(lines: str, line: int) -> bool:
+    first, _, last = lines.partition("-")
+    return int(first) <= line <= int(last)
 
 
 _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | None]] = {

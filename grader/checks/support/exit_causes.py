@@ -14,6 +14,7 @@ from grader.checks.support.exceptions import (
     SLIPS,
     evaluated,
     explain_exception,
+    explain_narrow_handler,
     explain_number_of_values,
     explain_operand,
 )
@@ -428,7 +429,7 @@ def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts
     if slip := next((name for said, name in OF_OTHER_LINES.items() if said in found.message), ""):
         return next(((s.message, s.fix) for s in own if slip in {s.kind, s.name}), None)
     late = found.kind in {"ROSInitException", "ROSException"} and "init_node" in found.message
-    return _late_init(place, package) if late else None
+    return _late_init(place, package) if late else explain_narrow_handler(found, place, package)
 
 
 def _no_number(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:

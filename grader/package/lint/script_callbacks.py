@@ -1,5 +1,5 @@
 """Finds what is wrong with the functions that ROS calls in a student's Python, for `slips.py`: how ROS is given them,
-what they do to the node, what they print of a message, and how they end an action's goal.
+what they do to the node, and what they print of a message.
 
 Nothing is executed. Python 3.8, standard library only.
 """
@@ -9,7 +9,6 @@ import builtins
 import itertools
 
 from script_names import (
-    LOOPS,
     all_of,
     argument,
     callback_of,
@@ -20,18 +19,16 @@ from script_names import (
     given_names,
     gives_function,
     is_call,
-    is_call_alone,
     listed,
     names_in,
     parents_of,
-    set_in,
     slip,
-    statements_of,
     text_of,
     walk,
 )
-from script_objects import FINISHING
 
+BELOW_LIMIT = 50
+"""So many statements or conditions of a block are looked at."""
 CALLBACKS = {
     "Subscriber": ("callback", 2, 1),
     "Timer": ("callback", 1, 1),
@@ -532,69 +529,3 @@ def changes(node, found):
     if isinstance(node.op, ast.Add):
         return isinstance(other, ast.Constant) and not isinstance(other.value, str)
     return not (isinstance(node.op, ast.Mod) and not found[0][0])
-
-
-BELOW_LIMIT = 50
-"""So many statements below the end of a goal are looked at."""
-
-
-def finished_goals(tree):
-    """Where an `if` of an action's callback ends the goal last of all, and the callback goes on below it."""
-    parents = parents_of(tree)
-    for node in all_of(tree, ast.If):
-        # With an `else`, what stands below is meant for both cases
-        if node.orelse or not is_call_alone(node.body[-1]):
-            continue
-        call, around = node.body[-1].value, parents.get(node)
-        if called_name(call) not in FINISHING:
-            continue
-        block = statements_of(around)
-        at = block.index(node) + 1 if node in block else len(block)
-        below = [one for one in block[at : at + BELOW_LIMIT] if not is_other_case(one, node)]
-        # a loop may also be there to stop the robot
-        more = any(calls_in(one, *FINISHING, "publish_feedback") for one in below)
-        in_loop = isinstance(around, LOOPS)
-        if more or (in_loop and not is_last_turn(around, node, call)):
-            what = "loop" if in_loop else "callback"
-            message = "the goal is over with `%s(…)`, and the %s goes on" % (called_name(call), what)
-            fix = "below line %d, write `return`" % node.body[-1].end_lineno
-            yield slip(call.lineno, "goes-on", message, fix, called_name(call))
-
-
-def finished_in_loops(tree):
-    """Where the first turn of a loop that reports on its way ends an action's goal, and the loop goes on."""
-    for loop in all_of(tree, *LOOPS):
-        alone = [one.value for one in loop.body if is_call_alone(one)]
-        ending = [one for one in alone if called_name(one) in FINISHING]
-        left = any(isinstance(one, (ast.Break, ast.Return)) for one in loop.body)
-        takes = calls_in(loop, "accept_new_goal", "is_active")
-        # as of `for goal in goals:` and `goal = waiting.get()`
-        takes = takes or set_in(loop) & {dotted(one.func.value) for one in ending}
-        if ending and not left and not takes and calls_in(loop, "publish_feedback"):
-            call, end = ending[-1], loop.end_lineno
-            message = "`%s(…)` is inside of the loop on line %d, whose first turn ends the goal"
-            fix = "move line %d out of the loop, below its last line, %d, with the same spaces or tabs before it "
-            fix += "as line %d has"
-            fix %= (call.lineno, end, loop.lineno)
-            yield slip(
-                call.lineno, "goes-on", message % (called_name(call), loop.lineno), fix, called_name(call)
-            )
-
-
-def is_other_case(node, before):
-    """Whether an `if` asks for the opposite of one above it, or whether the goal is still active."""
-    if not isinstance(node, ast.If):
-        return False
-    # `if not done:` below `if done:` does not run in the same turn
-    return bool(calls_in(node.test, "is_active")) or excludes(node.test, before.test)
-
-
-def is_last_turn(loop, node, call):
-    """Whether an `if` that ends a goal also ends the loop around it by what it sets, or the loop has one goal after the
-    other."""
-    if isinstance(loop, ast.For):
-        # Each turn ends another goal, so that none is ended twice
-        return dotted(loop.target) == dotted(call.func.value)
-    stored = {dotted(target) for n in node.body if isinstance(n, ast.Assign) for target in n.targets}
-    takes = any(calls_in(one, "accept_new_goal") for one in loop.body[:BELOW_LIMIT])
-    return bool(takes or calls_in(loop.test, "is_active") or stored & names_in(loop.test))

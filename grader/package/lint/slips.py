@@ -1,10 +1,11 @@
 """Finds what compiles in a student's Python and is not meant: `slips` of a syntax tree, for `syntax.py`.
 
 What nothing calls, statements without an effect, imports. Names are for `script_names.py`, texts for
-`script_texts.py`, objects for `script_objects.py`, callbacks for `script_callbacks.py`, loops for `script_loops.py`,
-their rates for `script_rates.py`, values for `script_values.py`, arithmetic for `script_arithmetic.py`, scans for
-`script_scans.py`, counters and clocks for `script_counters.py`. Nothing is executed. A file has to be parsed by ROS's
-own Python, which is to run it: Python 3.8, standard library only.
+`script_texts.py`, objects for `script_objects.py`, callbacks for `script_callbacks.py`, ends of goals for
+`script_goals.py`, loops for `script_loops.py`, their rates for `script_rates.py`, values for `script_values.py`,
+arithmetic for `script_arithmetic.py`, scans for `script_scans.py`, counters and clocks for `script_counters.py`, what
+functions return for `script_results.py`. Nothing is executed. A file has to be parsed by ROS's own Python, which is to
+run it: Python 3.8, standard library only.
 """
 
 import ast
@@ -17,10 +18,12 @@ sys.path.append(os.path.dirname(os.path.abspath(__file__)))
 import script_arithmetic as arithmetic
 import script_callbacks as callbacks
 import script_counters as counters
+import script_goals as goals
 import script_loops as loops
 import script_names as names
 import script_objects as objects
 import script_rates as rates
+import script_results
 import script_scans as scans
 import script_values as values
 from script_names import (
@@ -58,8 +61,8 @@ def slips(tree):
         values.values_never_set_back,
         callbacks.unprinted_messages, counters.values_left_out, counters.published_unchanged,
         objects.unused_publishers, objects.unsent_messages, loops.loops_of_numbers,
-        callbacks.finished_goals, callbacks.finished_in_loops, counters.sends_no_time, without_node,
-        debuggers,
+        goals.finished_goals, goals.finished_in_loops, goals.ended_without_result, counters.sends_no_time, without_node,
+        debuggers, script_results.results,
     )  # fmt: skip
     found = [one for find in finders for one in find(tree)]
     # of two that say why a name is not there, the first is about the class that it belongs to

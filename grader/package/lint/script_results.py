@@ -1,0 +1,139 @@
+"""Finds what becomes of what a student's functions make and return, for `slips.py`: results that nothing keeps, lists
+in the place of a response, which fields of a message are filled in, and which errors a `try` catches.
+
+These are facts, which checks compare with what the lab asks. Nothing is executed. Python 3.8, standard library only.
+"""
+
+import ast
+from collections import Counter
+
+from script_names import (
+    all_of,
+    argument,
+    called_name,
+    caught_by,
+    dotted,
+    functions_in,
+    is_call_alone,
+    parents_of,
+    slip,
+    walk,
+    walk_own,
+)
+from script_texts import VALUE, Texts
+
+BROAD = {"", "Exception", "BaseException"}
+HANDED_ON = ("publish", "publish_feedback", "set_succeeded", "set_aborted", "set_preempted", "send_goal")
+
+
+def results(tree):
+    yield from dropped_results(tree)
+    yield from listed_answers(tree)
+    yield from filled_fields(tree)
+    yield from narrow_handlers(tree)
+
+
+def dropped_results(tree):
+    """What a function returns, where each use of the function is a call whose result nothing keeps."""
+    used = Counter(dotted(n).rpartition(".")[2] for n in all_of(tree, ast.Name, ast.Attribute))
+    alone = {}
+    for node in filter(is_call_alone, walk(tree)):
+        alone.setdefault(called_name(node.value), []).append(node)
+    given = {dotted(n.targets[0]): n.value for n in all_of(tree, ast.Assign)}
+    read = Texts(given, set())
+    for name, own in functions_in(tree).items():
+        if name not in alone or len(alone[name]) != used[name]:
+            continue
+        for node in walk_own(own):
+            if isinstance(node, ast.Return) and not isinstance(node.value, (ast.Constant, type(None))):
+                call = alone[name][0].value
+                text = read.of(node.value)
+                yield slip(call.lineno, "drops-result", text or VALUE, str(node.lineno), dotted(call.func))
+
+
+def listed_answers(tree):
+    """Lists and tuples that a service's callback returns, with the names of what is in them."""
+    functions, handlers = functions_in(tree), {}
+    for call in all_of(tree, ast.Call):
+        given = argument(call, 2, "handler") if called_name(call) == "Service" else []
+        name = dotted(given[0]).rpartition(".")[2] if given else ""
+        if name in functions:
+            handlers[name] = functions[name]
+    for own in handlers.values():
+        for node in walk_own(own):
+            if isinstance(node, ast.Return) and isinstance(node.value, (ast.List, ast.Tuple)):
+                kind = "list" if isinstance(node.value, ast.List) else "tuple"
+                yield slip(node.lineno, "returns-list", ", ".join(map(dotted, node.value.elts)), name=kind)
+
+
+def filled_fields(tree):
+    """Which fields each message, response or result gets that a function makes; nothing of a class of which one may get
+    others."""
+    parents, found = parents_of(tree), {}
+    used, shared = Counter(n.id for n in all_of(tree, ast.Name)), names_of_inner(tree)
+    for own in [tree, *all_of(tree, ast.FunctionDef)]:
+        nodes, uses = list(walk_own(own)), {}
+        for n in nodes:
+            if isinstance(n, ast.Name) and n.id not in shared:
+                uses.setdefault(n.id, []).append(n)
+        if own is tree:  # of names that functions share, not all uses are here
+            uses = {name: here for name, here in uses.items() if len(here) == used[name]}
+        calls = [n for n in nodes if called_name(n)[:1].isupper()]
+        found.update((call, fields_of(call, uses, parents)) for call in calls)
+    made = [n for n in all_of(tree, ast.Call) if called_name(n)[:1].isupper()]
+    unsure = {called_name(n) for n in made if "*" in found.get(n, "*")}
+    for call, fields in found.items():
+        if called_name(call) not in unsure:
+            yield slip(call.lineno, "fills", " ".join(sorted(fields)), name=called_name(call))
+
+
+def names_of_inner(tree):
+    """Return the names in functions that stand in others, and in their lambdas."""
+    found, left = set(), [(tree, 0)]
+    while left:
+        node, depth = left.pop()
+        if isinstance(node, ast.Name) and depth > 1:
+            found.add(node.id)
+        depth += isinstance(node, (ast.FunctionDef, ast.Lambda))
+        left += [(one, depth) for one in ast.iter_child_nodes(node)]
+    return found
+
+
+def fields_of(call, uses, parents):
+    """Return the fields that a message gets in the call that makes it and later, `*` for others."""
+    fields = {k.arg or "*" for k in call.keywords} | ({"*"} if call.args else set())
+    around = parents.get(call)
+    if isinstance(around, ast.Assign):
+        return fields | fields_of_variable(around, uses, parents)
+    return fields if is_handed_on(call, parents) else {"*"}
+
+
+def fields_of_variable(made, uses, parents):
+    """Return the fields that are set or used of the variable that an assignment gives a message, `*` for others."""
+    name = dotted(made.targets[0])
+    is_plain = len(made.targets) == 1 and name in uses and not isinstance(parents.get(made), ast.ClassDef)
+    found = set() if is_plain else {"*"}
+    for one in uses.get(name, ()):
+        around = parents.get(one)
+        if isinstance(around, ast.Attribute):
+            found.add(around.attr)
+        elif around is not made and not is_handed_on(one, parents):
+            found.add("*")
+    return found
+
+
+def is_handed_on(node, parents):
+    """Whether a function returns a value, or gives it to ROS."""
+    around = parents.get(node)
+    return isinstance(around, ast.Return) or called_name(around) in HANDED_ON
+
+
+def narrow_handlers(tree):
+    """The `except` of a `try` that catches some errors only; `fix` is the name that it gives them, `name` the first and
+    the last line that it guards."""
+    for node in all_of(tree, ast.Try):
+        caught = {name for one in node.handlers for name in caught_by(one)}
+        if caught and caught.isdisjoint(BROAD):
+            last, end = node.handlers[-1], node.body[-1].end_lineno
+            lines = "%d-%d" % (node.body[0].lineno, end)
+            yield slip(last.lineno, "catches", " ".join(sorted(caught)), last.name or "", lines)
