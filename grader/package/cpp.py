@@ -148,9 +148,15 @@ def _waiting(path: str, code: str) -> Iterator[PythonSlip]:
 
 def _unspun(path: str, code: str) -> Iterator[PythonSlip]:
     """Yield the loop of a node that subscribes, or offers a service, and never lets ROS call anything."""
-    loop = _LOOP.search(code)
-    if loop is None or not _LISTENS.search(code) or _SPINS.search(code) or not _MAIN.search(code):
+    loop, spin, main = _LOOP.search(code), _SPINS.search(code), _DEFINES_MAIN.search(code)
+    if loop is None or not _LISTENS.search(code) or not _MAIN.search(code):
         return  # of a class, the file with its main() may spin
+    opened = _OPENS.match(code, loop.end())
+    below = end_of_block(code, opened.end()) if opened else loop.end()
+    # what stands below the loop of `main` comes when the node ends
+    inside = main is not None and main.end() <= loop.start() and end_of_block(code, main.end())
+    if spin is not None and not (opened and inside and below < spin.start() < inside):
+        return
     line = _line(code, loop.start())
     message = f"the loop on line {line} never calls ros::spinOnce(), so that no callback is ever called"
     fix = f"write `ros::spinOnce();` in the loop on line {line}"

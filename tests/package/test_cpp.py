@@ -122,6 +122,11 @@ def test_a_sine_of_degrees(line: str, fix: str) -> None:
     [
         ("while (ros::ok()) rate.sleep();", ["2: the loop on line 2 never calls ros::spinOnce()"]),
         ("while (node.ok()) {\n  rate.sleep();\n}", ["2: the loop on line 2 never calls ros::spinOnce()"]),
+        (
+            "while (ros::ok()) { rate.sleep(); }\nros::spinOnce();",
+            ["2: the loop on line 2 never calls ros::spinOnce()"],
+        ),
+        ("while (ros::ok()) { turn(); } }\nvoid turn() { ros::spinOnce();", []),
         ("while (ros::ok()) { ros::spinOnce(); }", []),
         ("ros::AsyncSpinner spinner(1); spinner.start(); while (ros::ok()) rate.sleep();", []),
         ("while (ros::ok()) queue.callAvailable(d);", []),

@@ -82,7 +82,8 @@ def first_error(lines: Sequence[str], package: PackageFacts) -> BuildError | Non
             place = _own_line(package, match["file"], int(match["line"]))
             where = f"{posixpath.basename(match['file'])}:{match['line']}: "
             name = "" if match["file"].startswith(SYSTEM) else where
-            return BuildError("compiler", shown(name + match["text"]), place)
+            # the other name of a type is long, and would leave no room for what is wrong with it
+            return BuildError("compiler", shown(name + re.sub(r" \{aka [^}]*\}", "", match["text"])), place)
     other = next((m["text"] for m in map(_OTHER_ERROR.match, lines) if m), None)
     return BuildError("other", shown(other), None) if other else None
 
@@ -300,6 +301,14 @@ def _no_language(found: re.Match[str], package: PackageFacts, _lines: Sequence[s
     )
 
 
+def _no_arrow(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
+    """Of `msg.data`, `msg` being what a callback gets."""
+    source = re.compile(rf"\|.*?\b(\w+)\.{found[1]}\b")
+    name = next((m[1] for line in lines if (m := source.search(line))), "msg")
+    why = "a ConstPtr is a pointer, whose fields stand behind `->`"
+    return Explained(why, f"write `{name}->{found[1]}` in place of `{name}.{found[1]}`")
+
+
 CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
     (r"Cannot determine link language for target \"([^\"]+)\"", _no_language),
     (r"expected (',' or )?';' before '([^']+)'", _no_semicolon),
@@ -319,6 +328,11 @@ CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
     (r"'([^']+)::(\w+)' has not been declared", _no_type),
     (r"'__s_get\w+' is not a member of '([^']+)'", _no_message),
     (r"'(\w+)' (?:has not been declared|is not a class, namespace, or enumeration)", other_namespace),
+    (r"(?:ConstPtr|Ptr|shared_ptr).* has no member named '(\w+)'", _no_arrow),
+    (
+        r"base operand of '->' has non-pointer type",
+        told("`->` is for pointers, and this is none", "on that line, write a dot in place of `->`"),
+    ),
     (
         r"(?:has no member named '([^']+)'|'([^']+)' is not a member of .*); did you mean '([^']+)'",
         lambda found, _package, _lines: Explained(

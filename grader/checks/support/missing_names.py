@@ -402,7 +402,12 @@ def _other_attributes(package: PackageFacts, owner: str, wrong: str, source: str
         for kind, names in own.members.items()
         if kind != owner and wrong in names and owner in {*own.classes, *own.members}
     ]
-    if len(having) == 1 and not near_names(wrong, known):
+    # `self._result.count`: what is called so is the right part, with a field of another one
+    part = next(
+        (one for one in ("Request", "Response", "Goal", "Result", "Feedback") if owner.endswith(one)), ""
+    )
+    is_right_part = bool(part and re.search(rf"(?i)\b\w*_?{part[:3]}\w*\.{wrong}\b", source))
+    if len(having) == 1 and not near_names(wrong, known) and not is_right_part:
         return f"{wrong} is a field of {having[0]}", f"make it as {having[0]}(), not as {owner}()"
     if not known:
         return None
@@ -413,7 +418,9 @@ def _other_attributes(package: PackageFacts, owner: str, wrong: str, source: str
         return f"{owner} has {near[0]}", _line_with(source, wrong, near[0])
     if owner in ATTRIBUTES:
         return None
-    if len(known) == 1 and any(hasattr(kind, wrong) for kind in (str, float, list)):
+    of_value = any(hasattr(kind, wrong) for kind in (str, float, list))
+    # what is set is no method of a text
+    if len(known) == 1 and of_value and not re.search(rf"\.{wrong}\s*[-+*/]?=(?!=)", source):
         return f"it is the whole message ({owner})", f"write `.{known[0]}.{wrong}` instead of `.{wrong}`"
     return _other_field(owner, known, wrong, source)
 
@@ -456,8 +463,10 @@ def _begins_alike(name: str, wrong: str) -> bool:
 
 
 def _line_with(source: str, wrong: str, right: str) -> str:
-    """Return the advice to write the line with another attribute, where it has the wrong one once."""
-    line, count = re.subn(rf"\.{wrong}\b", f".{right}", source)
+    """Return the advice to write the line with another attribute, where it sets the wrong one, or has it once."""
+    line, count = re.subn(rf"^([^=]*)\.{wrong}(?=\s*=(?!=))", rf"\g<1>.{right}", source)
+    if not count:
+        line, count = re.subn(rf"\.{wrong}\b", f".{right}", source)
     return f"write `{shown(line)}`" if count == 1 else f"write {right} instead of {wrong}"
 
 

@@ -343,6 +343,16 @@ def _swapped_values(found: Traceback, package: PackageFacts) -> Meaning | None:
     return None
 
 
+def _other_kind(found: Traceback) -> Meaning | None:
+    """Return the field that gets no number, where none of the script's own lines is in the traceback."""
+    field = re.search(r"field (\w+) must be (float|(?:an |unsigned )?integer) type", found.message)
+    if field is None or found.innermost.source:
+        return None
+    kind, number = ("float", "number") if field[2] == "float" else ("int", "whole number")
+    why = f"{field[1]} takes a {number}, and gets something else, such as a text"
+    return why, f"give {field[1]} a {number}: `{kind}(…)`"
+
+
 _WIDTH = re.compile(r"exceeds specified width \[(u?)int(\d+)\]|unsigned integer type (u)int(\d+)$")
 _BOUNDS = re.compile(r"format requires (-?\d+) <= number <= (\d+)$")
 
@@ -370,7 +380,7 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
         return f"`{made[1]}` is the service's type, and its response has another type", fix
     frame = found.innermost
     wants_text = "must be of type bytes or an ascii string" in found.message
-    swapped = _swapped_values(found, package)
+    swapped = _swapped_values(found, package) or _other_kind(found)
     if swapped or (not wants_text and "integer type" not in found.message):
         return swapped or _out_of_range(found.message)
     kind, other = ("string", "numbers") if wants_text else ("whole number", "strings")
