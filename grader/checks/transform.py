@@ -31,6 +31,8 @@ from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, grade_again, passed
 from grader.wording import join_words, plural, significant
 
+HALF_TURN_DEG = 179.0
+"""A 1.0 in x, y or z of a quaternion, in place of w, turns by more."""
 ORDER_S = 0.1
 """Two topics come over two connections: so much earlier a transform may be recorded than the pose that it follows."""
 RECENT = 4
@@ -257,6 +259,9 @@ def _other_value(seen: Sequence[Seen], params: TransformParams) -> Verdict | Non
     value, wanted = wrong[0], _wanted_transform(wrong[0], params)
     count = f"in {len(wrong)} of {plural(len(seen), 'message')}"
     hint = "the translation is in metres, and the angles of quaternion_from_euler in radians"
+    metres, degrees = value.apart(wanted)
+    if degrees > HALF_TURN_DEG and not any(wanted.rpy_deg) and metres <= params.tolerance_m:
+        hint = "a quaternion without rotation has w = 1.0, and 0 in x, y and z"
     why = _why(value, wanted, params)
     message = f"{params.name} is wrong {count}{why}; it is {_text(value)}, not {_text(wanted)}"
     return failed(message, hint=_axes(value, wanted, params)[1] or hint)

@@ -328,6 +328,9 @@ def test_a_callback_that_the_script_calls_itself_gets_no_message(tmp_path, call,
          "TypeError: Invalid number of arguments, args should be ['sum'] args are(1, 2)", "give it one value: `sum=…`"),
         ("answer.sum", "AttributeError: 'AddRequest' object has no attribute 'sum'",
          "make it as AddResponse(), not as AddRequest()"),
+        ("raise 'too far'", "TypeError: exceptions must derive from BaseException", "`raise ValueError(…)`"),
+        ("pub.publish(str(a))", "rospy.exceptions.ROSSerializationException: field data is not a bool",
+         "publish a bool, without `str(…)`"),
         ("self.res.count = self.count", "AttributeError: 'AddResponse' object has no attribute 'count'",
          "write `self.res.sum = self.count`"),
         ("self.res.a", "AttributeError: 'AddResponse' object has no attribute 'a'", "write `self.res.sum`"),
@@ -345,7 +348,7 @@ def test_what_is_wrong_with_messages_is_told_with_their_fields(tmp_path, source,
         "msg/Reading.msg": "int32 level\n",
         "srv/Add.srv": "int64 a\n---\nint64 sum\n",
         "srv/Fit.srv": "float64 a\n---\nfloat64 result\nbool changed\n",
-        "node.py": text.replace("x = return", "x ="),
+        "node.py": text.replace("x = return", "x =").replace("x = raise", "x ="),
     }
     assert hint in explained(tmp_path, files, ("node.py", 5, source), error=error).hint
 

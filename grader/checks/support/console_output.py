@@ -546,9 +546,28 @@ def unprinted_result(
     numbers = [s for s in own if s.message == "{}" and re.search(r"\d|<number>", words)]
     slip = next(iter(texts or numbers), None)
     if slip is None:
-        return None
+        return _unreached(package, script, never, found_in)
     call = f"`{slip.name}(…)` on line {slip.line}"
     why = f"line {slip.fix} of {slip.file} returns {'it' if texts else 'the number'}"
     hint = f"print what {call} returns" if texts else f"print {words} above line {slip.fix}"
     message = f"{never}: {why}, and nothing keeps what {call} returns"
     return failed(message, hint=hint, citations=(slip.place,))
+
+
+def _unreached(
+    package: PackageFacts, script: str, never: str, found_in: Callable[[Line], Iterable[object]]
+) -> Verdict | None:
+    """Return the loss where an `except` prints the words, and what is above it raised nothing."""
+    own = [s for s in package.slips if s.file == script]
+    said = [
+        s for s in own if s.kind == "prints" and any(found_in(Line(0, re.sub(r"\{\w*\}", "0", s.message))))
+    ]
+    caught = {s.line + 1: s for s in own if s.kind == "catches"}
+    if len(said) != 1 or said[0].line not in caught:
+        return None
+    slip, lines = said[0], caught[said[0].line].name.replace("-", " to ")
+    message = (
+        f"{never}: line {slip.line} of {slip.file} would, and lines {lines} raise nothing that it catches"
+    )
+    hint = "look at what is called there: where the handout asks for a failure, a service's callback has to raise one"
+    return failed(message, hint=hint, citations=(slip.place,)).if_repeated()

@@ -314,6 +314,13 @@ CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
     (r"expected (',' or )?';' before '([^']+)'", _no_semicolon),
     (r"expected initializer before '([^']+)'", _no_semicolon_above),
     (
+        r"a function-definition is not allowed here before '{'",
+        told(
+            "{0}: the function above it is not closed",
+            "write the `}}` that ends the function above that line",
+        ),
+    ),
+    (
         r"expected '}' at end of input",
         told(
             "{0}: a `}}` is missing", "write a `}}` for each `{{`; the indentation shows where one is missing"

@@ -84,6 +84,9 @@ SLIPS = {
     "is a non-ascii string": (
      "rospy names it by mistake, as a text may have such letters: another field has a value of the wrong type",
      "compare the value of each of the message's other fields with its type in the .msg file"),
+    "exceptions must derive from BaseException": ("only an exception can be raised, and this is none",
+     "write the exception that is meant around it: `raise ValueError(…)`"),
+    "is not a bool": ("the message takes True or False, and gets something else", "publish a bool, without `str(…)`"),
     "required argument is not a float": ("a field of numbers is given something else, such as a text",
      "give it a number: `float(…)`"),
     "namespaces are not allowed in node names": ("the name in `rospy.init_node(…)` has a slash in it",
