@@ -89,8 +89,9 @@ class PythonSlip(Placed, Record):
       `nanoseconds`, `bounds`, `added`); a grid's index that steps by its height, a cell that `int(…)` works out of a
       number below 0, a quaternion of a whole angle, a float for the seconds of a time, the mean of a scan's ranges, a
       distance without its square root, a parameter that is read where it is not set, what nothing sets back,
-      and a cell that is compared with a grid's side as if it had one more (`step`, `cut`, `half`, `secs`, `mean`,
-      `rootless`, `unset`, `stuck`, `edge`).
+      a cell that is compared with a grid's side as if it had one more, `atan2(x, y)`, degrees beside radians, and a
+      distance that is to be exactly 0 (`step`, `cut`, `half`, `secs`, `mean`, `rootless`, `unset`, `stuck`, `edge`,
+      `swapped`, `mixed`, `exact`).
 
     No slips, but what a line says, for checks that compare it with what the lab asks; `message` is a name, a number or
     a text:

@@ -475,6 +475,27 @@ def test_distances_without_a_root(text: str, lines: list[int], tmp_path: Path) -
     assert [s.line for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "rootless"] == lines
 
 
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("a = atan2(goal.x - p.x, goal.y - p.y)\n", ["swapped"]),
+        ("dx = goal.x - p.x\ndy = goal.y - p.y\na = math.atan2(dx, dy)\n", ["swapped"]),
+        ("a = atan2(goal.y - p.y, goal.x - p.x)\n", []),
+        ("a = math.atan2(sin(e), cos(e))\n", []),
+        ("e = degrees(atan2(dy, dx)) - self.pose.theta\n", ["mixed"]),
+        ("e = degrees(atan2(dy, dx)) - degrees(self.pose.theta)\n", []),
+        ("e = degrees(atan2(dy, dx) - self.pose.theta)\n", []),
+        ("def far(p):\n    return sqrt(p.x ** 2 + p.y ** 2)\nwhile self.far(p) != 0:\n    go()\n", ["exact"]),
+        ("d = math.hypot(dx, dy)\nif d == 0.0:\n    stop()\n", ["exact"]),
+        ("d = math.hypot(dx, dy)\nif d < 0.1 or count == 0:\n    stop()\n", []),
+    ],
+)
+def test_angles_and_distances(text: str, names: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.name for s in slips] == names
+
+
 RIGHT = {
     "squares-compared": "distance = a ** 2 + b ** 2\nprint(distance > R ** 2)\n",
     "root-below": "dist = a ** 2 + b ** 2\nprint(math.sqrt(dist))\n",

@@ -15,6 +15,7 @@ from script_names import (
     slip,
     text_of,
 )
+from script_values import IN_DEGREES
 
 SIDES = ("width", "height")
 
@@ -33,6 +34,9 @@ def arithmetic_slips(tree):
     yield from past_the_edge(tree, sides, axes)
     yield from cut_to_zero(tree)
     yield from whole_angles(tree)
+    yield from turned_atan(tree, axes)
+    yield from mixed_units(tree)
+    yield from exact_distances(tree)
     yield from float_seconds(tree)
     yield from without_root(tree)
 
@@ -99,6 +103,69 @@ def wrong_step(node, key, sides, axes):
         message = "a row of the grid has as many cells as it is wide, and this steps by its height"
         fix = "on line %d, write `%s` in place of `%s`" % (node.lineno, wide[0], high[0])
         yield slip(node.lineno, "wrong-value", message, fix, "step")
+
+
+def turned_atan(tree, axes):
+    """`math.atan2(dx, dy)`, which takes y first."""
+    named = {
+        "dx": "x",
+        "x": "x",
+        "dy": "y",
+        "y": "y",
+        "diff_x": "x",
+        "diff_y": "y",
+        "delta_x": "x",
+        "delta_y": "y",
+    }
+    for call in all_of(tree, ast.Call):
+        if called_name(call) not in ("atan2", "arctan2") or len(call.args) != 2:
+            continue
+        found = []
+        for one in call.args:
+            names = [dotted(n) for n in ast.walk(one) if isinstance(n, (ast.Name, ast.Attribute))]
+            last = {
+                axes[name][0] if name in axes else named.get(name.rpartition(".")[2].lower())
+                for name in names
+            }
+            found.append(last - {None})
+        if found == [{"x"}, {"y"}]:
+            message = "`%s` takes y first, and then x" % called_name(call)
+            fix = "on line %d, swap the two values in the brackets of `%s`" % (call.lineno, called_name(call))
+            yield slip(call.lineno, "wrong-value", message, fix, "swapped")
+
+
+def mixed_units(tree):
+    """`math.degrees(math.atan2(dy, dx)) - pose.theta`, of which one is in degrees, and the other in radians."""
+    for node in all_of(tree, ast.BinOp):
+        sides = [node.left, node.right]
+        degrees = [one for one in sides if called_name(one) in IN_DEGREES]
+        radians = [
+            n for n in sides if getattr(n, "attr", "") == "theta" or called_name(n) in ("atan2", "radians")
+        ]
+        if isinstance(node.op, (ast.Add, ast.Sub)) and len(degrees) == len(radians) == 1:
+            name = called_name(degrees[0])
+            message = "this mixes an angle in degrees with one in radians"
+            fix = "on line %d, leave out `%s(…)`: both are in radians then" % (node.lineno, name)
+            yield slip(node.lineno, "wrong-value", message, fix, "mixed")
+
+
+def exact_distances(tree):
+    """`while distance != 0`, of a distance that is worked out."""
+    roots = ("sqrt", "hypot", "dist")
+    made = {dotted(n.targets[0]) for n in all_of(tree, ast.Assign) if called_name(n.value) in roots}
+    made |= {
+        one.name
+        for one in all_of(tree, ast.FunctionDef)
+        if any(called_name(getattr(n, "value", None)) in roots for n in one.body if isinstance(n, ast.Return))
+    }
+    for node in all_of(tree, ast.Compare):
+        asked = called_name(node.left) or dotted(node.left)
+        is_zero = getattr(node.comparators[0], "value", None) == 0 and len(node.ops) == 1
+        if is_zero and isinstance(node.ops[0], (ast.Eq, ast.NotEq)) and (asked in made or asked in roots):
+            message = "a distance that is worked out is hardly ever exactly 0"
+            sign = ">" if isinstance(node.ops[0], ast.NotEq) else "<"
+            fix = "on line %d, compare it with how near is near enough: `%s 0.1`" % (node.lineno, sign)
+            yield slip(node.lineno, "wrong-value", message, fix, "exact")
 
 
 def axes_of(tree):
