@@ -581,7 +581,7 @@ def _why_first(
         hint = f"publish once on {params.topic} before you wait for any message, as soon as the publisher is made"
         return f", which came only after {topics}", hint
     sent = [c for c in run.channels if c.by_grader and c.messages and c.topic not in SYSTEM_TOPICS]
-    sent = [c for c in sent if not c.topic.startswith("/grader")]
+    sent = [c for c in sent if not c.topic.startswith("/grader") and c.times_ns[0] <= found[0].time_ns]
     if beside or len(sent) != 1 or sent[0].topic == params.topic or len(sent[0].messages) <= len(found):
         return None
     topic, count = sent[0].topic, plural(len(sent[0].messages), "message")

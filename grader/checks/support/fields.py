@@ -326,8 +326,11 @@ def made_of(found: Sequence[Reading], channels: Iterable[Channel], wanted: _Want
 
 
 def one_for_another(values: Sequence[object], wanted: object) -> str:
-    """Return what to write where all wrong items of a list have one number in place of another one; "" elsewhere."""
+    """Return what to write where a list is empty, or all its wrong items have one number in place of another one; ""
+    elsewhere."""
     got = values[0] if len(values) == 1 else None
+    if got in ((), []) and isinstance(wanted, list | tuple):
+        return "fill the list above the line that publishes it: it is still empty there"
     if not isinstance(got, list | tuple) or not isinstance(wanted, list | tuple) or len(got) != len(wanted):
         return ""
     pairs = {(a, b) for a, b in zip(got, wanted, strict=True) if a != b and is_number(a) and is_number(b)}

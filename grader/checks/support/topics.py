@@ -427,7 +427,7 @@ def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | 
 SEEN_AS = {
     "nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": "", "added": "",
     "step": "order", "cut": "place", "half": "value", "secs": "never", "mean": "", "unset": "value",
-    "stuck": "stuck", "edge": "place",
+    "stuck": "stuck", "edge": "place", "times": "order",
 }  # fmt: skip
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so; others always show."""
 

@@ -5,16 +5,7 @@ Nothing is executed. Python 3.8, standard library only.
 
 import ast
 
-from script_names import (
-    all_of,
-    called_name,
-    dotted,
-    key_of,
-    listed,
-    names_in,
-    slip,
-    text_of,
-)
+from script_names import all_of, called_name, dotted, key_of, listed, names_in, parents_of, slip, text_of
 from script_values import IN_DEGREES
 
 SIDES = ("width", "height")
@@ -35,6 +26,7 @@ def arithmetic_slips(tree):
     yield from cut_to_zero(tree)
     yield from whole_angles(tree)
     yield from turned_atan(tree, axes)
+    yield from multiplied_cells(tree)
     yield from mixed_units(tree)
     yield from exact_distances(tree)
     yield from float_seconds(tree)
@@ -132,6 +124,26 @@ def turned_atan(tree, axes):
             message = "`%s` takes y first, and then x" % called_name(call)
             fix = "on line %d, swap the two values in the brackets of `%s`" % (call.lineno, called_name(call))
             yield slip(call.lineno, "wrong-value", message, fix, "swapped")
+
+
+def multiplied_cells(tree):
+    """`column = int(p.x * resolution)`, where a cell is so many metres long."""
+    lines = []
+    for node in all_of(tree, ast.BinOp) if any("resolution" in name for name in names_in(tree)) else ():
+        sides = [node.left, node.right] if is_product(node) else []
+        points = [one for one in sides if any(map(is_point, ast.walk(one)))]
+        lengths = [one for one in sides if "resolution" in dotted(one)]
+        around = parents_of(tree)[node]
+        if points and lengths and called_name(around) in WHOLE:
+            lines.append(node.lineno)
+    if lines:
+        message = "a cell's number is the point's coordinate divided by the resolution, and this multiplies"
+        fix = "on %s, write `/` in place of `*`" % listed(sorted(set(lines)))
+        yield slip(lines[0], "wrong-value", message, fix, "times")
+
+
+def is_point(node):
+    return isinstance(node, ast.Attribute) and node.attr in ("x", "y")
 
 
 def mixed_units(tree):
