@@ -1,4 +1,4 @@
-"""What `lint/` finds in scripts that read a scan, and in what they keep of it."""
+"""What `lint/` finds in scripts that read a scan, and in what callbacks keep, or write to a file."""
 
 from pathlib import Path
 
@@ -206,3 +206,22 @@ def test_inf_that_is_made_0(text: str, lines: list[int], tmp_path: Path) -> None
 def test_angles_that_are_taken_for_indexes(index: str, found: bool, tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(f"d = 9\nr = msg.ranges[{index}]\n", encoding="utf-8")
     assert any(s.name == "bounds" for s in check_syntax(tmp_path, ["a.py"]).slips) is found
+
+
+@pytest.mark.parametrize(
+    ("lines", "fixes"),
+    [
+        ("with open('a.csv', 'w') as f: f.write(str(m.data))", ["on line 3, write 'a' in place of 'w'"]),
+        (
+            "f = open('a.csv', mode='w+'); csv.writer(f).writerow([m.data])",
+            ["on line 3, write 'a' in place of 'w'"],
+        ),
+        ("with open('a.csv', 'a') as f: f.write(str(m.data))", []),
+        ("with open('a.csv') as f: print(f.read())", []),
+        ("with open('a.csv', 'w') as f: csv.writer(f).writerows(rows)", []),
+    ],
+)
+def test_files_that_each_call_empties(lines: str, fixes: list[str], tmp_path: Path) -> None:
+    text = f"rospy.Subscriber('/steps', Float64, heard)\ndef heard(m):\n    {lines}\n"
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "emptied"] == fixes

@@ -11,10 +11,13 @@ from script_names import (
     LOOPS,
     USES_LIMIT,
     all_of,
+    argument,
     bound_names,
+    callback_of,
     called_name,
     calls_in,
     dotted,
+    functions_in,
     is_call,
     is_call_alone,
     names_in,
@@ -487,3 +490,30 @@ def in_loop(node, tree):
         if isinstance(node, (ast.While, ast.For)):
             return True
     return False
+
+
+def emptied_files(tree):
+    """A topic's callback that opens its file with 'w' for each row that it writes."""
+    functions = functions_in(tree)
+    callbacks = {id(one): one for one in (callback_of(n, functions) for n in all_of(tree, ast.Call)) if one}
+    for function in callbacks.values():
+        inside = list(ast.walk(function))
+        calls = [n for n in inside if isinstance(n, ast.Call)]
+        modes = [(n, argument(n, 1, "mode")) for n in calls if called_name(n) == "open"]
+        opens = [n for n, mode in modes if mode and text_of(mode[0]).startswith("w")]
+        rows = [n for n in calls if called_name(n) in ("write", "writerow", "print")]
+        # who writes all rows again each time may empty the file first
+        whole = {called_name(n) for n in calls} & {
+            "writerows",
+            "dump",
+            "writelines",
+            "join",
+            "savetxt",
+            "to_csv",
+        }
+        if opens and rows and not whole and not any(isinstance(n, (ast.For, ast.While)) for n in inside):
+            message = (
+                "each call of `%s` opens the file with 'w', which deletes what was in it" % function.name
+            )
+            fix = "on line %d, write 'a' in place of 'w'" % opens[0].lineno
+            yield slip(opens[0].lineno, "wrong-value", message, fix, "emptied")
