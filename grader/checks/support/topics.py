@@ -431,6 +431,9 @@ SEEN_AS = {
 }  # fmt: skip
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so; others always show."""
 
+STEERING, OF_STEERING = ("swapped", "mixed", "rootless"), ("ends-at", "stays-within", "path")
+"""What leads a robot astray wherever its script computes so, and the checks of its way."""
+
 OF_TURNS = ("orientation", "rotation", "transform")
 """What a quaternion can be wrong in."""
 
@@ -439,13 +442,18 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
     """Return a lost mark with the line of a script that runs on which the value goes wrong, or with its conditions that
     are always or never true."""
     files = _files_that_run(package, run)
-    of_values = check.of_callbacks or check.name in OF_VALUES
+    of_values = check.of_callbacks or check.name in OF_VALUES or (check.name == "prints" and verdict.silent)
     kinds = ["wrong-value"] if of_values and not verdict.cause else []
     if check.name == "action-result" and verdict.wrong != "nothing" and ends_twice(run):
         kinds.append("goes-on")
     found = [s for s in package.slips if s.kind in kinds and s.file in files]
     wrong = verdict.wrong
-    sure = [s for s in found if s.kind == "goes-on" or (wrong and SEEN_AS.get(s.name) == wrong)]
+    steers = STEERING if check.name in OF_STEERING else ()
+    sure = [
+        s
+        for s in found
+        if s.kind == "goes-on" or s.name in steers or (wrong and SEEN_AS.get(s.name) == wrong)
+    ]
     turns = any(word in verdict.message for word in OF_TURNS)
     sure = [s for s in sure if s.name != "half" or turns]
     maybe = [s for s in found if not (SEEN_AS.get(s.name) or (wrong and s.name in SEEN_AS))]
