@@ -28,6 +28,7 @@ def arithmetic_slips(tree):
     yield from turned_atan(tree, axes)
     yield from multiplied_cells(tree)
     yield from mixed_units(tree)
+    yield from turned_errors(tree)
     yield from exact_distances(tree)
     yield from float_seconds(tree)
     yield from without_root(tree)
@@ -159,6 +160,27 @@ def mixed_units(tree):
             message = "this mixes an angle in degrees with one in radians"
             fix = "on line %d, leave out `%s(…)`: both are in radians then" % (node.lineno, name)
             yield slip(node.lineno, "wrong-value", message, fix, "mixed")
+
+
+def turned_errors(tree):
+    """`error = pose.theta - math.atan2(dy, dx)`, by which the robot turns without a minus."""
+    given = all_of(tree, ast.Assign)
+    turns = [n.value for n in given if dotted(n.targets[0]).endswith(".angular.z")]
+    inside = [n for value in turns for n in ast.walk(value)]
+    # a number of its own, a sign or a choice may put it right
+    if not inside or any(isinstance(n, (ast.USub, ast.Sub, ast.IfExp)) for n in inside):
+        return
+    if any(isinstance(n, ast.Constant) and n.value for n in turns) or any(
+        isinstance(getattr(n.value, "op", None), ast.USub) for n in given
+    ):
+        return
+    towards = {dotted(n.targets[0]) for n in given if called_name(n.value) in ("atan2", "arctan2")}
+    for node in all_of(tree, ast.BinOp):
+        is_direction = called_name(node.right) in ("atan2", "arctan2") or dotted(node.right) in towards
+        if isinstance(node.op, ast.Sub) and getattr(node.left, "attr", "") == "theta" and is_direction:
+            message = "the angle to turn by is the direction of the goal minus the heading, and not the other way round"
+            fix = "on line %d, swap what stands on the two sides of the minus" % node.lineno
+            yield slip(node.lineno, "wrong-value", message, fix, "swapped")
 
 
 def exact_distances(tree):
