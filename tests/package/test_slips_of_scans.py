@@ -108,11 +108,15 @@ class Stop:
 @pytest.mark.parametrize(
     ("given", "other", "fixes"),
     [
-        ("self.stopped = True", "pass", ["write `self.stopped = False` in an `else` of the `if` on line 7"]),
+        (
+            "self.stopped = True",
+            "pass",
+            ["set `self.stopped` back to False in an `else` of the `if` on line 7"],
+        ),
         (
             "self.cmd.linear.x = 0",
             "pass",
-            ["write `self.cmd.linear.x = 0.2` in an `else` of the `if` on line 7"],
+            ["set `self.cmd.linear.x` back to 0.2 in an `else` of the `if` on line 7"],
         ),
         ("pass", "self.stopped = len(msg.ranges) > 0", []),
         ("self.stopped = True", "self.stopped = self.stopped and near", []),

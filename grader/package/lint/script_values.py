@@ -462,7 +462,7 @@ def never_back(name, nodes, tree, is_speed):
     # `if not started: started = True` is to happen once
     if is_other and "..." not in back and name not in names_in(choice.test):
         message = "`%s` is %r from line %d on, and no line sets it back" % (name, value, node.lineno)
-        fix = "write `%s = %s` %s" % (name, back, where_it_is_over(choice, node))
+        fix = "set `%s` back to %s %s" % (name, back, where_it_is_over(choice, node))
         yield slip(node.lineno, "wrong-value", message, fix, "stuck")
 
 
