@@ -514,10 +514,19 @@ def circling(path: Sequence[Pose], band: Band) -> tuple[list[Pose], float]:
     near = next(
         (i for i, p in enumerate(reversed(path)) if math.dist(p.point, path[-1].point) > CIRCLE_M), len(path)
     )
-    end = list(path[len(path) - near :])
+    end = _from_first_turn(path[len(path) - near :])
     around = circles(end, [1.0] * len(end))
     has_inside = any(abs(_sweep(end, point)) > math.tau for wall in band.walls for point in wall)
     return (end, around) if around > OFTEN and not has_inside else ([], 0.0)
+
+
+def _from_first_turn(path: Sequence[Pose]) -> list[Pose]:
+    """Return a path without the straight way by which it came."""
+    steps = (
+        (math.remainder(b.heading - a.heading, math.tau), b.time_s - a.time_s) for a, b in pairwise(path)
+    )
+    first = next((i for i, (turn, time_s) in enumerate(steps) if abs(turn) > TURNS_RAD_S * time_s), 0)
+    return list(path[first:])
 
 
 def _sweep(path: Sequence[Pose], point: Point) -> float:

@@ -208,7 +208,7 @@ def axes_of(tree):
     for node in all_of(tree, ast.Assign):
         read = {n.attr for n in ast.walk(node.value) if isinstance(n, ast.Attribute)} & {"x", "y"}
         name = dotted(node.targets[0])
-        twice |= {name} & set(found)
+        twice |= {name} if name in found else set()
         if len(read) == 1:
             is_whole = any(
                 called_name(n) in WHOLE or isinstance(n, ast.FloorDiv) for n in ast.walk(node.value)

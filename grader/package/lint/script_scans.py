@@ -177,7 +177,7 @@ def drives_where_near(tree):
     held = names_of_ranges(tree)
     made = [n for n in all_of(tree, ast.Assign) if held and is_smallest(n.value, held)]
     near = {dotted(n.targets[0]) for n in made}
-    for node in all_of(tree, ast.If) if held else ():
+    for node in all_of(tree, ast.If)[:USES_LIMIT] if held else ():
         test = node.test if isinstance(node.test, ast.Compare) and len(node.test.ops) == 1 else None
         if test is None or not (is_smallest(test.left, held) or dotted(test.left) in near):
             continue
