@@ -303,6 +303,12 @@ def test_the_index_of_a_cell(check: str, index: str, fixes: list[str], tmp_path:
     ("check", "fixes"),
     [
         ("not column > self.w", ["on line 9, write `>=` in place of `>` between `column` and `self.w`"]),
+        (
+            "column <= self.w and row <= self.h",
+            [
+                "on line 9, write `<` in place of `<=` between `column` and `self.w`, and between `row` and `self.h`"
+            ],
+        ),
         ("0 <= row <= self.h", ["on line 9, write `<` in place of `<=` between `row` and `self.h`"]),
         ("self.w >= column", ["on line 9, write `>` in place of `>=` between `self.w` and `column`"]),
         ("column < self.w and row <= self.h - 1", []),

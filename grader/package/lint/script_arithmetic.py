@@ -158,7 +158,7 @@ def mixed_units(tree):
         if isinstance(node.op, (ast.Add, ast.Sub)) and len(degrees) == len(radians) == 1:
             name = called_name(degrees[0])
             message = "this mixes an angle in degrees with one in radians"
-            fix = "on line %d, leave out `%s(…)`: both are in radians then" % (node.lineno, name)
+            fix = "on line %d, leave out `%s(…)`, so that you have both in radians" % (node.lineno, name)
             yield slip(node.lineno, "wrong-value", message, fix, "mixed")
 
 
@@ -222,19 +222,23 @@ WHOLE = ("int", "floor", "trunc", "round")
 
 def past_the_edge(tree, sides, axes):
     """`if column > width: return`, and `if column <= width:`: the last column is `width - 1`."""
-    wrong = {ast.Gt: ">=", ast.LtE: "<", ast.Lt: "<=", ast.GtE: ">"}
+    signs = {ast.Gt: (">", ">="), ast.LtE: ("<=", "<"), ast.Lt: ("<", "<="), ast.GtE: (">=", ">")}
+    lines = {}
     for node in all_of(tree, ast.Compare):
         each = [node.left, *node.comparators]
         for at, op in enumerate(node.ops):
-            left, right = each[at], each[at + 1]
-            turned = isinstance(op, (ast.Lt, ast.GtE))
-            cell, side = (dotted(right), dotted(left)) if turned else (dotted(left), dotted(right))
-            if type(op) in wrong and side in sides and cell in axes and axes[cell][2]:
-                shown = {ast.Gt: ">", ast.LtE: "<=", ast.Lt: "<", ast.GtE: ">="}[type(op)]
-                message = "the last `%s` is `%s - 1`, and this takes `%s` for one, too" % (cell, side, side)
-                fix = "on line %d, write `%s` in place of `%s` between `%s` and `%s`"
-                fix %= (node.lineno, wrong[type(op)], shown, dotted(left), dotted(right))
-                yield slip(node.lineno, "wrong-value", message, fix, "edge")
+            left, right = dotted(each[at]), dotted(each[at + 1])
+            cell, side = (right, left) if isinstance(op, (ast.Lt, ast.GtE)) else (left, right)
+            if type(op) in signs and side in sides and cell in axes and axes[cell][2]:
+                lines.setdefault((node.lineno, signs[type(op)]), []).append(
+                    (cell, side, "`%s` and `%s`" % (left, right))
+                )
+    for (line, (shown, meant)), found in lines.items():
+        cell, side, _ = found[0]
+        message = "the last `%s` is `%s - 1`, and this takes `%s` for one, too" % (cell, side, side)
+        places = ", and between ".join(place for _, _, place in found[:2])
+        fix = "on line %d, write `%s` in place of `%s` between %s" % (line, meant, shown, places)
+        yield slip(line, "wrong-value", message, fix, "edge")
 
 
 def cut_to_zero(tree):
