@@ -169,7 +169,7 @@ else:
 )
 def test_conditions_that_are_the_wrong_way_round(test: str, fixes: list[str], tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(TURNED.replace("TEST", test), encoding="utf-8")
-    assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "bounds"] == fixes
+    assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "turned"] == fixes
 
 
 @pytest.mark.parametrize(
@@ -191,7 +191,7 @@ def test_conditions_that_are_the_wrong_way_round(test: str, fixes: list[str], tm
 )
 def test_inf_that_is_made_0(text: str, lines: list[int], tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(text, encoding="utf-8")
-    assert [s.line for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "bounds"] == lines
+    assert [s.line for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "inf"] == lines
 
 
 @pytest.mark.parametrize(
@@ -209,7 +209,7 @@ def test_inf_that_is_made_0(text: str, lines: list[int], tmp_path: Path) -> None
 )
 def test_angles_that_are_taken_for_indexes(index: str, found: bool, tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(f"d = 9\nr = msg.ranges[{index}]\n", encoding="utf-8")
-    assert any(s.name == "bounds" for s in check_syntax(tmp_path, ["a.py"]).slips) is found
+    assert any(s.name == "angle" for s in check_syntax(tmp_path, ["a.py"]).slips) is found
 
 
 @pytest.mark.parametrize(

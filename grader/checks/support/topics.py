@@ -431,8 +431,9 @@ SEEN_AS = {
 }  # fmt: skip
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so; others always show."""
 
-STEERING, OF_STEERING = ("swapped", "mixed", "rootless"), ("ends-at", "stays-within", "path")
-"""What leads a robot astray wherever its script computes so, and the checks of its way."""
+STEERING = ("swapped", "mixed", "rootless", "inf", "angle", "turned")
+OF_STEERING = ("ends-at", "stays-within", "path", "reacts")
+"""What leads a robot astray wherever its script computes so, and the checks of what a robot does."""
 
 OF_TURNS = ("orientation", "rotation", "transform")
 """What a quaternion can be wrong in."""

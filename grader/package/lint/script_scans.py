@@ -134,9 +134,7 @@ def nothing_taken_for_near(tree):
         parts = asked.values if isinstance(asked, ast.BoolOp) and isinstance(asked.op, ast.Or) else [asked]
         if line and any(map(asks_for_inf, parts)):
             message = "inf says that nothing is in reach, and this makes 0 of it, as if a wall were touched"
-            yield slip(
-                line, "wrong-value", message, "on line %d, write `10.0` in place of 0" % line, "bounds"
-            )
+            yield slip(line, "wrong-value", message, "on line %d, write `10.0` in place of 0" % line, "inf")
 
 
 def zero_given(node, tree):
@@ -193,7 +191,7 @@ def drives_where_near(tree):
             signs = ("<", ">") if is_far else (">", "<")
             message = "this drives where something is near, and stops or turns where the way is free"
             fix = "on line %d, write `%s` in place of `%s`, or swap the two branches" % (node.lineno, *signs)
-            yield slip(node.lineno, "wrong-value", message, fix, "bounds")
+            yield slip(node.lineno, "wrong-value", message, fix, "turned")
 
 
 FULL = 6.3
@@ -215,7 +213,7 @@ def angles_for_indexes(tree):
         if angles and not turned and all(map(is_number, steps)) and not calls_of(key, "degrees", "len"):
             message = "this takes an angle in radians for an index, which counts the ranges"
             fix = "on line %d, write `int((angle - msg.angle_min) / msg.angle_increment)`, with your angle and message"
-            yield slip(node.lineno, "wrong-value", message, fix % node.lineno, "bounds")
+            yield slip(node.lineno, "wrong-value", message, fix % node.lineno, "angle")
 
 
 def is_smallest(node, held):
