@@ -422,6 +422,7 @@ def _waits_in_vain(live: RunState, process: str) -> bool:
     nodes = {node for node in live.here if live.owners.get(node) == process}
     nodes |= {UNNAMED} if is_unnamed(live, process) else set[str]()
     asked = {service for node in nodes & live.sought.keys() for service in live.sought[node]}
+    asked |= live.polled.get(process, frozenset())
     goals = {t.removesuffix("/goal") for t in live.published if t.endswith("/goal")}
     goals = {action for action in goals if f"{action}/cancel" in live.published}
     served = {topic.removesuffix("/goal") for topic in live.listened if topic.endswith("/goal")}
@@ -456,7 +457,8 @@ def _patience_s(live: RunState) -> float:
         if own_s == SPINNING_S and _raised(live, [process]):
             own_s = ANSWERING_S
         if _waits_in_vain(live, process):
-            own_s = IN_VAIN_S if live.serves and not live.naps else SPINNING_S
+            is_seen = live.serves and not live.naps and not live.polled.get(process)
+            own_s = IN_VAIN_S if is_seen else SPINNING_S
         found.append(min(TALKING_S if process in talking else LOOPING_S, own_s))
     return max(found)
 

@@ -239,8 +239,7 @@ class ProcessEnvironment:
         """Return whether a script or a source file of the lab's packages has it, or this script of theirs; with
         `programs`, this one or a file that has nothing like that and may be imported."""
         search = pattern.search if isinstance(pattern, re.Pattern) else pattern
-        packages = (self.workspace, *self.workspace.others.values())
-        folders = [one.repaired / one.folder for one in packages]
+        folders = self._folders()
         own = [folder / script for folder in folders] if script is not None else []
         found = (path for folder in folders for path in folder.rglob("*") if path.suffix in SOURCE_ENDINGS)
         files = own if script is not None and programs is None else [*own, *islice(found, SOURCES_MAX)]
@@ -250,6 +249,14 @@ class ProcessEnvironment:
             for path, text in texts
             if programs is None or path in own or not programs.search(text)
         )
+
+    def text_of(self, script: str) -> bytes:
+        """Return the text of a script of the lab's packages."""
+        found = (folder / script for folder in self._folders())
+        return next((read_untrusted(path, SOURCE_BYTES_MAX) or b"" for path in found if path.is_file()), b"")
+
+    def _folders(self) -> list[Path]:
+        return [one.repaired / one.folder for one in (self.workspace, *self.workspace.others.values())]
 
     def package_file(self, file: str) -> Path | None:
         """Return where a file of the package is on disk, found as `script_path` finds it."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import re
 import time
 from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, suppress
@@ -18,6 +17,17 @@ from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.sandbox_files import FUNCTIONS, ROSTESTS
 from grader.arena.scenario_inputs import OVER, make_shots, settings
 from grader.arena.session import GRAPH_EVERY_S, ArenaSession
+from grader.arena.source_waits import (
+    IDLE,
+    NAPS,
+    PROGRAM,
+    PUBLISHER,
+    PUBLISHES,
+    SLEEPING,
+    gives_up,
+    polled,
+    sleeps_elsewhere,
+)
 from grader.arena.static_recorder import RunCost
 from grader.arena.steps import CTRL_C_S, LAUNCH_CTRL_C_S, TERM_S, ProcessSpec, StepRunner, Tell
 from grader.errors import ArenaError
@@ -26,51 +36,6 @@ from grader.evidence.writer import EvidenceWriter
 from grader.model.message_rate import RateBounds
 from grader.rubric.course_packages import LAUNCH_ENDINGS
 from grader.rubric.scenario import Param, Scenario, Start
-
-NAPS = re.compile(rb"sleep\s*\(\s*[^)\s]|Timer\s*\(")
-"""A sleep of so many seconds, `rospy.sleep(0.5)` and not `rate.sleep()`, or a timer."""
-PUBLISHES = re.compile(
-    rb"^[^#\n]*?(?:publish(?!er)|sendTransform|send_goal|set_succeeded|set_aborted)", re.MULTILINE
-)
-"""A line that sends a message, or may."""
-PUBLISHER = re.compile(rb"(?:Publisher|Broadcaster)\(|\.advertise\s*<")
-PROGRAM = re.compile(rb"\binit_node\s*\(|\bros::init\s*\(")
-GIVES_UP = re.compile(rb"[wW]ait_?[fF]or_?[sS]erv(?:er|ice)\([^)\n]*(?:,|timeout|Duration|\b\d)")
-"""A wait for a service or an action's server that ends without it."""
-ENDLESS = rb"(?:True|1|not\s+(?:rospy\.)?is_shutdown\(\))"
-IDLE = re.compile(
-    rb"^[ \t]*while(?:\s*\()?\s*" + ENDLESS + rb"\s*(?:\)\s*)?:\s*(?:#[^\n]*\n\s*)*(?:pass|continue)\b",
-    re.MULTILINE,
-)
-"""A loop that does nothing and never ends: `while True: pass`."""
-SLEEPS = rb"(?:print|rospy\.log\w+|[\w.]*sleep)\b[^\n;]*(?:\n|\Z)|[ \t]*(?:#[^\n]*)?\n"
-SLEEPING = re.compile(
-    rb"^([ \t]*)while(?:\s*\()?\s*" + ENDLESS + rb"\s*(?:\)\s*)?:[ \t]*"
-    rb"(?:[\w.]*sleep\([^\n;]*(?:\n|\Z)|(?:#[^\n]*)?\n(?:\1[ \t]+" + SLEEPS + rb")+(?!\1[ \t]|[ \t]*[#\n]))",
-    re.MULTILINE,
-)
-"""One that sleeps, and no more."""
-
-
-RETRIES = re.compile(
-    rb"^([ \t]*)while(?:\s*\()?\s*" + ENDLESS + rb"\s*(?:\)\s*)?:[ \t]*(?:#[^\n]*)?\n\1([ \t]+)try:[ \t]*\n"
-    rb"\1\2[ \t]+[^\n;]*[wW]ait_?[fF]or_?[sS]erv[^\n;]*\n(?:\1\2[ \t]+(?:break|return)\b[^\n]*\n)?"
-    rb"\1\2except\b[^\n]*:[ \t]*\n(?:\1\2[ \t]+(?:(?:pass|continue)\b[^\n;]*(?:\n|\Z)|" + SLEEPS + rb"))+"
-    rb"(?:\1\2[\w.]*sleep\([^\n;]*(?:\n|\Z))?(?!(?:[ \t]*\n)*\1[ \t]+\S)",
-    re.MULTILINE,
-)
-"""One that waits for a service again each time it has waited for long enough."""
-
-
-def gives_up(text: bytes) -> bool:
-    """Return whether a source waits for a service, and goes on or ends if that does not come."""
-    return GIVES_UP.search(RETRIES.sub(b"", text)) is not None
-
-
-def sleeps_elsewhere(text: bytes) -> bool:
-    """Return whether a source sleeps or waits outside of such loops, too: then what calls it may go on after that."""
-    return re.search(NAPS.pattern + rb"|[wW]ait_?[fF]or", SLEEPING.sub(b"", text)) is not None
-
 
 # Of the run's time. A node's timer or sleep is late by one step at most.
 CLOCK_STEP_S = 0.05
@@ -185,6 +150,7 @@ def _tell_what_is_known(
     session.live.serves = frozenset(one.name for one in scenario.serves)
     session.live.naps = place.has_line(NAPS)
     scripts = {spec["name"]: spec["script"] for _, spec in starts if spec["script"] is not None}
+    session.live.polled = {name: polled(place.text_of(path)) for name, path in scripts.items()}
     session.live.endless = frozenset(s["name"] for _, s in starts if place.has_line(IDLE, s["script"]))
     session.live.sleeping = frozenset(s["name"] for _, s in starts if place.has_line(SLEEPING, s["script"]))
     # A file that the script may import counts, too

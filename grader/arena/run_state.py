@@ -63,6 +63,8 @@ class RunState:
     """Those whose script has a publisher, and nothing in it, or in what it may import, publishes."""
     serves: frozenset[str] = frozenset()
     """The services and actions that the grader offers."""
+    polled: dict[str, frozenset[str]] = field(default_factory=dict)
+    """By process, the services for which its script looks in the list of all again and again."""
     gives_up: bool = False
     """A program of the package ends where its wait for a service does."""
     rates: dict[str, list[RateBounds]] = field(default_factory=lambda: defaultdict(list))

@@ -315,6 +315,18 @@ def test_who_looks_for_what_nobody_offers_is_not_waited_for(
     assert find_outcome(live, until, 2.3) == (("silent", "the graph has settled") if in_vain else None)
 
 
+@pytest.mark.parametrize(
+    ("polled", "offered", "in_vain"), [("/addd", "", True), ("/add", "", False), ("/b", "/b", False)]
+)
+def test_who_looks_in_the_list_for_a_service_that_nobody_offers_is_not_waited_for(
+    polled: str, offered: str, *, in_vain: bool
+) -> None:
+    live, until = _resting(node=("loops", 1)), Until(ended=("node",))
+    live.serves, live.services, live.polled = frozenset({"/add"}), {offered}, {"node": frozenset({polled})}
+    assert find_outcome(live, until, 3.4) is None
+    assert find_outcome(live, until, 3.6) == (("silent", "the graph has settled") if in_vain else None)
+
+
 def test_a_client_of_another_name_than_the_students_server_is_not_waited_for() -> None:
     live, until = _resting(client=("loops", 1), server=("spins", 1)), Until(ended=("client",))
     live.services, live.sought["/client"] = {"/clamps"}, {"/clamp"}

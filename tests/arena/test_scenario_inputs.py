@@ -10,8 +10,9 @@ from types import SimpleNamespace
 import pytest
 
 from grader.arena.process_environment import TEXT_BYTES_MAX, ProcessEnvironment
-from grader.arena.run_scenario import IDLE, NAPS, RETRIES, SLEEPING, gives_up, set_params, sleeps_elsewhere
+from grader.arena.run_scenario import set_params
 from grader.arena.scenario_inputs import FILE_BYTES_MAX, made_up, make_shots
+from grader.arena.source_waits import IDLE, NAPS, SLEEPING, gives_up, polled, sleeps_elsewhere
 from grader.arena.static_recorder import (
     ATTACHED_BYTES_MAX,
     ATTACHED_FILES_MAX,
@@ -189,7 +190,9 @@ def test_who_sleeps_elsewhere_too_may_go_on() -> None:
 @pytest.mark.parametrize("text", ["while{}x", "while True{}x", "while(True{}x", "while not{}x", "sleep{}x"])
 def test_blanks_without_end_are_read_in_linear_time(text: str) -> None:
     blanks = text.format(" " * 200_000).encode()
-    assert not any(pattern.search(blanks) for pattern in (SLEEPING, IDLE, NAPS, RETRIES))
+    assert not any(pattern.search(blanks) for pattern in (SLEEPING, IDLE, NAPS))
+    assert not gives_up(blanks)
+    assert not gives_up(b"\n".join([b"while True:", *[b" while True:" + b" " * 300] * 5000]))
 
 
 RETRYING = """def ask():
@@ -210,7 +213,25 @@ RETRYING = """def ask():
     [
         ("", "", False),
         ("            rospy.sleep(0.5)\n", "        rate.sleep()\n", False),
-        ("            break\n", "            break\n        except KeyError:\n            pass\n", True),
+        ("            break\n", "            break\n        except KeyError:\n            pass\n", False),
+        ("            break\n", "            break\n        except KeyError:\n            return\n", True),
+        (
+            "            break\n",
+            "            break\n        except rospy.ROSInterruptException:\n            return\n",
+            False,
+        ),
+        ("            break\n", "            print(rospy.ServiceProxy('/add', Add)(1, 2))\n", False),
+        ("            break\n", "            there = True\n", False),
+        ("while not rospy.is_shutdown()", "while not there and not rospy.is_shutdown()", False),
+        ("while not rospy.is_shutdown()", "while there is False", False),
+        ("while not rospy.is_shutdown()", "while not rospy.is_shutdown() and time.time() < end", True),
+        ("while not rospy.is_shutdown()", "for _ in range(5)", True),
+        ("        try:\n", "        tries += 1\n        try:\n", True),
+        (
+            "            rospy.wait_for_service('/add', timeout=1)\n            break\n",
+            "            rospy.wait_for_service('/add', timeout=1)\n        else:\n            break\n",
+            True,
+        ),
         ("rospy.sleep(0.5)", "break", True),
         ("rospy.sleep(0.5)", "raise", True),
         ("rospy.sleep(0.5)", "tries += 1", True),
@@ -226,4 +247,41 @@ RETRYING = """def ask():
     ],
 )
 def test_a_client_that_asks_again_without_end_does_not_give_up(old: str, new: str, gives: bool) -> None:
+    assert old in RETRYING
     assert gives_up(RETRYING.replace(old, new, 1).encode()) is gives
+
+
+@pytest.mark.parametrize(
+    ("loop", "gives"),
+    [
+        ("while not client.wait_for_server(rospy.Duration(1)):\n    rospy.loginfo('waiting')\n", False),
+        ("while not client.wait_for_server(rospy.Duration(1)) and tries < 5:\n    rospy.loginfo('waiting')\n", True),
+        ("while not client.wait_for_server(rospy.Duration(1)):\n    sys.exit(1)\n", True),
+        ("while True:\n    if client.wait_for_server(rospy.Duration(1)):\n        break\n    print('no')\n", False),
+        ("while True:\n    if not client.wait_for_server(rospy.Duration(1)):\n        break\n    print('no')\n", True),
+        ("while True:\n    if not c.wait_for_server(D(1)):\n        continue\n    else:\n        break\n", False),
+        ("while True:\n    client.wait_for_server(rospy.Duration(1))\n    client.send_goal(goal)\n", True),
+    ],
+)  # fmt: skip
+def test_a_client_of_an_action_that_asks_again_does_not_give_up(loop: str, gives: bool) -> None:
+    assert gives_up(loop.encode()) is gives
+
+
+@pytest.mark.parametrize(
+    ("loop", "names"),
+    [
+        ("while '/add' not in rosservice.get_service_list():\n    rospy.sleep(0.5)\n", {"/add"}),
+        (
+            'while not rospy.is_shutdown() and "/add" not in get_service_list():  # wait\n\trate.sleep()\n',
+            {"/add"},
+        ),
+        ("while '/add' not in rosservice.get_service_list():\n    tries += 1\n", set()),
+        (
+            "while '/add' not in rosservice.get_service_list() and late():\n    rate.sleep()\n    tries += 1\n",
+            set(),
+        ),
+        ("if '/add' not in rosservice.get_service_list():\n    rate.sleep()\n", set()),
+    ],
+)
+def test_the_services_that_a_client_looks_for_in_the_list_are_known(loop: str, names: set[str]) -> None:
+    assert polled(loop.encode()) == names
