@@ -19,12 +19,12 @@ from grader.arena.scenario_inputs import OVER, make_shots, settings
 from grader.arena.session import GRAPH_EVERY_S, ArenaSession
 from grader.arena.source_waits import (
     IDLE,
-    NAPS,
     PROGRAM,
     PUBLISHER,
     PUBLISHES,
     SLEEPING,
     gives_up,
+    naps,
     polled,
     sleeps_elsewhere,
 )
@@ -148,7 +148,7 @@ def _tell_what_is_known(
     """Set what the scenario and the package's sources say of how long anything may yet come."""
     session.live.gives_up = place.has_line(gives_up)
     session.live.serves = frozenset(one.name for one in scenario.serves)
-    session.live.naps = place.has_line(NAPS)
+    session.live.naps = place.has_line(naps)
     scripts = {spec["name"]: spec["script"] for _, spec in starts if spec["script"] is not None}
     session.live.polled = {name: polled(place.text_of(path)) for name, path in scripts.items()}
     session.live.endless = frozenset(s["name"] for _, s in starts if place.has_line(IDLE, s["script"]))

@@ -47,14 +47,23 @@ LINE_BYTES_MAX, LOOP_LINES_MAX = 200, 40
 
 def gives_up(text: bytes) -> bool:
     """Return whether a source waits for a service, and goes on or ends if that does not come."""
-    lines = text.splitlines()
-    skipped, kept = 0, list[bytes]()
+    return GIVES_UP.search(_without_asking(text)) is not None
+
+
+def naps(text: bytes) -> bool:
+    """Return whether a source sleeps for a time of its own or has a timer: while it only asks, sleeping is no work."""
+    return NAPS.search(_without_asking(text)) is not None
+
+
+def _without_asking(text: bytes) -> bytes:
+    """Return a source without its loops that ask for a service without end."""
+    lines, skipped, kept = text.splitlines(), 0, list[bytes]()
     for number, line in enumerate(lines):
         if number >= skipped:
             skipped = number + _asks_without_end(lines[number : number + LOOP_LINES_MAX])
         if number >= skipped:
             kept.append(line)
-    return GIVES_UP.search(b"\n".join(kept)) is not None
+    return b"\n".join(kept)
 
 
 def polled(text: bytes) -> frozenset[str]:

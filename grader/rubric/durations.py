@@ -19,6 +19,12 @@ FASTEST_HZ = 100
 """No lab asks for rows of a table, or feedback, more often than this."""
 SUBSCRIBE_S, ANSWER_S = 6.0, 10.0
 """How long a run waits for a subscriber of one more topic, and for the answer of a service."""
+CONNECTED = frozenset({"connected", "launch-connects", "launch-runs"})
+"""Checks of the connections between nodes."""
+CONDITIONS = frozenset(
+    ("window_s", "topics", "messages", "connected", "heard", "nodes", "alive_s", "opened", "ended", "quiet_s")
+)
+"""Those of `until` that end a run before its limit."""
 LASTING = ("window_s", "alive_s")
 """Conditions of `until` that hold after a time, once the last step is done."""
 
@@ -178,6 +184,19 @@ def _goal(about: WrittenCriterion) -> dict[str, Any] | None:
 
 def _limit_s(goal: dict[str, Any]) -> Any:  # noqa: ANN401 - whatever the rubric has
     return goal.get("limit_s", Action.model_fields["limit_s"].default)
+
+
+def early_faults(about: WrittenCriterion) -> Iterator[Fault]:
+    """Yield runs that are over as soon as their nodes are there, while a criterion asks how these are connected: nodes
+    look for each other a moment later."""
+    topic, scenario = about.given.get("topic"), about.scenario
+    until = as_map(scenario.get("until"))
+    given = {key for key in until if key in CONDITIONS and until[key]}
+    if about.check not in CONNECTED or topic is None or not given or given - {"nodes"}:
+        return
+    if not any(scenario.get(key) for key in ("steps", "probes", "calls")):
+        over = f"the run is over once they are there, and {about.id} asks for a connection over {topic}"
+        yield ("scenarios", about.run, "until", "nodes"), f"{over}: write connected: [{topic}] as well"
 
 
 def within_faults(about: WrittenCriterion) -> Iterator[Fault]:

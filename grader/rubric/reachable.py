@@ -15,6 +15,7 @@ from grader.checks.registry import Check
 from grader.checks.support.fields import Reading, is_number
 from grader.rubric.definitions import PATH_PARTS, is_form
 from grader.rubric.durations import (
+    early_faults,
     late_faults,
     longest_s,
     often_faults,
@@ -33,6 +34,7 @@ from grader.rubric.simulators import (
     room_faults,
     start_faults,
 )
+from grader.rubric.step_faults import wait_faults
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
@@ -63,12 +65,14 @@ def reach_faults(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator
     yield from _too_few(criteria)
     yield from _too_many_nodes(rubric)
     yield from late_faults(rubric.scenarios)
+    yield from wait_faults(rubric)
     for name, scenario in rubric.scenarios.items():
         yield from start_faults(("scenarios", name), scenario)
     for about in criteria:
         others = [one for one in criteria if one is not about and one.run == about.run]
         yield from often_faults(about)
         yield from within_faults(about)
+        yield from early_faults(about)
         yield from stretch_faults(about)
         yield from room_faults(about, longest_s(about.scenario))
         yield from _never_sent(about, others)

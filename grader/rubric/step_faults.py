@@ -21,6 +21,7 @@ from grader.ros_env import ros_packages
 from grader.rubric.durations import FASTEST_HZ, longest_s
 from grader.rubric.fault_words import model_faults
 from grader.rubric.scenario import STEP_S_MAX, Action, Play, Step, Transform
+from grader.rubric.simulators import topics_of_programs
 from grader.rubric.spelling import is_slip
 from grader.rubric.yaml_lines import (
     Fault,
@@ -33,7 +34,9 @@ from grader.rubric.yaml_lines import (
     give_one,
     given_steps,
     items_in,
+    parts_of,
     starts_of,
+    texts_in,
 )
 from grader.wording import did_you_mean
 
@@ -318,6 +321,27 @@ def _wait(at: KeyPath, wait: dict[str, Any]) -> Iterator[Fault]:
         yield (*at, "limit_s"), "is for a topic or a node"
     yield from slash((*at, "topic"), wait.get("topic"), "a topic")
     yield from slash((*at, "node"), wait.get("node"), "a node's name")
+
+
+def wait_faults(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield waits for messages on a topic on which the grader alone sends, while no criterion judges any: the
+    grader's own do not count."""
+    for at, step in rubric.steps():
+        topic, run = as_map(step.get("wait")).get("topic"), at[1]
+        scenario = rubric.scenarios[str(run)]
+        sent = [one for _, kind, one in parts_of(scenario) if kind == "publish" and one.get("topic") == topic]
+        judged = [
+            as_map(one.given.get(key))
+            for one in rubric.criteria
+            if one.run == run
+            for key in ("effect", "topics")
+        ]
+        judged += [one.given for one in rubric.criteria if one.run == run and one.check != "hears"]
+        awaited = [text for _, text in texts_in((), scenario.get("until"))]
+        named = any(one.get("topic") == topic or topic in one for one in judged) or topic in awaited
+        if sent and isinstance(topic, str) and not named and topic not in topics_of_programs(scenario):
+            told = f"the grader itself sends on {topic}, and its messages do not count"
+            yield (*at, "wait", "topic"), f"{told}: name the one on which the node answers"
 
 
 def slash(path: KeyPath, name: object, what: str) -> Iterator[Fault]:

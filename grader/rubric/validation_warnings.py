@@ -19,6 +19,7 @@ from grader.rubric.prose_warnings import prose_warnings
 from grader.rubric.simulators import TRUE_POSE, robot_of, topics_of_programs
 from grader.rubric.started import argument_warnings
 from grader.rubric.step_faults import count_causes
+from grader.rubric.value_warnings import value_warnings
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
@@ -31,7 +32,6 @@ from grader.rubric.yaml_lines import (
     given_steps,
     parts_of,
     services_in,
-    set_in,
     starts_of,
     texts_in,
 )
@@ -56,7 +56,6 @@ CLOSE_DEG = 0.5
 CLOSE_M = 0.02
 """No student's robot stops as near to its goal as this."""
 EMPTY = "std_srvs/Empty"
-SIDEWAYS = frozenset({"linear.y", "linear.z", "angular.x", "angular.y"})
 
 
 def warnings(rubric: WrittenRubric) -> Iterator[Fault]:
@@ -92,35 +91,8 @@ def warnings(rubric: WrittenRubric) -> Iterator[Fault]:
         if criterion.check == "service-answers":
             yield from _answers(criterion)
         yield from _cancelled_goal(criterion)
-        yield from _set_otherwise(criterion)
         yield from _other_run(criterion, rubric)
-        yield from _not_driven(criterion)
-        yield from _swapped_params(criterion)
-
-
-def _swapped_params(criterion: WrittenCriterion) -> Iterator[Fault]:
-    """Yield values of a field that are the value of another parameter of the run, beside one with the field's name."""
-    value, name = criterion.given.get("value"), str(criterion.given.get("field")).rpartition(".")[2]
-    params = {
-        str(one.get("name")).rpartition("/")[2]: one.get("value") for _, one in set_in(criterion.scenario)
-    }
-    others = [key for key, one in params.items() if one == value and key != name]
-    if criterion.check == "field-equals" and is_number(value) and params.get(name, value) != value and others:
-        fault = f"is {others[0]} in {criterion.run}, and {name} is {json.dumps(params[name])} there: is it that one?"
-        yield (*criterion.at, "value"), fault
-
-
-def _not_driven(criterion: WrittenCriterion) -> Iterator[Fault]:
-    """Yield parts of a velocity that a robot with two wheels cannot have, and that are to be other than 0."""
-    for at, asked in criterion.conditions if robot_of(criterion.scenario) else ():
-        field, bounds = asked.get("field"), (asked.get("value"), asked.get("min"), asked.get("max"))
-        value, low, high = (
-            one if is_number(one) else other
-            for one, other in zip(bounds, (0, -math.inf, math.inf), strict=True)
-        )
-        moves = not (value == 0 and low <= 0 <= high) and not criterion.given.get("never")
-        if asked.get("topic") == "/cmd_vel" and field in SIDEWAYS and moves:
-            yield (*at, "field"), f"the robot cannot move by {field}: it has linear.x and angular.z alone"
+        yield from value_warnings(criterion, rubric)
 
 
 def _short_times(rubric: WrittenRubric) -> Iterator[Fault]:
@@ -333,15 +305,6 @@ def _cancelled_goal(criterion: WrittenCriterion) -> Iterator[Fault]:
     if is_number(after_s) and given.get("status", "SUCCEEDED") == "SUCCEEDED" and "feedback" not in given:
         fault = f"the step cancels this goal after {after_s:g} s: is its status PREEMPTED?"
         yield (*criterion.at, "status" if "status" in given else "goal"), fault
-
-
-def _set_otherwise(criterion: WrittenCriterion) -> Iterator[Fault]:
-    """Yield parameters that the scenario sets to one value, and that should have another one."""
-    name, value = criterion.given.get("name"), criterion.given.get("value")
-    named = [one for _, one in set_in(criterion.scenario) if one.get("name") == name]
-    values = [one["value"] for one in named if "value" in one]
-    if criterion.check == "param-value" and values and value not in values:
-        yield (*criterion.at, "value"), f"{criterion.run} sets {name} to {json.dumps(values[-1])}"
 
 
 def _other_run(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:

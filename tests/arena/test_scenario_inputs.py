@@ -12,7 +12,7 @@ import pytest
 from grader.arena.process_environment import TEXT_BYTES_MAX, ProcessEnvironment
 from grader.arena.run_scenario import set_params
 from grader.arena.scenario_inputs import FILE_BYTES_MAX, made_up, make_shots
-from grader.arena.source_waits import IDLE, NAPS, SLEEPING, gives_up, polled, sleeps_elsewhere
+from grader.arena.source_waits import IDLE, NAPS, SLEEPING, gives_up, naps, polled, sleeps_elsewhere
 from grader.arena.static_recorder import (
     ATTACHED_BYTES_MAX,
     ATTACHED_FILES_MAX,
@@ -285,3 +285,9 @@ def test_a_client_of_an_action_that_asks_again_does_not_give_up(loop: str, gives
 )
 def test_the_services_that_a_client_looks_for_in_the_list_are_known(loop: str, names: set[str]) -> None:
     assert polled(loop.encode()) == names
+
+
+def test_who_sleeps_between_two_questions_has_no_timer() -> None:
+    assert not naps(RETRYING.encode())
+    assert naps(RETRYING.encode() + b"    rospy.sleep(0.5)\n")
+    assert naps(RETRYING.replace("not rospy.is_shutdown()", "tries < 5").encode())

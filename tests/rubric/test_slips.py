@@ -187,6 +187,28 @@ def test_what_looks_like_a_slip_and_is_none_is_accepted(
     assert not [one for one in found if "did you mean" in one or "has 20" in one or "to max is" in one]
 
 
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        # a value that is a little too large tests what the node does with it
+        ("battery", "value: {percentage: 0.9}", "value: {percentage: 1.5}"),
+        # a robot that may move sideways
+        ("scan-to-cmd-vel", "forward at 0.2 m/s, or 0", "sideways at 0.2 m/s (linear.y), or 0"),
+        # the student publishes where the grader does
+        ("latched-map", "{topic: /map, limit_s: 8}", "{topic: /obstacle, limit_s: 8}"),
+        # the answers have numbers of their own, and those of another call
+        ("service-own-type", "{result: -2.25, changed: true}", "{result: -1, changed: true}"),
+    ],
+)
+def test_what_was_meant_is_accepted(examples: Path, name: str, old: str, new: str) -> None:
+    path = _spoiled(examples, name, old, new)
+    text = path.read_text(encoding="utf-8").replace("linear.x, value: 0.2", "linear.y, value: 0.2")
+    text = text.replace("messages: {/map: 3}", "messages: {/map: 3, /obstacle: 9}")
+    path.write_text(text, encoding="utf-8")
+    found = warnings_of(load_rubric(str(path)), path.name)
+    assert not [one for one in found if "never" in one or "two wheels" in one or "swapped" in one]
+
+
 STOPS = "linear.x, value: 0, tolerance: 0.01}, within_s: 1.5}"
 
 
@@ -257,7 +279,7 @@ def test_a_goal_outside_of_the_box_that_another_criterion_keeps_the_robot_in(exa
 
 def test_lists_of_one_field_that_no_message_can_both_be_are_refused(examples: Path) -> None:
     path = _spoiled(
-        examples, "latched-map", "100, 100, 0, 0, 0, 0, 0], when: last", "100, 0, 0, 0, 0, 0], when: first"
+        examples, "latched-map", "100, 100, 0, 0, 0, 0, 0], when: last", "100, 0, 0, 0, 0, 0, 0], when: first"
     )
     told = "free wants data of /map otherwise in the same run"
     assert faults(path) == [f"spoiled.yaml:47: criteria[7].with: {told}"]
