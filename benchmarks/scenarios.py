@@ -39,6 +39,17 @@ CLIENT, SERVER = "adder/scripts/add_client.py", "own_service/scripts/server.py"
 DRIVER, COUNT = "go_to_goal/scripts/go_to_goal.py", "counting/scripts/count.py"
 RECORD = "walk_log/launch/record.launch"
 TYPE = "import String\n"
+ADD = "    rospy.wait_for_service('/add')\n"
+AGAIN = """        try:
+            rospy.wait_for_service('/sum', timeout=1)
+            break
+        except rospy.ROSException:
+            rospy.logwarn('not yet')
+"""
+POLLING = """    import rosservice
+    while '/sum' not in rosservice.get_service_list():
+        rospy.sleep(0.5)
+"""
 FAULTS = (
     Fault("an exception in a listener's callback", YORK, "receiver", RECEIVER, "data.data", "data.dat"),
     Fault("a listener of another type", YORK, "receiver", RECEIVER, TYPE, "import Int32 as String\n"),
@@ -72,6 +83,11 @@ FAULTS = (
     Fault("a node that dies", YORK, "sender", SENDER, "        rate.sleep()", "        raise KeyError"),
     Fault("a topic of the goal's", "go-to-goal", "goals", DRIVER, "'/goal'", "'/target'"),
     Fault("an action of another name", "action-server", "goals", COUNT, "'/count'", "'/counter'"),
+    Fault(
+        "a goal that never ends", "action-server", "goals", COUNT, "while total < goal.target", "while True"
+    ),
+    Fault("a client that asks again", "service-client", "adds", CLIENT, ADD, f"    while True:\n{AGAIN}"),
+    Fault("a client that polls the list", "service-client", "adds", CLIENT, ADD, POLLING),
     Fault(
         "a recording of nothing", "record-and-replay", "record", RECORD, "walk.bag /steps", "walk.bag /walk"
     ),

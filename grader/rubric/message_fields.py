@@ -114,6 +114,7 @@ def field_faults(rubric: WrittenRubric, known: Definitions) -> Iterator[Fault]:
         if criterion.check == "topic-type":
             yield from _other_type(criterion, rubric)
         yield from _expected(criterion, known)
+        yield from _reported(criterion, known)
         yield from _other_size(criterion, rubric)
         yield from _other_definitions(criterion, known, rubric)
     for name, scenario in rubric.scenarios.items():
@@ -440,6 +441,26 @@ def _expected(criterion: WrittenCriterion, known: Definitions) -> Iterator[Fault
             yield from _quoted((*criterion.at, key, *at), one, are_fields=True)
         elif fault := shape.misfit(one) or _of_other_part(one, str(about.get("type")), shape, known):
             yield (*criterion.at, key, *at), fault
+
+
+def _reported(criterion: WrittenCriterion, known: Definitions) -> Iterator[Fault]:
+    """Yield fields of feedback, and of the result that is compared with it, that an action does not have: a field that
+    is never there is compared with nothing."""
+    _, about, _ = _asked(criterion.check, criterion.given, criterion.scenario)
+    kind, compared = str(as_map(about).get("type")), as_map(criterion.given.get("as_reported"))
+    named = [(("reports", name), "feedback", name) for name in as_map(criterion.given.get("reports"))]
+    named += [(("as_reported", name), "result", name) for name in compared]
+    named += [(("as_reported", name), "feedback", field) for name, field in compared.items()]
+    for at, part, field in named:
+        shape = known.shape(kind, part)
+        if shape is not None and isinstance(field, str):
+            fault = _of_other_part({field: None}, kind, shape, known)
+            try:
+                shape.field_at(field)
+            except Misfit as error:
+                fault = str(error)
+            if fault:
+                yield (*criterion.at, *at), fault
 
 
 def _of_other_part(value: dict[str, Any], kind: str, shape: Shape, known: Definitions) -> str:

@@ -18,11 +18,14 @@ from grader.rubric.yaml_lines import (
     as_list,
     as_map,
     as_maps,
+    given_steps,
     numbers_in,
+    parts_of,
     services_in,
     set_in,
     starts_of,
 )
+from grader.wording import join_words
 
 SIDEWAYS = frozenset({"linear.y", "linear.z", "angular.x", "angular.y"})
 """The parts of a velocity that a robot with two wheels does not have."""
@@ -34,6 +37,8 @@ OTHER_WAYS = re.compile(
 """Words of a handout about a robot that may move otherwise."""
 STANDS = 0.05
 """Bounds of a velocity as near to 0 as these ask for one that is 0."""
+FORMS = frozenset({"from", "each", "repeat", "text", "integers"})
+"""Keys of values that are no fields."""
 PLAIN = frozenset({0.0, 1.0})
 """These are in many requests and answers, by chance."""
 
@@ -43,6 +48,7 @@ def value_warnings(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterat
     yield from _set_otherwise(criterion)
     yield from _not_driven(criterion, rubric.handout)
     yield from _swapped_params(criterion)
+    yield from _left_out(criterion)
     if criterion.check == "service-answers":
         yield from _swapped_answers(criterion)
     if criterion.check == "prints":
@@ -93,6 +99,27 @@ def _not_driven(criterion: WrittenCriterion, handout: str) -> Iterator[Fault]:
             criterion.check == "field-bounds" and all(map(is_number, bounds[1:])) and max(-low, high) > STANDS
         ):
             yield (*at, "field"), f"{field} of a robot with two wheels is always 0: every node passes"
+
+
+def _left_out(criterion: WrittenCriterion) -> Iterator[Fault]:
+    """Yield a cause's field that no message has which the run sends, while these have others: it is always zero."""
+    cause = as_map(criterion.given.get("cause"))
+    topic, field = cause.get("topic"), re.split(r"\W", str(cause.get("field") or ""))[0]
+    sent = [
+        one
+        for _, kind, one in parts_of(criterion.scenario)
+        if kind == "publish" and one.get("topic") == topic
+    ]
+    values = [
+        value
+        for one in sent
+        for value in (one.get("value"), *as_list(one.get("values")))
+        if value is not None
+    ]
+    keys = {key for value in values for key in (value if isinstance(value, dict) else ("data",))}
+    if field and keys and not keys & {field, *FORMS} and not given_steps(criterion.scenario, "play"):
+        told = f"{criterion.run} sends {join_words(sorted(map(str, keys)))} on {topic}"
+        yield (*criterion.at, "cause", "field"), f"{told}, and no {field}, which is zero there"
 
 
 def _is_turtle(scenario: dict[str, Any]) -> bool:
