@@ -87,7 +87,9 @@ def _asks_without_end(lines: Sequence[bytes]) -> int:
         return 0
     depth = _depth(lines[0])
     body = list(takewhile(lambda line: not line.strip() or _depth(line) > depth, islice(lines, 1, None)))
-    is_harmless = len(body) < LOOP_LINES_MAX - 1 and all(_only_asks(body))
+    # Another loop may wait for a flag that a callback sets, and then go on.
+    asks = any(GIVES_UP.search(line) or POLLS.search(line) for line in (lines[0], *body))
+    is_harmless = asks and len(body) < LOOP_LINES_MAX - 1 and all(_only_asks(body))
     return is_harmless * (1 + len(body))
 
 

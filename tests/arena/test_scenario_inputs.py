@@ -291,3 +291,6 @@ def test_who_sleeps_between_two_questions_has_no_timer() -> None:
     assert not naps(RETRYING.encode())
     assert naps(RETRYING.encode() + b"    rospy.sleep(0.5)\n")
     assert naps(RETRYING.replace("not rospy.is_shutdown()", "tries < 5").encode())
+    assert not naps(b"while '/add' not in rosservice.get_service_list():\n    rospy.sleep(0.5)\n")
+    assert naps(b"while pose is None:\n    rospy.sleep(0.5)\n")
+    assert naps(b"while not rospy.is_shutdown():\n    rospy.sleep(0.5)\n")
