@@ -70,10 +70,10 @@ def _fix_package(chosen: Chosen, *, dry_run: bool, yes: bool) -> bool:
         of_git: list[Repair] = []
         packages = (submission.package, *submission.also)
         for package, facts in zip(packages, (read, *read.also), strict=True):
-            repairs = find_repairs(package.folder, facts, wanted_of(rubric, package.asked))
-            fixed = [one for one in repairs if is_fixed(package.folder, one)]
+            known = find_repairs(package.folder, facts, wanted_of(rubric, package.asked))
+            fixed = [one for one in known if is_fixed(package.folder, one)]
             found[package.folder] = [*_bits_of_git(package.folder, facts), *fixed]
-            bits = (one for one in repairs if one.kind == "executable-bit" and one not in fixed)
+            bits = (one for one in known if one.kind == "executable-bit" and one not in fixed)
             of_git += [one for one in bits if is_executable(package.folder, one.file)]
         found = {folder: repairs for folder, repairs in found.items() if repairs}
         for number, (folder, repairs) in enumerate(found.items()):

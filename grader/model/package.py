@@ -509,8 +509,7 @@ class PackageFacts(Record):
     asked: str = Field(default="", exclude_if=lambda value: not value)
     """The lab's name for it, if the lab asks for several packages and this is not the main one."""
     also: tuple[PackageFacts, ...] = Field(default=(), exclude_if=lambda value: not value)
-    """The other packages that the lab asks for, as far as they were handed in. Their paths are relative to
-    their own folders."""
+    """The other packages that the lab asks for and that were handed in; their paths are below their own folders."""
     beside: tuple[str, ...] = Field(default=(), exclude_if=lambda value: not value)
     """The names of all other packages that were handed in."""
 
@@ -560,9 +559,8 @@ class PackageFacts(Record):
     @property
     def has_no_manifest(self) -> bool:
         """Whether there is no `package.xml`; one that cannot be read is another fault."""
-        return self.manifest is None and (
-            self.manifest_fault is None or self.manifest_fault.kind == "Missing"
-        )
+        fault = self.manifest_fault
+        return self.manifest is None and (fault is None or fault.kind == "Missing")
 
     @property
     def own_modules(self) -> set[str]:
@@ -583,9 +581,8 @@ class PackageFacts(Record):
         if not top or top in PACKAGE_FOLDERS or not PACKAGE_FOLDERS & {path.parts[1] for path in inside}:
             return ""
         calls = self.cmake.calls if self.cmake is not None else ()
-        named = {
-            PurePosixPath(INTERFACE_FOLDERS.get(c.name, "."), arg) for c in calls for arg in c.args if arg
-        }
+        paths = ((INTERFACE_FOLDERS.get(c.name, "."), arg) for c in calls for arg in c.args if arg)
+        named = {PurePosixPath(folder, path) for folder, path in paths}
         there = {PurePosixPath(f.path) for f in self.files}
         return top if any(PurePosixPath(top, path) in there and path not in there for path in named) else ""
 
@@ -598,7 +595,6 @@ class PackageFacts(Record):
         return tuple(hint for hint in self.hints if hint.startswith(f"{path} "))
 
     def general_hints(self) -> tuple[str, ...]:
-        """Return intake's remarks about the submission as a whole: where the package was found, and as
-        what."""
+        """Return intake's remarks about the submission as a whole: where the package was found, and as what."""
         of_files = {hint for file in self.files for hint in self.hints_on(file.path)}
         return tuple(hint for hint in self.hints if hint not in of_files)

@@ -543,34 +543,6 @@ def test_what_a_right_build_says_in_another_way_is_left_alone(name: str, tmp_pat
     assert find_repairs(folder, facts_of(folder), needs) == ()
 
 
-RIGHT_NODES = {
-    "a handle goes first": (
-        "  message_filters::Subscriber<Int8> of_a;\n  of_a.subscribe(nh, topic, 10);\n  ros::spin();\n"
-    ),
-    "of images": '  image_transport::ImageTransport it(nh);\n  it.subscribe("a", 1, see);\n  ros::spin();\n',
-    "tests": '  auto sub = nh.subscribe("a", 1, hear);\n  return RUN_ALL_TESTS();\n',
-    "kept while it waits": (
-        '  ros::spin();\n}\nvoid other() {\n  ros::Subscriber sub = nh.subscribe("a", 1, hear);\n  waitForMessage();\n'
-    ),
-    "kept by a test": (
-        '  ros::spin();\n}\nTEST(A, b) {\n  ros::Subscriber sub = nh.subscribe("a", 1, hear);\n  EXPECT_EQ(1, n);\n'
-    ),
-}
-
-
-@pytest.mark.parametrize("name", RIGHT_NODES)
-def test_a_right_node_of_cpp_is_left_alone(name: str, tmp_path: Path) -> None:
-    begin = 'int main(int argc, char** argv) {\n  ros::init(argc, argv, "a");\n  ros::NodeHandle nh;\n'
-    folder = package(tmp_path, {"src/a.cpp": f"{begin}{RIGHT_NODES[name]}}}\n"})
-    assert find_repairs(folder, facts_of(folder), WANTED) == ()
-
-
-def test_a_subscription_by_a_variable_is_kept(tmp_path: Path) -> None:
-    node = "int main() {\n  ros::NodeHandle nh;\n  nh.subscribe(topic, 1, hear);\n  ros::spin();\n}\n"
-    folder = package(tmp_path, {"src/a.cpp": node})
-    assert [one.line for one in find_repairs(folder, facts_of(folder), WANTED)] == [3]
-
-
 @pytest.mark.parametrize("first", ["", "#!/usr/bin/env python\r\n", "\ufeff#!/usr/bin/env python2\n"])
 def test_a_module_that_a_script_imports_needs_no_bit_and_no_first_line(tmp_path: Path, first: str) -> None:
     script = FILES[TALKER].replace("import rospy\n", "import rospy\nimport steps\n")

@@ -271,10 +271,8 @@ def _in_comments(slips: Sequence[PythonSlip]) -> dict[str, str]:
     kinds = {one.kind for one in slips}
     gone = (s for s in slips if s.kind == "commented-out" and "`#`" in s.fix)
     lines = sorted({s.line for s in gone if MAKES_NODES.get(s.name.rpartition(" ")[2], s.kind) not in kinds})
-    told = {
-        "message": f"{on_lines(lines)} are commented out",
-        "fix": f"remove the `#` from {on_lines(lines)}",
-    }
+    where = on_lines(lines)
+    told = {"message": f"{where} are commented out", "fix": f"remove the `#` from {where}"}
     return told if len(lines) > 1 else {}
 
 
