@@ -16,6 +16,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from grader.model.git_ignores import IgnoreLine
 from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
 from grader.model.submission import ModeSource
@@ -508,6 +509,8 @@ class PackageFacts(Record):
     """Launch files once more, read with the arguments that a scenario of the lab gives them."""
     asked: str = Field(default="", exclude_if=lambda value: not value)
     """The lab's name for it, if the lab asks for several packages and this is not the main one."""
+    git_ignores: tuple[IgnoreLine, ...] = Field(default=(), exclude_if=lambda value: not value)
+    """What git leaves out, where the package was handed in with git."""
     also: tuple[PackageFacts, ...] = Field(default=(), exclude_if=lambda value: not value)
     """The other packages that the lab asks for and that were handed in; their paths are below their own folders."""
     beside: tuple[str, ...] = Field(default=(), exclude_if=lambda value: not value)

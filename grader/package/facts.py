@@ -25,6 +25,7 @@ from grader.model.package import Fault, Interface, PackageFacts, Shebang, Sheban
 from grader.model.python_slip import PythonSlip
 from grader.model.submission import SourcePackage, Submission
 from grader.package.cpp import SUFFIXES, cpp_slips
+from grader.package.git_ignores import read_git_ignores
 from grader.package.python import check_syntax
 from grader.package.reading import (
     LEFT_OUT,
@@ -302,6 +303,7 @@ def read_package(
         interfaces=_interfaces(package.folder, _readable(entries)),
         asked=package.asked,
         beside=others,
+        git_ignores=read_git_ignores(package, (file.path for file in files)),
     )
 
 

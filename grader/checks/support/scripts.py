@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
+from grader.model.git_ignores import hiding_line
 from grader.model.package import CMakeCall, Executable, Fault, PackageFacts, SourceFile
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.verdict import FileCitation
@@ -124,7 +125,11 @@ def old_encoding(package: PackageFacts, error: str, files: Collection[str]) -> t
 
 
 def add_hint(package: PackageFacts, path: str) -> str:
-    """Return the hint that a file has to be written; of what was handed in with git, that it has to be pushed too."""
+    """Return the hint that a file has to be written; of what was handed in with git, that it has to be pushed too, and
+    whether git leaves it out."""
+    if hiding := hiding_line(package.git_ignores, path):
+        where = f"line {hiding.line} of {hiding.file}, `{hiding.pattern}`,"
+        return f"{where} keeps {path} out of git: git add -f {path}, then commit and push it"
     then = ", then git add, commit and push it" if handed_in_with_git(package) else ""
     return f"write {path}{then}"
 
