@@ -26,6 +26,7 @@ from grader.model.python_slip import PythonSlip
 from grader.model.submission import SourcePackage, Submission
 from grader.package.cpp import SUFFIXES, cpp_slips
 from grader.package.git_ignores import read_git_ignores
+from grader.package.own_modules import drop_slips_of_modules
 from grader.package.python import check_syntax
 from grader.package.reading import (
     LEFT_OUT,
@@ -35,6 +36,7 @@ from grader.package.reading import (
     read_markup,
     regular_file,
 )
+from grader.package.repairs.editing import read_data
 from grader.portable import system
 
 _CHUNK_BYTES = 1 << 20
@@ -289,6 +291,8 @@ def read_package(
         launch_files = read_launch_files(package.folder, readable, names, commands, {*others, *needed})
         report = asked.result()
     files = tuple(entry.file for entry in entries)
+    scripts = [one.path for one in files if one.python and one.link is None]
+    texts = {path: (read_data(package.folder, path) or b"").decode("utf-8", "replace") for path in scripts}
     return PackageFacts(
         name=package.name,
         path=package.path,
@@ -299,7 +303,10 @@ def read_package(
         launch_files=tuple(one for one in launch_files if not one.given),
         launched=tuple(one for one in launch_files if one.given),
         hints=hints,
-        slips=(*report.slips, *cpp_slips(package.folder, (e.path for e in _readable(entries)))),
+        slips=(
+            *drop_slips_of_modules(report.slips, texts),
+            *cpp_slips(package.folder, (e.path for e in _readable(entries))),
+        ),
         interfaces=_interfaces(package.folder, _readable(entries)),
         asked=package.asked,
         beside=others,

@@ -86,13 +86,14 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     files = Files(folder=folder.resolve())
     renames = find_renames(package, wanted)
     started = _started(package, wanted, renames)
-    scripts = [*started, *_imported(files, package, started)][:SCRIPTS_MAX]
+    imported = _imported(files, package, started)
+    scripts = [*started, *imported][:SCRIPTS_MAX]
     repair_files(files, scripts, {file.path for file in started})
     # Renamed first: whatever follows looks for a file where it will be.
     rename_files(files, renames)
     sources = (f.path for f in scripts if f.python and f.link is None and not f.is_no_script)
     paths = [renames.get(path, path) for path in sources]
-    names = repair_python(files, paths, package, wanted.types)
+    names = repair_python(files, paths, package, wanted.types, {file.path for file in imported})
     name = repair_manifest(files, package, wanted)
     repair_cmake(files, package, name, wanted, [f.path for f in scripts])
     rename_package(files, package, wanted)

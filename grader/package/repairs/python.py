@@ -8,9 +8,10 @@ from __future__ import annotations
 import json
 import re
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from difflib import get_close_matches
 from importlib.util import find_spec
+from itertools import takewhile
 from pathlib import Path
 from typing import Literal
 
@@ -84,9 +85,14 @@ class _Entry(Record):
 
 
 def repair_python(
-    files: Files, scripts: Sequence[str], package: PackageFacts, types: Sequence[str]
+    files: Files,
+    scripts: Sequence[str],
+    package: PackageFacts,
+    types: Sequence[str],
+    modules: Collection[str] = (),
 ) -> dict[str, tuple[Name, ...]]:
-    """Find what keeps the sources from running, and return the names that they use once they do."""
+    """Find what keeps the sources from running, and return the names that they use once they do. `modules` are only
+    imported: nothing has to start in them."""
     _delete_imports(files, scripts, package)
     _delete_manifests(files, scripts, package)
     _spell_package(files, scripts, package)
@@ -97,10 +103,20 @@ def repair_python(
         for each in (package, *package.also)
     }
     for entry in _examine(texts, types, fields):
-        for cause, steps in _join_steps(entry.steps):
+        left_out = OF_START if entry.file in modules else ()
+        for cause, steps in _join_steps([*_until(entry.steps, left_out)]):
             _change(files, entry.file, cause, steps)
         names[entry.file] = entry.names
     return names
+
+
+def _until(steps: Sequence[_Step], causes: Collection[Cause]) -> Iterator[_Step]:
+    """Return the steps before the first one of these causes: each has the changes of those before it."""
+    return takewhile(lambda step: step.cause not in causes, steps)
+
+
+OF_START: tuple[Cause, ...] = ("inside", "start", "main", "server", "spin")
+"""Causes that keep a script from starting, which come last."""
 
 
 def _delete_imports(files: Files, scripts: Sequence[str], package: PackageFacts) -> None:

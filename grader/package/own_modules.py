@@ -1,0 +1,47 @@
+"""Slips of a script that another file of the package makes none: what it imports, or what imports it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import PurePosixPath
+
+from grader.model.python_slip import PythonSlip
+
+_IMPORT = re.compile(r"^[ \t]*(?:from|import)[ \t]([^#\n]{1,200})", re.MULTILINE)
+_OWNER = re.compile(r"(\w+)\.publish\(")
+
+
+def drop_slips_of_modules(slips: Iterable[PythonSlip], texts: Mapping[str, str]) -> tuple[PythonSlip, ...]:
+    """Return the slips without those of a file alone, such as a function that nothing in it calls, where another one of
+    the `texts` does it."""
+    named = {path: {*re.findall(r"\w+", " ".join(_IMPORT.findall(text)))} for path, text in texts.items()}
+    return tuple(one for one in slips if not _is_done_elsewhere(one, texts, named))
+
+
+def _is_done_elsewhere(slip: PythonSlip, texts: Mapping[str, str], named: Mapping[str, set[str]]) -> bool:
+    name = PurePosixPath(slip.file).stem
+    importing = [texts[path] for path, words in named.items() if name in words and path != slip.file]
+    if slip.kind == "no-init":
+        return any("init_node" in one for one in (*importing, *_imported(slip.file, texts, named)))
+    if slip.kind == "never-called":
+        word = rf"\b{re.escape(slip.name.rpartition('.')[2])}\b"
+    elif slip.kind == "never-published":
+        owner = _OWNER.search(slip.message.replace("(…)", "("))
+        word = rf"\b{re.escape(owner[1])}\b" if owner else "(?!)"
+    elif slip.kind == "object":
+        word = rf"\bdef {re.escape(slip.name)}\b"
+    else:
+        return False
+    return any(re.search(word, text) for text in importing)
+
+
+def _imported(file: str, texts: Mapping[str, str], named: Mapping[str, set[str]]) -> Iterator[str]:
+    """Yield the texts of the files that a file imports, and that these import."""
+    left, seen = [file], {file}
+    while left:
+        words = named.get(left.pop(), set())
+        for path in (one for one in texts if PurePosixPath(one).stem in words and one not in seen):
+            seen.add(path)
+            left.append(path)
+            yield texts[path]
