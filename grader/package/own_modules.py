@@ -16,14 +16,21 @@ def drop_slips_of_modules(slips: Iterable[PythonSlip], texts: Mapping[str, str])
     """Return the slips without those of a file alone, such as a function that nothing in it calls, where another one of
     the `texts` does it."""
     named = {path: {*re.findall(r"\w+", " ".join(_IMPORT.findall(text)))} for path, text in texts.items()}
-    return tuple(one for one in slips if not _is_done_elsewhere(one, texts, named))
+    given = tuple(slips)
+    # of a script and its module, the script is told that it is no node
+    without_init = {one.file for one in given if one.kind == "no-init"}
+    return tuple(one for one in given if not _is_done_elsewhere(one, texts, named, without_init))
 
 
-def _is_done_elsewhere(slip: PythonSlip, texts: Mapping[str, str], named: Mapping[str, set[str]]) -> bool:
+def _is_done_elsewhere(
+    slip: PythonSlip, texts: Mapping[str, str], named: Mapping[str, set[str]], without_init: set[str]
+) -> bool:
     name = PurePosixPath(slip.file).stem
-    importing = [texts[path] for path, words in named.items() if name in words and path != slip.file]
+    paths = [path for path, words in named.items() if name in words and path != slip.file]
+    importing = [texts[path] for path in paths]
     if slip.kind == "no-init":
-        return any("init_node" in one for one in (*importing, *_imported(slip.file, texts, named)))
+        others = (*importing, *_imported(slip.file, texts, named))
+        return not without_init.isdisjoint(paths) or any("init_node" in one for one in others)
     if slip.kind == "never-called":
         word = rf"\b{re.escape(slip.name.rpartition('.')[2])}\b"
     elif slip.kind == "never-published":
