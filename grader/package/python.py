@@ -336,11 +336,12 @@ def _reason_of_block(message: str, text: str, *, mixed: bool) -> Reason | None:
     if other_quotes(text) or (message.startswith("f-string") and _SAME_QUOTES.search(text)):
         why = "the quote inside the braces of this f-string ends it"
         return Reason(why, "write the other kind of quotes inside the braces")
-    empty = _EMPTY_BLOCK.match(message)
-    if empty and _EXCEPT.match(text):
+    commented = re.match(r"only comments in the block on line (\d+)", message)
+    empty = commented or _EMPTY_BLOCK.match(message)
+    if empty and not commented and _EXCEPT.match(text):
         why = f"there is nothing in the block on line {empty[1]}"
         return Reason(why, f"below line {empty[1]}, write `pass`")
-    if empty and _NEXT_BLOCK.match(text) and "class" not in message:
+    if empty and (commented or (_NEXT_BLOCK.match(text) and "class" not in message)):
         why = f"there are only comments in the block on line {empty[1]}"
         return Reason(why, f"below line {empty[1]}, write what it should do")
     return None

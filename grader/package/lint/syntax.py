@@ -305,7 +305,7 @@ def syntax_fault(error, data):
     if first is not None and lines[first][:1] not in "=>|":
         at = lines[first].find("{") + 1 or 1
         return fault("SyntaxError", first + 1, at, "invalid syntax", text=lines[first])
-    of_block = block_fault(lines, line, "unexpected indent" in str(error)) if known else None
+    of_block = block_fault(lines, line, str(error)) if known else None
     if of_block is not None:
         return of_block
     begins = {text[0] for text in lines if text[:1] in ("\t", " ") and text.strip()}
@@ -321,8 +321,18 @@ def syntax_fault(error, data):
     )
 
 
-def block_fault(lines, line, indented):
-    """Return the fault of a block whose first line is a comment, or which some of its lines are out of; None else."""
+def block_fault(lines, line, message):
+    """Return the fault of a block whose first line or whole body is a comment, or which some of its lines are out of;
+    None else."""
+    indented = "unexpected indent" in message
+    above = [n for n in range(line - 1) if lines[n].strip()]
+    head = next((n for n in reversed(above) if is_code(lines[n])), None)
+    comments = (
+        [n for n in above if head is not None and n > head] if "expected an indented" in message else []
+    )
+    if any(len(blanks_of(lines[n])) > len(blanks_of(lines[head])) for n in comments):
+        told = "only comments in the block on line %d" % (head + 1)
+        return fault("IndentationError", line, 1, told, text=lines[line - 1])
     head = commented_head(lines, line) if indented else None
     if head is not None:
         at, text = lines[head].index("#") + 1, lines[head]

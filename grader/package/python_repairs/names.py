@@ -227,6 +227,7 @@ def with_names(text: str) -> Iterator[Step]:
     known = bound | set(dir(builtins)) | {"__file__"}
     loaded = {n.id for n in nodes_in(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
     functions = {n.name for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)}
+    kept = made_by(nodes_in(tree))
     unread = [one for one in tree.body if isinstance(one, ast.FunctionDef) and one.name not in loaded]
     parts = (one for one in tree.body if not isinstance(one, ast.Import | ast.ImportFrom))
     blocks = (inner for one in parts for inner in (one.body if isinstance(one, ast.ClassDef) else [one]))
@@ -239,6 +240,8 @@ def with_names(text: str) -> Iterator[Step]:
         member_of = {n.value.id: n.attr for n in parts_of if isinstance(n.value, ast.Name)}
         given = {one: kind for one, kind in made_by(nodes_in(tree)).items() if one in own}
         values, idle = _values_in(block), _meant_calls(unread, block)
+        # what the object has is meant with `self.` before it
+        missing = [n for n in missing if f"self.{n.id}" not in kept] if "self" in bound else missing
         alone = {n.id for n in stated if isinstance(n, ast.Name) and is_one_edit(n.id.lower(), "pass")}
         for name in dict.fromkeys(n.id for n in missing):
             guards = name == "name" and any(_is_guard(one) for one in tree.body)

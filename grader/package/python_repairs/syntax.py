@@ -155,6 +155,8 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
     if not 0 <= at < len(lines):
         return
     yield "token", with_line(lines, at, ROSPY_COMMA.sub("rospy.", lines[at]))
+    if error["message"].startswith("expected an indented block") and _is_in_comments(lines, at):
+        return
     if "global declaration" in error["message"]:
         yield from _with_global_first(text, error["line"])
     yield from _in_their_blocks(lines, at, error["message"])
@@ -207,6 +209,13 @@ def _without_braces(lines: list[str]) -> str:
         else:
             kept.append(line)
     return "\n".join(kept)
+
+
+def _is_in_comments(lines: list[str], at: int) -> bool:
+    """Return whether comments stand where the block above a line has to be: its lines may be no part of that."""
+    above = list(takewhile(lambda line: not without_texts(line).strip(), reversed(lines[:at])))
+    comments = [_width(line) for line in above if line.strip()]
+    return bool(comments) and max(comments) > _width(lines[at - len(above) - 1])
 
 
 def _with_body_indented(lines: list[str], at: int) -> Iterator[str]:
