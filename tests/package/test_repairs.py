@@ -482,6 +482,9 @@ def test_what_few_students_write_and_is_right_is_left_alone(name: str, tmp_path:
 
 CPP_CMAKE = CMAKE.replace(" rospy", " roscpp") + "add_executable(a src/a.cpp)\n"
 LINKED = "target_link_libraries(a ${catkin_LIBRARIES})\n"
+OF_OWN = CMAKE.replace("rospy", "rospy geometry_msgs message_generation").replace(
+    "catkin_p", "add_message_files(FILES Own.msg)\ngenerate_messages(DEPENDENCIES geometry_msgs)\ncatkin_p"
+)
 RIGHT_BUILDS = {
     "linked-in-a-loop": {
         CMAKELISTS: CPP_CMAKE + "foreach(t a)\n  target_link_libraries(${t} ${catkin_LIBRARIES})\nendforeach()\n"
@@ -523,6 +526,12 @@ RIGHT_BUILDS = {
             "catkin_p", "add_message_files(FILES Own.msg)\ngenerate_messages(DEPENDENCIES arm_msgs)\ncatkin_p"),
         "msg/Own.msg": "geometry_msgs/Pose pose\n",
     },
+    "waits-with-its-library": {
+        CMAKELISTS: OF_OWN + "add_library(b src/b.cpp)\nadd_dependencies(b ${${PROJECT_NAME}_EXPORTED_TARGETS})\n"
+        "add_executable(a src/a.cpp)\ntarget_link_libraries(a b)\n",
+        "msg/Own.msg": "float64 b\n",
+        **dict.fromkeys(("src/a.cpp", "src/b.cpp"), "#include <lab/Own.h>\nint main() {}\n"),
+    },
     "bracket-of-no-tag": {
         **swapped(XML, ('"2">', '"2">>')), **swapped(LAUNCHED, ("<launch>", "<launch>\n  <!-- one --> -->"))
     },
@@ -551,9 +560,6 @@ def test_a_module_that_a_script_imports_needs_no_bit_and_no_first_line(tmp_path:
     assert find_repairs(folder, facts_of(folder), WANTED) == ()
 
 
-OF_OWN = CMAKE.replace("rospy", "rospy geometry_msgs message_generation").replace(
-    "catkin_p", "add_message_files(FILES Own.msg)\ngenerate_messages(DEPENDENCIES geometry_msgs)\ncatkin_p"
-)
 WALKER = CPP_CMAKE.replace("(a ", "(walker ")
 NODE_OF_CPP = ("</", '<node pkg="lab" type="walkr" name="a"/>\n</')
 WHOLE = {

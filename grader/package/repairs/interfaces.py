@@ -137,7 +137,7 @@ def wait_for_headers(files: Files, package: PackageFacts, name: str) -> None:
     }
     headers = "|".join(f"{re.escape(maker)}/(?:{stems})" for maker, stems in made.items())
     includes = re.compile(rf"#\s*include\s*[<\"]({headers})(?:Request|Response|Action)?\.h[>\"]")
-    waiting = {token.value for call in calls_of(files, "add_dependencies") for token in words_of(call)[:1]}
+    waiting = _waiting(files)
     found = []
     for call in calls_of(files, "add_executable") if made else ():
         target, *sources = [token.value for token in words_of(call)] or [""]
@@ -158,6 +158,18 @@ def wait_for_headers(files: Files, package: PackageFacts, name: str) -> None:
     targets = join_words(target for target, *_ in found)
     why = f"{targets} may be compiled before the headers of the messages"
     change_line(files, found[0][1], "\n".join(lines), why, "; ".join(fixes))
+
+
+def _waiting(files: Files) -> set[str]:
+    """Return the targets that wait for others: a program waits for what the libraries wait for that it links."""
+    waiting = {token.value for call in calls_of(files, "add_dependencies") for token in words_of(call)[:1]}
+    linked = [[token.value for token in words_of(c)] for c in calls_of(files, "target_link_libraries")]
+    for _ in linked:
+        more = {words[0] for words in linked if words and not waiting.isdisjoint(words[1:])} - waiting
+        if not more:
+            break
+        waiting |= more
+    return waiting
 
 
 def depend_on_exported(files: Files, package: PackageFacts, name: str) -> None:
