@@ -28,13 +28,14 @@ _NO_NAME = "unparsable"
 """What libxml2 calls a tag without a name."""
 _MISMATCH = r"tag mismatch: (\S+) line (\d+) and ([^\s,]+)"
 _NO_QUOTE = (r"Unescaped '<' not allowed in attr", r"AttValue: ['\"] expected")
+NEVER_ENDED = "a comment is opened by `<!--` and never closed"
 # libxml2's message and what it means ({0}, {1}: the pattern's groups, {root}: the root tag)
 _CAUSES: tuple[tuple[str, ...], ...] = (
     (r"Document is empty", "the file is empty", "write `<{root}>` and `</{root}>` into it"),
     (r"Start tag expected", "there is something before the first tag", "the file must start with `<{root}>`"),
     (NO_END, "`<{0}>` on line {1} is never closed", "add `</{0}>`"),
     (r"hyphen|must not contain '--'", "`--` is not allowed inside a comment `<!-- ... -->`", "delete it there"),
-    (r"Comment not terminated", "a comment is opened by `<!--` and never closed", "write `-->` where it ends"),
+    (r"Comment not terminated", NEVER_ENDED, "write `-->` where it ends"),
     (r"Extra content at the end",
      "text comes after the first block", "delete it, since only one `<{root}>` is allowed"),
     (r"XML declaration allowed only", "something comes before `<?xml ... ?>`", "delete it, blank lines too"),
@@ -167,7 +168,10 @@ def _fault(error: etree.XMLSyntaxError, parser: etree.XMLParser, data: bytes, fi
     known = 0 < column <= len(text) + 1
     # the error's own log holds what went wrong with other files before, too
     log = [str(entry.message)[:_MESSAGE_CHARS_MAX] for entry in islice(parser.error_log, _MESSAGES)]
-    reason, opened = _closed_early(message, data, root) or _explain(message, log, text, root=root)
+    known_by_text = _closed_early(message, data, root) or _stands_for_another(message, text)
+    reason, opened = known_by_text or _explain(message, log, text, root=root)
+    if reason.why == NEVER_ENDED:  # libxml2 says where the file ends
+        opened = data[: data.rfind(b"<!--")].count(b"\n") + 1
     reason = _by_columns(reason, data, opened) if opened else reason
     if opened and opened != line:
         line, text = opened, _line(data, opened)
@@ -280,6 +284,13 @@ def _mismatch(opened: str, line: int, closed: str, root: str) -> tuple[Reason, i
         return Reason(why, f"delete `</{closed}>`"), None
     fix = f"end it with `/>` or with `</{opened}>`"
     return Reason(f"{tag} is still open where `</{closed}>` comes", fix), line
+
+
+def _stands_for_another(message: str, line: str) -> tuple[Reason, None] | None:
+    """Return what is wrong with `type="<your script>"`, as handouts write it; None for another fault."""
+    found = re.search(r"=\s*[\"'](<[^<>=\"']+>)[\"']", line) if "Unescaped '<'" in message else None
+    why = f"`{found[1]}` stands for what you have to write there" if found else ""
+    return (Reason(why, "write that in its place, without `<` and `>`"), None) if found else None
 
 
 def _by_columns(reason: Reason, data: bytes, line: int) -> Reason:

@@ -61,7 +61,13 @@ def test_attributes_that_are_not_there_are_none():
         ("", 1, "the file is empty"),
         ("hello <launch/>", 1, "there is something before the first tag"),
         ("<launch>\n<!-- a -- b -->\n</launch>", 2, "`--` is not allowed inside a comment"),
-        ("<launch>\n<!-- a\n</launch>", 3, "never closed: write `-->`"),
+        ("<launch>\n<!-- a\n</launch>", 2, "never closed: write `-->`"),
+        ("<launch>\n<!-- a -->\n<!-- b\n<node/>\n</launch>", 3, "never closed: write `-->`"),
+        (
+            '<launch>\n<node pkg="lab" type="<your script>" name="a"/>\n</launch>',
+            2,
+            "`<your script>` stands for what you have to write there: write that in its place",
+        ),
         (
             '<launch>\n<node pkg="a">\n</launch>',
             2,
