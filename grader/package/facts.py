@@ -259,6 +259,8 @@ def is_near_python(data: bytes) -> bool:
 
 
 INTERFACES_MAX = 200
+OTHERS_MAX = 1_000
+"""So many packages that were handed in beside one are named in its facts."""
 INTERFACE_LIMIT_BYTES = 64_000
 
 
@@ -319,7 +321,9 @@ def read_packages(submission: Submission, commands: Collection[tuple[str, tuple[
     names = {one.name for one in (*submission.packages, *submission.also, submission.package)}
 
     def read(one: SourcePackage, hints: tuple[str, ...] = ()) -> PackageFacts:
-        return read_package(one, hints=hints, commands=commands, others=tuple(sorted(names - {one.name})))
+        return read_package(
+            one, hints=hints, commands=commands, others=tuple(sorted(names - {one.name})[:OTHERS_MAX])
+        )
 
     facts = read(submission.package, submission.hints)
     also = tuple(map(read, submission.also))
