@@ -19,6 +19,8 @@ _NO_COLON = re.compile(
     r"""(?P<key>\s*(?:- )?[A-Za-z_][\w-]*)(?:\s*(?P<sign>[=;,.])\s*|\s+)(?P<value>["'\w].*)"""
 )
 _KEY_ALONE = re.compile(r"(?P<key>\s*[A-Za-z_][\w-]*)\s*")
+_OPEN_LIST = re.compile(r"""(?P<key>\s*(?:- )?[A-Za-z_][\w-]*): +(?P<value>\[[^\[\]{}"']*[^\[\]{}"',\s])""")
+_KEY_BELOW = re.compile(r"\s*[A-Za-z_][\w-]*:(?:\s[^\]]*)?")
 _DASH_ALONE = re.compile(r"(?P<above>\s*)- .*")
 _NO_SPACE_AFTER_DASH = re.compile(r"(?P<above>\s*)-(?P<value>[^\s-].*)")
 _OPEN_QUOTE = re.compile(
@@ -59,6 +61,10 @@ def slip_of_yaml(text: str, until: int) -> YamlSlip | None:
             return YamlSlip(number, *found)
         below = next((one for one in lines[number:] if one.strip()), "")
         is_above_block = _indent(below) > _indent(code)
+        if (found := _OPEN_LIST.fullmatch(code)) and (not below or _KEY_BELOW.fullmatch(below)):
+            return YamlSlip(
+                number, "opens [ and does not close it", f"{found['key'].strip()}: {found['value']}]"
+            )
         if found := _slip_of_key(code, is_above_block=is_above_block) or _slip_of_value(code):
             return YamlSlip(number, *found)
     return None

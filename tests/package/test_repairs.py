@@ -568,6 +568,7 @@ WHOLE = {
         {"config/a.yaml": "details:\nname:\n    first: Ann\n    last: Lee\n  phone: 1\n"},
         "begin the line with 2 spaces",
     ),
+    "list of one line": ({"config/a.yaml": "limits: [1.0, 2.0\nspeed: 0.5\n"}, "write `limits: [1.0, 2.0]`"),
     "list": ({"config/a.yaml": "limits:\n  - 1.0\n  -2.0\n"}, "write `- 2.0`"),
     "program": (
         {CMAKELISTS: f"{WALKER}target_link_libraries(walker x)\n", **swapped(LAUNCHED, NODE_OF_CPP)},
