@@ -61,9 +61,9 @@ def slip_of_yaml(text: str, until: int) -> YamlSlip | None:
             return YamlSlip(number, *found)
         below = next((one for one in lines[number:] if one.strip()), "")
         is_above_block = _indent(below) > _indent(code)
-        if (found := _OPEN_LIST.fullmatch(code)) and (not below or _KEY_BELOW.fullmatch(below)):
+        if (open_list := _OPEN_LIST.fullmatch(code)) and (not below or _KEY_BELOW.fullmatch(below)):
             return YamlSlip(
-                number, "opens [ and does not close it", f"{found['key'].strip()}: {found['value']}]"
+                number, "opens [ and does not close it", f"{open_list['key'].strip()}: {open_list['value']}]"
             )
         if found := _slip_of_key(code, is_above_block=is_above_block) or _slip_of_value(code):
             return YamlSlip(number, *found)
