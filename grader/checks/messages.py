@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Sequence
-from itertools import chain, pairwise
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
@@ -24,6 +24,7 @@ from grader.checks.support.fields import (
     is_within,
     join_items,
     made_of,
+    near_texts,
     no_field,
     one_for_another,
     readings,
@@ -456,9 +457,9 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
     elif not any(r.values for r in found):
         verdict = no_field(found[0], channels)
     elif len(wrong) == len(asked) if params.when == "any" else wrong:
-        each = (differences(value, params.value, params.tolerance) for value in wrong[0].values)
-        nan = any(one.nan for one in chain.from_iterable(each))
-        verdict = _other_value(wrong, found, run, params)
+        nan = any(one.nan for v in wrong[0].values for one in differences(v, params.value, params.tolerance))
+        near = near_texts(wrong[0].values, params.value)
+        verdict = _other_value(wrong, found, run, params).seeking("quoted", *near)
         verdict = verdict if verdict.wrong else verdict.of_value(nan=nan)
     else:
         count = f"all of {plural(len(found), 'message')}" if params.when == "every" else which

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from grader.checks.support.fields import near_texts
 from grader.model.verdict import Status, Verdict
 from tests.checks.examples import judge_runs
 from tests.support.timeline import build_runs
@@ -71,3 +72,19 @@ def test_what_cannot_be_seen_in_a_message_is_named(hidden: str, shown: str) -> N
     found = verdict([f"The {hidden}time is {i / 10:.3f}" for i in range(60)], 10)
     assert found.status is Status.PARTIAL
     assert f"The {shown}time is 0.000" in found.message
+
+
+@pytest.mark.parametrize(
+    ("values", "wanted", "near"),
+    [
+        (["White"], "white", ("White",)),
+        (["whte", "white"], "white", ("whte",)),
+        (["red"], "white", ()),
+        ([3, ""], "white", ()),
+        (["White"], 3, ()),
+    ],
+)
+def test_texts_that_are_a_slip_of_the_right_one_are_sought_in_the_script(
+    values: list[object], wanted: object, near: tuple[str, ...]
+) -> None:
+    assert near_texts(values, wanted) == near

@@ -512,7 +512,9 @@ def _unknown_command(found: re.Match[str], package: PackageFacts, _lines: Sequen
     if name.lower() in OF_INTERFACES and has_catkin:
         why = f"{name}(…) comes with message_generation, which find_package(catkin …) does not name"
         call = next(iter(cmake_calls(package, name.lower())), None)
-        fix = "write find_package(catkin REQUIRED COMPONENTS … message_generation)"
+        catkin = [one for one in cmake_calls(package, "find_package") if one.args[:1] == ("catkin",)]
+        words = "" if "COMPONENTS" in catkin[0].args else "COMPONENTS "
+        fix = f"in the find_package(…) on line {catkin[0].line}, add {words}message_generation"
         if call is not None and not package.interfaces:
             fix = f"delete {name}(…), line {call.line}: the package has no messages, services or actions of its own"
         return Explained(why, fix, by_itself=True)

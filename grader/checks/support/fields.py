@@ -17,7 +17,7 @@ from typing import Annotated, Any, NamedTuple, Protocol, TypeGuard
 from pydantic import AfterValidator
 
 from grader.checks.support.processes import plain_type
-from grader.checks.support.text import shown
+from grader.checks.support.text import near_names, shown
 from grader.evidence.run import Channel
 from grader.model.message_definitions import NOT_FINITE
 from grader.model.verdict import Verdict, failed_or_blocked, grade_again
@@ -214,6 +214,12 @@ def differences(got: object, wanted: object, tolerance: float, path: str = "") -
         why = f"{value_text(got)}, not {value_text(wanted)}{_kinds(got, wanted)}"
         nan = any(isinstance(one, float) and math.isnan(one) for one in (got, wanted))
         yield Difference(path, f"{why}{unit_slip(got, wanted)}", nan)
+
+
+def near_texts(values: Iterable[object], wanted: object) -> tuple[str, ...]:
+    """Return the texts among the values that look like a slip of the text that is wanted."""
+    texts = [one for one in values if isinstance(one, str) and one]
+    return near_names(wanted, texts) if isinstance(wanted, str) else ()
 
 
 def _in_fields(
