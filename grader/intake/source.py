@@ -28,7 +28,7 @@ _SCP = re.compile(
 )
 _HOST_AND_PATH = re.compile(r"(www\.|[\w-]+\.(com|org|edu|net|io|ac\.uk)/)")
 # what `git check-ref-format` refuses; a leading hyphen would be an option
-_NO_REF = re.compile(r"[\x00-\x20~^:?*\[\\\x7f]|\.\.|@\{|//|^[/-]|[/.]$")
+NO_REF = re.compile(r"[\x00-\x20~^:?*\[\\\x7f]|\.\.|@\{|//|^[/-]|[/.]$")
 _SOURCES = "Give a folder, a .zip or .tar.gz, or a git URL with an optional @branch, @tag or @commit."
 
 
@@ -131,7 +131,7 @@ def _splits(text: str) -> list[tuple[str, str]]:
 
 
 def _is_ref(text: str) -> bool:
-    return bool(text) and _NO_REF.search(text) is None
+    return bool(text) and NO_REF.search(text) is None
 
 
 def _no_ref(text: str) -> UsageError:

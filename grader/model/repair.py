@@ -153,14 +153,15 @@ def _where_and_how(repair: Repair) -> tuple[str, str]:
     replaced, script = repair.before not in (new[0], new[-1]), repair.file.endswith(".py")
     if replaced:
         # In Python the indentation is a part of what to write.
-        moved = script and _blanks(new[0]) != _blanks(repair.before)
+        moved = script and indent_of(new[0]) != indent_of(repair.before)
         return place_of(repair), f"write {code}{_indentation(new[0]) if moved else ''}"
     where = "below" if repair.before == new[0] else "above"
     depth = _indentation(new[1] if where == "below" else new[0]) if script else ""
     return repair.file, f"{where} line {repair.line} add {code}{depth}"
 
 
-def _blanks(line: str) -> str:
+def indent_of(line: str) -> str:
+    """Return the blanks with which the line begins."""
     return line[: len(line) - len(line.lstrip())]
 
 
@@ -189,7 +190,7 @@ def _is_rewritten(one: Repair, later: Repair) -> bool:
 
 def _indentation(line: str) -> str:
     """Return how an indented line begins, as it has to be typed: with the tabs or the spaces of the lines beside it."""
-    blanks = _blanks(line)
+    blanks = indent_of(line)
     counts = ((blanks.count("\t"), "tab"), (blanks.count(" "), "space"))
     words = join_words(plural(count, kind) for count, kind in counts if count)
     return f", with {words} before it" if words else ""

@@ -32,6 +32,7 @@ from grader.rubric.yaml_lines import (
     dotted,
     give_one,
     given_steps,
+    starts_of,
 )
 from grader.wording import did_you_mean, join_words
 
@@ -331,10 +332,9 @@ def _means(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
 
 def _has_tests(scenario: dict[str, Any]) -> bool:
     """Return whether it has tests, until whose end it lasts."""
-    starts = [start for _, start in as_maps(scenario.get("start"))]
     return any(
         start.get("tests") is not None or str(start.get("program")).endswith(ROSTEST_ENDING)
-        for start in starts
+        for start in starts_of(scenario)
     )
 
 
@@ -440,7 +440,7 @@ def _until(path: KeyPath, until: dict[str, Any], scenario: dict[str, Any]) -> It
         if name.startswith("/"):
             fault = f"is for programs that are asked to open something, like firefox: write messages: {{{name}: 1}}"
             yield (*path, "opened", index), fault
-    names = [str(start.get("name")) for _, start in as_maps(scenario.get("start"))]
+    names = [str(start.get("name")) for start in starts_of(scenario)]
     for index, name in as_texts(until.get("ended")):
         if name not in names:
             yield (*path, "ended", index), f'there is no start "{name}"{did_you_mean(name, names)}'

@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import PurePosixPath
 from typing import Any, NamedTuple, TypeGuard
 
-from grader.checks.support.fields import is_number
+from grader.checks.support.fields import PATH_PARTS, is_number
 from grader.evidence.decode import full_definition
 from grader.evidence.definitions import Field, Types, parse
 from grader.evidence.message_values import ANGLES, CLOCKS, FORMS, NOW, MessageType
@@ -26,8 +26,6 @@ ALMOST = 0.87
 SUFFIXES = {part: suffix for suffix, parts in PARTS.items() for part in parts}
 """The ending of the file in which a part is defined."""
 KINDS = {"string": "a text", "bool": "true or false"}
-PATH_PARTS = re.compile(r"[A-Za-z]\w*|\[(?:\d+|\*)\]")
-"""The parts of a field's path: names, and items of lists."""
 
 
 def slip_of(name: str, there: Iterable[str]) -> str:

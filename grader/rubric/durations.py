@@ -12,7 +12,16 @@ from grader.checks.conditions import Condition
 from grader.checks.rate import RateParams
 from grader.checks.support.fields import Reading, is_number
 from grader.rubric.scenario import ROSTEST_ENDING, Action, Probe, Scenario, Step, Until
-from grader.rubric.yaml_lines import Fault, KeyPath, WrittenCriterion, as_list, as_map, as_maps, given_steps
+from grader.rubric.yaml_lines import (
+    Fault,
+    KeyPath,
+    WrittenCriterion,
+    as_list,
+    as_map,
+    as_maps,
+    given_steps,
+    starts_of,
+)
 from grader.wording import significant
 
 FASTEST_HZ = 100
@@ -99,7 +108,7 @@ def longest_s(scenario: dict[str, Any], played_s: float | None = None) -> float 
     first_s, limit_s = _until(scenario, "first_message_s"), _until(scenario, "limit_s")
     warp = scenario.get("warp", Scenario.model_fields["warp"].default)
     warp = warp if scenario.get("clock") == "warped" else 1
-    steps, starts = _read_steps(scenario), [start for _, start in as_maps(scenario.get("start"))]
+    steps, starts = _read_steps(scenario), starts_of(scenario)
     if steps is None or "recording" in scenario or not all(map(is_number, (first_s, limit_s, warp))):
         return None
     # Their own length is not in the rubric.

@@ -31,6 +31,7 @@ from grader.rubric.yaml_lines import (
     dotted,
     give_one,
     items_in,
+    starts_of,
 )
 from grader.wording import did_you_mean, join_words
 
@@ -306,7 +307,7 @@ def inputs_with_values(
         for kind, part in parts
         if names & names_in(part)
     ]
-    for _, start in as_maps(scenario.get("start")):
+    for start in starts_of(scenario):
         args = [arg for _, arg in as_texts(start.get("args")) if names & names_in(arg)]
         found += [f"the argument {place(arg, values)}" for arg in args]
     return list(dict.fromkeys(found))

@@ -40,6 +40,7 @@ from grader.rubric.yaml_lines import (
     as_list,
     as_map,
     as_maps,
+    given_steps,
     items_in,
     parts_of,
     services_in,
@@ -412,8 +413,8 @@ def _asked(
     part = {"calls": "request", "service-answers": "response", "action-result": "result"}.get(check, "")
     name = given.get("action" if part == "result" else "service")
     services = [(one.get("service"), one) for _, _, one in services_in(scenario)]
-    of_actions = [as_map(step.get("action")) for _, step in as_maps(scenario.get("steps"))]
-    of_actions += [one for _, one in as_maps(scenario.get("serves")) if one.get("action")]
+    offered = [one for _, one in as_maps(scenario.get("serves")) if one.get("action")]
+    of_actions = [*given_steps(scenario, "action"), *offered]
     actions = [(one.get("name") or one.get("action"), one) for one in of_actions]
     of_action = part == "request" and any(name == called for called, _ in actions)
     about = next((one for called, one in (*services, *actions) if called == name and name), None)

@@ -12,8 +12,8 @@ from pydantic import ValidationError
 
 from grader.checks.conditions import Condition
 from grader.checks.registry import Check
-from grader.checks.support.fields import Reading, is_number
-from grader.rubric.definitions import PATH_PARTS, is_form
+from grader.checks.support.fields import PATH_PARTS, Reading, is_number
+from grader.rubric.definitions import is_form
 from grader.rubric.durations import (
     early_faults,
     late_faults,

@@ -22,6 +22,7 @@ from grader.rubric.yaml_lines import (
     as_map,
     as_maps,
     as_texts,
+    given_steps,
     parts_of,
     set_in,
     starts_of,
@@ -308,7 +309,7 @@ def _unknown_causes(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Itera
 def _of_actions(scenario: dict[str, Any]) -> Iterator[str]:
     """Yield the topics of the actions that the grader offers or asks: `/dock/goal`, `/dock/cancel`, …"""
     offered = [one.get("action") for _, one in as_maps(scenario.get("serves"))]
-    asked = [as_map(step.get("action")).get("name") for _, step in as_maps(scenario.get("steps"))]
+    asked = [action.get("name") for action in given_steps(scenario, "action")]
     for name in filter(None, (*offered, *asked)):
         yield from (f"{name}/{part}" for part in ("goal", "cancel", "status", "feedback", "result"))
 

@@ -260,7 +260,7 @@ def _transform(at: KeyPath, transform: dict[str, Any]) -> Iterator[Fault]:
 
 def _processes(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
     """Yield the faults of steps that start, stop or type to a process."""
-    starts = {str(start.get("name")): start for _, start in as_maps(scenario.get("start"))}
+    starts = {str(start.get("name")): start for start in starts_of(scenario)}
     steps = as_maps(scenario.get("steps"))
     named = [
         (kind, step[kind]) for _, step in steps for kind in PROCESS_STEPS if isinstance(step.get(kind), str)

@@ -25,7 +25,8 @@ from grader.wording import join_words, plural, significant
 
 ROUNDING = 1e-6
 _STEP = r"[A-Za-z]\w*(?:\[(?:\d+|\*)\])*"
-_PARTS = re.compile(r"[A-Za-z]\w*|\[(?:\d+|\*)\]")
+PATH_PARTS = re.compile(r"[A-Za-z]\w*|\[(?:\d+|\*)\]")
+"""The parts of a field's path: names, and items of lists."""
 
 
 def _sound(path: str) -> str:
@@ -44,7 +45,7 @@ class NoField(LookupError):
 def values_at(message: Any, path: str) -> list[Any]:  # noqa: ANN401 - decoded messages hold anything
     """Return all values that the path names, several where it holds `[*]`. Raises NoField."""
     found, done = [message], ""
-    for part in _PARTS.findall(path):
+    for part in PATH_PARTS.findall(path):
         found = [item for one in found for item in _step(one, part, done)]
         done += part if part.startswith("[") else f".{part}" if done else part
     return found

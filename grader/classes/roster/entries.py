@@ -25,7 +25,7 @@ from urllib.parse import unquote
 from grader.errors import GraderError, SubmissionError, UsageError
 from grader.files import read_given
 from grader.intake.names import brief, encodable, folder_key, is_archive_name, is_package_name
-from grader.intake.source import parse_source
+from grader.intake.source import NO_REF, parse_source
 from grader.model.batch import Entry, Roster, RosterFault
 
 BYTES_MAX = 32 << 20
@@ -247,7 +247,6 @@ _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://|[^/\s@]+@[^/\s:]+:|[\w.-]{2,}
 _WINDOWS = re.compile(r"[A-Za-z]:[\\/]|.*\\", re.DOTALL)
 _SLASHES = re.compile(r"(https?|ssh|git|file):(?!//)", re.IGNORECASE)
 _WEB = re.compile(r"(www\.|[\w-]+(\.[\w-]+)*\.(com|org|edu|net|io|de|fr|it|es|uk)/)\S")
-_NO_REF = re.compile(r"[\x00-\x20~^:?*\[\\\x7f]|\.\.|@\{|//|^[/-]|[/.]$")
 
 
 def source_fault(source: str, base: Path, local: Local = OWN_FOLDER) -> str:
@@ -294,7 +293,7 @@ def whole_source(source: str, base: Path) -> str:
 
 def ref_fault(ref: str) -> str:
     """Return why `ref` names no branch, tag or commit; empty where it may."""
-    return f"{brief(ref)} cannot be the name of a branch, tag or commit" if _NO_REF.search(ref) else ""
+    return f"{brief(ref)} cannot be the name of a branch, tag or commit" if NO_REF.search(ref) else ""
 
 
 def _without_password(source: str) -> str:

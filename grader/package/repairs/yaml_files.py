@@ -10,6 +10,7 @@ from typing import NamedTuple
 import yaml
 
 from grader.model.package import PackageFacts
+from grader.model.repair import indent_of
 from grader.package.repairs.editing import Files, keep_first_version
 from grader.package.repairs.names import Wanted
 from grader.wording import on_lines, plural
@@ -136,14 +137,14 @@ def _values(text: str) -> dict[tuple[str, ...], tuple[int, int]]:
 def _without_fault(text: str, at: int, wanted: Wanted) -> _Repaired | None:
     """Return the text without its first fault, that was noticed at line `at`; None where no line is plainly wrong."""
     lines = text.split("\n")
-    tabbed = next((n for n, line in enumerate(lines, 1) if "\t" in _blanks(line)), None)
+    tabbed = next((n for n, line in enumerate(lines, 1) if "\t" in indent_of(line)), None)
     if tabbed is not None and tabbed <= at:
         why = f"line {tabbed} of {{path}} is indented with a tab, which YAML does not accept"
         plain = [_Repaired(one, why, _begin(one, lines, tabbed)) for one in _untabbed(lines, tabbed)]
         return _best(plain, wanted)
     if slip := slip_of_yaml(text, at):
         comment = re.search(r"\s+#.*", lines[slip.number - 1])
-        changed = f"{_blanks(lines[slip.number - 1])}{slip.right}{comment[0] if comment else ''}"
+        changed = f"{indent_of(lines[slip.number - 1])}{slip.right}{comment[0] if comment else ''}"
         repaired = "\n".join([*lines[: slip.number - 1], changed, *lines[slip.number :]])
         return _Repaired(repaired, f"line {slip.number} of {{path}} {slip.why}", f"write `{slip.right}`")
     why = "line {} of {{path}} does not line up with the lines beside it"
@@ -157,7 +158,7 @@ def _untabbed(lines: list[str], number: int) -> Iterator[str]:
     """Yield the text with the line in the column of a line beside it, and with as many spaces for each tab."""
     yield from _moved(lines, number)
     for spaces in (2, 4):
-        yield "\n".join(_blanks(line).replace("\t", " " * spaces) + line.lstrip() for line in lines)
+        yield "\n".join(indent_of(line).replace("\t", " " * spaces) + line.lstrip() for line in lines)
 
 
 def _begin(text: str, lines: list[str], number: int) -> str:
@@ -165,7 +166,7 @@ def _begin(text: str, lines: list[str], number: int) -> str:
     changed = text.split("\n")
     if sum(one != other for one, other in zip(changed, lines, strict=True)) > 1:
         return "indent with spaces only, two per level"
-    return f"begin the line with {plural(len(_blanks(changed[number - 1])), 'space')}"
+    return f"begin the line with {plural(len(indent_of(changed[number - 1])), 'space')}"
 
 
 def _moved(lines: list[str], number: int) -> Iterator[str]:
@@ -173,7 +174,7 @@ def _moved(lines: list[str], number: int) -> Iterator[str]:
     if not 0 < number <= len(lines):
         return
     others = [line for line in (*reversed(lines[: number - 1]), *lines[number:]) if line.strip()]
-    for blanks in [*dict.fromkeys(map(_blanks, others))][:COLUMNS_MAX]:
+    for blanks in [*dict.fromkeys(map(indent_of, others))][:COLUMNS_MAX]:
         changed = blanks + lines[number - 1].lstrip()
         if "\t" not in blanks and changed != lines[number - 1]:
             yield "\n".join([*lines[: number - 1], changed, *lines[number:]])
@@ -185,13 +186,9 @@ def _best(candidates: list[_Repaired], wanted: Wanted) -> _Repaired | None:
     names = {tuple(name.strip("/").split("/")) for name in wanted.params}
 
     def quality(one: _Repaired) -> tuple[int, int]:
-        return len(names & _paths(one.text)), -len({len(_blanks(line)) for line in one.text.split("\n")})
+        return len(names & _paths(one.text)), -len({len(indent_of(line)) for line in one.text.split("\n")})
 
     return max(readable, key=quality, default=None)
-
-
-def _blanks(line: str) -> str:
-    return line[: len(line) - len(line.lstrip())]
 
 
 def _fault_in(text: str) -> int | None:
