@@ -3,6 +3,6 @@
 A module here has no `from __future__ import annotations`, since the parser is made from the annotations.
 """
 
-from grader.cli.commands import students, grading, classes, labs, integrations  # noqa: I001 - their order
+from grader.cli.commands import grading, classes, labs, integrations  # noqa: I001 - their order
 
-__all__ = ["classes", "grading", "integrations", "labs", "students"]
+__all__ = ["classes", "grading", "integrations", "labs"]
