@@ -6,35 +6,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
 
 from grader import pipeline
-from grader.authoring.rubric_draft import (
-    ANSWERED,
-    ANSWERS_S,
-    ASKED,
-    MADE_UP,
-    SENT,
-    WAIT,
-    Observed,
-    Parts,
-    RubricEntry,
-    Topic,
-    answers_to,
-    calls_of,
-    dump_flow,
-    find_parts,
-    first_look,
-    format_number,
-    heard_template,
-    observe,
-    plain_fields,
-    printed_answer,
-    probe_for,
-    rubric_text,
-    second_look,
-    serves_of,
-    start_alone,
-    step_for,
-    wraps_of,
-)
+from grader.authoring import rubric_draft
+from grader.authoring.rubric_draft import Observed, Parts, RubricEntry, Topic
 from grader.checks.build import judge_build
 from grader.checks.package_files import RUNTIME_KINDS
 from grader.checks.stamps import StampsParams
@@ -174,14 +147,16 @@ class Proposal:
             call = f"- call: {{service: {service}, type: {kind}, request: {self._request(kind)}}}"
             self.notes.append(f"what {service} answers is not covered: a step can call it, {call}")
             return
-        calls = calls_of(self._seen[name], self._facts.interfaces)
+        calls = rubric_draft.calls_of(self._seen[name], self._facts.interfaces)
         times_ns = [t for t, e in run.actors if e.action in {"call", "answer"}] if run else []
         waits_ns = (end - begin for begin, end in zip(times_ns[::2], times_ns[1::2], strict=False))
         if max(waits_ns, default=0) < QUICK_S * NS:
             # a service that sleeps is not waited for as long as one that computes
             calls = [call | {"limit_s": QUICK_LIMIT_S} for call in calls]
-        self.scenarios[scenario] = start_alone(self._parts, name, ASKED, calls=calls, until={"nodes": 1})
-        parameters = {"service": service, "expect": list(map(plain_fields, answers))}
+        self.scenarios[scenario] = rubric_draft.start_alone(
+            self._parts, name, rubric_draft.ASKED, calls=calls, until={"nodes": 1}
+        )
+        parameters = {"service": service, "expect": list(map(rubric_draft.plain_fields, answers))}
         if len(answers) > 1 and all(answer == answers[0] for answer in answers):
             self.notes.append(
                 f"{service} answers all calls alike: give them requests with answers of their own"
@@ -192,9 +167,9 @@ class Proposal:
 
     def _client(self, name: str, file: str, run: Run, requires: list[str]) -> None:
         """Ask for what a program asks of a service of the package's, and prints of its answer."""
-        scenario, serves = f"{name}-served", serves_of(name, self._seen, self._facts.interfaces)
-        self.scenarios[scenario] = start_alone(
-            self._parts, name, ANSWERED, serves=serves, until={"quiet_s": 2}
+        scenario, serves = f"{name}-served", rubric_draft.serves_of(name, self._seen, self._facts.interfaces)
+        self.scenarios[scenario] = rubric_draft.start_alone(
+            self._parts, name, rubric_draft.ANSWERED, serves=serves, until={"quiet_s": 2}
         )
         for served in serves:
             service, answer = served["service"], served["answer"]
@@ -202,11 +177,14 @@ class Proposal:
             if not asked:
                 self.notes.append(f"{file} looked for {service} and did not call it, which is not covered")
                 continue
-            parameters: RubricEntry = {"service": service, "expect": list(map(plain_fields, asked))}
+            parameters: RubricEntry = {
+                "service": service,
+                "expect": list(map(rubric_draft.plain_fields, asked)),
+            }
             title, id_ = f"{file} calls {service}", f"{name}-calls-{label_of(service)}"
             needs: RubricEntry = {"scenario": scenario, "requires": requires}
             calls = self._add(id_, title, "calls", parameters, **needs)
-            if printed := printed_answer(run, answer):
+            if printed := rubric_draft.printed_answer(run, answer):
                 needs["requires"] = [calls]
                 title = f"{file} prints the answer"
                 self._add(f"{name}-prints", title, "prints", {"process": name, **printed}, **needs)
@@ -233,7 +211,7 @@ class Proposal:
         )
         if seen.ended:
             until = {"quiet_s": 2}
-        self.scenarios[name] = start_alone(self._parts, name, " in real time", until=until)
+        self.scenarios[name] = rubric_draft.start_alone(self._parts, name, " in real time", until=until)
 
     def _life(self, name: str, script: str, seen: Observed, requires: list[str]) -> str:
         anonymous = "required" if seen.anonymous else "allowed"
@@ -266,7 +244,10 @@ class Proposal:
         )
         needs: RubricEntry = {"scenario": name, "requires": [kind, node]}
         if topic.rate_hz:
-            parameters: RubricEntry = {"topic": topic.name, "rate_hz": format_number(topic.rate_hz)}
+            parameters: RubricEntry = {
+                "topic": topic.name,
+                "rate_hz": rubric_draft.format_number(topic.rate_hz),
+            }
             hz = f"{topic.name} runs at {topic.rate_hz:g} Hz"
             self._add(f"{label}-rate", hz, "rate", parameters, **needs, reproduce=f"rostopic hz {topic.name}")
         stamped = {"topic": topic.name}
@@ -291,14 +272,14 @@ class Proposal:
 
     def _counter(self, name: str, topic: Topic, requires: list[str], fast: Run | None) -> None:
         label, about = self._label(name, topic), {"topic": topic.name}
-        wrap = wraps_of(fast, topic.name) if fast else None
-        rate: RubricEntry = {"rate_hz": format_number(topic.rate_hz)} if topic.rate_hz else {}
+        wrap = rubric_draft.wraps_of(fast, topic.name) if fast else None
+        rate: RubricEntry = {"rate_hz": rubric_draft.format_number(topic.rate_hz)} if topic.rate_hz else {}
         needs: RubricEntry = {"scenario": name, "requires": requires}
         if wrap:
             last, first = wrap
             words = f" with a fast clock, {WRAPS} times around"
             until = {"messages": {topic.name: WRAPS * (last - first + 1) + 2}}
-            self.scenarios[f"{name}-fast"] = start_alone(
+            self.scenarios[f"{name}-fast"] = rubric_draft.start_alone(
                 self._parts, name, words, clock="warped", until=until
             )
             needs["scenario"] = f"{name}-fast"
@@ -313,15 +294,15 @@ class Proposal:
 
     def _hearing(self, name: str, script: str, seen: Observed, requires: list[str]) -> None:
         run = self._runs.get(f"{name}-hears")
-        found = {t: k for t, k in seen.listens.items() if run and probe_for(t, k)}
-        heard = {t: template for t in found if run and (template := heard_template(run, t))}
+        found = {t: k for t, k in seen.listens.items() if run and rubric_draft.probe_for(t, k)}
+        heard = {t: template for t in found if run and (template := rubric_draft.heard_template(run, t))}
         self._answering(name, script, {t: k for t, k in seen.listens.items() if t not in heard}, requires)
         if not heard:
             return
         scenario = f"{name}-hears"
-        probes = [probe_for(topic, found[topic]) for topic in heard]
-        self.scenarios[scenario] = start_alone(
-            self._parts, name, MADE_UP, probes=probes, until={"heard": True}
+        probes = [rubric_draft.probe_for(topic, found[topic]) for topic in heard]
+        self.scenarios[scenario] = rubric_draft.start_alone(
+            self._parts, name, rubric_draft.MADE_UP, probes=probes, until={"heard": True}
         )
         for topic, template in heard.items():
             parameters = {"topic": topic} | ({"template": template} if template != "{value}" else {})
@@ -333,7 +314,7 @@ class Proposal:
         """Return the topics on which a node was seen to answer what it heard on one."""
         run = self._runs.get(f"{name}-answers")
         periodic = {one.name for one in self._seen[name].topics if one.rate_hz}
-        return set(answers_to(run, topic, ANSWERS_S)) - periodic if run else set()
+        return set(rubric_draft.answers_to(run, topic, rubric_draft.ANSWERS_S)) - periodic if run else set()
 
     def _answering(self, name: str, script: str, listens: Mapping[str, str], requires: list[str]) -> None:
         """Ask for what it publishes upon what it hears and does not print."""
@@ -341,18 +322,24 @@ class Proposal:
         for topic, kind in listens.items():
             found = self._answers(name, topic)
             if not found:
-                step = step_for(topic, kind)["publish"]
+                step = rubric_draft.step_for(topic, kind)["publish"]
                 words = f"{script} listens to {topic} ({kind}), which is not covered: a step can send it something, "
-                self.notes.append(f"{words}- publish: {dump_flow(step)}")
+                self.notes.append(f"{words}- publish: {rubric_draft.dump_flow(step)}")
                 continue
-            steps.append(step_for(topic, kind))
+            steps.append(rubric_draft.step_for(topic, kind))
             for answer in sorted(found):
-                parameters = {"cause": {"topic": topic}, "effect": {"topic": answer}, "within_s": ANSWERS_S}
+                parameters = {
+                    "cause": {"topic": topic},
+                    "effect": {"topic": answer},
+                    "within_s": rubric_draft.ANSWERS_S,
+                }
                 id_ = f"{name}-answers-{label_of(topic)}-{label_of(answer)}"
                 title = f"{PurePosixPath(script).name} publishes on {answer} after each message on {topic}"
                 self._add(id_, title, "reacts", parameters, scenario=scenario, requires=requires)
         if steps:
-            self.scenarios[scenario] = start_alone(self._parts, name, SENT, steps=[*steps, WAIT])
+            self.scenarios[scenario] = rubric_draft.start_alone(
+                self._parts, name, rubric_draft.SENT, steps=[*steps, rubric_draft.WAIT]
+            )
 
     def _launch(self, name: str, launch: str, seen: Observed) -> None:
         file = next(f for f in self._facts.launch_files if PurePosixPath(f.path).name == launch)
@@ -424,20 +411,24 @@ def propose_rubric(
     with temporary_folder("new") as folder:
         submission = open_submission(source, package=package, workdir=folder / "source")
         facts = read_package(submission.package)
-        parts = find_parts(submission.package.folder, facts)
+        parts = rubric_draft.find_parts(submission.package.folder, facts)
         if not parts.nodes and not parts.launches:
             raise SubmissionError(
                 f"{package} has no node and no launch file", hint="name a finished solution"
             )
-        runs = _record_runs(source, first_look(package, parts), folder / "first", options, progress)
-        seen = {name: observe(runs[name]) for name in (*parts.nodes, *parts.launches)}
-        again = second_look(package, parts, seen, facts.interfaces)
+        runs = _record_runs(
+            source, rubric_draft.first_look(package, parts), folder / "first", options, progress
+        )
+        seen = {name: rubric_draft.observe(runs[name]) for name in (*parts.nodes, *parts.launches)}
+        again = rubric_draft.second_look(package, parts, seen, facts.interfaces)
         if again is not None:
             runs |= _record_runs(source, again, folder / "second", options, progress)
         if "package" in runs:  # with what the build said of CMakeLists.txt
             facts = package_facts(runs["package"])
         proposal = Proposal(facts, parts, seen, runs)
-        return rubric_text(package, rubric_id, proposal.scenarios, proposal.criteria, proposal.notes)
+        return rubric_draft.rubric_text(
+            package, rubric_id, proposal.scenarios, proposal.criteria, proposal.notes
+        )
 
 
 def _record_runs(

@@ -22,25 +22,7 @@ from pydantic import ValidationError
 from grader.checks.support.scripts import PYTHON, copies_of, find_script, installed, names_script
 from grader.evidence.events import CATKIN_MAKE, PACKAGE_RUN
 from grader.evidence.run import Run
-from grader.judging.repair_charges import (
-    BUILD,
-    DONE_BEFORE_RUNS,
-    INSTALL,
-    MADE_BY_BUILDS,
-    NAMES,
-    OF_BUILDS,
-    OF_PACKAGES,
-    asks_for,
-    charge_repairs,
-    charged_verdict,
-    cites_file,
-    fails_in,
-    is_next_fault,
-    is_unmade,
-    lines_read_now,
-    shared_verdict,
-    words_of,
-)
+from grader.judging import repair_charges
 from grader.model.package import PackageFacts
 from grader.model.repair import OF_LOGIC, Repair
 from grader.model.result import CriterionResult, Repaired
@@ -105,7 +87,7 @@ def needs_build(package: PackageFacts | None) -> bool:
     """Return whether its nodes need what the build makes: messages, programs, modules. Scripts run without."""
     packages = (package, *package.also) if package is not None else ()
     paths = [PurePosixPath(file.path) for one in packages for file in one.files]
-    return any(path.suffix in MADE_BY_BUILDS or path.name == "setup.py" for path in paths)
+    return any(path.suffix in repair_charges.MADE_BY_BUILDS or path.name == "setup.py" for path in paths)
 
 
 def programs_of_build(package: PackageFacts) -> set[str]:
@@ -161,7 +143,7 @@ def apply_repaired_copy(
         for c in rubric.criteria
     }
     better = {c.id for c in rubric.criteria if _is_better(first, on_copy, c, needs[c.id])}
-    charges = charge_repairs(rubric, first, better, needs)
+    charges = repair_charges.charge_repairs(rubric, first, better, needs)
     for criterion in rubric.criteria:
         charged = tuple(one for one in repairs if criterion.id in charges.get(one, ()))
         needed = needs[criterion.id] or charged
@@ -174,11 +156,13 @@ def apply_repaired_copy(
         placed = with_names_as_handed_in(copy, repairs)
         if charged:
             own = _without_others(verdict, [one for one in needed if one not in charged])
-            verdicts[criterion.id] = charged_verdict(own, copy, told, cited_lines(placed.citations))
+            verdicts[criterion.id] = repair_charges.charged_verdict(
+                own, copy, told, cited_lines(placed.citations)
+            )
         else:
-            verdicts[criterion.id] = shared_verdict(placed, told, share)
+            verdicts[criterion.id] = repair_charges.shared_verdict(placed, told, share)
         uses[criterion.id] = Repaired(repairs=told, share=share, charged=bool(charged))
-    installing = {c.id for c in rubric.criteria if c.check == INSTALL}
+    installing = {c.id for c in rubric.criteria if c.check == repair_charges.INSTALL}
     return {i: _at_new_paths(v, repairs) if i in installing else v for i, v in verdicts.items()}, uses
 
 
@@ -193,8 +177,8 @@ def _is_better(
     verdict, copy = first[criterion.id], on_copy[criterion.id]
     return verdict.status.is_lost and (
         not _is_worse(first, on_copy, criterion)
-        or is_next_fault(verdict, copy, needed)
-        or (copy.of_machine and any(fails_in(verdict, one) for one in needed))
+        or repair_charges.is_next_fault(verdict, copy, needed)
+        or (copy.of_machine and any(repair_charges.fails_in(verdict, one) for one in needed))
     )
 
 
@@ -220,7 +204,7 @@ def _at_new_paths(verdict: Verdict, repairs: Iterable[Repair]) -> Verdict:
 def _without_others(verdict: Verdict, others: Sequence[Repair]) -> Verdict:
     """Return the loss as blocked where what was found is in lines that other repairs made readable: the criterion that
     these are charged to tells it."""
-    if cited_lines(verdict.citations).isdisjoint(lines_read_now(others)):
+    if cited_lines(verdict.citations).isdisjoint(repair_charges.lines_read_now(others)):
         return verdict
     return verdict.model_copy(update={"status": Status.BLOCKED, "citations": ()})
 
@@ -249,18 +233,24 @@ def concerns(
         return criterion.check not in of_others and is_used_by(
             rubric.scenarios[criterion.scenario], repair, rubric, built=built, launched=launched
         )
-    if repair.kind == "package-name" and repair.file in OF_PACKAGES:
-        wrong = words_of(repair.before) - words_of(repair.after)
-        return bool(wrong & words_of(found[criterion.id].message)) or cites_file(found[criterion.id], repair)
-    if repair.kind in OF_BUILDS and (criterion.check == BUILD or is_unmade(found[criterion.id])):
+    if repair.kind == "package-name" and repair.file in repair_charges.OF_PACKAGES:
+        wrong = repair_charges.words_of(repair.before) - repair_charges.words_of(repair.after)
+        return bool(
+            wrong & repair_charges.words_of(found[criterion.id].message)
+        ) or repair_charges.cites_file(found[criterion.id], repair)
+    if repair.kind in repair_charges.OF_BUILDS and (
+        criterion.check == repair_charges.BUILD or repair_charges.is_unmade(found[criterion.id])
+    ):
         return not builds or not (repair.kind == "manifest-line" or _only_installs(repair))
     seen = f"{found[criterion.id].message} {found[criterion.id].measured}"
     if repair.kind == "file-name" and PurePosixPath(repair.before).name in seen:
         return True
     if root := found[criterion.id].blocked_by:
-        asking = criterion.requires if repair.kind in NAMES else (root,)
-        return any(asks_for(found[name], repair) for name in asking)
-    return repair.kind not in OF_BUILDS and asks_for(found[criterion.id], repair)
+        asking = criterion.requires if repair.kind in repair_charges.NAMES else (root,)
+        return any(repair_charges.asks_for(found[name], repair) for name in asking)
+    return repair.kind not in repair_charges.OF_BUILDS and repair_charges.asks_for(
+        found[criterion.id], repair
+    )
 
 
 def _only_installs(repair: Repair) -> bool:
@@ -295,7 +285,7 @@ def _scripts_named(package: PackageFacts, build: Run) -> dict[str, set[str]]:
         if not lines and file.size_bytes:
             return {}
         # who imports a package runs its `__init__.py`, and does not name it
-        said = {"__init__", *words_of(" ".join(lines).replace(".", " "))}
+        said = {"__init__", *repair_charges.words_of(" ".join(lines).replace(".", " "))}
         words.setdefault(PurePosixPath(file.path).name, set()).update(said)
     named = {name: {one for one in words if one.removesuffix(".py") in said} for name, said in words.items()}
     for name, found in named.items():  # with what those name, and so on
@@ -322,14 +312,14 @@ def is_used_by(
     both = {name, PurePosixPath(repair.after).name} if repair.kind == "exchanged-files" else {name}
     launches = any(start.launch for start in scenario.start)
     known = any(name in _started_files(one) for one in rubric.scenarios.values())
-    if repair.kind in DONE_BEFORE_RUNS:
+    if repair.kind in repair_charges.DONE_BEFORE_RUNS:
         return not known and _may_launch(scenario, name, launched)
-    if repair.kind in OF_BUILDS:
-        of_file = PurePosixPath(repair.file).suffix in MADE_BY_BUILDS
+    if repair.kind in repair_charges.OF_BUILDS:
+        of_file = PurePosixPath(repair.file).suffix in repair_charges.MADE_BY_BUILDS
         changed = {*repair.after.split("\n")} - {*repair.before.split("\n")}
         made = of_file or any(map(GENERATION.search, changed))
         return made or not built or any(start.built for start in scenario.start)
-    if repair.kind == "package-name" and repair.file in OF_PACKAGES:
+    if repair.kind == "package-name" and repair.file in repair_charges.OF_PACKAGES:
         return True
     if both & _started_files(scenario):
         return True
@@ -340,7 +330,8 @@ def is_used_by(
     imported = [launched.get(one, {name}) for one in _started_files(scenario)]
     unused = name.endswith(".py") and imported != [] and not any(name in found for found in imported)
     not_run = repair.kind == "launch-type" or (
-        repair.kind == "yaml-syntax" and name in _read_by_grader(scenario)
+        repair.kind == "yaml-syntax"
+        and name in {PurePosixPath(param.file).name for param in scenario.params if param.file}
     )
     return not not_run and (launches or not (known or a_program or unused))
 
@@ -362,11 +353,6 @@ def is_first_line_added(repair: Repair, rubric: Rubric, repairs: Iterable[Repair
 
 def _started_files(scenario: Scenario) -> set[str]:
     return {PurePosixPath(path).name for s in scenario.start for path in (s.script, s.launch) if path}
-
-
-def _read_by_grader(scenario: Scenario) -> set[str]:
-    """Return the names of parameter files whose values the grader sets; what is in one that is not YAML it makes up."""
-    return {PurePosixPath(param.file).name for param in scenario.params if param.file}
 
 
 def _is_worse(first: Mapping[str, Verdict], on_copy: Mapping[str, Verdict], criterion: Criterion) -> bool:

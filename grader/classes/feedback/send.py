@@ -20,20 +20,9 @@ from pydantic import ValidationError
 
 from grader.classes.batch.folder import BatchFolder
 from grader.classes.batch.run import hold_folder
+from grader.classes.feedback import publish
 from grader.classes.feedback.forms import Feedback, FeedbackForm, Sender, Unsure
-from grader.classes.feedback.publish import (
-    FOLDER,
-    Freezing,
-    Published,
-    check_only,
-    freeze,
-    history_words,
-    plan,
-    publication_of,
-    read_published,
-    read_rows,
-    refuse_other_rubric,
-)
+from grader.classes.feedback.publish import Freezing, Published
 from grader.errors import NotSent, UsageError
 from grader.files import FILE as PRIVATE
 from grader.files import temporary_folder, unwritable
@@ -58,7 +47,7 @@ class SentLog:
     def __init__(self, folder: Path, form: str) -> None:
         self.path, self.form = folder / FILE, form
         self._lines: dict[str, list[Sent]] = {}
-        for number, row in enumerate(read_rows(self.path), start=1):
+        for number, row in enumerate(publish.read_rows(self.path), start=1):
             if newer := SENT.newer_in(row):
                 raise UsageError(f"{self.path}:{number}: {newer}", hint=UPDATE)
             try:
@@ -169,19 +158,19 @@ def open_selection(
 
     Raises UsageError if nothing is published, or for an unknown id; Busy if other feedback is being sent.
     """
-    published = read_published(folder.path)
+    published = publish.read_published(folder.path)
     if not published.history and wanted.drafts is None:
         raise UsageError(
             f"{folder.path}: nothing of this class is published, so there is nothing to return",
             hint=f"grader publish {folder.path}; or --drafts to return results as they are now",
         )
-    check_only(folder, wanted.only)
+    publish.check_only(folder, wanted.only)
     # before the first publication there is no folder for these; drafts then hold the class's own
-    place = folder.path / FOLDER if published.history else folder.path
+    place = folder.path / publish.FOLDER if published.history else folder.path
     who = "other feedback is being sent, or a class published,"
     with hold_folder(place, who), temporary_folder("run") as room:
         # read again, as another program may have published before the folder was held
-        log, published = SentLog(folder.path, form.name), read_published(folder.path)
+        log, published = SentLog(folder.path, form.name), publish.read_published(folder.path)
         if wanted.drafts is None:
             last = {name: history[-1] for name, history in published.history.items()}
             made = {name: (one, published.folder(one)) for name, one in last.items()}
@@ -194,7 +183,7 @@ def _select(
     folder: BatchFolder, wanted: Recipients, made: Mapping[str, tuple[Publication, Path]], log: SentLog
 ) -> Selection:
     """`made` has by the names of folders what can be sent, and where its reports are."""
-    names, selection = check_only(folder, wanted.only), Selection()
+    names, selection = publish.check_only(folder, wanted.only), Selection()
     for entry in folder.run.entries:
         name = safe_name(entry.id)
         if name not in names:
@@ -232,17 +221,17 @@ def _drafts(
     jobs: int,
 ) -> dict[str, tuple[Publication, Path]]:
     """Return the reports of results as they are now, written into `room`."""
-    refuse_other_rubric(folder, rubric, "publish it")
+    publish.refuse_other_rubric(folder, rubric, "publish it")
     wanted = {
         safe_name(step.entry.id): Freezing(
-            publication=publication_of(step.entry, step.result),
+            publication=publish.publication_of(step.entry, step.result),
             result=step.result,
             evidence=folder.folder_of(step.entry),
             into=room / safe_name(step.entry.id),
-            changes=history_words(published.of(step.entry)),
+            changes=publish.history_words(published.of(step.entry)),
             hidden=hidden_ids(rubric.rubric),
         )
-        for step in plan(folder, published, only)
+        for step in publish.plan(folder, published, only)
         if step.result is not None and step.state != "draft"
     }
     write = partial(_freeze_draft, rubric)
@@ -254,7 +243,7 @@ def _drafts(
 
 def _freeze_draft(rubric: LoadedRubric, job: Freezing) -> str:
     """In a worker."""
-    freeze(rubric, job)
+    publish.freeze(rubric, job)
     return ""
 
 

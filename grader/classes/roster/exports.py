@@ -18,19 +18,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from grader.classes.roster.entries import (
-    REFUSED,
-    FoundEntry,
-    Local,
-    RosterRow,
-    Table,
-    columns_of,
-    gather,
-    local_fault,
-    source_fault,
-    text_of,
-    whole_source,
-)
+from grader.classes.roster import entries
+from grader.classes.roster.entries import FoundEntry, Local, RosterRow, Table
 from grader.errors import HostError, UsageError
 from grader.files import make_folder, read_given, temporary_folder, unwritable
 from grader.intake.names import archive_stem, encodable, is_archive_name, listing, printable
@@ -49,7 +38,8 @@ def from_folder(folder: Path, local: Local) -> Roster:
     """
     if local.remote_only:
         raise UsageError(
-            f"{folder}: a folder of submissions {REFUSED}", hint="give a roster of addresses, or leave it out"
+            f"{folder}: a folder of submissions {entries.REFUSED}",
+            hint="give a roster of addresses, or leave it out",
         )
     paths = _inside(folder)
     if any(path.name == "package.xml" for path in paths):
@@ -63,7 +53,7 @@ def from_folder(folder: Path, local: Local) -> Roster:
         key = (named.platform, named.id) if named else ("", path.name)
         students.setdefault(key, []).append((path, named))
     found = [_check_links(_student(files), folder, local) for files in students.values()]
-    return gather(folder, found, columns=columns_of(found))
+    return entries.gather(folder, found, columns=entries.columns_of(found))
 
 
 def _inside(folder: Path) -> list[Path]:
@@ -77,7 +67,7 @@ def _inside(folder: Path) -> list[Path]:
 
 def _check_links(found: FoundEntry, folder: Path, local: Local) -> FoundEntry:
     """Return it with a fault if a link leads out of the folder."""
-    fault = "" if found.faults else local_fault(found.entry.source, folder, local)
+    fault = "" if found.faults else entries.local_fault(found.entry.source, folder, local)
     return FoundEntry(found.entry, (fault,)) if fault else found
 
 
@@ -326,7 +316,7 @@ def from_gitlab(path: Path, local: Local) -> Roster:
         for number, project in enumerate(_projects(path), start=1)
     ]
     found = _told_apart(found)
-    return gather(path, found, columns=columns_of(found))
+    return entries.gather(path, found, columns=entries.columns_of(found))
 
 
 def _read_project(project: object, where: str, base: Path, local: Local) -> FoundEntry:
@@ -338,12 +328,12 @@ def _read_project(project: object, where: str, base: Path, local: Local) -> Foun
     unknown = Entry(id=name, source="", where=where)
     if source is None or not name:
         return FoundEntry(unknown, ("no http_url_to_repo, or no path",))
-    if fault := source_fault(source, base, local):
+    if fault := entries.source_fault(source, base, local):
         return FoundEntry(unknown, (f"source: {fault}",))
     namespace = project.get("namespace")
     group = namespace.get("full_path") if isinstance(namespace, dict) else None
     about = {
-        "source": whole_source(source, base),
+        "source": entries.whole_source(source, base),
         "name": texts.get("name", ""),
         "group": group if isinstance(group, str) and encodable(group) else "",
         "extra": {"path_with_namespace": path} if (path := texts.get("path_with_namespace")) else {},
@@ -396,4 +386,4 @@ def _text(path: Path) -> str:
     data = read_given(path, BYTES_MAX)
     if data is None:
         raise UsageError(f"{path}: larger than {BYTES_MAX >> 20} MB: this is not a list of projects")
-    return text_of(data, path).strip(_BLANK)
+    return entries.text_of(data, path).strip(_BLANK)

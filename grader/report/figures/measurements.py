@@ -23,6 +23,7 @@ from grader.checks.robot_places import (
     placed,
     stretch_to_judge,
 )
+from grader.checks.support import counters
 from grader.checks.support.clocks import lateness, run_seconds
 from grader.checks.support.console_output import (
     Line,
@@ -34,18 +35,7 @@ from grader.checks.support.console_output import (
     probes_on,
     text_places,
 )
-from grader.checks.support.counters import (
-    Count,
-    Step,
-    WrapParams,
-    bad_turn_message,
-    counts,
-    judge_wraps,
-    longest,
-    turns_of,
-    whose_turn,
-    wrong_steps,
-)
+from grader.checks.support.counters import Count, Step, WrapParams
 from grader.checks.support.exit_causes import process_tracebacks
 from grader.checks.support.geometry import Polyline, Pose, out_along, relative, shown_walls, track
 from grader.checks.support.processes import how_it_ended, life_of
@@ -80,7 +70,7 @@ Mark = tuple[int, str]
 
 def start_figures(run: Run, params: StartParams) -> Iterator[CounterFigure]:
     """Yield the beginning of the publisher that came first."""
-    for count in counts(run, params.topic)[:1]:
+    for count in counters.counts(run, params.topic)[:1]:
         wrong = judge_start(count, run, params).status is Status.FAIL
         marks = (
             [(0, f"the first value is {significant(count.values[0])}, not {params.start}")] if wrong else []
@@ -93,10 +83,10 @@ def start_figures(run: Run, params: StartParams) -> Iterator[CounterFigure]:
 
 def step_figures(run: Run, params: StepParams) -> Iterator[CounterFigure]:
     """Yield the publisher that sent most."""
-    count = longest(run, params.topic)
+    count = counters.longest(run, params.topic)
     if count is None:
         return
-    found = wrong_steps(count, run, maximum=params.maximum, rate_hz=params.rate_hz)
+    found = counters.wrong_steps(count, run, maximum=params.maximum, rate_hz=params.rate_hz)
     lost = {s.number for s in found.lost}
     marks = [(s.number, _step_text(s, flood=found.flood, lost=s.number in lost)) for s in found.steps]
     turns = [s for s in count.steps if s.change < -1]
@@ -105,13 +95,13 @@ def step_figures(run: Run, params: StepParams) -> Iterator[CounterFigure]:
 
 def wrap_figures(run: Run, package: PackageFacts, params: WrapParams) -> Iterator[CounterFigure]:
     """Yield the publisher that sent most."""
-    count = longest(run, params.topic)
+    count = counters.longest(run, params.topic)
     if count is None:
         return
-    found = turns_of(count, run, params)
+    found = counters.turns_of(count, run, params)
     goes_on = (s for s in found.bad if not (s.before > params.maximum and s.change > 0))
     marks = [(s.number, _turn_text(s, found.every, count, run, params)) for s in goes_on]
-    verdict, _ = judge_wraps(count, run, package, params)
+    verdict, _ = counters.judge_wraps(count, run, package, params)
     if not found.bad and verdict.status is Status.FAIL and not verdict.unjudged:
         # no turn is wrong, and it fails: there was none at all, which shows at the end
         marks = [(len(count.values) - 1, verdict.message)]
@@ -127,9 +117,9 @@ def _step_text(step: Step, *, flood: bool, lost: bool) -> str:
 
 
 def _turn_text(step: Step, turns: list[Step], count: Count, run: Run, params: WrapParams) -> str:
-    whose = whose_turn(step, count, run, params)
+    whose = counters.whose_turn(step, count, run, params)
     if whose == "program":
-        return bad_turn_message(step, turns, params)
+        return counters.bad_turn_message(step, turns, params)
     return _step_text(step, flood=whose == "flood", lost=True)
 
 
