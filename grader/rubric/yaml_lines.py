@@ -535,12 +535,12 @@ def numbers_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, float]]:
         yield from numbers_in((*path, key), inner)
 
 
-def starts_of(scenario: dict[str, Any]) -> list[dict[str, Any]]:
+def starts_of(scenario: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return what a scenario starts."""
     return [start for _, start in as_maps(scenario.get("start"))]
 
 
-def given_steps(scenario: dict[str, Any], kind: str) -> list[dict[str, Any]]:
+def given_steps(scenario: Mapping[str, Any], kind: str) -> list[dict[str, Any]]:
     """Return what the scenario's steps of one kind (`publish`) say."""
     return [as_map(step[kind]) for _, step in as_maps(scenario.get("steps")) if kind in step]
 
