@@ -45,18 +45,13 @@ _BOUNDED = re.compile(r"\[<=\d+\]")
 _KEPT_FOR_LATE = re.compile(r"durability: *(?:1|transient_local)\b")
 
 
-def ros1_type(name: str) -> str:
-    """Return `std_msgs/String` for `std_msgs/msg/String`."""
-    return name.replace("/msg/", "/")
-
-
 def ros1_definition(type_: str, definition: str) -> str:
     """Return a `ros2msg` definition in ROS 1's words: without bounds, defaults and constants, its times as `time`.
 
     Raises DefinitionError for a part without a name.
     """
     parts: list[str] = []
-    for name, lines in sections_of(ros1_type(type_), definition.replace("/msg/", "/")):
+    for name, lines in sections_of(type_.replace("/msg/", "/"), definition.replace("/msg/", "/")):
         if name not in CLOCKS:
             heading = [f"MSG: {name}"] if parts else []
             parts.append("\n".join([*heading, *_fields(lines)]))

@@ -28,7 +28,6 @@ from grader.report.findings import EACH_MAX, Severity, github_annotation, render
 from grader.report.platform_results import render_classroom
 from grader.report.text import line, markdown
 from grader.rubric.load import LoadedRubric
-from grader.rubric.model import Rubric
 from grader.wording import number, plural
 
 MODES = ("auto", "require", "none")
@@ -171,11 +170,6 @@ def read_pass_mark(text: str) -> PassMark | None:
     return mark
 
 
-def visible_points(rubric: Rubric) -> float:
-    """Return the points that students can see they may get."""
-    return sum(c.points for c in rubric.criteria if c.visibility == "visible")
-
-
 def with_pass_mark(loaded: LoadedRubric, mark: PassMark | None) -> LoadedRubric:
     """Return the rubric with that pass mark, scaled from the visible points to all points.
 
@@ -183,7 +177,7 @@ def with_pass_mark(loaded: LoadedRubric, mark: PassMark | None) -> LoadedRubric:
     """
     if mark is None:
         return loaded
-    rubric, most = loaded.rubric, visible_points(loaded.rubric)
+    rubric, most = loaded.rubric, sum(c.points for c in loaded.rubric.criteria if c.visibility == "visible")
     if not mark.percent and mark.value > most:
         raise UsageError(
             f"pass-mark: {number(mark.value)} points, but {rubric.id} has {number(most)} visible ones",

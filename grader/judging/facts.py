@@ -66,7 +66,8 @@ class Facts:
             if isinstance(run, Verdict):
                 return run
             if run.foreign and not check.messages_only:
-                return _not_in_messages(run)
+                message = f"{run.evidence} holds messages, but nothing about the processes and nodes that are judged"
+                return inconclusive(message, hint="hand in the package too, so that its nodes can be run")
             if run.foreign:
                 found["package"] = NO_PACKAGE
             found["run"] = run
@@ -263,11 +264,6 @@ class Facts:
 
 def _launch_names(package: PackageFacts) -> set[str]:
     return {PurePosixPath(file.path).name for file in package.launch_files}
-
-
-def _not_in_messages(run: Run) -> Verdict:
-    message = f"{run.evidence} holds messages, but nothing about the processes and nodes that are judged"
-    return inconclusive(message, hint="hand in the package too, so that its nodes can be run")
 
 
 def try_facts(rubric: Rubric, runs: Mapping[str, Run]) -> Facts:

@@ -54,7 +54,10 @@ def settle(
     automatic = unsettled(result, rubric)
     # Also those that a group had left out: with a person's points, others may be its best.
     judged = take_in(automatic.criteria)
-    said = {criterion.id: _automatic(criterion) for criterion in judged}
+    said = {
+        criterion.id: Automatic(status=criterion.status, points=criterion.points, message=criterion.message)
+        for criterion in judged
+    }
     applied = tuple(_apply(name, overrides[name], said[name], before) for name in said if name in overrides)
     decided = awarded(applied)
     criteria = tuple(_decide(criterion, decided.get(criterion.id), rubric.digits) for criterion in judged)
@@ -106,10 +109,6 @@ def status_after_overrides(
     if result.error is not None and any(c.counts and c.id not in decided for c in criteria):
         return "error"
     return overall_status(criteria)
-
-
-def _automatic(criterion: CriterionResult) -> Automatic:
-    return Automatic(status=criterion.status, points=criterion.points, message=criterion.message)
 
 
 def _apply(

@@ -135,7 +135,8 @@ def _maxima(work: _Work, students: Sequence[TemplateRow]) -> Iterator[str]:
 
 def _maximum(work: _Work, students: Sequence[TemplateRow], place: int) -> float | None:
     if work.platform == "blackboard":
-        return maximum_in(work.sheet.header[place])
+        found = re.search(r"\[Total Pts: (?:up to )?([\d.]+)", work.sheet.header[place])
+        return float(found[1]) if found and found[1].count(".") < 2 else None
     if work.maximum is not None:
         return next((_number(record.value(work.maximum)) for record in students), None)
     possible = (record for record in work.sheet.records if "Points Possible" in record.value(0))
@@ -222,12 +223,6 @@ def worksheet_columns(header: Sequence[str], known: dict[str, ColumnKind]) -> tu
     if grade is None or "platform" not in known.values():
         return None
     return grade, next((place for place, name in enumerate(plains) if name in _MAXIMUM), None)
-
-
-def maximum_in(header: str) -> float | None:
-    """Return how many points Blackboard says in a column's name that it has; None where it says nothing."""
-    found = re.search(r"\[Total Pts: (?:up to )?([\d.]+)", header)
-    return float(found[1]) if found and found[1].count(".") < 2 else None
 
 
 def _titles(name: str, platform: Platform) -> set[str]:
