@@ -525,10 +525,8 @@ class PackageFacts(Record):
             if PurePosixPath(file.path).name in {PurePosixPath(word).name for word in argv}
             and file.given == tuple(word for word in argv if ":=" in word)
         }
-        if not read:
-            return self
         files = tuple(read.get(file.path, file) for file in self.launch_files)
-        return self.model_copy(update={"launch_files": files})
+        return self.model_copy(update={"launch_files": files}) if read else self
 
     @property
     def others(self) -> set[str]:
@@ -544,10 +542,8 @@ class PackageFacts(Record):
         """Return this package and those of `also`, in this order, each with all the others as its own `also`."""
         # Without its own `also`: otherwise each of them would hold all others, and these each other again.
         alone = [one.model_copy(update={"also": ()}) for one in (self, *self.also)]
-        return tuple(
-            one.model_copy(update={"also": tuple(other for other in alone if other is not one)})
-            for one in alone
-        )
+        rest = (tuple(other for other in alone if other is not one) for one in alone)
+        return tuple(one.model_copy(update={"also": also}) for one, also in zip(alone, rest, strict=True))
 
     def launches_of(self, programs: AbstractSet[str]) -> list[str]:
         """Return the launch files that start all of these programs; if there are several, those of the

@@ -93,7 +93,9 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     rename_files(files, renames)
     sources = (f.path for f in scripts if f.python and f.link is None and not f.is_no_script)
     paths = [renames.get(path, path) for path in sources]
-    names = repair_python(files, paths, package, wanted.types, {renames.get(f.path, f.path) for f in imported})
+    names = repair_python(
+        files, paths, package, wanted.types, {renames.get(f.path, f.path) for f in imported}
+    )
     name = repair_manifest(files, package, wanted)
     repair_cmake(files, package, name, wanted, [f.path for f in scripts])
     rename_package(files, package, wanted)
