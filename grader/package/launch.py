@@ -55,7 +55,7 @@ def read_launch_files(
     places, own = dict(paths), tuple(dict.fromkeys(names))
     library = _Library(places, lambda path: read_markup(folder, places[path]), others)
     launched = (
-        _record(path, library, own, given)
+        _record(path, library.parsed(path), library, own, given)
         for name, given in commands
         for path in library.paths
         if PurePosixPath(path).name == name
@@ -70,13 +70,13 @@ def parse_launch_files(texts: Mapping[str, bytes], names: Iterable[str] = ()) ->
 
 def parse_launch(data: bytes, path: str) -> LaunchFile:
     """Return one launch file from its bytes. Never raises: what is wrong with it is the record's `fault`."""
-    return _record(path, _Library({}, lambda _: data), ())
+    return _record(path, _parse(data, path), _Library({}, lambda _: data), ())
 
 
 def _records(library: _Library, names: Iterable[str]) -> tuple[LaunchFile, ...]:
     own = tuple(dict.fromkeys(names))
     paths = list(filter(is_launch_file, library.paths))[:_FILES_MAX]
-    return tuple(_record(path, library, own) for path in paths)
+    return tuple(_record(path, library.parsed(path), library, own) for path in paths)
 
 
 class _Library:
@@ -131,8 +131,9 @@ def _parse(data: bytes, path: str) -> _Parsed:
     return _Parsed(element, None, root)
 
 
-def _record(path: str, library: _Library, own: tuple[str, ...], given: tuple[str, ...] = ()) -> LaunchFile:
-    parsed = library.parsed(path)
+def _record(
+    path: str, parsed: _Parsed, library: _Library, own: tuple[str, ...], given: tuple[str, ...] = ()
+) -> LaunchFile:
     nodes: list[LaunchNode] = []
     includes: list[str] = []
     if parsed.element is None:

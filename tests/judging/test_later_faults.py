@@ -573,7 +573,7 @@ def test_arguments_without_a_value_are_named_behind_what_roslaunch_says_first() 
     scenarios = {"talker": {**SCENARIO, "start": [{"name": "roslaunch", "launch": "a.launch"}]}}
     runs = build_runs({"runs": {"talker": run}, "package": package})
     (found,) = judge(rubric(lab, scenarios=scenarios), runs)
-    assert "Resource not found: elsewhere" in found.message
+    assert "there is no package elsewhere" in found.message
     assert found.hint.endswith(
         '; then on line 3 of launch/a.launch write <arg name="rate" default="…"/> and '
         'below <launch> in launch/a.launch add <arg name="speed" default="…"/>'
