@@ -128,8 +128,12 @@ def _other_size(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[
     same = [
         one.given for one in rubric.criteria if one.run == criterion.run and one.given.get("topic") == topic
     ]
-    sizes = {str(one.get("field")): one.get("value") for one in same}
-    width, height = sizes.get("info.width"), sizes.get("info.height")
+    sizes = [
+        [one.get("value") for one in same if one.get("field") == f"info.{side}"]
+        for side in ("width", "height")
+    ]
+    # A map may grow.
+    width, height = (side[0] if side and side.count(side[0]) == len(side) else None for side in sizes)
     counts = [len(as_list(one.get("value"))) for one in same if one.get("field") == "data"]
     if not isinstance(width, int) or not isinstance(height, int) or width * height not in counts:
         return

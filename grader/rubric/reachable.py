@@ -68,11 +68,18 @@ def reach_faults(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator
     yield from wait_faults(rubric)
     for name, scenario in rubric.scenarios.items():
         yield from start_faults(("scenarios", name), scenario)
+    watched = {
+        one.run
+        for one in criteria
+        if (check := checks.get(one.check))
+        and any(ref.to == "watched_s" for ref in check.references(one.given))
+    }
     for about in criteria:
         others = [one for one in criteria if one is not about and one.run == about.run]
         yield from often_faults(about)
         yield from within_faults(about)
-        yield from early_faults(about)
+        if about.run not in watched:
+            yield from early_faults(about)
         yield from stretch_faults(about)
         yield from room_faults(about, longest_s(about.scenario))
         yield from _never_sent(about, others)

@@ -31,7 +31,8 @@ SIDEWAYS = frozenset({"linear.y", "linear.z", "angular.x", "angular.y"})
 """The parts of a velocity that a robot with two wheels does not have."""
 OTHER_WAYS = re.compile(
     r"\b(?:side\w*|strafe\w*|lateral\w*|holonomic\w*|omni\w*|mecanum|left|right|up|down|climb\w*|rise\w*|hover\w*|fl(?:y|ies)\w*"
-    r"|drone|arm|roll|pitch|tilt\w*|altitude|height|(?:linear|angular)\.[xyz]|y)\b",
+    r"|drone|\w*copter|quad\w*|rotors?|uav|[ar]ov|boat|submarine|take\w*\Woff|legs?|legged|arm|roll|pitch|tilt\w*"
+    r"|altitude|height|(?:linear|angular)\.[xyz]|y)\b",
     re.IGNORECASE,
 )
 """Words of a handout about a robot that may move otherwise."""
@@ -163,6 +164,11 @@ def _of_another_run(criterion: WrittenCriterion, rubric: WrittenRubric) -> Itera
     if not any(
         one.get("answer") or one.get("answers") for _, one in as_maps(criterion.scenario.get("serves"))
     ):
+        return
+    asked = [as_list(one.given.get("numbers")) for one in rubric.criteria if one.check == "prints"]
+    printed = {number for numbers in asked for number in numbers if is_number(number)}
+    # A program may print what it works out of the answers.
+    if not printed <= set[float]().union(*map(_served, rubric.scenarios.values())):
         return
     for index, number in enumerate(as_list(criterion.given.get("numbers"))):
         others = [

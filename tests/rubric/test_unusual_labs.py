@@ -1,0 +1,86 @@
+"""Rubrics of unusual labs: they are right, and load without a warning."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from grader.rubric.load import load_rubric, warnings_of
+
+RUNS = """\
+schema: grader.rubric/1
+id: sample
+title: A sample
+version: "1"
+package: lab1
+handout: {handout}
+scenarios:
+{scenarios}
+criteria:
+{criteria}
+"""
+RELAY = """\
+  alone: {title: Alone, start: [{name: relay, script: relay.py}], until: {window_s: 5, topics: [/said]}}
+  both:
+    title: Both
+    start: [{name: relay, script: relay.py}, {name: listen, script: listen.py}]
+    steps: [publish: {topic: /said, type: std_msgs/String, value: hello}, wait: {topic: /said}]
+    until: {quiet_s: 2}"""
+PAIR = """\
+  pair: {title: Pair, start: [{name: all, launch: pair.launch}], until: {nodes: 2}}"""
+GROWS = """\
+  grows: {title: Grows, start: [{name: maps, script: maps.py}], until: {window_s: 5, topics: [/map]}}"""
+CLIENT = """\
+  four:
+    title: Four
+    start: [{name: client, script: client.py}]
+    serves: [{service: /get, type: rospy_tutorials/AddTwoInts, answer: {sum: 4}}]
+    until: {ended: [client]}
+  eight:
+    title: Eight
+    start: [{name: client, script: client.py}]
+    serves: [{service: /get, type: rospy_tutorials/AddTwoInts, answer: {sum: 8}}]
+    until: {ended: [client]}"""
+
+
+@pytest.mark.parametrize(
+    ("handout", "scenarios", "asked"),
+    [
+        # another run judges what the script itself sends on the topic
+        ("the relay hears /said and publishes on it; listen prints hello", RELAY,
+         ["check: rate, with: {topic: /said, rate_hz: 1}, scenario: alone",
+          "check: prints, with: {process: listen, text: hello}, scenario: both"]),
+        # the launch file is watched for longer than until both nodes are there
+        ("a talker and a listener on /said", PAIR,
+         ["check: node-lives, with: {process: all, min_s: 5, names: [talker]}, scenario: pair",
+          "check: launch-connects, with: {launch: pair.launch, topic: /said}, scenario: pair"]),
+        # a map that grows has two sizes
+        ("a nav_msgs/OccupancyGrid on /map, of 2 by 1 cells and then of 2 by 2", GROWS,
+         ["check: field-equals, with: {topic: /map, field: info.width, value: 2}, scenario: grows",
+          "check: field-equals, with: {topic: /map, field: info.height, value: 1, when: first}, scenario: grows",
+          "check: field-equals, with: {topic: /map, field: info.height, value: 2, when: last}, scenario: grows",
+          "check: field-equals, with: {topic: /map, field: data, value: [0, 0], when: first}, scenario: grows",
+          "check: field-equals, with: {topic: /map, field: data, value: [0, 0, 0, 0], when: last}, scenario: grows"]),
+        # a client that prints twice of what it gets
+        ("asks /get and prints twice the sum", CLIENT,
+         ["check: prints, with: {process: client, text: '{number}', numbers: [8]}, scenario: four",
+          "check: prints, with: {process: client, text: '{number}', numbers: [16]}, scenario: eight"]),
+        # a robot without wheels
+        ("a quadrotor starts: the node maps publishes geometry_msgs/Twist on /cmd_vel",
+         GROWS.replace("/map", "/cmd_vel"),
+         ["check: field-equals, with: {topic: /cmd_vel, field: linear.z, value: 0.5}, scenario: grows"]),
+    ],
+)  # fmt: skip
+def test_a_rubric_of_an_unusual_lab_loads_without_a_word(
+    handout: str, scenarios: str, asked: list[str], tmp_path: Path
+) -> None:
+    share = [100 - 10 * len(asked[1:]), *(10 for _ in asked[1:])]
+    criteria = [
+        f"  - {{id: c{n}, title: Part {chr(97 + n)}, points: {points}, {one}}}"
+        for n, (one, points) in enumerate(zip(asked, share, strict=True))
+    ]
+    path = tmp_path / "lab.yaml"
+    text = RUNS.format(handout=f'"{handout}"', scenarios=scenarios, criteria="\n".join(criteria))
+    path.write_text(text, encoding="utf-8")
+    assert warnings_of(load_rubric(str(path)), path.name) == []
