@@ -23,6 +23,8 @@ from script_names import (
 from script_texts import VALUE, Texts
 
 BROAD = {"", "Exception", "BaseException"}
+OTHER_VALUES = (ast.BoolOp, ast.Compare, ast.Dict, ast.DictComp, ast.Lambda, ast.List, ast.ListComp)
+OTHER_VALUES += (ast.Set, ast.SetComp, ast.Tuple)
 HANDED_ON = ("publish", "publish_feedback", "set_succeeded", "set_aborted", "set_preempted", "send_goal")
 
 
@@ -45,10 +47,18 @@ def dropped_results(tree):
         if name not in alone or len(alone[name]) != used[name]:
             continue
         for node in walk_own(own):
-            if isinstance(node, ast.Return) and not isinstance(node.value, (ast.Constant, type(None))):
+            if isinstance(node, ast.Return) and node.value and not is_other(node.value, given):
                 call = alone[name][0].value
                 text = read.of(node.value)
                 yield slip(call.lineno, "drops-result", text or VALUE, str(node.lineno), dotted(call.func))
+
+
+def is_other(value, given):
+    """Whether it is no number and no text: a list, a condition, what a class makes, such as a publisher."""
+    if isinstance(value, ast.Constant):
+        return True
+    value = given.get(dotted(value), value) if isinstance(value, ast.Name) else value
+    return called_name(value)[:1].isupper() or isinstance(value, OTHER_VALUES)
 
 
 def listed_answers(tree):
