@@ -25,6 +25,7 @@ from script_texts import VALUE, Texts
 BROAD = {"", "Exception", "BaseException"}
 OTHER_VALUES = (ast.BoolOp, ast.Compare, ast.Dict, ast.DictComp, ast.Lambda, ast.List, ast.ListComp)
 OTHER_VALUES += (ast.Set, ast.SetComp, ast.Tuple)
+NAME_USES_LIMIT = 200
 HANDED_ON = ("publish", "publish_feedback", "set_succeeded", "set_aborted", "set_preempted", "send_goal")
 
 
@@ -123,6 +124,8 @@ def fields_of_variable(made, uses, parents):
     name = dotted(made.targets[0])
     is_plain = len(made.targets) == 1 and name in uses and not isinstance(parents.get(made), ast.ClassDef)
     found = set() if is_plain else {"*"}
+    if len(uses.get(name, ())) > NAME_USES_LIMIT:
+        return {"*"}
     for one in uses.get(name, ()):
         around = parents.get(one)
         if isinstance(around, ast.Attribute):

@@ -152,7 +152,8 @@ def zero_given(node, tree):
         names = {dotted(one) for one in getattr(only, "targets", ())}
         if isinstance(only, ast.Return):
             block = parents_of(tree)[node]
-            names = {dotted(n.value) for n in statements_of(block) if isinstance(n, ast.Return)}
+            below = statements_of(block)[:USES_LIMIT]
+            names = {dotted(n.value) for n in below if isinstance(n, ast.Return)}
     is_zero = is_number(value) and value.value == 0
     return (value.lineno, test) if is_zero and names & names_in(test) else (0, None)
 
