@@ -23,7 +23,7 @@ from grader.checks.support.fields import (
 )
 from grader.checks.support.processes import observed_until_ns, run_slips
 from grader.checks.support.recorder_losses import losses
-from grader.checks.support.scans import looks_elsewhere
+from grader.checks.support.scans import SCAN, has_angles, looks_elsewhere
 from grader.checks.support.text import near_names
 from grader.checks.support.topics import (
     cite,
@@ -143,7 +143,7 @@ def _with_ranges(
     package: PackageFacts, run: Run, params: ReactsParams, causes: Sequence[Reading], verdict: Verdict
 ) -> Verdict:
     """Return the loss with what the script reads of a scan, where the range that is the cause is elsewhere."""
-    scans = [c for c in run.channels if c.topic == params.trigger.topic and "LaserScan" in c.type]
+    scans = [c for c in run.channels if c.topic == params.trigger.topic and c.type == SCAN]
     reads = run_slips(package, run, "ranges-read") if scans else []
     began = next((one for one in causes if params.trigger.holds(one)), None)
     if not reads or began is None:
@@ -155,7 +155,7 @@ def _with_ranges(
     if scan is None or index is None or not (said := looks_elsewhere(scan, index, reads)):
         return verdict
     seen = f"the one that is near is ranges[{index}]; " if params.trigger.items == "any" else ""
-    around = "read all of them: `min(…)` is the smallest" if not scan["angle_increment"] else ""
+    around = "read all of them: `min(…)` is the smallest" if not has_angles(scan) else ""
     hint = around or f"read ranges[{index}] too, and those around it"
     return verdict.explained(seen + join_words(said), hint, tuple(one.place for one in reads))
 

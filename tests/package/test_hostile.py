@@ -487,8 +487,8 @@ SCRIPT = "import rospy\nrospy.init_node('x')\npub = rospy.Publisher('c', String,
         SCRIPT
         + "class A:\n    def f(self):\n"
         + "".join(f"        print(self.a{n}x)\n" for n in range(2000)),
-        "def f(m):\n    r = m.ranges[0]\n" + "    if r == float('inf'): return 0\n    return r\n" * 3000,
-        SCRIPT + "def f(m):\n" + "    a = A()\n    a.x = 1\n    p.publish(a)\n" * 3000,
+        "def f(m):\n    r = m.ranges[0]\n" + "    if r == float('inf'): return 0\n    return r\n" * 1500,
+        SCRIPT + "def f(m):\n" + "    a = A()\n    a.x = 1\n    p.publish(a)\n" * 1500,
     ],
 )
 def test_lines_that_all_have_to_do_with_each_other(tmp_path, text) -> None:

@@ -17,6 +17,9 @@ from grader.wording import join_words
 
 NEAR_DEG = 30.0
 """A range that is no further from another one looks to the same side."""
+SCAN = "sensor_msgs/LaserScan"
+ANGLE_MAX = 100.0
+"""No angle of a scan is larger than this."""
 LOOK_AT = "see that the script reads this one: print the index or the angle of what it compares"
 
 
@@ -26,9 +29,22 @@ def nearest_seen(scan: Mapping[str, Any]) -> tuple[int, float] | None:
     return min(there)[::-1] if there else None
 
 
+def _angles(scan: Mapping[str, Any]) -> tuple[float, float]:
+    """Return the first angle of a LaserScan and the step between two (radians); a step of 0 if it has no sound ones."""
+    first, step = scan["angle_min"], scan["angle_increment"]
+    is_sound = abs(first) <= ANGLE_MAX and abs(step) <= ANGLE_MAX  # false of NaN, too
+    return (first, step) if is_sound else (0.0, 0.0)
+
+
+def has_angles(scan: Mapping[str, Any]) -> bool:
+    """Return whether a LaserScan says where its ranges are: one that the grader made up may not."""
+    return _angles(scan)[1] != 0
+
+
 def _degrees(scan: Mapping[str, Any], index: int) -> float:
     """Return where a range of a LaserScan is, 0 being straight ahead, and the left positive."""
-    return math.degrees(math.remainder(scan["angle_min"] + index * scan["angle_increment"], math.tau))
+    first, step = _angles(scan)
+    return math.degrees(math.remainder(first + index * step, math.tau))
 
 
 def seen_at(scan: Mapping[str, Any], index: int) -> str:
@@ -78,11 +94,10 @@ def looks_elsewhere(scan: Mapping[str, Any], index: int, reads: Sequence[PythonS
         if numbers is None:
             return []
         apart = (math.remainder(_degrees(scan, number) - _degrees(scan, index), 360) for number in numbers)
-        # a scan that the grader made up may be without angles
-        if index in numbers or (scan["angle_increment"] and any(abs(deg) < NEAR_DEG for deg in apart)):
+        if index in numbers or (has_angles(scan) and any(abs(deg) < NEAR_DEG for deg in apart)):
             return []
         ends = [*numbers[:1], *numbers[-1:]]
-        places = [seen_at(scan, n) if scan["angle_increment"] else f"ranges[{n}]" for n in ends]
+        places = [seen_at(scan, n) if has_angles(scan) else f"ranges[{n}]" for n in ends]
         as_written = f"ranges[{one.message.replace('n', 'len(…)')}]"
         where = " to ".join(dict.fromkeys(places)) or "empty"
         said.append(f"{as_written} on line {one.line} is {where}")
