@@ -7,11 +7,14 @@ other.
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Iterable
+from itertools import pairwise
 
 from grader.arena.run_state import ROSOUT, RunState, TopicSeen
 from grader.evidence.events import UNNAMED
 from grader.rubric.scenario import Until
+from grader.wording import hertz
 
 Outcome = tuple[str, str]
 HEARD_S, HEARD_LOST_S_MAX = 2.0, 6.0
@@ -47,6 +50,8 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
     silent = silent or _in_namespaces(live, until, now_s)
     if silent:
         return "silent", silent
+    if not wanting and (slow := _too_slow(live, until, given, now_s)):
+        return "timeout", slow
     if now_s - live.started_s > until.limit_s:
         return "timeout", f"not complete after {until.limit_s:g} s"
     return None
@@ -263,6 +268,38 @@ def _never(live: RunState, until: Until, given: Until, now_s: float) -> str:
     return ""
 
 
+def _too_slow(live: RunState, until: Until, given: Until, now_s: float) -> str:
+    """Return that a topic is too slow for the messages that are waited for to come within the limit, and all the rest
+    has been seen; else "". `given` is `until` as the rubric has it."""
+    left_s = live.started_s + until.limit_s - now_s
+    rates_hz = {
+        topic: hz
+        for topic, wanted in until.messages.items()
+        if (hz := _steady_hz(live.topics[topic])) and wanted - live.topics[topic].count > FASTER * hz * left_s
+    }
+    if not rates_hz or is_fed(live, now_s) or now_s < live.all_began_s + live.least_s:
+        return ""
+    others = {topic: count for topic, count in until.messages.items() if topic not in rates_hz}
+    if not all(_enough(live, until.model_copy(update={"messages": others}), now_s, given)):
+        return ""
+    topic, hz = min(rates_hz.items())
+    return f"{until.messages[topic]} messages on {topic} take over {until.limit_s:g} s at {hertz(hz)}"
+
+
+def _steady_hz(seen: TopicSeen) -> float:
+    """Return the rate of a topic that has been steady for long; 0 where it is not, or may become faster."""
+    if len(seen.latest_s) < STEADY_COUNT or seen.last_s - seen.latest_s[0] < STEADY_S:
+        return 0.0
+    times_s = [*seen.latest_s]
+    first = bisect_right(times_s, seen.last_s - STEADY_S) - 1
+    times_s = times_s[min(first, len(times_s) - STEADY_COUNT) :]
+    gaps_s = [later - earlier for earlier, later in pairwise(times_s)]
+    mean_s, half = sum(gaps_s) / len(gaps_s), len(gaps_s) // 2
+    is_even = all(abs(gap_s - mean_s) <= UNSTEADY * mean_s for gap_s in gaps_s)
+    quickens = sum(gaps_s[-half:]) < (1 - QUICKER) * sum(gaps_s[:half])
+    return 0.0 if quickens or not is_even else 1 / mean_s
+
+
 def has_goal(live: RunState) -> bool:
     """Return whether an action's server, which tells its status again and again, has a goal that has no result yet:
     a node that waits for it neither works nor sends until then."""
@@ -318,6 +355,12 @@ LATE_MOST = 0.25
 share of it at most."""
 STREAM, GAPS = 3, 5.0
 """A topic with so many messages is one that goes on, and has stopped when it is silent for so many of its gaps."""
+STEADY_COUNT, STEADY_S, UNSTEADY, QUICKER = 20, 15.0, 0.2, 0.05
+"""A topic's rate is known from so many messages over so long a time on, if no gap differs by more than this share from
+the mean one, and the gaps of the second half are not shorter by more than that share: a full machine makes gaps that
+differ, and a node that speeds up makes shorter ones."""
+FASTER = 2.0
+"""What comes too late for the limit would come too late at so many times the rate, too."""
 SLOW_START = 1.2
 """A program that loops and has not published yet is given so many times as long as a right one is watched."""
 

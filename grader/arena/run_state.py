@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections import defaultdict
+from collections import defaultdict, deque
 from collections.abc import Iterable, Mapping
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
@@ -13,6 +13,7 @@ from grader.model.message_rate import RateBounds
 
 ROSOUT = "/rosout"
 ARRIVALS_MAX = 2000
+LATEST_MAX = 100
 LINES_MAX = 1000
 LOG_TIME = re.compile(r"\[\d{1,12}\.\d{1,9}(?:, \d{1,12}\.\d{1,9})?\]")
 """The time in a log line of rospy's: `[WARN] [1712.512]: not yet`."""
@@ -32,6 +33,8 @@ class TopicSeen:
     first_s: float = 0.0
     lost_before_s: float = 0.0
     last_s: float = 0.0
+    latest_s: deque[float] = field(default_factory=lambda: deque(maxlen=LATEST_MAX))
+    """When the latest messages came."""
 
 
 @dataclass
@@ -177,6 +180,7 @@ class RunState:
         if not seen.first_s:
             seen.first_s, seen.lost_before_s = now_s, self.lost_s
         seen.last_s = now_s
+        seen.latest_s.extend([now_s] * min(count, LATEST_MAX))
         seen.count += count
         if active:
             self.activity_s = now_s

@@ -294,3 +294,49 @@ def test_a_goal_without_its_result_is_waited_for_up_to_the_limit() -> None:
     assert find_outcome(live, until, 40.1) == ("timeout", "not complete after 40 s")
     live.note_messages("/count/result", 1, 30.0)
     assert find_outcome(live, until, 36.1) == ("silent", "nothing happened for 6 s")
+
+
+SLOW = Until(messages={"/a": 258}, silent_s=6, limit_s=60)
+EVEN = [1.0] * 40
+
+
+@pytest.mark.parametrize(
+    ("gaps_s", "ends_s"),
+    [
+        (EVEN, 20.0),
+        ([0.5] * 80, 16.0),
+        ([2.0] * 30, 39.0),
+        ([0.1] * 30 + EVEN, 23.0),  # a fast clock that the node does not follow
+        ([0.25] * 240, 55.0),  # 60 s are too short for it, but by little
+        ([0.2] * 300, None),
+        ([1.2 * 0.97**i for i in range(60)], None),  # quickens
+        ([1.0] * 15 + [0.1] * 300, None),
+        ([1.0, 1.6] * 20, None),  # as on a machine that stalls
+        ([1.0] * 10 + [3.0] + [1.0] * 8, None),
+    ],
+)
+def test_a_topic_that_is_steadily_too_slow_is_not_waited_for(
+    gaps_s: list[float], ends_s: float | None
+) -> None:
+    live, ended_s = state_of(), None
+    live.note_graph(["/talker"], {"/talker": "talker"}, 0.5)
+    for now_s in accumulate(gaps_s, initial=1.0):
+        live.note_messages("/a", 1, now_s)
+        if now_s < 59 and (done := find_outcome(live, SLOW, now_s)) and done[0] == "timeout":
+            ended_s = now_s
+            break
+    assert ended_s == (pytest.approx(ends_s) if ends_s else None)
+
+
+def test_what_else_a_slow_topics_run_is_to_show_is_waited_for() -> None:
+    live, until = state_of(), SLOW.model_copy(update={"messages": {"/a": 258, "/b": 9}, "silent_s": 30})
+    for second in range(1, 25):
+        live.note_messages("/a", 1, float(second))
+    live.note_messages("/b", 8, 20.0)
+    assert find_outcome(live, until, 24.5) is None
+    live.note_messages("/b", 1, 24.5)
+    assert find_outcome(live, until, 24.5) == ("timeout", "258 messages on /a take over 60 s at 1.00 Hz")
+    live.least_s = 30.0
+    assert find_outcome(live, until, 24.5) is None
+    live.least_s, live.listened, live.owners = 0.0, {"/a": {"/n"}}, {"/n": "n"}
+    assert find_outcome(live, until, 24.5) is None  # who is sent messages may yet answer
