@@ -50,11 +50,9 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
     silent = silent or _in_namespaces(live, until, now_s)
     if silent:
         return "silent", silent
-    if not wanting and (slow := _too_slow(live, until, given, now_s)):
-        return "timeout", slow
-    if now_s - live.started_s > until.limit_s:
-        return "timeout", f"not complete after {until.limit_s:g} s"
-    return None
+    slow = "" if wanting else _too_slow(live, until, given, now_s)
+    late = slow or (now_s - live.started_s > until.limit_s and f"not complete after {until.limit_s:g} s")
+    return ("timeout", late) if late else None
 
 
 def _enough(live: RunState, until: Until, now_s: float, given: Until | None = None) -> tuple[bool, ...]:
