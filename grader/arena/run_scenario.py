@@ -42,6 +42,9 @@ CLOCK_STEP_S = 0.05
 UNFOLLOWED_S = 2.0
 # By the wall's clock: a node of 10 Hz that follows the simulated clock is many times as fast.
 UNFOLLOWED_HZ = 15.0
+TRIAL_S, TRIAL_MESSAGES = 1.0, 8
+SLOWED = 0.25
+"""A node that sends less than this share of what it sent with a fast clock follows that clock."""
 REGISTERED_S = 1.0
 HEARD_SETTLE_S = 0.3
 TALKED_S = 1.0
@@ -241,7 +244,7 @@ async def _await_rostests(scenario: Scenario, arena: ArenaSession, tell: Tell) -
 
 async def _observe(scenario: Scenario, arena: ArenaSession, tell: Tell) -> tuple[str, str]:
     until, live = scenario.until, arena.live
-    warped = scenario.clock == "warped"
+    trial = _ClockTrial(scenario, arena)
     looked = bool(until.connected)
     while True:
         now_s = time.monotonic()
@@ -256,10 +259,7 @@ async def _observe(scenario: Scenario, arena: ArenaSession, tell: Tell) -> tuple
                 await arena.wait(lambda: not live.running, HEARD_SETTLE_S)
             return done
         tell(describe_wait(live, until))
-        if warped and _does_not_follow(scenario, arena, now_s):
-            warped = False
-            detail = "the node does not follow the simulated clock; the run goes on in real time"
-            arena.send(do="rewarp", warp=1, detail=detail)
+        trial.look(now_s)
         if until.connected:
             await arena.look_at_connections()
             await arena.wait(lambda: not live.running, GRAPH_EVERY_S)
@@ -270,16 +270,47 @@ async def _observe(scenario: Scenario, arena: ArenaSession, tell: Tell) -> tuple
             )
 
 
-def _does_not_follow(scenario: Scenario, arena: ArenaSession, now_s: float) -> bool:
-    """Return whether a node keeps its own rate, however fast `/clock` runs: it sleeps by the wall's clock."""
-    for topic in scenario.until.messages:
-        seen = arena.live.topics[topic]
-        # A machine that others fill also makes a node slow, by no clock of its own.
-        seen_s = now_s - seen.first_s
-        lost_s = arena.live.lost_s - seen.lost_before_s
-        if seen.count and seen_s - lost_s > UNFOLLOWED_S:
-            return seen.count / seen_s < UNFOLLOWED_HZ
-    return False
+class _ClockTrial:
+    """Whether a node whose messages come slowly follows the fast clock: for a while, that runs as the wall's does. A
+    node that follows it is then slower by far, and it runs fast again. For a node that sleeps by the wall's clock, it
+    stays as it is then."""
+
+    def __init__(self, scenario: Scenario, arena: ArenaSession) -> None:
+        self._scenario, self._arena = scenario, arena
+        self._is_over = scenario.clock != "warped"
+        self._topic, self._hz, self._began_s, self._count = "", 0.0, 0.0, 0
+
+    def look(self, now_s: float) -> None:
+        """Begin the trial where there is reason for it, and end it once it has shown something."""
+        if self._is_over:
+            return
+        if not self._topic:
+            self._begin(now_s)
+        elif now_s > self._began_s + max(TRIAL_S, TRIAL_MESSAGES / self._hz):
+            self._is_over = True
+            came_hz = (self._arena.live.topics[self._topic].count - self._count) / (now_s - self._began_s)
+            if came_hz < SLOWED * self._hz:
+                self._set(self._scenario.warp, "the node follows the simulated clock, which runs fast again")
+            else:
+                self._set(1, "the node does not follow the simulated clock; the run goes on in real time")
+
+    def _begin(self, now_s: float) -> None:
+        live = self._arena.live
+        for topic in self._scenario.until.messages:
+            seen = live.topics[topic]
+            # A machine that others fill also makes a node slow, by no clock of its own.
+            seen_s = now_s - seen.first_s
+            lost_s = live.lost_s - seen.lost_before_s
+            if seen.count and seen_s - lost_s > UNFOLLOWED_S:
+                self._hz = seen.count / seen_s
+                if self._hz < UNFOLLOWED_HZ:
+                    self._topic, self._began_s, self._count = topic, now_s, seen.count
+                    self._set(1, "the node is slow; the clock shows whether the node follows it")
+                return
+
+    def _set(self, warp: float, detail: str) -> None:
+        self._arena.send(do="rewarp", warp=warp, detail=detail)
+        self._arena.live.graph_changed_s = time.monotonic()  # what pauses now is not silent
 
 
 def process_specs(start: Start, place: ProcessEnvironment, numbers: Iterator[int]) -> Iterator[ProcessSpec]:

@@ -72,10 +72,21 @@ def test_a_node_that_looks_at_the_clock_at_once_finds_no_time_gone(tmp_path: Pat
 def test_node_that_sleeps_by_the_wall_is_noticed_and_goes_on_in_real_time(tmp_path: Path) -> None:
     code = COUNTER.format(prepare="", sleep="time.sleep(0.1)")
     # on a full machine it takes longer to see: the time that others took is left out
-    run = run_script(tmp_path, code, clock="warped", messages={"/count": 120}, limit_s=60)
-    assert _values(run)[:120] == list(range(120))
+    run = run_script(tmp_path, code, clock="warped", messages={"/count": 150}, limit_s=60)
+    assert _values(run)[:150] == [n % 128 for n in range(150)]
     assert run.outcome.outcome == "complete"
     assert any("does not follow" in event.detail for _, event in run.actors)
+
+
+@pytest.mark.parametrize("hz", [0.5, 0.2])
+def test_a_slow_node_that_follows_the_clock_is_not_taken_for_one_of_real_time(
+    hz: float, tmp_path: Path
+) -> None:
+    code = COUNTER.format(prepare=f"rate = rospy.Rate({hz})", sleep="rate.sleep()")
+    run = run_script(tmp_path, code, clock="warped", messages={"/count": 60}, limit_s=50)
+    assert _values(run)[:60] == list(range(60))
+    assert run.outcome.outcome == "complete"
+    assert any("follows" in event.detail for _, event in run.actors)
 
 
 def test_node_that_takes_five_seconds_to_start(tmp_path: Path) -> None:
