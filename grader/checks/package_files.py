@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.registry import DependencyName, NoParams, PackageName, check
-from grader.checks.support.scripts import add_hint, find_script, is_product, move_hint
+from grader.checks.support.scripts import add_folder_hint, add_hint, find_script, is_product, move_hint
 from grader.checks.support.text import near_names, shown
 from grader.installable import known_packages, noetic_messages
 from grader.model.package import MANIFEST, Dependency, Manifest, PackageFacts, meant_manifest
@@ -121,10 +121,11 @@ def _lost_folder(package: PackageFacts, folder: str, params: LayoutParams) -> Sl
     instead = _instead(package, folder)
     if instead:
         what = f"there is no folder {folder}/, but {instead}/"
-        return Slip(what, f"git mv {instead} {folder}", f"{instead}/")
+        return Slip(what, move_hint(package, instead, folder), f"{instead}/")
     own = [s for s in params.scripts if PurePosixPath(s).parts[0] == folder]
     nowhere = bool(own) and all(find_script(package, s) is None for s in own)
-    fix = f"mkdir {folder} in the package folder, and put the files that belong there into it"
+    below = [path for path in (*params.files, *params.scripts) if path.startswith(f"{folder}/")]
+    fix = add_folder_hint(package, folder, below)
     return Slip(f"there is no folder {folder}/", fix, explained=nowhere)
 
 
@@ -152,7 +153,8 @@ def _lost_file(package: PackageFacts, name: str) -> Slip:
     ]
     other = next(iter([*near, *same]), "")
     if other:
-        return Slip(f"there is no {name}, but {other}", f"git mv {other} {name}", other, explained=True)
+        fix = move_hint(package, other, name)
+        return Slip(f"there is no {name}, but {other}", fix, other, explained=True)
     return Slip(f"there is no {name}", add_hint(package, name), explained=True, missing=name)
 
 

@@ -30,7 +30,7 @@ from grader.intake.choose import (
     not_found,
 )
 from grader.intake.git import Git, Repository
-from grader.intake.gitdir import Repositories
+from grader.intake.gitdir import Repositories, repository_around
 from grader.intake.limits import IntakeLimits
 from grader.intake.names import brief, encodable, printable, safe_name
 from grader.intake.package_files import (
@@ -319,8 +319,10 @@ def _read(opened: Opened, choice: Choice, repositories: Repositories, limits: In
     right: frozenset[str] = frozenset()
     if opened.in_place:
         right = right_in_git(chosen.folder, content.entries, repositories.git, opened.leave_out)
+    top = repository_around(chosen.folder) if opened.in_place and modes.source == "git" else None
+    in_git = "" if top is None else printable(chosen.folder.relative_to(top).as_posix())
     return _Read(
-        package=_package(chosen, modes, content, right),
+        package=_package(chosen, modes, content, right).model_copy(update={"path_in_git": in_git}),
         modes=modes,
         digest=tree_digest(chosen.folder, content.entries, modes.executable, content.left_out),
         hints=(

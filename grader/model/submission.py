@@ -47,6 +47,8 @@ class SourcePackage(Record):
     executable: dict[str, bool | None]
     left_out: frozenset[str] = frozenset()
     right_in_git: frozenset[str] = frozenset()
+    path_in_git: str = ""
+    """The same as `path` from the top of the repository around a folder that is graded in place; "" for others."""
     asked: str = ""
 
 

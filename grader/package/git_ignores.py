@@ -1,4 +1,5 @@
-"""Reads the `.gitignore` files of a package and of the folders above it, up to the root of what was handed in."""
+"""Reads the `.gitignore` files of a package and of the folders above it, up to the root of what was handed in, or of the
+repository around it."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ def read_git_ignores(package: SourcePackage, paths: Iterable[str]) -> tuple[Igno
     """Return the lines that count for the package, those of outer folders first; `paths` are the package's files."""
     if package.mode_source != "git":
         return ()
-    above = PurePosixPath(package.path).parts
+    above = PurePosixPath(package.path_in_git or package.path).parts
     found: list[IgnoreLine] = []
     for depth in range(len(above), 0, -1):
         folder = package.folder.parents[depth - 1] if depth <= len(package.folder.parents) else None

@@ -83,6 +83,16 @@ def test_a_folder_inside_a_repository(tmp_path):
     assert submission.package.mode_source == "git"
 
 
+def test_what_git_ignores_is_read_up_to_the_top_of_the_repository(tmp_path):
+    files = {f"ws/src/{path}": text for path, text in lab().items()} | {".gitignore": "# mine\nlaunch/\n"}
+    repo = repository(tmp_path / "r", files)
+    for root in (repo, repo / "ws", repo / "ws/src/lab1"):
+        (line,) = read_package(opened(root, tmp_path).package).git_ignores
+        assert (line.file, line.line, line.hides("launch/a.launch")) == ("../../../.gitignore", 2, True)
+    write(tmp_path / "untracked", lab() | {"lab1/.gitignore": "launch/\n"})
+    assert not read_package(opened(tmp_path / "untracked/lab1", tmp_path).package).git_ignores
+
+
 def test_a_repository_below_the_folder(tmp_path):
     repo = repository(tmp_path / "ws/src/lab1", lab("."))
     submission = opened(tmp_path / "ws", tmp_path)

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.model.git_ignores import hiding_line
+from grader.model.git_ignores import IgnoreLine, hiding_line
 from grader.model.package import CMakeCall, Executable, Fault, PackageFacts, SourceFile
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.verdict import FileCitation
@@ -128,10 +128,23 @@ def add_hint(package: PackageFacts, path: str) -> str:
     """Return the hint that a file has to be written; of what was handed in with git, that it has to be pushed too, and
     whether git leaves it out."""
     if hiding := hiding_line(package.git_ignores, path):
-        where = f"line {hiding.line} of {hiding.file}, `{hiding.pattern}`,"
-        return f"{where} keeps {path} out of git: git add -f {path}, then commit and push it"
+        return f"{_keeps_out(hiding, path)}: git add -f {path}, then commit and push it"
     then = ", then git add, commit and push it" if handed_in_with_git(package) else ""
     return f"write {path}{then}"
+
+
+def add_folder_hint(package: PackageFacts, folder: str, paths: Iterable[str]) -> str:
+    """Return the hint that a folder has to be made, and whether git leaves it out, or each of the files of it that the
+    lab asks for."""
+    lines = [hiding_line(package.git_ignores, path) for path in (*paths,) or (f"{folder}/file",)]
+    if lines and lines[0] is not None and None not in lines:
+        put = f"put the files that belong there into it, git add -f {folder}, then commit and push it"
+        return f"{_keeps_out(lines[0], f'{folder}/')}: {put}"
+    return f"{'mkdir -p' if '/' in folder else 'mkdir'} {folder} in the package folder, and put the files that belong there into it"
+
+
+def _keeps_out(hiding: IgnoreLine, path: str) -> str:
+    return f"line {hiding.line} of {hiding.file}, `{hiding.pattern}`, keeps {path} out of git"
 
 
 def move_hint(package: PackageFacts, path: str, wanted: str) -> str:
