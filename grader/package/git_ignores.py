@@ -1,5 +1,4 @@
-"""Reads the `.gitignore` files of a package and of the folders above it, up to the root of what was handed in, or of the
-repository around it."""
+"""Reads the `.gitignore` files of a package and of the folders above it, up to the top of its repository."""
 
 from __future__ import annotations
 
