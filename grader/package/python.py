@@ -9,7 +9,7 @@ import time
 import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 from pydantic import Field
 
@@ -160,6 +160,11 @@ def _below(folder: str, found: Iterable[_Found]) -> Iterator[_Found]:
             yield one.model_copy(update={"file": one.file.removeprefix(folder)})
 
 
+class _OddLine(Record):
+    line: int
+    wants: Literal["tabs", "spaces"]
+
+
 class _RawFault(Record):
     kind: str
     line: int | None
@@ -169,6 +174,7 @@ class _RawFault(Record):
     opened: int | None = None
     mixed: bool = False
     tab_size: int | None = None
+    odd: _OddLine | None = None
 
 
 class _RawEntry(Record):
@@ -225,6 +231,10 @@ def _fault(file: str, raw: _RawFault) -> Fault:
     reason = reason_of(raw.message, raw.text, column=raw.column, opened=raw.opened, mixed=raw.mixed)
     if reason.fix == _ONE_WIDTH and raw.tab_size:
         reason = Reason(reason.why, _TAB_SIZE.format(raw.tab_size))
+    elif reason.fix == _ONE_WIDTH and raw.odd is not None:
+        reason = Reason(
+            reason.why, f"begin line {raw.odd.line} with {raw.odd.wants}, as the other lines of the file"
+        )
     kind = printable(raw.kind[:MESSAGE_CHARS_MAX])
     column = raw.column if raw.line and raw.column and 0 < raw.column <= len(raw.text) + 1 else None
     if kind in {"TabError", "IndentationError"} and raw.text.strip():

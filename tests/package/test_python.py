@@ -73,6 +73,21 @@ CASES = {
     "tabs_of_4": ("def f():\n    x = 1\n\ty = 2\n", 3, "at a tab size of 4"),
     "tabs_and_more": ("if 1:\n        x = 1\n\tprint 'a'\n", 3, "at a tab size of 8"),
     "tabs_unindent": ("if 1:\n\tif 2:\n\t\tx = 1\n  y = 2\n", 4, "tabs and spaces are mixed"),
+    "spaces_on_one_line": (
+        "if 1:\n\tif 2:\n\t\tx = 1\n  y = 2\n",
+        4,
+        "begin line 4 with tabs, as the other lines of the file",
+    ),
+    "tab_on_one_line": (
+        "if 1:\n   if 2:\n      x = 1\n\ty = 2\n",
+        4,
+        "begin line 4 with spaces, as the other lines of the file",
+    ),
+    "tabs_on_two_lines": (
+        "if 1:\n   if 2:\n      x = 1\n\ty = 2\n\tz = 2\n",
+        4,
+        "use four spaces everywhere",
+    ),
     "indent_missing": ("if 1:\nx = 1\n", 2, "must be indented"),
     "indent_more": ("x = 1\n  y = 2\n", 2, "further than the one above"),
     "indent_less": ("if 1:\n    x = 1\n  y = 2\n", 3, "matches none of the lines above"),

@@ -140,7 +140,8 @@ def add_folder_hint(package: PackageFacts, folder: str, paths: Iterable[str]) ->
     if lines and lines[0] is not None and None not in lines:
         put = f"put the files that belong there into it, git add -f {folder}, then commit and push it"
         return f"{_keeps_out(lines[0], f'{folder}/')}: {put}"
-    return f"{'mkdir -p' if '/' in folder else 'mkdir'} {folder} in the package folder, and put the files that belong there into it"
+    make = "mkdir -p" if "/" in folder else "mkdir"
+    return f"{make} {folder} in the package folder, and put the files that belong there into it"
 
 
 def _keeps_out(hiding: IgnoreLine, path: str) -> str:

@@ -1,10 +1,11 @@
 """Reads Python files without running them: `syntax.py ROOT FILE...`, or the files as a JSON array on stdin.
 
 Prints one JSON object a file, as soon as it is known, so that a file which crashes the interpreter can be
-told: `{"file": ..., "faults": [{"kind", "line", "column", "message", "text", "opened", "mixed", "tab_size"}],
+told: `{"file": ..., "faults": [{"kind", "line", "column", "message", "text", "opened", "mixed", "tab_size", "odd"}],
 "slips": [{"line", "kind", "message"}]}`. `text` is the faulty line, `opened` the line of a bracket that is never
 closed, `mixed` whether the file indents with tabs and with spaces, `tab_size` the size at which its tabs fit those
-spaces. Runs under ROS's own Python (3.8 and later), standard library only; nothing is imported from ROOT.
+spaces, `odd` the only line that is not indented as all others are. Runs under ROS's own Python (3.8 and later),
+standard library only; nothing is imported from ROOT.
 """
 
 import ast
@@ -46,6 +47,7 @@ REFUSED_LIMIT = 20
 FURTHER_LIMIT, FURTHER_BYTES = 12, 100_000
 """So many more errors are looked for, in a file of no more than that: each compiles all of it again."""
 OF_NAMES = ("node-name", "publisher", "publisher-type", "subscriber", "subscriber-type", "rate-number")
+DEPTHS_MAX = 4
 MARKER = re.compile(r"(<<<<<<<|=======|>>>>>>>|\|\|\|\|\|\|\|)( |$)")
 CPP = re.compile(rb"^#include\s*[<\"].*?^(int|void)\s+\w+\s*\(", re.MULTILINE | re.DOTALL)
 NO_SCRIPTS = (
@@ -250,10 +252,10 @@ def bare_except(tree, name):
     return None
 
 
-def fault(kind, line, column, message, *, text="", opened=None, mixed=False, tab_size=None):
+def fault(kind, line, column, message, *, text="", opened=None, mixed=False, tab_size=None, odd=None):
     texts = {"message": message[:MESSAGE_LIMIT], "text": text[:TEXT_LIMIT]}
     place = {"line": line, "column": column, "opened": opened}
-    return {"kind": kind, **place, "mixed": mixed, "tab_size": tab_size, **texts}
+    return {"kind": kind, **place, "mixed": mixed, "tab_size": tab_size, "odd": odd, **texts}
 
 
 def undecodable(data):
@@ -318,6 +320,7 @@ def syntax_fault(error, data):
         opened=never_closed(data, line) if known else None,
         mixed=len(begins) > 1,
         tab_size=tab_size(lines) if len(begins) > 1 else None,
+        odd=odd_line(lines) if len(begins) > 1 else None,
     )
 
 
@@ -350,14 +353,38 @@ def tab_size(lines):
     """Return the size of a tab at which the lines fit into blocks, as in the editor that they were written in; None
     where no usual size does."""
     for size in (8, 4):
-        fitted = "\n".join(blanks_of(line).expandtabs(size) + line.lstrip() for line in lines)
-        try:
-            compile(fitted, "script", "exec", dont_inherit=True)
-        except IndentationError:
-            continue
-        except (SyntaxError, ValueError, OverflowError, RecursionError, MemoryError):
-            pass
-        return size
+        if fits("\n".join(blanks_of(line).expandtabs(size) + line.lstrip() for line in lines)):
+            return size
+    return None
+
+
+def fits(text):
+    """Return whether the lines of a text fit into blocks."""
+    try:
+        compile(text, "script", "exec", dont_inherit=True)
+    except IndentationError:
+        return False
+    except (SyntaxError, ValueError, OverflowError, RecursionError, MemoryError):
+        pass
+    return True
+
+
+def odd_line(lines):
+    """Return the only line that is indented with tabs where all others are with spaces, or the other way round; None
+    where there are more, or none of the others' indentations is right for it."""
+    kinds = {}
+    for number, line in enumerate(lines):
+        if line.strip() and blanks_of(line):
+            kinds.setdefault("".join(sorted(set(blanks_of(line)))), []).append(number)
+    rare, usual = sorted(kinds, key=lambda kind: len(kinds[kind])) if len(kinds) == 2 else ("", "")
+    if usual not in ("\t", " ") or len(kinds[rare]) != 1 or len(kinds[usual]) == 1:
+        return None
+    (at,) = kinds[rare]
+    others = {blanks_of(line) for number, line in enumerate(lines) if number != at and line.strip()} - {""}
+    for blanks in sorted(others, key=len)[:DEPTHS_MAX]:
+        fitted = [*lines[:at], blanks + lines[at].lstrip(), *lines[at + 1 :]]
+        if fits("\n".join(fitted)):
+            return {"line": at + 1, "wants": "tabs" if usual == "\t" else "spaces"}
     return None
 
 
