@@ -194,12 +194,29 @@ def in_turn(named: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
 
 @contextmanager
 def workers(count: int = SIDE_BY_SIDE) -> Iterator[ProcessPoolExecutor]:
-    """Processes that grade side by side; what has not begun when the block is left is not begun."""
-    pool = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"))
+    """Processes that grade side by side. They end when the block is left, whatever they are at: nobody waits for it."""
+    spawn = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(count, mp_context=spawn, initializer=_end_with_parent)
     try:
         yield pool
     finally:
-        pool.shutdown(cancel_futures=True)
+        ours = list((pool._processes or {}).values())  # `shutdown` waits for what has begun
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in ours:
+            process.terminate()
+        for process in ours:
+            process.join()
+
+
+def _end_with_parent() -> None:
+    """End this worker with its parent, also if that is killed."""
+
+    def watch() -> None:
+        if (parent := multiprocessing.parent_process()) is not None:
+            parent.join()
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def expected_points(fixture: Mutant, rubric: Rubric) -> float:

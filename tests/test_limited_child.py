@@ -2,15 +2,50 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import os
+import re
 import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from grader import limited_child
 from grader.limited_child import Answer, ChildLimits, run_limited
 
+GRADER = Path(limited_child.__file__).parent
+FUNCTION = re.compile(r'"(grader\.[\w.]+:\w+)"')
+LINT = {path.stem for path in GRADER.glob("package/lint/[a-z]*.py")}
+OF_REPAIRS = {
+    *("errors", "installable", "package", "package.line_corrections", "syntax_fixes", "wording"),
+    *("package.python_repairs", "package.python_repairs.calls", "package.python_repairs.examine"),
+    *("package.python_repairs.imports", "package.python_repairs.members", "package.python_repairs.names"),
+    *("package.python_repairs.rospy_names", "package.python_repairs.syntax"),
+}
+MAY_IMPORT = {
+    "grader.intake.archive:unpack_here": {
+        *("errors", "intake", "intake.archive", "intake.limits", "intake.names", "intake.tree"),
+        *("limited_child", "portable", "wording"),
+    },
+    "grader.package.lint.syntax:check_all": {"package", "package.lint", "package.lint.syntax"},
+    "grader.package.python_repairs.examine:examine": OF_REPAIRS,
+    "grader.package.python_repairs.examine:with_sign_turned": OF_REPAIRS,
+}
+"""The grader's functions that run in such a child, and the modules that they are made of: a module that comes to import
+a library, which is not there, takes with it all that its function finds, without an error."""
+LIBRARIES = {("syntax.py", "fissix"), ("installable.py", "packaging")}
+"""The folder of the one is handed to the function that needs it; the other is for a function that no child calls."""
+LOADED = """
+import importlib, json, sys
+sys.path.append(sys.argv[1])
+importlib.import_module(sys.argv[2])
+names = [n.partition(".")[2] for n in sys.modules if n.startswith("grader.")]
+print(json.dumps(names))
+"""
 LIMITS = ChildLimits(memory_bytes=256 << 20, cpu_s=1, wall_s=30.0, file_bytes=1 << 20)
 
 
@@ -69,3 +104,42 @@ def test_a_template_that_was_killed_costs_no_answer() -> None:
 def test_without_templates_each_child_is_a_process_of_its_own(monkeypatch) -> None:
     monkeypatch.setattr(limited_child, "CAN_COPY", False)
     assert json.loads(ask("remember").lines)["parent"] == os.getpid()
+
+
+def test_every_function_that_runs_in_a_child_is_known() -> None:
+    texts = [path.read_text() for path in GRADER.rglob("*.py") if path.name != "limited_child.py"]
+    found = {name for text in texts if "run_limited" in text for name in FUNCTION.findall(text)}
+    assert found == MAY_IMPORT.keys()
+
+
+@pytest.mark.parametrize("function", MAY_IMPORT)
+def test_what_a_function_in_a_child_imports_is_there(function: str) -> None:
+    module = function.partition(":")[0]
+    command = [sys.executable, "-I", "-S", "-B", "-c", LOADED, limited_child.ROOT, module]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert set(json.loads(done.stdout)) == MAY_IMPORT[function]
+    paths = [GRADER.joinpath(*name.split(".")) for name in MAY_IMPORT[function]]
+    files = [path / "__init__.py" if path.is_dir() else path.with_suffix(".py") for path in paths]
+    files += GRADER.glob("package/lint/*.py") if ".lint." in function else []
+    # a folder without __init__.py is a package, too
+    found = {
+        (file.name, root)
+        for file in files
+        if file.exists()
+        for root in _imported(ast.parse(file.read_text()))
+    }
+    known = {*sys.stdlib_module_names, "grader", *(LINT if ".lint." in function else ())}
+    assert {one for one in found - LIBRARIES if one[1] not in known} == set()
+
+
+def _imported(tree: ast.AST) -> Iterator[str]:
+    """Yield the first names of what a file imports, within functions too; not what only its types need."""
+    if isinstance(tree, ast.If) and ast.unparse(tree.test) == "TYPE_CHECKING":
+        return
+    if isinstance(tree, ast.Import):
+        yield from (alias.name.split(".")[0] for alias in tree.names)
+    elif isinstance(tree, ast.ImportFrom) and not tree.level:
+        yield (tree.module or "").split(".")[0]
+    for node in ast.iter_child_nodes(tree):
+        yield from _imported(node)
