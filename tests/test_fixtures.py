@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path
@@ -122,6 +124,35 @@ def test_packages_are_written_and_listed(lab, tmp_path) -> None:
         assert (
             read_tree(tmp_path / name) == read_tree(faulty_package(lab, name)) != read_tree(REFERENCES / lab)
         )
+
+
+KILLED = """
+import os, signal, time
+from tests.fixture_runs import workers
+if __name__ == "__main__":
+    with workers(2) as pool:
+        print([pool.submit(os.getpid).result() for _ in range(2)][0], flush=True)
+        for _ in range(6):
+            pool.submit(time.sleep, 100)
+        {end}
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+@pytest.mark.parametrize("end", ["os.kill(os.getpid(), signal.SIGKILL)", "raise KeyboardInterrupt", "pass"])
+def test_workers_end_with_who_started_them(end, tmp_path) -> None:
+    script = tmp_path / "killed.py"
+    script.write_text(KILLED.replace("{end}", end))
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, script], env=env, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+        timeout=60, check=False,
+    )  # fmt: skip
+    worker, until_s = Path("/proc", done.stdout.strip(), "stat"), time.monotonic() + 20
+    while worker.exists() and time.monotonic() < until_s:
+        time.sleep(0.1)
+    assert done.stdout.strip()
+    assert not worker.exists()
 
 
 def test_executable_bits_are_those_of_the_declaration() -> None:
