@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from grader.package.python_repairs.rospy_names import with_logger
 from tests.package.repairing import TALKER, Case, check, swapped
 
 PUBLISHER = "rospy.Publisher('numeric_chatter', Int8, queue_size=10)"
@@ -81,3 +82,34 @@ def test_the_module_of_ros_2_is_none_of_a_script_that_calls_rospy(tmp_path: Path
         ("rclpy.init_node(", "rclpy.create_node("),
     )
     check(Case(of_ros_2, []), tmp_path / "three")
+
+
+ALL = f"        rospy.loginfo('x')\n        rospy.logerr(str(1))\n{LOOP}"
+
+
+@pytest.mark.parametrize("of", ["self", "rospy"])
+def test_the_logger_of_ros_2_is_one_slip(of: str, tmp_path: Path) -> None:
+    wrong = f"        {of}.get_logger().info('x')\n        {of}.get_logger().error(str(1))\n{LOOP}"
+    said = "there is no get_logger() in rospy"
+    check(Case(swapped(TALKER, (LOOP, wrong)), ["missing-call"], said, after={TALKER: ALL}), tmp_path)
+
+
+@pytest.mark.parametrize(
+    "swaps",
+    [
+        [(LOOP, f"        log.get_logger().info('x')\n{LOOP}")],
+        [(LOOP, f"        self.get_logger().info('x', once=True)\n{LOOP}")],
+        [(LOOP, f"        self.get_logger().log('x', 10)\n{LOOP}")],
+        [
+            (LOOP, f"        self.get_logger().info('x')\n{LOOP}"),
+            ("def main", "def get_logger(): pass\n\n\ndef main"),
+        ],
+        [
+            (LOOP, f"        self.get_logger().info('x')\n{LOOP}"),
+            ("def main", "class A(B):\n    x = 1\n\n\ndef main"),
+        ],
+    ],
+)
+def test_another_logger_is_left_alone(swaps: list[tuple[str, str]], tmp_path: Path) -> None:
+    text = swapped(TALKER, *swaps)[TALKER]
+    assert "loginfo" not in "".join(one["text"] for one in with_logger(str(text)))

@@ -42,7 +42,7 @@ from grader.package.python_repairs.names import (
     with_parameters,
     with_self,
 )
-from grader.package.python_repairs.rospy_names import ROSPY, with_attributes, with_rospy
+from grader.package.python_repairs.rospy_names import ROSPY, with_attributes, with_logger, with_rospy
 from grader.package.python_repairs.syntax import (
     Step,
     as_python3,
@@ -122,6 +122,7 @@ def _steps(text: str, types: list[str], known: Known, *, is_run: bool = True) ->
             with_methods,
             with_parameters,
             with_attributes,
+            with_logger,
             with_message_classes,
             with_values_called,
             with_calls,

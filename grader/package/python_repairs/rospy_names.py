@@ -58,6 +58,16 @@ TYPE_FIRST = {
     "create_timer": "rospy.Timer(rospy.Duration({0}), {1})",
 }
 """Calls of ROS 2 that take their arguments in another order: the call of rospy with them."""
+LOGGER = "get_logger"
+LEVELS = {
+    "info": "loginfo",
+    "warn": "logwarn",
+    "warning": "logwarn",
+    "error": "logerr",
+    "debug": "logdebug",
+    "fatal": "logfatal",
+}
+"""The methods of a logger of ROS 2."""
 OTHER_MODULES = ("rclpy", "ros", "roscpp", "ros2", "rospy2")
 
 
@@ -112,6 +122,42 @@ def with_attributes(text: str) -> Iterator[Step]:
             yield step
             yield from with_attributes(step["text"])
             return
+
+
+def with_logger(text: str) -> Iterator[Step]:
+    """`rospy.loginfo(…)` in place of each `self.get_logger().info(…)` of ROS 2, in a script that has no such method."""
+    tree, lines = tree_of(text), text.split("\n")
+    imported = {
+        a.name.partition(".")[0] for n in nodes_in(tree) if isinstance(n, ast.Import) for a in n.names
+    }
+    inherits = {
+        last_name(base) for n in nodes_in(tree) if isinstance(n, ast.ClassDef) for base in n.bases
+    } - {"object"}
+    given = {
+        last_name(target)
+        for n in nodes_in(tree)
+        if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)
+        if ast.unparse(n.value.func) == "rospy.init_node"
+        for target in n.targets
+    }
+    named = {n.attr for n in nodes_in(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
+    if "rospy" not in imported or inherits or LOGGER in bound_in(tree) | named:
+        return
+    edits, first = [], 0
+    for node in (n for n in nodes_in(tree) if isinstance(n, ast.Call) and isinstance(n.func, ast.Attribute)):
+        level, got = LEVELS.get(node.func.attr, ""), node.func.value
+        is_logger = (
+            isinstance(got, ast.Call) and isinstance(got.func, ast.Attribute) and got.func.attr == LOGGER
+        )
+        if not is_logger or last_name(got.func.value) not in {"self", "rospy", *given}:
+            continue
+        span = span_of(lines, node.func)
+        if not level or span is None or node.keywords or len(node.args) != 1:
+            return  # how often it is to log is not known
+        edits.append((*span, f"rospy.{level}"))
+        first = first or node.lineno
+    if edits:
+        yield from step_to("attribute", first, text, edited(text, edits), f"{LOGGER}() in rospy")
 
 
 def _near(name: str, *, is_called: bool) -> str:
