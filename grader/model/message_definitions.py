@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import math
 import re
 from collections.abc import Collection, Iterator, Mapping
@@ -9,6 +10,7 @@ from difflib import get_close_matches
 from pathlib import PurePosixPath
 
 from grader.model.package import Fault, Interface, InterfaceField
+from grader.wording import is_one_edit
 
 FIELDS_MAX = 500
 PARTS = {".msg": ("",), ".srv": ("request", "response"), ".action": ("goal", "result", "feedback")}
@@ -60,6 +62,7 @@ def parse_interface(data: bytes, path: str) -> Interface:
             fault = fault or _no_field(text, path, line)
         elif one is not None and len(fields) < FIELDS_MAX:
             fields.append(one)
+            fault = fault or _refused(text, one, path)
     if number != len(parts) - 1:
         fault = fault or _other_parts(path, number, parts)
     return Interface(path=path, fields=tuple(fields), fault=fault)
@@ -118,33 +121,114 @@ def _parse_line(text: str, part: str, line: int) -> InterfaceField | None:
 def _no_field(text: str, path: str, line: int) -> Fault:
     shown = text.strip()[:60]
     message = f"`{shown}` is not a field: a line is a type and a name, like `float64 speed`"
-    bare = shown.partition("//")[0].strip().rstrip(";, ")
-    # Also dashes that a word processor made of `---`.
-    if re.fullmatch(r"[-_=*\u2013\u2014]{1,}", bare) and not path.endswith(".msg"):
-        cause, fix = f"`{shown}` on line {line} does not divide its parts", f"write `{DIVIDING}`"
-        if bare.startswith(DIVIDING):
-            cause, fix = (
-                f"{cause}: it has to stand at the beginning of the line",
-                f"{fix} without spaces before it",
-            )
-        else:
-            cause += ": that takes three of `-`"
-        return Fault(file=path, line=line, kind="NoField", message=cause, cause=cause, fix=fix)
-    # `float64: speed` and `int32 A: 5` with ROS's own signs, `std_msgs.Header` with a slash.
-    right = re.sub(
-        r"^(\w+\s+\w+)\s*(?::=?|==|\s)\s*(?=[-\d])", r"\1 = ", re.sub(r"^(\w+)\.", r"\1/", bare)
-    ) + (f"  # {note.strip()}" if (note := shown.partition("//")[2]) else "")
-    if not bare and shown.startswith("//"):
-        right = f"# {shown.lstrip('/ ')}"
-    is_known = (right != shown and _parse_line(right, "", line)) or right.startswith("#")
+    cause, right = f"`{shown}` on line {line} is not a field", corrected_line(text, path)
+    if right == DIVIDING:
+        message = cause = f"`{shown}` on line {line} does not divide its parts" + (
+            ": it has to stand at the beginning of the line"
+            if shown.startswith(DIVIDING)
+            else ": that takes three of `-`"
+        )
+        fix = f"write `{DIVIDING}`{' without spaces before it' if shown.startswith(DIVIDING) else ''}"
+        return Fault(file=path, line=line, kind="NoField", message=message, cause=cause, fix=fix)
     return Fault(
         file=path,
         line=line,
         kind="NoField",
         message=message,
-        cause=f"`{shown}` on line {line} is not a field",
-        fix=f"write `{right}`" if is_known else "",
+        cause=cause,
+        fix=f"write `{right}`" if right else "",
     )
+
+
+def corrected_line(text: str, path: str) -> str:
+    """Return what a line that ROS does not read as a field, a constant or a divider should be, without a comment behind
+    `#`; "" where that is not plain."""
+    code = text.partition("#")[0].strip()
+    bare = code.partition("//")[0].strip().rstrip(";, ")
+    if not bare:
+        return f"# {code.lstrip('/ ')}" if code.startswith("//") else ""
+    # Also dashes that a word processor made of `---`.
+    if re.fullmatch(r"[-_=*\u2013\u2014]+", bare) and not path.endswith(".msg"):
+        return DIVIDING
+    note = f"  # {note.strip()}" if (note := code.partition("//")[2]) else ""
+    read = _parse_line(bare, "", 0)
+    if read is not None:
+        return f"{right}{note}" if (right := _rewritten(bare, read)) != code else ""
+    changed = (re.sub(pattern, new, bare) for pattern, new in _SLIPS)
+    right = next(
+        (one for one in changed if (read := _parse_line(one, "", 0)) and not _refusal(one, read)), ""
+    )
+    return right and f"{right}{note}"
+
+
+_PLAIN = "|".join(sorted({*BUILT_IN, *FULL_NAMES}, key=len, reverse=True))
+_SLIPS = (
+    (r"^(\w+\s+\w+)\s*(?::=?|==|\s)\s*(?=[-\d])", r"\1 = "),
+    (r"^(\w+)\.(?=[A-Z])", r"\1/"),
+    (rf"^((?:{_PLAIN})(?:\[\d*\])?)\s*[:;,=]\s*(?=\w+$)", r"\1 "),
+    (rf"^(\w+)\s*:\s*((?:{_PLAIN})(?:\[\d*\])?)$", r"\2 \1"),
+    (rf"^({_PLAIN})\s+(\[\d*\])\s*", r"\1\2 "),
+    (rf"^({_PLAIN})\s+(\w+)\s*(\[\d*\])$", r"\1\3 \2"),
+    (r"^(u?int|float) (8|16|32|64)\b", r"\1\2"),
+    (rf"^((?:{_PLAIN})(?:\[\d*\])?\s+[A-Za-z]\w*) ([A-Za-z]\w*)$", r"\1_\2"),
+    (r"(?<=\w)-(?=\w)", "_"),
+)  # fmt: skip
+"""What lines have that are no fields, and what is meant: `float64: speed`, `int32 A: 5`, `std_msgs.Header header`."""
+
+
+def _refused(text: str, field: InterfaceField, path: str) -> Fault | None:
+    if not (why := _refusal(text.partition("#")[0].strip(), field)):
+        return None
+    cause, right = f"line {field.line} cannot be read: {why}", corrected_line(text, path)
+    fix = f"write `{right}`" if right else ""
+    return Fault(file=path, line=field.line, kind="NoField", message=cause, cause=cause, fix=fix)
+
+
+def _refusal(code: str, field: InterfaceField) -> str:
+    """Return why ROS refuses a line that has the form of a field or a constant; "" where it does not."""
+    if code.split(" ", maxsplit=1)[0].strip() != field.type:
+        return "a tab stands between its type and its name, and ROS asks for a space"
+    if field.value is None:
+        return ""
+    if field.type not in {*BUILT_IN, "byte", "char"} - {"time", "duration"}:
+        return f"a constant cannot be a {field.type}"
+    if field.type == "string":
+        return ""
+    if not field.value:
+        return f"nothing stands behind the `=` of {field.name}"
+    return (
+        ""
+        if _is_value(field.value, field.type)
+        else f"`{field.value}` is not a value of the type {field.type}"
+    )
+
+
+def _is_value(value: str, type_: str) -> bool:
+    limits = integer_limits(FULL_NAMES.get(type_, type_))
+    try:
+        if limits is not None:
+            return limits[0] <= int(value) <= limits[1]
+        if type_ == "bool":
+            ast.literal_eval(value)
+        else:
+            float(value)
+    except (ValueError, SyntaxError, MemoryError, RecursionError, TypeError):
+        return False
+    return True
+
+
+def _rewritten(code: str, field: InterfaceField) -> str:
+    """Return a line that has the form of a field as ROS reads it; as it is where that is not plain."""
+    value = field.value
+    if value is None or not _refusal(f"{field.type} {field.name}", field):
+        end = "" if value is None else f" = {value}"
+        return f"{field.type} {field.name}{end}"
+    other = re.sub(
+        r"^=\s*|(?<=[\d.])[fFuUlL]$|\.0*$", "", value.capitalize() if field.type == "bool" else value
+    )
+    if re.fullmatch(r"-?0[xX][0-9a-fA-F]{1,16}", other):
+        other = str(int(other, 16))
+    return f"{field.type} {field.name} = {other}" if _is_value(other, field.type) else code
 
 
 def _other_parts(path: str, number: int, parts: tuple[str, ...]) -> Fault:
@@ -190,11 +274,24 @@ def _own_fields(type_: str, text: str) -> list[str]:
     return found
 
 
+def meant_field(
+    field: InterfaceField, own: Collection[str], known: Mapping[str, Collection[str]]
+) -> tuple[str, str]:
+    """Return the type and the name that a field is meant to have, as `meant_type` does; `speed float64` has them the
+    wrong way round."""
+    is_type = not field.type.isidentifier() or field.type in {*BUILT_IN, *FULL_NAMES, *own}
+    if field.name in BUILT_IN and field.value is None and not is_type:
+        return field.name, field.type
+    return meant_type(field.type, own, known), field.name
+
+
 def meant_type(type_: str, own: Collection[str], known: Mapping[str, Collection[str]]) -> str:
     """Return the type of a field that is meant by one that there is none of; the type itself where there is one. `own`
     are types of the same package, `known` those of others."""
     base, bracket, size = type_.partition("[")
-    if base in {*BUILT_IN, *FULL_NAMES, *own} or "/" in base:
+    if "/" in base:
+        return f"{_meant_full_name(*base.split('/', 1), known)}{bracket}{size}"
+    if base in {*BUILT_IN, *FULL_NAMES, *own}:
         return type_
     # Small letters on both sides: `pose` is meant for the package's own `Pose`.
     near = get_close_matches(base.lower(), sorted(map(str.lower, own)), 1)
@@ -207,3 +304,14 @@ def meant_type(type_: str, own: Collection[str], known: Mapping[str, Collection[
         *get_close_matches(plain, sorted(BUILT_IN), 1),
     ]
     return f"{meant[0] if meant else base}{bracket}{size}"
+
+
+def _meant_full_name(package: str, name: str, known: Mapping[str, Collection[str]]) -> str:
+    """Return `std_msgs/Header` for `std_msg/Header` and for `std_msgs/header`; the name itself of any other package."""
+    if name in known.get(package, ()):
+        return f"{package}/{name}"
+    # Not another first letter: there are packages `mav_msgs` and `nav_msgs`.
+    near = [one for one in known if one[0] == package[0] and is_one_edit(package, one) and name in known[one]]
+    alike = [one for one in known.get(package, ()) if one.lower() == name.lower() or is_one_edit(name, one)]
+    meant = [f"{one}/{name}" for one in near] or [f"{package}/{one}" for one in alike]
+    return meant[0] if len(meant) == 1 else f"{package}/{name}"

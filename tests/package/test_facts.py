@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from grader.installable import noetic_messages
+from grader.model.message_definitions import meant_field, parse_interface
 from grader.model.package import Fault, PackageFacts
 from grader.package.facts import python_paths, read_package, with_build_facts
 from tests.package.trees import CMAKE, MANIFEST, NODE, make_package
@@ -104,3 +106,60 @@ def test_cmake_says_what_it_was_told(tmp_path, stops):
     assert ("catkin_install_python", ("PROGRAMS", "src/a.py", "DESTINATION", "lib/lab1"), 5) in calls
     assert [line for name, _, line in calls if name == "catkin_package"] == [4, 6]
     assert calls[:5] == [(c.name, c.args, c.line) for c in static.cmake.calls][:5]
+
+
+LINES = {
+    "float64\tlevel": "float64 level",
+    "uint8 A\t=\t1": None,
+    "float64 \tlevel": None,
+    "uint8 A = 0x10": "uint8 A = 16",
+    "uint8 A = 256": "",
+    "uint8 A = zero": "",
+    "int8 A = -128": None,
+    "int32 A == 5": "int32 A = 5",
+    "int32 A = 1.0": "int32 A = 1",
+    "bool B = true": "bool B = True",
+    "bool B = 1": None,
+    "float32 F = 1.5f": "float32 F = 1.5",
+    "float64 F = 1e3  # m": None,
+    "string S = a-b # c": None,
+    "string[] S = a": "",
+    "float64: level": "float64 level",
+    "level: float64": "float64 level",
+    "float64 le-vel": "float64 le_vel",
+    "float64 my speed": "float64 my_speed",
+    "float64 [] levels": "float64[] levels",
+    "float64 levels[3]": "float64[3] levels",
+    "float 64 level": "float64 level",
+    "std_msgs.Header header": "std_msgs/Header header",
+    "float64 a, b": "",
+    "float64 2nd": "",
+    "Pose pose at": "",
+    "// in metres": "# in metres",
+}
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_a_line_that_ros_refuses_is_a_fault_with_what_is_meant(line: str) -> None:
+    right = LINES[line]
+    fault = parse_interface(line.encode(), "msg/Level.msg").fault
+    assert (fault and fault.fix) == (None if right is None else f"write `{right}`" if right else "")
+    assert not right or parse_interface(right.encode(), "msg/Level.msg").fault is None
+
+
+@pytest.mark.parametrize(
+    ("field", "meant"),
+    [
+        ("speed float64", "float64 speed"),
+        ("float64[] time", ""),
+        ("std_msgs/Header duration", ""),
+        ("Level string", ""),
+        ("std_msg/Header header", "std_msgs/Header header"),
+        ("geometry_msgs/pose[] poses", "geometry_msgs/Pose[] poses"),
+        ("mav_msgs/Odometry odometry", ""),
+        ("lab/Other other", ""),
+    ],
+)
+def test_a_field_of_no_type_has_the_one_that_is_meant(field: str, meant: str) -> None:
+    (read,) = parse_interface(field.encode(), "msg/Lab.msg").fields
+    assert " ".join(meant_field(read, {"Level"}, noetic_messages())) == (meant or field)

@@ -39,6 +39,7 @@ INSTALLED = {"src/listener.py": SCRIPT, "scripts/other.py": SCRIPT}
 TWO_NODES = LAUNCH.replace("</launch>", LAUNCH.splitlines()[1].replace("talker", "listener") + "\n</launch>")
 OWN = {"msg/Level.msg": "float64 level\n", "src/level.py": "from lab.msg import Level\n"}
 OWN_CMAKE = CMAKE.replace("rospy)\n", "message_generation rospy)\nadd_message_files(FILES Level.msg)\n")
+GENERATED = OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")
 RUN_OWN = {**OWN, TALKER: SCRIPT.replace("import Int8\n", "import Int8\nfrom lab.msg import Level\n")}
 SERVICE = {**OWN, "srv/Two.srv": "int64 a\n---\n", "src/level.py": "from lab.srv import Two\n"}
 SERVICE_CMAKE = CMAKE.replace(
@@ -485,6 +486,18 @@ CASES = {
         {**OWN, "msg/Level.msg": "Float64 level\n",
          CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")},
         ["build-line"], "write `float64 level`",
+    ),
+    "own-message-of-a-package-of-no-such-name": Case(
+        {**OWN, "msg/Level.msg": "std_msg/Header header\nstd_msgs/float32[] levels # all\n",
+         CMAKELISTS: GENERATED.replace("messages()", "messages(DEPENDENCIES std_msgs)")},
+        ["build-line"] * 2, "there is no field type `std_msg/Header`",
+        after={"msg/Level.msg": "std_msgs/Header header\nstd_msgs/Float32[] levels # all\n"},
+    ),
+    "own-message-with-lines-that-are-no-fields": Case(
+        {**OWN, "msg/Level.msg": "uint8 OK 0  # good\nfloat64: level\nfloat64\ttilt\nfloat64 my-speed\n",
+         CMAKELISTS: GENERATED},
+        ["build-line"] * 4, "`uint8 OK 0  # good` on line 1 is not a field",
+        after={"msg/Level.msg": "uint8 OK = 0  # good\nfloat64 level\nfloat64 tilt\nfloat64 my_speed\n"},
     ),
     "manifest-of-rosbuild": Case(
         swapped(TALKER, ("import rospy\n", "import rospy\nimport roslib; roslib.load_manifest('old_lab')\n")),

@@ -32,7 +32,7 @@ from grader.installable import (
     known_packages,
     noetic_messages,
 )
-from grader.model.message_definitions import meant_type
+from grader.model.message_definitions import meant_field
 from grader.model.package import (
     CMAKE,
     INTERFACE_FOLDERS,
@@ -269,7 +269,7 @@ def no_types(package: PackageFacts) -> Explained | None:
         (FileCitation(file=one.path, line=field.line), field, right)
         for one in package.interfaces
         for field in one.fields
-        if (right := meant_type(field.type, own, noetic_messages())) != field.type
+        if (right := meant_field(field, own, noetic_messages())) != (field.type, field.name)
     ]
     if faults:
         hint = faults[0].fix or "write each line as a type and a name: `float64 speed`"
@@ -277,11 +277,12 @@ def no_types(package: PackageFacts) -> Explained | None:
     if not wrong:
         return None
     place, first, _ = wrong[0]
-    fixes = [f"on line {at.line} of {at.file}, write `{right} {field.name}`" for at, field, right in wrong]
-    others = {right.partition("/")[0] for _, _, right in wrong if "/" in right}
+    fixes = [f"on line {at.line} of {at.file}, write `{' '.join(right)}`" for at, _, right in wrong]
+    listed = {word for call in cmake_calls(package, "generate_messages") for word in call.args}
+    others = {right.partition("/")[0] for _, _, (right, _) in wrong if "/" in right} - listed
     named = f", and {join_words(sorted(others))} after DEPENDENCIES in generate_messages(…)" if others else ""
     if len(wrong) == 1 and not others:
-        fixes = [f"write `{wrong[0][2]} {first.name}`"]
+        fixes = [f"write `{' '.join(wrong[0][2])}`"]
     why = f"line {place.line} of {place.file}: there is no field type `{shown(first.type)}`"
     return Explained(why, join_words(fixes) + named, place=place)
 

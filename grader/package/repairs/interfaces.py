@@ -10,13 +10,14 @@ from cmake_parser.ast import Command
 
 from grader.installable import noetic_definitions, noetic_messages
 from grader.model.message_definitions import (
-    BUILT_IN,
     DIVIDER,
     DIVIDING,
     FULL_NAMES,
     PARTS,
+    corrected_line,
     exchanged_parts,
-    meant_type,
+    meant_field,
+    parse_interface,
 )
 from grader.model.package import INTERFACE_FOLDERS, Interface, InterfaceField, PackageFacts
 from grader.package.repairs.cmake_calls import (
@@ -41,6 +42,8 @@ OF_PACKAGE = re.compile(r"^MSG: (\w+)/", re.MULTILINE)
 """What stands above each further type in a full definition."""
 GENERATE, GENERATION = "generate_messages", "message_generation"
 EXPORTED = "${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS}"
+LINES_MAX = 20
+"""Of one definition that are put right: each reads the file again."""
 GENERATORS = {GENERATION, "genmsg", "actionlib_msgs"}
 """Packages of which each brings the calls that make messages; the last one finds genmsg."""
 
@@ -69,8 +72,8 @@ def make_interfaces(
     if not any(made.values()):
         _delete_generation(files, package)
         return
+    _correct_lines(files, package)
     _correct_types(files, package, wanted)
-    _correct_dividers(files, package)
     _call_by_kind(files)
     run = [path for path in code if path in scripts or path.endswith(CPP)]
     needed = {word for path in run for word in re.findall(r"\w+", files.text(path) or "")}
@@ -298,37 +301,32 @@ def _correct_types(files: Files, package: PackageFacts, wanted: Wanted) -> None:
         for field in one.fields:
             if (one.path, field.part, field.name) in asked:
                 continue
-            right = meant_type(field.type, others, noetic_messages())
+            right, name = meant_field(field, others, noetic_messages())
             lines = (files.text(one.path) or "").split("\n")
-            if (
-                field.name in BUILT_IN
-                and field.type not in {*BUILT_IN, *FULL_NAMES, *own}
-                and field.value is None
-            ):
-                _turn_around(files, one.path, field)
+            if (right, name) == (field.type, field.name) or field.line > len(lines):
                 continue
-            if right != field.type and field.line <= len(lines):
-                lines[field.line - 1] = lines[field.line - 1].replace(field.type, right, 1)
-                message = f"line {field.line} of {one.path}: there is no field type `{field.type}`"
-                files.change("build-line", one.path, "\n".join(lines), message)
+            why = f"there is no field type `{field.type}`"
+            if name != field.name:
+                why = f"the name {field.type} stands before its type"
+            written = rf"^(\s*){re.escape(field.type)}(\s+){re.escape(field.name)}"
+            lines[field.line - 1] = re.sub(written, rf"\g<1>{right}\g<2>{name}", lines[field.line - 1])
+            files.change("build-line", one.path, "\n".join(lines), f"line {field.line} of {one.path}: {why}")
 
 
-def _turn_around(files: Files, path: str, field: InterfaceField) -> None:
-    """Write the type before the name."""
-    lines = (files.text(path) or "").split("\n")
-    lines[field.line - 1] = re.sub(r"^(\s*)(\S+)(\s+)(\w+)", r"\1\4\3\2", lines[field.line - 1])
-    message = f"line {field.line} of {path}: the name {field.type} stands before its type"
-    files.change("build-line", path, "\n".join(lines), message)
-
-
-def _correct_dividers(files: Files, package: PackageFacts) -> None:
-    """Write `---` where a line is meant to divide the parts, and is one of other dashes."""
-    for fault in (one.fault for one in package.interfaces if one.fault and DIVIDING in one.fault.fix):
-        lines = (files.text(fault.file) or "").split("\n")
-        if fault.line and fault.line <= len(lines):
-            lines[fault.line - 1] = DIVIDING
-            message = f"{fault.file}: {fault.cause}"
-            files.change("build-line", fault.file, "\n".join(lines), message, fault.fix)
+def _correct_lines(files: Files, package: PackageFacts) -> None:
+    """Write each line that ROS cannot read as it is meant: `float64 level` for `float64: level`, and `---` for other
+    dashes."""
+    for path in [one.path for one in package.interfaces if one.fault]:
+        for _ in range(LINES_MAX):
+            text = files.text(path) or ""
+            fault, lines = parse_interface(text.encode(), path).fault, text.split("\n")
+            line = fault.line if fault is not None else None
+            right = corrected_line(lines[line - 1], path) if line and line <= len(lines) else ""
+            if fault is None or line is None or not right:
+                break
+            comment = lines[line - 1].partition("#")[2]
+            lines[line - 1] = f"{right}  #{comment}" if comment and right != DIVIDING else right
+            files.change("build-line", path, "\n".join(lines), f"{path}: {fault.cause}", fault.fix)
 
 
 def _call_by_kind(files: Files) -> None:
