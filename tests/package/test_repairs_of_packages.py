@@ -477,15 +477,12 @@ CASES = {
         asking(definitions=(("action/Go.action", GO_FIELDS),)), {"action/Go.action": "int32 n\n---\nbool"},
     ),
     "own-message-with-a-text-for-a-list": Case(
-        {**OWN, "msg/Level.msg": "float32 level\nstring  names  # of all\nbyte b\n",
-         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")},
+        {**OWN, "msg/Level.msg": "float32 level\nstring  names  # of all\nbyte b\n", CMAKELISTS: GENERATED},
         ["build-line"], "write `string[] names`", asking(definitions=(("msg/Level.msg", LEVEL_FIELDS),)),
         {"msg/Level.msg": "float32 level\nstring[]  names  # of all\nbyte b\n"},
     ),
     "own-message-of-no-type": Case(
-        {**OWN, "msg/Level.msg": "Float64 level\n",
-         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")},
-        ["build-line"], "write `float64 level`",
+        {**OWN, "msg/Level.msg": "Float64 level\n", CMAKELISTS: GENERATED}, ["build-line"], "write `float64 level`",
     ),
     "own-message-of-a-package-of-no-such-name": Case(
         {**OWN, "msg/Level.msg": "std_msg/Header header\nstd_msgs/float32[] levels # all\n",
@@ -505,6 +502,13 @@ CASES = {
     ),
     "manifest-of-rosbuild-that-is-there": Case(
         swapped(TALKER, ("import rospy\n", "import rospy\nimport roslib; roslib.load_manifest('lab')\n")), [],
+    ),
+    "targets-by-other-names-and-above-what-makes-them": Case(
+        {CMAKELISTS: CMAKE + "add_dependencies(men x)\nadd_executable(mean src/mean.cpp)\n"
+                             "target_link_libraries(mean x)\ninstall(TARGET meann RUNTIM DESTINATION bin)\n",
+         "src/mean.cpp": "int main() {}\n"},
+        ["build-line"] * 4, "write mean instead of men",
+        after={CMAKELISTS: "()\n\nadd_executable(mean src/mean.cpp)\nadd_dependencies(mean x)\ntarget_link_libraries("},
     ),
     "two-programs-that-nothing-is-linked-to": Case(
         {CMAKELISTS: CMAKE + "add_executable(a src/a.cpp)\nadd_executable(b src/b.cpp)\n",

@@ -11,7 +11,7 @@ from grader.checks.support.scripts import CPP_SUFFIXES, cmake_calls, path_in_pac
 from grader.checks.support.text import near_names, shown
 from grader.model.package import CMAKE, PackageFacts
 from grader.model.verdict import FileCitation
-from grader.wording import ON_THE_MACHINE, on_lines
+from grader.wording import ON_THE_MACHINE, on_lines, there_is
 
 _CMAKE_ERROR = re.compile(
     r"^CMake Error(?: at (?P<file>[^:()]+):(?P<line>\d+)(?: \((?P<call>\w+)\))?)?:?\s*(?P<text>.*)"
@@ -268,7 +268,11 @@ def call_below(program: str, command: str, words: str) -> str:
 def _missing_target(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     name = found[1]
     why = f"it names the target {name}, which no add_executable(…) or add_library(…) above it makes"
-    made = cmake_calls(package, "add_executable", "add_library")
+    made = [call for call in cmake_calls(package, "add_executable", "add_library") if call.args]
+    below = next((call for call in made if call.args[0] == name), None)
+    if below is not None:
+        there = f"{below.name}({name} …) is below it, on line {below.line}"
+        return Explained(f"{why}: {there}", f"move {below.name}({name} …) above that line")
     source = next(
         (f.path for f in package.files if f.path.endswith(tuple(f"/{name}{end}" for end in CPP_SUFFIXES))), ""
     )
@@ -278,7 +282,18 @@ def _missing_target(found: re.Match[str], package: PackageFacts, _lines: Sequenc
         return Explained(f"{why}: {there}", f"write {name} instead of {other.args[0]} on line {other.line}")
     if source:
         return Explained(why, f"above it, write add_executable({name} {source})")
+    if near := near_names(name, [call.args[0] for call in made]):
+        return Explained(f"{why}; {there_is(near)}", f"write {near[0]} instead of {name}")
     return Explained(why, f"take that line out, or make {name} above it")
+
+
+OF_INSTALL = ("TARGETS", "PROGRAMS", "DIRECTORY", "FILES", "ARCHIVE", "LIBRARY", "RUNTIME", "DESTINATION")
+
+
+def _unknown_keyword(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    near = near_names(found[1], OF_INSTALL)
+    hint = f"write {near[0]} instead of {found[1]}" if near else "check the spelling of its words in capitals"
+    return Explained(f"install(…) does not know the word {found[1]}", hint)
 
 
 def _no_language(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -353,6 +368,8 @@ CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
     ),
     (r'dependencies to non-existent target "([^"]+)"', _missing_target),
     (r'link libraries for target "([^"]+)" which is not built', _missing_target),
+    (r'install TARGETS given target "([^"]+)" which does not exist', _missing_target),
+    (r'install (?:called with unknown mode|TARGETS given unknown argument) "?(\w+)', _unknown_keyword),
 )
 
 

@@ -46,6 +46,7 @@ from grader.package.repairs.programs import (
     leave_out_missing,
     link_programs,
     name_programs,
+    name_targets,
 )
 from grader.wording import is_one_edit, join_words, numbers_text
 
@@ -117,6 +118,7 @@ def repair_cmake(
     if not any(has_call(files, package, name) for name in MAKES_PACKAGE):
         below = (GENERATE, "find_package", "project")
         add_call(files, "catkin_package()", "catkin_package()", below)
+    name_targets(files)
     wait_for_headers(files, package, name)
     if needs_interfaces(files, package, name, scripts):
         make_interfaces(files, package, name, scripts, wanted)
@@ -188,6 +190,7 @@ KEYWORDS = {
     "add_action_files": ("FILES",),
     "generate_messages": ("DEPENDENCIES",),
     INSTALL: ("PROGRAMS", "DESTINATION"),
+    "install": ("TARGETS", "PROGRAMS", "DIRECTORY", "ARCHIVE", "LIBRARY", "RUNTIME", "DESTINATION"),
 }
 """Words of these calls that have to be in capitals and spelt so."""
 FIRST = {"cmake_minimum_required": "VERSION", INSTALL: "PROGRAMS"}
@@ -203,6 +206,8 @@ def _spell_keywords(files: Files) -> None:
                 if name == INSTALL and words and words[0].value.upper() == keyword:
                     continue  # the capitals of this word alone do not count
                 strays = [w for w in words if is_near(w.value, keyword) and w.value not in keywords]
+                # Files and targets may be called as these words are, in small letters.
+                strays = [w for w in strays if name != "install" or w.value.isupper()]
                 if strays and keyword not in [w.value for w in words]:
                     why = f"{name}(…) has no keyword {strays[0].value}: it is {keyword}"
                     change_word(files, strays[0], keyword, why)

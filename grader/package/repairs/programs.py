@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import takewhile
 from pathlib import PurePosixPath
 
@@ -11,6 +11,7 @@ from cmake_parser.ast import Command, Token
 
 from grader.model.package import CMAKE, PackageFacts
 from grader.package.repairs.cmake_calls import (
+    CALLS_MAX,
     all_words,
     calls_of,
     change_line,
@@ -41,27 +42,75 @@ def link_programs(files: Files, package: PackageFacts) -> None:
     linked |= {call.args[0] for call in told if call.name == "target_link_libraries" and call.args}
     if has_call(files, package, "link_libraries"):
         return
-    made = {
-        words[0].value for c in calls_of(files, "add_executable", "add_library") if (words := words_of(c))
-    }
     for call in reversed(calls_of(files, "add_executable")):  # places above stay
         words = words_of(call)
-        slips = [one for one in linked - made if words and is_near(one, words[0].value)]
-        if words and words[0].value not in linked and len(slips) == 1:
-            _correct_target(files, slips[0], words[0].value)
-        elif words and words[0].value not in linked and not _is_elsewhere(words):
+        if words and words[0].value not in linked and not _is_elsewhere(words):
             text, line = cmake_text(files), f"target_link_libraries({words[0].value} ${{catkin_LIBRARIES}})"
             changed = f"{text[: call.span.stop]}\n{line}{text[call.span.stop :]}"
             change_line(files, call, changed, f"nothing is linked to the program {words[0].value}")
 
 
-def _correct_target(files: Files, slip: str, target: str) -> None:
-    """Link to the program what is linked to a target that is not there and has nearly its name."""
-    for call in calls_of(files, "target_link_libraries"):
-        if (words := words_of(call)) and words[0].value == slip:
-            why = f"there is no target {slip}: it is called {target}"
-            change_word(files, words[0], target, why, f"write {target} instead of {slip}", call=call)
+def name_targets(files: Files) -> None:
+    """Call what waits for a target, links to it or installs it by the target's name, below the call that makes it."""
+    # Where a file makes targets in such ways, which there are is for CMake to say.
+    if calls_of(files, "foreach", "function", "macro", "include", "add_subdirectory"):
+        return
+    for _ in range(CALLS_MAX):
+        made = dict[str, Command]()
+        for call in calls_of(files, *MAKING):
+            for word in words_of(call)[:1]:
+                made.setdefault(word.value, call)
+        if any(_OF_VARIABLE.search(name) for name in made):
             return
+        if not (_correct_target(files, made) or _move_below(files, made)):
+            return
+
+
+def _correct_target(files: Files, made: Mapping[str, Command]) -> bool:
+    """Write the name of a target in place of one that is not there; return whether there was one."""
+    for name in (*OF_TARGETS[1:], "install"):
+        about = [(call, target) for call in calls_of(files, name) if (target := _target_of(call))]
+        given = {target.value for _, target in about}
+        for call, target in about:
+            meant = [one for one in made if one not in given and is_near(target.value, one)]
+            if "$" not in target.value and target.value not in made and len(meant) == 1:
+                why = f"there is no target {target.value}: it is called {meant[0]}"
+                fix = f"write {meant[0]} instead of {target.value}"
+                change_word(files, target, meant[0], why, fix, call=call)
+                return True
+    return False
+
+
+def _target_of(call: Command) -> Token | None:
+    """Return the target that a call is about: its first word, or of install(TARGETS …) the second."""
+    words = words_of(call)
+    if call.identifier.lower() == "install":
+        words = words[1:] if words and words[0].value == "TARGETS" else []
+    return words[0] if words else None
+
+
+def _move_below(files: Files, made: Mapping[str, Command]) -> bool:
+    """Move a call that is about a target below the one that makes it; return whether there was one."""
+    for call in calls_of(files, *OF_TARGETS[1:]):
+        target = _target_of(call)
+        maker = made.get(target.value) if target is not None else None
+        if maker is None or maker.line <= call.line:
+            continue
+        text, span, at = cmake_text(files), call.span, maker.span.stop
+        # Its line stays, empty, so that those between them keep the numbers that they were handed in with.
+        changed = f"{text[: span.start]}{text[span.stop : at]}\n{text[span]}{text[at:]}"
+        what = f"{call.identifier}({target.value if target else ''} …)"
+        why = f"{what} is called above {maker.identifier}(…), which makes its target"
+        change_line(files, call, changed, why, f"move {what}, line {call.line}, below line {maker.line}")
+        return True
+    return False
+
+
+MAKING = (
+    *("add_executable", "add_library", "add_custom_target", "cuda_add_executable", "cuda_add_library"),
+    *("catkin_add_gtest", "catkin_add_gmock", "add_rostest_gtest", "add_rostest_gmock"),
+)
+_OF_VARIABLE = re.compile(r"\$\{(?!(CMAKE_)?PROJECT_NAME\})")
 
 
 def _is_elsewhere(words: Sequence[Token]) -> bool:
