@@ -57,7 +57,7 @@ class ChildLimits(NamedTuple):
 
 class Answer(NamedTuple):
     """What the function yielded, a line of JSON each; `done` if it came to its end, `timed_out` if it took longer than
-    `wall_s`. Where it is neither, the child went beyond another limit, or crashed."""
+    `cpu_s` or `wall_s`. Where it is neither, the child went beyond another limit, or crashed."""
 
     lines: bytes
     done: bool
@@ -74,7 +74,7 @@ def run_limited(function: str, *arguments: object, limits: ChildLimits) -> Answe
         given.seek(0)
         code = _run(function, given.fileno(), out.fileno(), limits.wall_s)
         out.seek(0)
-        return Answer(lines=out.read(limits.answer_bytes), done=code == 0, timed_out=code is None)
+        return Answer(lines=out.read(limits.answer_bytes), done=code == 0, timed_out=code in _OUT_OF_TIME)
 
 
 def _run(function: str, stdin: int, stdout: int, wall_s: float) -> int | None:
@@ -108,6 +108,7 @@ def _run(function: str, stdin: int, stdout: int, wall_s: float) -> int | None:
     return None
 
 
+_OUT_OF_TIME = (None, -signal.SIGXCPU if resource else None)
 _have_had_one: set[int] = set()
 _templates: dict[int, Template] = {}
 """Both by process: a copy of the process that made a template makes its own."""
@@ -291,5 +292,7 @@ def _set_limits(limits: ChildLimits) -> None:
     ):
         with contextlib.suppress(*refused):
             _, most = resource.getrlimit(kind)
-            value = value if most == resource.RLIM_INFINITY else min(value, most)  # noqa: PLW2901
-            resource.setrlimit(kind, (value, value))
+            # the first limit of its time sends SIGXCPU, which tells it from all else that kills a process
+            last = value + (kind == resource.RLIMIT_CPU)
+            last = last if most == resource.RLIM_INFINITY else min(last, most)
+            resource.setrlimit(kind, (min(value, last), last))

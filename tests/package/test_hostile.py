@@ -474,6 +474,7 @@ SCRIPT = "import rospy\nrospy.init_node('x')\npub = rospy.Publisher('c', String,
         + "    p.publish(v)\n",
         "".join(f"q{n}.z = sin(a)\nq{n}.w = cos(a)\n" for n in range(2000)),
         "while a:\n" + "    for i in b:\n        p.publish(i)\n" * 1500,
+        SCRIPT + "while a < 3:\n    t.angular.z = 1\n    pub.publish(t)\nrospy.spin()\n" * 1200,
         SCRIPT + "rospy.spin()\ndef f():\n" + "    if a:\n        g()\n" * 4000,
         SCRIPT
         + "".join(f"def f{n}(m):\n    global x{n}\n    x{n} = m.data\n" for n in range(1000))

@@ -147,7 +147,7 @@ def stopped_loops(tree):
     """`spin()` in a loop that publishes: the loop does not come round. `break` or `return` in each of its turns, or so
     many turns and no more. And `if` in place of `while`.
     """
-    turned, called = dict(turns(tree)), calls_made(tree)
+    turned, called, is_robot = dict(turns(tree)), calls_made(tree), is_of_robot(tree)
     for loop in walk(tree):
         asks = isinstance(loop, ast.If) and is_call(getattr(loop.test, "operand", None), "is_shutdown")
         name = getattr(turned[loop][0], "name", None)
@@ -169,7 +169,7 @@ def stopped_loops(tree):
             fix = "remove spin(): the loop keeps the node alive"
             yield slip(spin.lineno, "spin-in-loop", message, fix)
         # of what the node does
-        is_part = (called[name] > 1 and name != "publish") or spins_after(loop, tree)
+        is_part = (called[name] > 1 and name != "publish") or (is_robot and spins_after(loop, tree))
         if is_counted(loop) and ending is None and not turned[loop][1] and not is_part:
             counted = isinstance(loop, ast.For) or any(isinstance(n, ast.AugAssign) for n in ast.walk(loop))
             message = "after a fixed number of rounds" if counted else "as soon as its condition is false"
@@ -177,7 +177,7 @@ def stopped_loops(tree):
             used = {n.id for one in loop.body for n in ast.walk(one) if isinstance(n, ast.Name)}
             fix = "write `while not rospy.is_shutdown():` on line %d" % loop.lineno
             last = next((one for one in reversed(run_after(loop, tree)) if calls_in(one, "publish")), None)
-            last = last or (loop if is_of_robot(tree) else None)  # which has to stay where it is then
+            last = last or (loop if is_robot else None)  # which has to stay where it is then
             if last is not None:
                 fix = "call rospy.spin() below line %d%s: it waits there until Ctrl-C"
                 alike = ", with the same spaces or tabs before it as line %d has" % last.lineno
@@ -197,7 +197,7 @@ def stopped_loops(tree):
 
 def spins_after(loop, tree):
     """Whether a robot's node stays alive in `spin()` once it has arrived."""
-    return is_of_robot(tree) and any(calls_in(one, "spin") for one in run_after(loop, tree))
+    return any(calls_in(one, "spin") for one in run_after(loop, tree))
 
 
 def is_of_robot(tree):
@@ -268,7 +268,9 @@ def sleepless_loops(tree):
     for loop in loops:
         if waiting.intersection(called_name(n) for n in ast.walk(loop)) or is_of_publishers(loop):
             continue
-        inner = [n for n in ast.walk(loop) if n is not loop and n in loops and calls_in(n, "publish")]
+        inner = [
+            n for n in ast.walk(loop) if n is not loop and isinstance(n, LOOPS) and calls_in(n, "publish")
+        ]
         # a `sleep()` of another function or loop belongs to that one
         function, outer = around[loop][0], loop_around(loop, tree)
         sleeps = [n for n, own in every if own is outer and around[n][0] in (function, None)]
