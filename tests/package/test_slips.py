@@ -232,7 +232,8 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("loop-left", 4, "write `while not rospy.is_shutdown():` on line 4")]),
         *((f"def f(m):\n    for i in range(4):\n        pub.publish(1)\n{given}\nrospy.spin()\n", [])
           for given in ("rospy.Subscriber('a', Bool, f)", "rospy.Subscriber('a', Bool, callback=f)",
-                        "rospy.Timer(rospy.Duration(1), f)")),
+                        "rospy.Timer(rospy.Duration(1), f)",
+                        "s = actionlib.SimpleActionServer('a', Act, f, False)")),
         ("def f(m):\n    for i in range(4):\n        pub.publish(1)\nrospy.on_shutdown(g)\nf(0)\n",
          [("loop-left", 2, "ends after a fixed number of rounds")]),
         ("def stop():\n    for i in range(4):\n        p.publish(1)\nrospy.init_node('a')\nstop()\nstop()\n", []),
@@ -503,6 +504,7 @@ def test_a_script_that_is_no_node(tmp_path, text, told):
         ("while not rospy.is_shutdown():\n    for i in range(99):\n        rate.sleep()\n", "the loop on line 2 never"),
         ("while n < 9:\n    n = 0\n", "the loop on line 1"),
         ("while n[0] < 9:\n    m[0] += 1\n", "the loop on line 1"),
+        ("while self.n[0] < 9:\n    self.n[0] += 1\n", ""),
         ("while n < 9:\n    n += 1\nwhile True:\n    n = 0\n", "the loop on line 3"),
         ("for n in itertools.count():\n    time.sleep(1)\n", "the loop on line 1"),
         ("while n > 9:\n    n -= 9\nfor n in range(9):\n    time.sleep(1)\n", "the loop on line 3 never checks"),
@@ -524,9 +526,10 @@ def test_why_a_node_goes_on_after_ctrl_c(tmp_path, code, told):
     [
         ("n < 9 and on", "on line 1, write `and not rospy.is_shutdown()` before the colon"),
         ("(n <\n 9)", "on line 2, write"),
-        ("n < 9 or on", "check `rospy.is_shutdown()` in it"),
-        ("n := look()", "check `rospy.is_shutdown()` in it"),
-        ("n if on else m", "check `rospy.is_shutdown()` in it"),
+        ("n < 9 or on", "on line 1, put the condition in brackets, and write `and not"),
+        ("n := look()", "on line 1, put the condition in brackets"),
+        ("n if on else m", "on line 1, put the condition in brackets"),
+        ("True", "check `rospy.is_shutdown()` in it"),
     ],
 )
 def test_a_condition_is_joined_with_another_where_that_changes_nothing_in_it(

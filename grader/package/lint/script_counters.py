@@ -326,9 +326,17 @@ def values_left_out(tree):
             for call in chain:
                 sent.setdefault(ast.dump(call.func), []).append(call)
             for calls in [sent[func] for func in sent if func not in outside][:TOPICS_LIMIT]:
-                if not publishes_always([one], calls[0]):
+                if not publishes_always([one], calls[0]) and not waits_for_it(one.test, calls, source):
                     topic = source.topic(calls[0])
                     yield from left_out(one, calls, topic, alone=len(chain) == 1)
+
+
+def waits_for_it(test, calls, source):
+    """Whether a condition asks if anything listens, or if there is anything to publish."""
+    values = [value for name in names_in(test) for value in source.bound.get(name, ())[:TOPICS_LIMIT]]
+    there = test.left if isinstance(test, ast.Compare) and isinstance(test.ops[0], ast.IsNot) else test
+    sent = {name for call in calls for one in call.args for name in names_in(one)}
+    return dotted(there) in sent or any(calls_in(one, "get_num_connections") for one in (test, *values))
 
 
 def left_out(one, calls, topic, *, alone):

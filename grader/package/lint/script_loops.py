@@ -168,8 +168,9 @@ def stopped_loops(tree):
             message = "the loop stops at the spin() on line %d, which waits until the node ends" % spin.lineno
             fix = "remove spin(): the loop keeps the node alive"
             yield slip(spin.lineno, "spin-in-loop", message, fix)
-        # of what the node does
-        is_part = (called[name] > 1 and name != "publish") or (is_robot and spins_after(loop, tree))
+        # of what the node does; a robot's may stay alive in `spin()` once it has arrived
+        spins = is_robot and any(calls_in(one, "spin") for one in run_after(loop, tree))
+        is_part = (called[name] > 1 and name != "publish") or spins
         if is_counted(loop) and ending is None and not turned[loop][1] and not is_part:
             counted = isinstance(loop, ast.For) or any(isinstance(n, ast.AugAssign) for n in ast.walk(loop))
             message = "after a fixed number of rounds" if counted else "as soon as its condition is false"
@@ -195,11 +196,6 @@ def stopped_loops(tree):
             yield slip(left.lineno, "loop-left", message, fix)
 
 
-def spins_after(loop, tree):
-    """Whether a robot's node stays alive in `spin()` once it has arrived."""
-    return any(calls_in(one, "spin") for one in run_after(loop, tree))
-
-
 def is_of_robot(tree):
     """Whether it sets velocities: `twist.angular.z`, `Twist(angular=…)`."""
     return any(getattr(n, "attr", getattr(n, "arg", "")) == "angular" for n in walk(tree))
@@ -209,7 +205,7 @@ def calls_made(tree):
     """Return how often each name is called: what a loop calls, or a topic, a service or a timer, counts twice, since it
     is called again and again."""
     called = Counter(map(called_name, walk(tree)))
-    for call in calls_in(tree, *CALLED_BACK, "Timer"):
+    for call in calls_in(tree, *CALLED_BACK, "Timer", "SimpleActionServer", "ActionServer"):
         given = [*call.args, *(keyword.value for keyword in call.keywords)]
         called.update(2 * [dotted(one).rpartition(".")[2] for one in given])
     for loop in walk(tree):
@@ -268,9 +264,7 @@ def sleepless_loops(tree):
     for loop in loops:
         if waiting.intersection(called_name(n) for n in ast.walk(loop)) or is_of_publishers(loop):
             continue
-        inner = [
-            n for n in ast.walk(loop) if n is not loop and isinstance(n, LOOPS) and calls_in(n, "publish")
-        ]
+        within = [n for n in ast.walk(loop) if isinstance(n, LOOPS) and calls_in(n, "publish")]
         # a `sleep()` of another function or loop belongs to that one
         function, outer = around[loop][0], loop_around(loop, tree)
         sleeps = [n for n, own in every if own is outer and around[n][0] in (function, None)]
@@ -278,7 +272,7 @@ def sleepless_loops(tree):
         below = [n for n in sleeps if n.lineno > loop.lineno and (n in plain or around[n][0])]
         outside = below or [n for n in plain if n.lineno < loop.lineno]
         yield from sleeps_in_if(loop)
-        if calls_in(loop, *WAITS) or inner or not calls_in(loop, "publish"):
+        if calls_in(loop, *WAITS) or within != [loop]:
             continue
         if not outside:
             yield from rates_in_loop(loop)
@@ -521,6 +515,7 @@ RAISING = ("wait_for_message", "wait_for_service")
 ASKS = "check `rospy.is_shutdown()` in it: `while not rospy.is_shutdown():`"
 ENDS_FOR = "write `if rospy.is_shutdown(): break` below the `for` on line %d"
 ASKS_TOO = "on line %d, write `and not rospy.is_shutdown()` before the colon"
+ASKS_AS_WELL = "on line %d, put the condition in brackets, and write `and not rospy.is_shutdown()` behind it"
 
 
 def deaf_loops(tree):
@@ -560,7 +555,8 @@ def counts_down(loop):
     """Whether it calls nothing, and steps what it asks for: `while angle > pi: angle -= 2 * pi`."""
     asked = names_in(getattr(loop, "test", loop)) - {"..."}
     inside = [n for one in loop.body for n in ast.walk(one)]
-    steps = any(isinstance(n, ast.AugAssign) and dotted(n.target) in asked for n in inside)
+    stepped = [n.target for n in inside if isinstance(n, ast.AugAssign)]
+    steps = any(dotted(n.value if isinstance(n, ast.Subscript) else n) in asked for n in stepped)
     return isinstance(loop, ast.While) and steps and not any(isinstance(n, ast.Call) for n in inside)
 
 
@@ -570,9 +566,10 @@ def deaf(loop, within):
     named %= listed(one.lineno for one in (loop, *within))
     asks, ends = ASKS, [ENDS_FOR % one.lineno for one in within]
     test = getattr(loop, "test", ast.Constant(True))
-    is_loose = isinstance(getattr(test, "op", None), ast.Or)  # binds less than `and` does
-    if not is_loose and not isinstance(test, (ast.Constant, ast.NamedExpr, ast.IfExp, ast.Lambda)):
-        asks = ASKS_TOO % test.end_lineno  # its own condition ends it, too
+    # binds less than `and` does
+    is_loose = isinstance(test, (ast.NamedExpr, ast.IfExp)) or isinstance(getattr(test, "op", None), ast.Or)
+    if not isinstance(test, (ast.Constant, ast.Lambda)):  # its own condition ends it, too
+        asks = (ASKS_AS_WELL if is_loose else ASKS_TOO) % test.end_lineno
     fixes = [asks, *ends] if isinstance(loop, ast.While) or within else [ENDS_FOR % loop.lineno]
     return slip(loop.lineno, "deaf", "the %s whether the node should end" % named, "; then ".join(fixes))
 

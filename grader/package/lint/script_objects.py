@@ -12,6 +12,7 @@ from collections import Counter
 
 from script_names import (
     CALL_BACK,
+    LOOPS,
     TEXT_LIMIT,
     USES_LIMIT,
     all_of,
@@ -395,12 +396,13 @@ def unused_publishers(tree):
     """Yield each `pub = Publisher(…)` whose `pub` nothing in the script uses, so that nothing is published by it."""
     # of an attribute, another object's name may stand for `self`, and a class's own is read by `self`
     read = {dotted(n).rpartition(".")[2] for n in walk(tree) if isinstance(getattr(n, "ctx", None), ast.Load)}
+    has_loop = bool(all_of(tree, *LOOPS))
     for node in all_of(tree, ast.Assign):
         name = dotted(node.targets[0])
         topics = argument(node.value, 0, "name") if is_call(node.value, "Publisher") else []
         if topics and "..." not in name and name.rpartition(".")[2] not in read:
             message = "nothing in the script calls `%s.publish(…)`" % name
-            fix = "call `%s.publish(…)` inside the loop" % name
+            fix = "call `%s.publish(…)`" % name + (" inside the loop" if has_loop else "")
             yield slip(node.lineno, "never-published", message, fix, text_of(topics[0]))
 
 
