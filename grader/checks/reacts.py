@@ -436,8 +436,9 @@ def _other_answer(
     effects: Sequence[Reading],
     own: Sequence[Channel],
     params: ReactsParams,
-) -> tuple[str, str] | None:
-    """Return, in words, what comes upon the cause where the effect never does, and what to look at."""
+) -> tuple[str, ...] | None:
+    """Return, in words, what comes upon the cause where the effect never does, what to look at, and the field that has
+    another value."""
     at_ns = answers[0].at_ns if answers else math.inf
     came = next((one for one in effects if one.time_ns >= at_ns and one.values), None)
     if came is None or params.effect.value is None or any(map(params.effect.holds, effects)):
@@ -455,11 +456,11 @@ def _other_answer(
     beside = set_beside(own, came.time_ns, field or "", wanted, params.effect.tolerance)
     also = f", and {beside} is {value_text(wanted)}" if beside else ""
     fix = f"set {field} to {value_text(wanted)}, not {beside}" if beside else fix
-    return f"{field} is {value_text(came.values[0])} then{also}", fix
+    return f"{field} is {value_text(came.values[0])} then{also}", fix, field or ""
 
 
 def _judge_unanswered(
-    answers: Sequence[Answer], run: Run, params: ReactsParams, instead: tuple[str, str] | None
+    answers: Sequence[Answer], run: Run, params: ReactsParams, instead: tuple[str, ...] | None
 ) -> Verdict | None:
     hint = f"each time that {params.trigger.words} comes, publish {params.effect.words}"
     hint = f"{hint}, in the callback of {params.trigger.topic}"
@@ -478,8 +479,9 @@ def _judge_unanswered(
     late = max((one.after_s for one in slow if one.after_s is not None), default=None)
     due = [(one.at_ns, one.at_ns + round((params.within_s + ORDER_S) * 1e9)) for one in slow]
     if late is None and len(slow) == len(answers):
-        seen, hint = (f"; {instead[0]}", instead[1]) if instead else ("", hint)
+        seen, hint, *fields = (f"; {instead[0]}", *instead[1:]) if instead else ("", hint)
         verdict = failed(f"{reaction.format('never follows')}, which came {times}{seen}", hint=hint).late(due)
+        verdict = verdict.seeking("field", *fields)
         # A single answer may have been lost on its way.
         return verdict.if_repeated() if len(answers) == 1 else verdict
     how = "does not follow" if late is None else f"comes up to {late:.2f} s after"

@@ -16,6 +16,7 @@ from grader.checks.support.scripts import (
     SourceLine,
     commented_call,
     commented_calls,
+    line_that_makes,
     lines_that_answer,
     lines_that_call,
     lines_that_publish,
@@ -61,8 +62,14 @@ def cite_source(
     found = _lines_to_blame(verdict, criterion, lines)
     if len(found) != 1:
         return verdict
-    place = FileCitation(file=found[0].file, line=found[0].number)
-    return verdict.model_copy(update={"citations": (place, *verdict.citations)})
+    made = line_that_makes(lines, found[0]) if _field_of(verdict, criterion) else None
+    places = (FileCitation(file=one.file, line=one.number) for one in (made, *found) if one is not None)
+    return verdict.model_copy(update={"citations": (*places, *verdict.citations)})
+
+
+def _field_of(verdict: Verdict, criterion: Criterion) -> str:
+    """Return the field of a message that has to have another value, if the criterion judges one."""
+    return verdict.sought_name("field") or str(criterion.parameters.get("field", ""))
 
 
 def _is_placed(verdict: Verdict) -> bool:
@@ -98,8 +105,8 @@ def _lines_to_blame(verdict: Verdict, criterion: Criterion, lines: list[SourceLi
             found = _published_of(found, lines, criterion)
         case "stamps":
             found = _published_of(lines_that_set(lines, "stamp"), lines, criterion)
-        case _ if "field" in given:
-            found = _published_of(lines_that_set(lines, str(given["field"])), lines, criterion)
+        case _ if field := _field_of(verdict, criterion):
+            found = _published_of(lines_that_set(lines, field), lines, criterion)
         case _:
             found = []
     return found
@@ -115,7 +122,9 @@ def _that_name(said: str, check: str, lines: list[SourceLine]) -> list[SourceLin
 
 def _published_of(found: list[SourceLine], lines: list[SourceLine], criterion: Criterion) -> list[SourceLine]:
     """Return of several lines the one that is published; of none, what is published has nothing of it."""
-    published = lines_that_publish(lines, str(criterion.parameters.get("topic", "")))
+    given = criterion.parameters
+    topic = given.get("topic") or given.get("effect", {}).get("topic", "")
+    published = lines_that_publish(lines, str(topic))
     return found if len(found) == 1 else [one for one in published if one in found] or published
 
 

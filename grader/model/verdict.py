@@ -122,7 +122,7 @@ class Mistake(Record):
         return self.kind in {"file-missing", "file-elsewhere"}
 
 
-SoughtKind = Literal["call", "uncalled", "below", "component", "dependency", "package", "quoted"]
+SoughtKind = Literal["call", "uncalled", "below", "component", "dependency", "package", "quoted", "field"]
 
 
 class Sought(Record):
@@ -131,7 +131,8 @@ class Sought(Record):
     kind: SoughtKind
     """The command that installs scripts, where `CMakeLists.txt` does not call it; another one that it does not call;
     the one below which that goes, and is cited; a package that the machine lacks and `find_package(…)` names, that
-    `package.xml` does not declare, or that roslaunch does not find; or what a script has in quotes."""
+    `package.xml` does not declare, or that roslaunch does not find; what a script has in quotes; or
+    a field of a message that has another value."""
     name: str
 
 

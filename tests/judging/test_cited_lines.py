@@ -130,6 +130,48 @@ def test_what_is_wrong_in_a_message_is_shown_where_it_is_set_or_published(
     assert found.citations == ((FileCitation(file=SCRIPT["path"], line=line + 1),) if line else ())
 
 
+REACTS = {
+    "check": "reacts",
+    "with": {
+        "cause": {"topic": "/scan"},
+        "effect": {"topic": "/cmd_vel", "field": "linear.x", "value": 0},
+        "within_s": 1,
+    },
+}
+
+
+@pytest.mark.parametrize(
+    ("asked", "source", "lines"),
+    [
+        (FIELD, "speed = 2\nmsg.linear.x = speed", [1, 2]),
+        (FIELD, "speed = rospy.get_param('~speed', 2)\nmsg.linear.x = speed  # m/s", [1, 2]),
+        (FIELD, "double speed = 2;\nmsg.linear.x = speed;", [1, 2]),
+        (FIELD, "speed = 2\nspeed += 1\nmsg.linear.x = speed", [3]),
+        (FIELD, "a, speed = 1, 2\nmsg.linear.x = speed", [2]),
+        (FIELD, "speed = 2\ndef drive(speed):\n    msg.linear.x = speed", [3]),
+        (FIELD, "for speed in (1, 2):\n    msg.linear.x = speed", [2]),
+        (FIELD, "ranges = []\nranges.append(1)\nmsg.linear.x = ranges", [3]),
+        (FIELD, "speed = 2\nmsg.linear.x = speed * 2", [2]),
+        (FIELD, "self.speed = 2\nmsg.linear.x = self.speed", [2]),
+        (FIELD, "goal.speed = 2\nmsg.linear.x = speed", [2]),
+        (REACTS, "msg.linear.x = 0.2\npub.publish(msg)", [1]),
+        (REACTS, "speed = 0.2\nmsg.linear.x = speed\npub.publish(msg)", [1, 2]),
+        (REACTS, "if near:\n    msg.linear.x = 0.1\nelse:\n    msg.linear.x = 0.2", []),
+    ],
+)
+def test_a_wrong_field_is_shown_where_its_value_comes_from(
+    asked: dict[str, Any], source: str, lines: list[int]
+) -> None:
+    lab = rubric({"id": "sent", "scenario": "talker", **asked})
+    package = {"package": {"files": [SCRIPT]}, "attachments": {SCRIPT["path"]: f"{source}\n"}}
+    runs = build_runs({"runs": {"package": package}})
+    verdict = failed("it is 2").seeking("field", "linear.x")
+    found = cite_source(verdict, lab.criteria[0], try_facts(lab, runs), runs["package"])
+    assert found.citations == tuple(FileCitation(file=SCRIPT["path"], line=line) for line in lines)
+    unsaid = cite_source(failed("nothing came"), lab.criteria[0], try_facts(lab, runs), runs["package"])
+    assert unsaid.citations == (found.citations if asked is FIELD else ())
+
+
 @pytest.mark.parametrize(
     ("text", "line"),
     [

@@ -412,9 +412,13 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
         return why, fix
     call = "str(…)" if wants_text else "int(…)"
     hint = f"publish a {kind} here, `{call}`; {other} go to the publisher of their own topic"
-    field, constants = re.search(r"field (\w+) must", found.message), _constants(package)
+    if here is not None:  # only the handout says which of the two is wrong
+        hint += f", or change {types[here.line]} on line {here.line} if /{here.message.lstrip('/')} has to carry them"
+    field, constants = re.search(r"field (?:\w+\.)*(\w+) must", found.message), _constants(package)
     if field and constants and not wants_text:
         hint = f"give its field {field[1]} one of the type's constants: {join_words(constants, 'or')}"
+    elif field and field[1] != "data":
+        hint = f"give its field {field[1]} a {kind}, `{call}`, and each of its other fields a value of its type too"
     return bounds or (f"the message takes a {kind} but gets something else", hint)
 
 

@@ -390,6 +390,22 @@ def lines_that_set(lines: Sequence[SourceLine], field: str) -> list[SourceLine]:
     return [line for line in lines if sets.search(line.text)]
 
 
+def line_that_makes(lines: Sequence[SourceLine], setting: SourceLine) -> SourceLine | None:
+    """Return the only line that gives a variable its value, where `setting` does no more than hand that variable on:
+    `speed = 2` of `msg.linear.x = speed`."""
+    handed = re.search(r"[^=!<>]=\s*([A-Za-z_]\w*)\s*;?\s*(?:(?:#|//).*)?$", setting.text)
+    if handed is None:
+        return None
+    name = handed[1]
+    # Whatever else may change it is reason enough to name no line.
+    bound = re.compile(
+        rf"\b(?:def|for|global|nonlocal|lambda|with|import)\b.*\b{name}\b|(?<!\.)\b{name}\b[^=()]*=(?!=)|\b{name}\s*(?:\.|\[|\+\+|--)"
+    )
+    found = [one for one in lines if one.file == setting.file and one != setting and bound.search(one.text)]
+    makes = re.compile(rf"\s*(?:[\w:<>]+\s+)?{name}\s*=(?!=)")
+    return found[0] if len(found) == 1 and makes.match(found[0].text) else None
+
+
 OF_FILES = {"add_message_files": ".msg", "add_service_files": ".srv", "add_action_files": ".action"}
 OF_INTERFACES = (*OF_FILES, "generate_messages")
 """The commands of CMake by which messages, services and actions are made."""
