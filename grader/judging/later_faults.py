@@ -37,7 +37,16 @@ from grader.checks.support.text import (
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.installable import PYTHON_2
-from grader.judging.cited_lines import LINE_CHARS, LINES_READ, LOOPS, OF_DATA, PLACES, loop_spins, lost_fields
+from grader.judging.cited_lines import (
+    LINE_CHARS,
+    LINES_READ,
+    LOOPS,
+    OF_DATA,
+    PLACES,
+    lines_making,
+    loop_spins,
+    lost_fields,
+)
 from grader.judging.facts import Facts, is_other_rate, names_started, scripts_of, sources_of
 from grader.judging.repeats_and_repairs import text_as_handed_in
 from grader.model.package import CMAKE, PackageFacts
@@ -498,10 +507,11 @@ class Later:
                 yield from self._fields(name, slip)
 
     def _making(self, slip: PythonSlip) -> list[int]:
-        """Return the other lines that make a message of the slip's type."""
-        lines = self._lines(slip.file)
-        making = re.compile(rf"^[^#]*(?<![\w.]){slip.message}\(")
-        return [n for n, text in enumerate(lines, 1) if n != slip.line and making.search(text)]
+        """Return the other lines that make a message of the slip's type, and none for another publisher."""
+        owner = next(
+            (s.name for s in self._of("publisher") if (s.file, s.line) == (slip.file, slip.line)), ""
+        )
+        return lines_making(self._lines(slip.file), slip, owner)
 
     def _unprinted(self) -> Iterator[Fix]:
         for slip in self._of("not-printed", "printed-in-part"):

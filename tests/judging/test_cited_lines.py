@@ -15,10 +15,12 @@ from grader.judging.cited_lines import (
     cite_name,
     cite_source,
     cite_unused_argument,
+    lines_making,
     show_lines,
 )
 from grader.judging.facts import try_facts
 from grader.model.package import PackageFacts
+from grader.model.python_slip import PythonSlip
 from grader.model.verdict import FileCitation, SoughtKind, failed, partial, passed
 from grader.package.launch import parse_launch_files
 from tests.support.rubrics import CMAKE_CHECK, RATE, SCRIPT, rubric
@@ -378,3 +380,21 @@ def test_what_stands_for_the_file_or_is_empty_or_long_has_none(place: dict[str, 
 
 def test_a_pass_stays_as_it_is() -> None:
     assert shown(passed, line=2).source == ""
+
+
+@pytest.mark.parametrize(
+    ("owner", "numbers"), [("pub", [1, 4]), ("self.over", [2, 3, 4]), ("", [1, 2, 3, 4])]
+)
+def test_a_line_that_makes_a_message_for_another_publisher_keeps_its_type(
+    owner: str, numbers: list[int]
+) -> None:
+    lines = [
+        "msg = Int8()",
+        "full = Int8()",
+        "self.over.publish(Int8(1))",
+        "both = Int8()",
+        "pub = Publisher(a, Int8)",
+    ]
+    lines += ["pub.publish(msg)", "self.over.publish( full )", "pub.publish(both)", "self.over.publish(both)"]
+    slip = PythonSlip(file="a.py", line=5, kind="publisher-type", message="Int8")
+    assert lines_making(lines, slip, owner) == numbers

@@ -181,20 +181,21 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
         return _explain_misspelt(slips, package)
     if explained := _of_submission(name, (package, *package.also)) or _of_no_ros(name, package):
         return explained
-    placeholder = re.fullmatch(r"dep(end)?\d", name) is not None
+    named = [one for c in cmake_calls(package, "find_package") for one in c.args]
+    dummies = [one for one in named if re.fullmatch(r"dep(end)?\d", one)]
     own = {package.name, *(one.name for one in package.also)}
-    if name in known_packages() or (not near and not placeholder and exists_somewhere(name, own)):
+    if name in known_packages() or (not near and name not in dummies and exists_somewhere(name, own)):
         return Explained(
             f"it needs the package {name}, which this grading machine lacks",
             install_hint(name, lines),
             of_machine=True,
             lacks=name,
         )
-    meant = f"write {near[0]}" if near else "correct its name or remove it"
+    dropped = f"remove {join_words(dummies)}" if len(dummies) > 1 else "correct its name or remove it"
+    meant = f"write {near[0]}" if near and name not in dummies else dropped
     hint = f"{meant} in find_package(…) and package.xml; a package of your own must be pushed with this one"
     why = f"find_package(…) names {name}, but there is no package of that name"
-    example = ": it is only a placeholder in the help text of catkin_create_pkg" if placeholder else ""
-    return Explained(f"{why}{example}", hint)
+    return Explained(f"{why}: {PLACEHOLDER}" if name in dummies else why, hint)
 
 
 def _of_no_ros(name: str, package: PackageFacts) -> Explained | None:
@@ -441,10 +442,11 @@ def _run_dependency(found: re.Match[str], package: PackageFacts, _lines: Sequenc
 
 def _unused_argument(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     why = f"catkin_package(…) does not know what to do with {shown(found[1].replace(';', ' '))}"
-    hint = "write it after INCLUDE_DIRS, LIBRARIES, CATKIN_DEPENDS or DEPENDS, spelt like this"
-    return Explained(why, hint)
+    kept = "write it after INCLUDE_DIRS, LIBRARIES, CATKIN_DEPENDS or DEPENDS, spelt like this"
+    return Explained(why, "remove each `...` from its brackets" if "..." in found[1].split(";") else kept)
 
 
+PLACEHOLDER = "it is only a placeholder in the help text of catkin_create_pkg"
 FIXES_MAX = 4
 MADE = (".msg", ".srv", ".action")
 """Files of which the build makes headers."""

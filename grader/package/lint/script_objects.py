@@ -396,13 +396,14 @@ def unused_publishers(tree):
     """Yield each `pub = Publisher(…)` whose `pub` nothing in the script uses, so that nothing is published by it."""
     # of an attribute, another object's name may stand for `self`, and a class's own is read by `self`
     read = {dotted(n).rpartition(".")[2] for n in walk(tree) if isinstance(getattr(n, "ctx", None), ast.Load)}
-    has_loop = bool(all_of(tree, *LOOPS))
+    answers = calls_in(tree, "Subscriber", "Timer") and not all_of(tree, ast.While)
+    where = " in the callback" if answers else " inside the loop" if all_of(tree, *LOOPS) else ""
     for node in all_of(tree, ast.Assign):
         name = dotted(node.targets[0])
         topics = argument(node.value, 0, "name") if is_call(node.value, "Publisher") else []
         if topics and "..." not in name and name.rpartition(".")[2] not in read:
             message = "nothing in the script calls `%s.publish(…)`" % name
-            fix = "call `%s.publish(…)`" % name + (" inside the loop" if has_loop else "")
+            fix = "call `%s.publish(…)`%s" % (name, where)
             yield slip(node.lineno, "never-published", message, fix, text_of(topics[0]))
 
 
