@@ -323,23 +323,6 @@ PLACES = re.compile(r"%[-+0-9.]*[dioxXeEfFgG]\b")
 FIELDS_SHOWN, MESSAGES_READ = 3, 5
 
 
-def lines_making(lines: Sequence[str], slip: PythonSlip, owner: str) -> list[int]:
-    """Return the lines, but for the slip's own, that make a message of its type. One that goes to other publishers than
-    `owner` alone is none; "" is any."""
-    texts = [line[:LINE_CHARS].partition("#")[0] for line in lines[:LINES_READ]]
-    sends = [
-        found.groups() for text in texts for found in re.finditer(r"([\w.]+)\.publish\( *([\w.]+)", text)
-    ]
-    making = re.compile(rf"(?:([\w.]+) *= *|([\w.]+)\.publish\( *)?(?<![\w.]){re.escape(slip.message)}\(")
-    numbers = []
-    for number, text in enumerate(texts, 1):
-        if number != slip.line and (found := making.search(text)):
-            by = {found[2]} if found[2] else {one for one, sent in sends if sent == found[1]}
-            if not by or not owner or owner in by:
-                numbers.append(number)
-    return numbers
-
-
 def lost_fields(lines: Sequence[str], slip: PythonSlip, wanted: str) -> str:
     """Return what to write in place of the fields that a script uses and that only the slip's type has: fields of the
     messages that it makes, or of the one that its callback gets. "" where it uses none."""
@@ -361,6 +344,8 @@ def lost_fields(lines: Sequence[str], slip: PythonSlip, wanted: str) -> str:
     fields = list(dict.fromkeys(one for _, found in taken for one in found))
     if not OF_DATA.fullmatch(wanted):
         return ""
+    if slip.kind == "publisher-type" and slip.message == "String" and wanted != "Bool":
+        return "put a number into its `data`, no text"
     alone = slip.kind == "publisher-type" and sum("Publisher(" in text for text in texts) == 1
     sent = [n for n, text in enumerate(texts, 1) if alone and _sends_several(text)]
     sent_on = f"{on_lines(sent)} of {slip.file}"

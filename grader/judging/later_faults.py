@@ -18,7 +18,7 @@ from grader.checks.support.launch import NOT_STARTED, refusal, unset_arg_fixes
 from grader.checks.support.launch_connections import find_renaming
 from grader.checks.support.launch_slips import find_launch, later_fixes, refusals
 from grader.checks.support.missing_names import name_slip
-from grader.checks.support.scripts import CPP_SUFFIXES, SYNTAX, cmake_calls
+from grader.checks.support.scripts import CPP_SUFFIXES, SYNTAX, cmake_calls, lines_making
 from grader.checks.support.text import (
     IN_OWN_WORDS,
     SAID_DATA,
@@ -37,16 +37,7 @@ from grader.checks.support.text import (
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.installable import PYTHON_2
-from grader.judging.cited_lines import (
-    LINE_CHARS,
-    LINES_READ,
-    LOOPS,
-    OF_DATA,
-    PLACES,
-    lines_making,
-    loop_spins,
-    lost_fields,
-)
+from grader.judging.cited_lines import LINE_CHARS, LINES_READ, LOOPS, OF_DATA, PLACES, loop_spins, lost_fields
 from grader.judging.facts import Facts, is_other_rate, names_started, scripts_of, sources_of
 from grader.judging.repeats_and_repairs import text_as_handed_in
 from grader.model.package import CMAKE, PackageFacts
@@ -508,10 +499,7 @@ class Later:
 
     def _making(self, slip: PythonSlip) -> list[int]:
         """Return the other lines that make a message of the slip's type, and none for another publisher."""
-        owner = next(
-            (s.name for s in self._of("publisher") if (s.file, s.line) == (slip.file, slip.line)), ""
-        )
-        return lines_making(self._lines(slip.file), slip, owner)
+        return lines_making(self._lines(slip.file)[:LINES_READ], slip, self._of("publisher"))
 
     def _unprinted(self) -> Iterator[Fix]:
         for slip in self._of("not-printed", "printed-in-part"):

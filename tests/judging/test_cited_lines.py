@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from grader.checks.support.scripts import OF_INTERFACES
+from grader.checks.support.scripts import OF_INTERFACES, lines_making
 from grader.evidence.run import Run
 from grader.judging.cited_lines import (
     LINE_CHARS,
@@ -15,12 +15,12 @@ from grader.judging.cited_lines import (
     cite_name,
     cite_source,
     cite_unused_argument,
-    lines_making,
+    lost_fields,
     show_lines,
 )
 from grader.judging.facts import try_facts
 from grader.model.package import PackageFacts
-from grader.model.python_slip import PythonSlip
+from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.verdict import FileCitation, SoughtKind, failed, partial, passed
 from grader.package.launch import parse_launch_files
 from tests.support.rubrics import CMAKE_CHECK, RATE, SCRIPT, rubric
@@ -397,4 +397,23 @@ def test_a_line_that_makes_a_message_for_another_publisher_keeps_its_type(
     ]
     lines += ["pub.publish(msg)", "self.over.publish( full )", "pub.publish(both)", "self.over.publish(both)"]
     slip = PythonSlip(file="a.py", line=5, kind="publisher-type", message="Int8")
-    assert lines_making(lines, slip, owner) == numbers
+    made = PythonSlip(file="a.py", line=5, kind="publisher", message="a", name=owner)
+    assert lines_making(lines, slip, [made]) == numbers
+
+
+@pytest.mark.parametrize(
+    ("kind", "was", "wanted", "told"),
+    [
+        ("publisher-type", "String", "Int32", "put a number into its `data`, no text"),
+        ("publisher-type", "String", "Bool", ""),
+        ("publisher-type", "Int8", "String", ""),
+        ("subscriber-type", "String", "Int32", ""),
+    ],
+)
+def test_a_text_has_no_place_in_a_message_of_numbers(
+    kind: SlipKind, was: str, wanted: str, told: str
+) -> None:
+    slip = PythonSlip(file="a.py", line=1, kind=kind, message=was)
+    assert (
+        lost_fields([f"pub = Publisher('a', {was})", f"msg = {was}()", "msg.data = x"], slip, wanted) == told
+    )

@@ -390,6 +390,24 @@ def lines_that_set(lines: Sequence[SourceLine], field: str) -> list[SourceLine]:
     return [line for line in lines if sets.search(line.text)]
 
 
+def lines_making(lines: Sequence[str], slip: PythonSlip, publishers: Iterable[PythonSlip]) -> list[int]:
+    """Return the lines, but for the slip's own, that make a message of its type, and none for another publisher than
+    the one on the slip's line."""
+    owner = next((one.name for one in publishers if (one.file, one.line) == (slip.file, slip.line)), "")
+    texts = [line[:LINE_CHARS_MAX].partition("#")[0] for line in lines]
+    sends = [
+        found.groups() for text in texts for found in re.finditer(r"([\w.]+)\.publish\( *([\w.]+)", text)
+    ]
+    making = re.compile(rf"(?:([\w.]+) *= *|([\w.]+)\.publish\( *)?(?<![\w.]){re.escape(slip.message)}\(")
+    numbers = []
+    for number, text in enumerate(texts, 1):
+        if number != slip.line and (found := making.search(text)):
+            by = {found[2]} if found[2] else {one for one, sent in sends if sent == found[1]}
+            if not by or not owner or owner in by:
+                numbers.append(number)
+    return numbers
+
+
 def line_that_makes(lines: Sequence[SourceLine], setting: SourceLine) -> SourceLine | None:
     """Return the only line that gives a variable its value, where `setting` does no more than hand that variable on:
     `speed = 2` of `msg.linear.x = speed`."""
