@@ -100,9 +100,18 @@ def _moved(package: PackageFacts, path: str, wanted: str) -> str:
     if path in (wanted, f"{package.folder_beside}/{wanted}"):
         return ""
     calls = {one.call.line: one.call for one in installed(package) if names_script(one, path)}
-    places = (f"in the {one.name}(…) on line {line} of {one.file}" for line, one in calls.items())
-    where = join_words(places) or f"where you name it in {CMAKE}"
-    return f"the handout puts it at {wanted}; move it there, and write {wanted} {where}"
+    where = join_words(f"in the {one.name}(…) on line {line} of {one.file}" for line, one in calls.items())
+    if not where and _is_named(package, PurePosixPath(path).name):
+        where = f"where you name it in {CMAKE}"
+    return f"the handout puts it at {wanted}; move it there{where and f', and write {wanted} {where}'}"
+
+
+def _is_named(package: PackageFacts, name: str) -> bool:
+    """Return whether CMake is told of a file of this name, in whatever way; True also where it cannot be read."""
+    cmake = package.cmake
+    if cmake is None or cmake.fault is not None:
+        return cmake is not None
+    return any(name in argument for call in cmake.calls for argument in call.args)
 
 
 def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: ExecutableParams) -> Verdict:

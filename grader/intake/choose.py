@@ -277,10 +277,8 @@ def _windows(folder: Path, names: list[str]) -> str:
     return f"; {listing(crlf)} cannot be started, because of Windows' line ends (CRLF): dos2unix {them} first"
 
 
-POINTER = (
-    "is only a pointer to another repository, and its files are not in this one: "
-    "delete {0}/.git, `git rm --cached {0}`, `git add {0}`, commit and push"
-)
+TAKE_IN = "delete {0}/.git, `git rm --cached {0}`, `git add {0}`, commit and push"
+POINTER = "is only a pointer to another repository, and its files are not in this one: " + TAKE_IN
 
 
 def _where_it_went(root: Path, wanted: str, git_links: tuple[str, ...]) -> str:
@@ -306,6 +304,15 @@ def _where_it_went(root: Path, wanted: str, git_links: tuple[str, ...]) -> str:
         packed = [entry.name for entry in folder.others if is_archive_name(entry.name)]
         if packed and folder.path == ".":
             return f"{printable(packed[0])} is here: unpack it, or give that file."
+    return _empty_place(root, wanted)
+
+
+def _empty_place(root: Path, wanted: str) -> str:
+    """Return what an empty folder of the package's name shows: a submodule is one in a clone and in an archive."""
+    for folder in walk(root, tolerant=True):
+        if folder.path.rpartition("/")[2] == wanted and not folder.folders and not folder.others:
+            path = printable(folder.path)
+            return f"{path}/ is empty here; if it is a repository of its own: {TAKE_IN.format(path)}."
     return ""
 
 

@@ -135,6 +135,17 @@ def test_what_is_there_instead_is_named(files, message, hint, tmp_path):
     assert list((tmp_path / "work").iterdir()) == []
 
 
+@pytest.mark.parametrize("path", ["lab1", "catkin_ws/src/lab1"])
+def test_an_empty_folder_of_the_name_may_be_a_submodule(path, tmp_path):
+    repo = write(tmp_path / "repo", {".gitmodules": "", **tree("b:other")})
+    (repo / path).mkdir(parents=True)
+    with pytest.raises(PackageNotFound, match="packages here: other") as caught:
+        opened(repo, tmp_path)
+    assert caught.value.hint.startswith(
+        f"{path}/ is empty here; if it is a repository of its own: delete {path}/.git"
+    )
+
+
 @pytest.mark.parametrize(
     ("files", "message", "hint"),
     [
