@@ -22,7 +22,7 @@ from grader.checks.support.cpp_errors import (
     told,
 )
 from grader.checks.support.scripts import CPP_SUFFIXES, OF_FILES, OF_INTERFACES, cmake_calls, installed
-from grader.checks.support.text import near_names, shown
+from grader.checks.support.text import in_one_line, near_names, shown
 from grader.installable import (
     LIBRARIES,
     ROS_2,
@@ -75,8 +75,9 @@ def explain_error_of_build(error: BuildError, package: PackageFacts, lines: Sequ
         return explained
     for pattern, explain in _EXPLAINED:
         if found := re.search(pattern, text):
-            return explain(found, package, lines)
-    return Explained(error.text, FIRST_ERROR_HINT)
+            explained = explain(found, package, lines)
+            return explained._replace(why=explained.why.replace(text, in_one_line(text)))
+    return Explained(in_one_line(error.text), FIRST_ERROR_HINT)
 
 
 def _beside_the_folder(text: str, package: PackageFacts) -> Explained | None:

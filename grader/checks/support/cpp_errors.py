@@ -23,6 +23,8 @@ _OTHER_ERROR = re.compile(
 _CALLER = re.compile(r"^\s+(?P<file>[^:()]+):(?P<line>\d+) \(\w+\)$")
 CALL_STACK = "Call Stack (most recent call first):"
 CALLERS_MAX = 40
+ERROR_CHARS = 1000
+"""Of an error, so much is looked at: the paths in it may be long, and what they are said of comes behind them."""
 SYSTEM = ("/usr/", "/opt/")
 FIRST_ERROR_HINT = "run catkin_make in a fresh clone and fix the first error that it prints"
 
@@ -77,15 +79,16 @@ def first_error(lines: Sequence[str], package: PackageFacts) -> BuildError | Non
             place = next(filter(None, places), None)
             named = place is None and match["file"] and not match["file"].startswith(SYSTEM)
             text = f"{match['file']}:{match['line']}: {text}" if named else text
-            return BuildError("cmake", shown(text), place)
+            return BuildError("cmake", shown(text, ERROR_CHARS), place)
         if match := _COMPILER_ERROR.match(line):
             place = _own_line(package, match["file"], int(match["line"]))
             where = f"{posixpath.basename(match['file'])}:{match['line']}: "
             name = "" if match["file"].startswith(SYSTEM) else where
             # the other name of a type is long, and would leave no room for what is wrong with it
-            return BuildError("compiler", shown(name + re.sub(r" \{aka [^}]*\}", "", match["text"])), place)
+            text = name + re.sub(r" \{aka [^}]*\}", "", match["text"])
+            return BuildError("compiler", shown(text, ERROR_CHARS), place)
     other = next((m["text"] for m in map(_OTHER_ERROR.match, lines) if m), None)
-    return BuildError("other", shown(other), None) if other else None
+    return BuildError("other", shown(other, ERROR_CHARS), None) if other else None
 
 
 def _callers(lines: Sequence[str]) -> list[tuple[str, int]]:

@@ -85,15 +85,15 @@ def _joined_words(name: str) -> str:
     return "".join(_words(name))
 
 
-def shown(text: str) -> str:
+def shown(text: str, most_chars: int = SHOWN_CHARS) -> str:
     """One line of someone's output, without colours, what cannot be seen written out, cut to fit a report."""
-    return in_one_line(without_colours(text[:SHOWN_BEFORE_CHARS]))
+    return in_one_line(without_colours(text[:SHOWN_BEFORE_CHARS]), most_chars)
 
 
-def in_one_line(text: str) -> str:
+def in_one_line(text: str, most_chars: int = SHOWN_CHARS) -> str:
     """Return the same of a message: its colours are part of it."""
     line = visible(" ".join(text[:SHOWN_BEFORE_CHARS].split()))
-    return shorten(line, SHOWN_CHARS)
+    return shorten(line, most_chars)
 
 
 OTHER_PLACES = re.compile(r"%[-+ 0]*[\d.]*[dfs](?!\w)|\\[dwsS][+*]?|\.\*|\{:[^{}]*\}|\{\d\}")
