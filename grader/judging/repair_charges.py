@@ -77,7 +77,7 @@ def charge_repairs(
         if repair.kind in OF_BUILDS:  # of a file with several faults, those that speak of this line
             new = _new_words(repair)
             better_by_it = better - {c.id for c in rubric.criteria if c.check == INSTALL}
-            told = {c.id for c in asking if _is_told(repair, first[c.id].hint)}
+            told = {c.id for c in asking if is_told(repair, first[c.id].hint)}
             asking = [c for c in asking if c.id in better_by_it | told or new & words_of(first[c.id].message)]
         sought = [c for c in asking if _seeks(first[c.id], repair)]
         asking = sought or [c for c in asking if _names(c, repair)] or asking
@@ -136,7 +136,7 @@ def _lines_away(found: Verdict, repair: Repair) -> float:
 
 
 def cites_file(found: Verdict | CriterionResult, repair: Repair) -> bool:
-    if repair.kind == "executable-bit" and not _is_told(repair, found.hint):
+    if repair.kind == "executable-bit" and not is_told(repair, found.hint):
         return False  # the build installs what runs the script, bit or not
     return any(getattr(citation, "file", None) == repair.file for citation in found.citations)
 
@@ -151,8 +151,8 @@ def asks_for(found: Verdict | CriterionResult, repair: Repair) -> bool:
     if is_unmade(found) or repair.kind == "exchanged-files":
         return False  # the build's own criterion asks for it, and none for what is in which file
     is_it = repair.kind == "file-name" and PurePosixPath(absent).name == PurePosixPath(repair.after).name
-    is_told = repair.kind in OF_BUILDS and _is_told(repair, found.hint)
-    return lost and (is_it or is_told or cites_file(found, repair))
+    is_said = repair.kind in OF_BUILDS and is_told(repair, found.hint)
+    return lost and (is_it or is_said or cites_file(found, repair))
 
 
 def _names(criterion: Criterion, repair: Repair) -> bool:
@@ -190,10 +190,10 @@ def charged_verdict(
     told_at_once = paths != [] and all(path in verdict.hint for path in paths)
     if copy.status.is_lost and verdict.hint and (told_at_once or not (is_next or further)):
         return _with_passed(verdict, copy, repairs)  # the repair brings up what its own advice is about
-    told = [one for one in repairs if _is_told(one, verdict.hint) and not _is_further_down(one, verdict)]
+    told = [one for one in repairs if is_told(one, verdict.hint) and not _is_further_down(one, verdict)]
     clauses = verdict.hint.split("; ") if told else []
     if any(one not in told for one in repairs):
-        clauses = [clause for clause in clauses if any(_is_told(one, clause) for one in told)]
+        clauses = [clause for clause in clauses if any(is_told(one, clause) for one in told)]
     hints = clauses + advice_on(one for one in repairs if one not in told)
     said = verdict.message
     unsaid = [one for one in repairs if one.kind == "node-name" or PurePosixPath(one.file).name not in said]
@@ -266,7 +266,7 @@ def _at_its_line(copy: Verdict) -> str:
     return f"on line {lines[0].line} of {lines[0].file}, {copy.hint}"
 
 
-def _is_told(repair: Repair, hint: str) -> bool:
+def is_told(repair: Repair, hint: str) -> bool:
     """Return whether the check's own hint says how this is repaired: how git learns of a bit, what has a name."""
     if repair.kind == "executable-bit":
         return repair.file in hint and "chmod" in hint
@@ -311,7 +311,7 @@ def is_next_fault(one: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> boo
     found = {(c.file, c.line) for c in one.citations if isinstance(c, FileCitation) and c.file in files}
     again = cited_lines(copy.citations)
     again -= lines_read_now(repairs)
-    in_repaired = found != set() or one.unjudged or any(_is_told(repair, one.hint) for repair in repairs)
+    in_repaired = found != set() or one.unjudged or any(is_told(repair, one.hint) for repair in repairs)
     shown = not copy.unjudged or (one.unjudged and found != set())
     return in_repaired and shown and not found & again and _is_other_fault(one, copy)
 

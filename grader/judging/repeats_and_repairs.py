@@ -155,7 +155,7 @@ def apply_repaired_copy(
         told = repairs_as_handed_in(charged or needed, repairs)
         placed = with_names_as_handed_in(copy, repairs)
         if charged:
-            own = _without_others(verdict, [one for one in needed if one not in charged])
+            own = _without_others(verdict, [one for one in needed if one not in charged], charged)
             verdicts[criterion.id] = repair_charges.charged_verdict(
                 own, copy, told, cited_lines(placed.citations)
             )
@@ -201,10 +201,13 @@ def _at_new_paths(verdict: Verdict, repairs: Iterable[Repair]) -> Verdict:
     return verdict.model_copy(update={"hint": hint})
 
 
-def _without_others(verdict: Verdict, others: Sequence[Repair]) -> Verdict:
-    """Return the loss as blocked where what was found is in lines that other repairs made readable: the criterion that
-    these are charged to tells it."""
-    if cited_lines(verdict.citations).isdisjoint(repair_charges.lines_read_now(others)):
+def _without_others(verdict: Verdict, others: Sequence[Repair], charged: Sequence[Repair]) -> Verdict:
+    """Return the loss as blocked where what was found is in lines that other repairs made readable, or is repaired by
+    these alone: the criterion that these are charged to tells it."""
+    theirs = any(repair_charges.is_told(one, verdict.hint) for one in others)
+    own = any(repair_charges.is_told(one, verdict.hint) for one in charged)
+    lines = repair_charges.lines_read_now(others)
+    if cited_lines(verdict.citations).isdisjoint(lines) and (own or not theirs):
         return verdict
     return verdict.model_copy(update={"status": Status.BLOCKED, "citations": ()})
 

@@ -22,7 +22,7 @@ from grader.judging.repeats_and_repairs import (
 from grader.model.repair import Repair
 from grader.model.verdict import FileCitation, failed
 from grader.package.launch import parse_launch_files
-from tests.support.rubrics import ALL, GOOD_RUN, NODE, PACKAGE, SCENARIO, SCRIPT, rubric
+from tests.support.rubrics import ALL, GOOD_RUN, NODE, PACKAGE, SCENARIO, SCRIPT, on_copy, rubric
 from tests.support.timeline import build_runs
 from tests.support.timeline_facts import complete_facts
 
@@ -206,7 +206,7 @@ def test_a_copy_of_a_script_that_is_not_the_one_that_runs_explains_nothing() -> 
 
 
 @pytest.mark.parametrize(
-    ("repairs", "file", "on_copy", "as_handed_in"),
+    ("repairs", "file", "line", "as_handed_in"),
     [
         ((IMPORT,), "a.py", 1, 1),
         ((IMPORT,), "a.py", 2, 2),
@@ -222,9 +222,9 @@ def test_a_copy_of_a_script_that_is_not_the_one_that_runs_explains_nothing() -> 
         ((IMPORT, RENAME, EXCHANGE.model_copy(update={"before": "b.py"})), "c.py", 9, 8),
     ],
 )
-def test_lines_of_the_copy_are_told_as_they_were_handed_in(repairs, file, on_copy, as_handed_in):
-    place = FileCitation(file=file, line=on_copy)
-    verdict = failed(f"{file}, line {on_copy} asks", hint=f"on line {on_copy}, write it", citations=(place,))
+def test_lines_of_the_copy_are_told_as_they_were_handed_in(repairs, file, line, as_handed_in):
+    place = FileCitation(file=file, line=line)
+    verdict = failed(f"{file}, line {line} asks", hint=f"on line {line}, write it", citations=(place,))
     told = with_lines_as_handed_in(verdict, repairs)
     assert told.message == f"{file}, line {as_handed_in} asks"
     assert told.hint == f"on line {as_handed_in}, write it"
@@ -256,3 +256,57 @@ def test_a_repair_names_its_lines_as_they_were_handed_in() -> None:
         "write y; delete lines 8, 10 and 11",
     )
     assert repairs_as_handed_in([IMPORT], (IMPORT, later)) == (IMPORT,)
+
+
+def test_a_build_that_two_lines_stop_names_the_one_that_it_is_charged_with() -> None:
+    name = Repair(
+        kind="build-line",
+        file="CMakeLists.txt",
+        line=1,
+        before="project(other)",
+        after="project(lab1)",
+        message="project(other) differs from the package's name lab1",
+        fix="project(lab1)",
+    )
+    install = Repair(
+        kind="build-line",
+        file="CMakeLists.txt",
+        line=3,
+        before="catkin_install_python(PROGRAMS a.py DESTINATION lib)",
+        after="",
+        message="line 3 of CMakeLists.txt: catkin_install_python(…) names a.py, which the package does not have",
+        fix="add a.py and push it, or remove it from that call",
+    )
+    asked = rubric(
+        {"id": "cmake", "check": "cmake", "with": {"name": "lab1"}}, {"id": "build", "check": "build"}
+    )
+    calls = [
+        ["project", "other"],
+        ["find_package", "catkin"],
+        ["catkin_package"],
+        ["catkin_install_python", "PROGRAMS", "a.py"],
+    ]
+    whole = {"name": "lab1", "path": "lab1", "manifest": {}, "files": [{"path": "CMakeLists.txt"}]}
+    said = [
+        "CMake Error at /usr/share/catkin/cmake/catkin_package_xml.cmake:54 (message):",
+        "  catkin_package_xml() package name 'lab1' in 'package.xml' does not match",
+        "  current PROJECT_NAME 'other'.",
+        "Call Stack (most recent call first):",
+        "  lab1/CMakeLists.txt:2 (catkin_package)",
+    ]
+    end = {"name": "catkin_make", "role": "build", "exit_s": 3}
+    run = {
+        "package": {**whole, "cmake": {"calls": calls}},
+        "processes": [{**end, "exit_code": 1}],
+        "console": [{"process": "catkin_make", "stream": "stderr", "lines": said}],
+    }
+    fixed = {
+        "package": {**whole, "cmake": {"calls": [["project", "lab1"], *calls[1:3]]}},
+        "processes": [{**end, "exit_code": 0}],
+    }
+    runs = build_runs({"runs": {"package": run}})
+    runs |= on_copy(build_runs({"runs": {"package": fixed}}), name, install)
+    cmake, build = judge(asked, runs)
+    assert cmake.hint == "write project(lab1)"
+    assert build.message == install.message
+    assert build.hint == f"CMakeLists.txt line 3: {install.fix}"
