@@ -43,22 +43,22 @@ class Pair(unittest.TestCase):
             self.assertTrue(came, "nothing comes on %s after the distance %g" % (self.topic, distance))
 
 
-class Average(Pair):
+class Average(Pair):  # distances and means are not whole, so that a mean of integers shows
     def test_first_two(self):  # tests run in the order of their names, so nothing came before these
-        self.send(4, 8)
-        self.assertAlmostEqual(self.heard[0], 4, 3, "after the first distance, 4, the mean is %g" % self.heard[0])
-        self.assertAlmostEqual(self.heard[1], 6, 3, "after the first two, 4 and 8, the mean is %g" % self.heard[1])
+        self.send(4.5, 8)
+        self.assertAlmostEqual(self.heard[0], 4.5, 3, "after the first distance, 4.5, the mean is %g" % self.heard[0])
+        self.assertAlmostEqual(self.heard[1], 6.25, 3, "after the first two, 4.5 and 8, the mean is %g" % self.heard[1])
 
     def test_mean_of_three(self):
-        self.send(1, 2, 6)
+        self.send(1, 2.5, 7)
         self.assertAlmostEqual(
-            self.heard[-1], 3, 3, "after 1, 2 and 6 the mean is %g, not 3" % self.heard[-1]
+            self.heard[-1], 3.5, 3, "after 1, 2.5 and 7 the mean is %g, not 3.5" % self.heard[-1]
         )
 
     def test_only_the_last_three(self):
-        self.send(50, 1, 2, 6)
+        self.send(50, 1, 2.5, 7)
         self.assertAlmostEqual(
-            self.heard[-1], 3, 3, "after 50, 1, 2 and 6 the mean is %g, not 3" % self.heard[-1]
+            self.heard[-1], 3.5, 3, "after 50, 1, 2.5 and 7 the mean is %g, not 3.5" % self.heard[-1]
         )
 
 
