@@ -496,6 +496,22 @@ CASES = {
         ["build-line"] * 4, "`uint8 OK 0  # good` on line 1 is not a field",
         after={"msg/Level.msg": "uint8 OK = 0  # good\nfloat64 level\nfloat64 tilt\nfloat64 my_speed\n"},
     ),
+    "own-message-with-constants-without-their-sign": Case(
+        {**OWN, "msg/Level.msg": "uint8 LOW 0\nuint8 HIGH: 1\nfloat64 level;\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")},
+        ["build-line"] * 3, "`uint8 LOW 0` on line 1 is not a field",
+        after={"msg/Level.msg": "uint8 LOW = 0\nuint8 HIGH = 1\nfloat64 level\n"},
+    ),
+    "own-message-with-a-line-of-no-meaning": Case(
+        {**OWN, "msg/Level.msg": "the level of the water\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")}, [],
+    ),
+    "own-message-of-a-misspelt-package": Case(
+        {**OWN, "msg/Level.msg": "geometry_msg/Point at\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES geometry_msgs)\ncatkin_p")},
+        ["build-line"], "there is no field type `geometry_msg/Point`",
+        after={"msg/Level.msg": "geometry_msgs/Point at\n"},
+    ),
     "manifest-of-rosbuild": Case(
         swapped(TALKER, ("import rospy\n", "import rospy\nimport roslib; roslib.load_manifest('old_lab')\n")),
         ["missing-import"], "delete line 3", after={TALKER: "import rospy\n\nfrom"},
