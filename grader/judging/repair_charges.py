@@ -82,7 +82,10 @@ def charge_repairs(
         sought = [c for c in asking if _seeks(first[c.id], repair)]
         asking = sought or [c for c in asking if _names(c, repair)] or asking
         if asking:
-            charges[repair] = {min(asking, key=lambda c: _lines_away(first[c.id], repair)).id}
+            is_other = {c.id: repair.file not in texts_in(c.parameters) for c in asking}
+            charges[repair] = {
+                min(asking, key=lambda c: (_lines_away(first[c.id], repair), is_other[c.id])).id
+            }
             continue
         own = [c for c in rubric.criteria if repair.kind == "node-name" and _names(c, repair)]
         if any(first[c.id].status.is_lost and c.id not in better for c in own):
