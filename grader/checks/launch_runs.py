@@ -387,7 +387,9 @@ def _other_type(file: LaunchFile, node: LaunchNode, name: str, params: LaunchRun
     lines = (
         f'on line {one.line} write value="{params.params[key]}" for {key}'
         for one in file.params
-        if (key := one.name.rpartition("/")[2]) in params.params and one.value != str(params.params[key])
+        if (key := one.name.rpartition("/")[2]) in params.params
+        and one.value != str(params.params[key])
+        and one.attribute == "name"
     )
     fix = "; then ".join([f'on line {node.line} write type="{name}"', *lines])
     return Slip(node.file, node.line, f'{node.pkg} has no program "{node.type}"', fix).verdict()

@@ -20,6 +20,7 @@ from grader.checks.support.exit_causes import explain_by_exception
 from grader.checks.support.launch import explain_by_refused_launch
 from grader.checks.support.launch_connections import explain_by_late_remap
 from grader.checks.support.parameters import (
+    explain_by_given_value,
     explain_by_misplaced_parameter,
     explain_by_overwritten_parameter,
     explain_by_unread_parameter,
@@ -280,6 +281,7 @@ EXPLANATIONS = (
     explain_by_exception,
     explain_by_unheard_topic,
     explain_by_overwritten_parameter,
+    explain_by_given_value,
     explain_by_unread_parameter,
     explain_by_misplaced_parameter,
     explain_by_wrong_value,

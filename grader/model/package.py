@@ -362,13 +362,15 @@ class LaunchNode(Placed, Record):
 
 
 class LaunchParam(Placed, Record):
-    """One `<param>`; `name` is the full name on the server; `value` is None if a file or command gives it."""
+    """One `<param>`, or `<rosparam param="…">` with its value in the tag; `name` is the full name on the server, which
+    `attribute` gives; `value` is None if a file or command gives it."""
 
     name: str
     value: str | None
     type: str | None
     file: str
     line: int
+    attribute: str = "name"
 
 
 class LaunchLoad(Placed, Record):

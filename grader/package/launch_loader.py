@@ -213,6 +213,11 @@ class _Loader:
             line=line_of(element) or 0,
         )
         self.loaded.loads.append(load)
+        name, value = scope.get(element, "param"), scope.text(element.text or "").strip()
+        if name and load.source is None and load.command == "load" and len(value.splitlines()) == 1:
+            whole = below.namespace.rstrip("/")
+            given = {"name": whole, "value": value, "type": None, "file": scope.file, "line": load.line}
+            self.loaded.params.append(LaunchParam(**given, attribute="param"))
 
     def _include(self, element: etree._Element, scope: Scope, depth: int) -> None:
         path = scope.own_path(scope.get(element, "file") or "")

@@ -163,6 +163,10 @@ def test_other_packages_are_left_alone(tmp_path: Path) -> None:
         ),
         ('<param name="~x" value="1"/><node name="n"/><node name="m"/>', ["/n/x", "/m/x"]),
         ('<group><param name="~x" value="1"/></group><node name="n"/>', []),
+        ('<node name="n"><rosparam param="x">1</rosparam></node>', ["/n/x"]),
+        ('<group ns="g"><rosparam param="x">[1, 2]</rosparam></group>', ["/g/x"]),
+        ('<rosparam param="x">\na: 1\nb: 2\n</rosparam><rosparam>c: 1</rosparam>', []),
+        ('<rosparam param="x" file="x.yaml"/><rosparam param="y" command="delete"/>', []),
     ],
 )
 def test_params(tmp_path: Path, body: str, names: list[str]) -> None:

@@ -443,6 +443,25 @@ def test_a_parameter_that_is_read_only_where_it_is_not_set(
     assert [s.fix for s in slips] == fixes
 
 
+@pytest.mark.parametrize(
+    ("arguments", "fixes"),
+    [
+        ("'white', '~color'", ["on line 1, write `get_param('~color', 'white')`"]),
+        ("5, '~rate'", ["on line 1, write `get_param('~rate', 5)`"]),
+        ("'~color', 'white'", []),
+        ("'topic', '/scan'", []),
+        ("'folder', '~/bags'", []),
+        ("'~topic', '~out'", []),
+        ("name, '~color'", []),
+        ("'~color'", []),
+    ],
+)
+def test_a_default_before_the_name_of_its_parameter(arguments: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"color = rospy.get_param({arguments})\n", encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.fix for s in slips] == fixes
+
+
 def test_a_parameter_may_be_read_where_it_has_just_been_set(tmp_path: Path) -> None:
     text = "if not rospy.has_param('~a'):\n    rospy.set_param('~a', 2)\n    a = rospy.get_param('~a')\n"
     (tmp_path / "a.py").write_text(text, encoding="utf-8")

@@ -16,7 +16,7 @@ from grader.checks.registry import Check
 from grader.checks.support.console_output import Line
 from grader.checks.support.exit_causes import Ending, explain_end, explain_error
 from grader.checks.support.fields import value_text
-from grader.checks.support.processes import base_name, early_end
+from grader.checks.support.processes import base_name, early_end, run_slips
 from grader.checks.support.text import both, get_param, init, near_names, shown
 from grader.checks.support.topics import cite, nodes_on, published_topics
 from grader.evidence.events import ParamEvent
@@ -43,6 +43,7 @@ _BETWEEN_PARTS = re.compile(r"[,;]?\s*\n\s*|[,;]\s+")
 _YAML_KEY = re.compile(r"^( *)[\"']?([A-Za-z]\w{0,99})[\"']?\s*:(?:\s|$)")
 _PLACE = re.compile(r"line (\d+), column (\d+)")
 _IN_LINE = "line {line} has a tab after a name or a value, which YAML does not accept"
+_QUOTED = re.compile(r"(['\"])(.*)\1")
 _NO_COLON = re.compile(r"(?<!\S)_\w{1,99}=(?!=)\S+")
 INDENT = "indent with spaces only, two per level"
 # what is printed, what it means ({line}: where), and what to do
@@ -218,9 +219,9 @@ def _may_rest_on_one(check: Check, verdict: Verdict) -> bool:
     return (check.of_callbacks or says) and not verdict.cause
 
 
-def explain_by_unread_parameter(check: Check, _package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
+def explain_by_unread_parameter(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a lost mark with the parameter that the run sets and that no node asked for, whatever it did instead."""
-    if not _may_rest_on_one(check, verdict):
+    if not _may_rest_on_one(check, verdict) or _is_misread(package, run, verdict):
         return verdict
     # Why it failed says more than what it did not read.
     if (early := early_end(run)) and (early.end is None or early.end.exit_code != 0):
@@ -252,6 +253,11 @@ def explain_by_unread_parameter(check: Check, _package: PackageFacts, run: Run, 
     return verdict.explained(why, hint, cause=name).about(citations=(cite(run, "/grader/actor"),))
 
 
+def _is_misread(package: PackageFacts, run: Run, verdict: Verdict) -> bool:
+    """Return whether a line that reads a parameter the wrong way explains a wrong value: `wrong-value` tells it."""
+    return verdict.wrong == "value" and any(s.name == "unset" for s in run_slips(package, run, "wrong-value"))
+
+
 def _asked_before(run: Run, asked: str, right: str) -> str:
     """Return what else to write where a node asked whether the parameter is there, and so never read it."""
     events = (e for _, e in run.actors if e.action == "read" and absolute_name(e.topic or "") == asked)
@@ -273,7 +279,7 @@ def explain_by_misplaced_parameter(
     check: Check, package: PackageFacts, run: Run, verdict: Verdict
 ) -> Verdict:
     """Return a lost mark with the parameter that the node reads and a launch file sets somewhere else."""
-    if not _may_rest_on_one(check, verdict) or early_end(run):
+    if not _may_rest_on_one(check, verdict) or early_end(run) or _is_misread(package, run, verdict):
         return verdict
     found = next(_misplaced(package, run, _publishing(verdict, run)), None)
     if _is_too_early(run):
@@ -293,7 +299,7 @@ def explain_by_misplaced_parameter(
         place = f"the <node> on line {node.line}"
         hint = f'move line {param.line} of {param.file} into {place}, as <param name="{last}" …/>'
     else:
-        hint += f'name="{last if asked.startswith(within) else asked}"'
+        hint += f'{param.attribute}="{last if asked.startswith(within) else asked}"'
     return verdict.explained(sets, hint, (param.place,), cause=asked)
 
 
@@ -335,6 +341,25 @@ def explain_by_overwritten_parameter(
             found.setdefault(event.caller_id, verdict.explained(why, hint, places, cause=name))
     judged = _publishing(verdict, run)  # of two nodes that do so, the one whose messages are wrong
     return min(found.items(), key=lambda one: one[0] not in judged, default=("", verdict))[1]
+
+
+def explain_by_given_value(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
+    """Return a lost mark with the line of a launch file that gives a node the very value that it wrongly publishes."""
+    if check.name != "field-equals" or verdict.cause or verdict.unjudged:
+        return verdict
+    nodes, there = _publishing(verdict, run), params_on_server(run)
+    read = {absolute_name(e.topic or "") for _, e in run.actors if e.action == "read" and e.actor in nodes}
+    for name in sorted(read & there.keys()):
+        value, param = there[name], where_given(package, name)
+        if param is None or value in ("", 0, 1) or value_text(value) != verdict.measured:
+            continue
+        place = f"line {param.line} of {param.file}"
+        hint = f"change the value on {place}: {verdict.hint}"
+        if param.attribute == "name" and (inner := _QUOTED.fullmatch(param.value or "")):
+            hint = f'on {place}, write value="{shown(inner[2])}": the quotes within are part of the text'
+        why = f"{place} sets {name} to {value_text(value)}"
+        return verdict.explained(why, hint, (param.place,), cause=f"{param.file}:{param.line}")
+    return verdict
 
 
 def _is_too_early(run: Run) -> bool:

@@ -5,6 +5,7 @@ Nothing is executed. Python 3.8, standard library only.
 """
 
 import ast
+import re
 from collections import Counter
 
 from script_names import (
@@ -159,6 +160,17 @@ def params_read_unset(tree):
             message = "this reads the parameter %s only where it is not set" % name
             right = "without its `not`" if is_not else "with a `not`"
             fix = "on line %d, write the condition %s" % (node.lineno, right)
+            yield slip(node.lineno, "wrong-value", message, fix, "unset")
+
+
+def defaults_first(tree):
+    """`rospy.get_param('white', '~color')`, which has the default in place of the name and the name in its place."""
+    for node in walk(tree):
+        first, second = node.args if is_call(node, "get_param") and len(node.args) == 2 else (None, None)
+        is_name = re.fullmatch(r"~[a-z]\w*", text_of(second), re.ASCII)
+        if is_name and isinstance(first, ast.Constant) and not str(first.value).startswith(("~", "/")):
+            message = "the default stands before the parameter's name"
+            fix = "on line %d, write `get_param('%s', %r)`" % (node.lineno, text_of(second), first.value)
             yield slip(node.lineno, "wrong-value", message, fix, "unset")
 
 

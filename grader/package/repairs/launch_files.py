@@ -115,7 +115,7 @@ def _repair_params(files: Files, launch: LaunchFile, wanted: Wanted) -> None:
         right = next((w for w in wanted.params if w not in there and is_near(param.name, w)), "")
         if right and param.file == launch.path and param.name not in wanted.params:
             old, new = param.name.rpartition("/")[2], right.rpartition("/")[2]
-            _set_attribute(files, launch.path, param.line, ("name", old, new), kind="parameter-name")
+            _set_attribute(files, launch.path, param.line, (param.attribute, old, new), kind="parameter-name")
 
 
 def _is_among(source: str, paths: Sequence[str]) -> bool:
