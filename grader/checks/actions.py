@@ -332,7 +332,9 @@ def _too_late(package: PackageFacts, run: Run, goal: Goal, params: ActionResultP
         else "do not sleep longer than the handout asks"
     )
     verdict = failed(message, hint=hint)
-    if waits := _long_wait(package, run, params.within_s):
+    # A goal of several turns takes as many pauses of its loop.
+    pause_s = params.within_s if goal.cancelled_ns else min(params.within_s, took_s / 10)
+    if waits := _long_wait(package, run, pause_s):
         return waits.verdict(failed, f"{message}: {waits.cause}")
     # So much later than asked is no lateness of a machine.
     if took_s > params.within_s + NEVER_LATE_S * run.warp:

@@ -362,6 +362,13 @@ def handler_traceback(run: Run, service: str, call: Exchange) -> Traceback | Non
     return next((one for one in found if not one.is_handled), found[0] if found else None)
 
 
+_IN_ORDER = re.compile(r" has ([^;]+); the handout asks for ([^;]+)")
+
+
+def _sorted(fields: str) -> tuple[str, ...]:
+    return tuple(sorted(fields.split(", ")))
+
+
 def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> Verdict:
     """Return why a call brought nothing back."""
     asked = f"{service}, called with {fields_text(one.request)},"
@@ -373,6 +380,9 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
     if one.detail.startswith(MISFIT):
         message = f"{service} cannot be called with {fields_text(one.request)}: {shown(one.detail)}"
         hint = f"give srv/{kind}.srv the handout's names and types, the request above ---, and build again"
+        if (found_order := _IN_ORDER.search(one.detail)) and len({*map(_sorted, found_order.groups())}) == 1:
+            order = shown(found_order[2])
+            hint = f"write the fields in srv/{kind}.srv in the handout's order, {order}, and build again"
         return _undivided(package, kind, one) or failed(message, hint=hint)
     if "returned None" in one.detail:
         hint = f"end the callback with return {kind}Response(…)"
