@@ -229,3 +229,23 @@ def test_files_that_each_call_empties(lines: str, fixes: list[str], tmp_path: Pa
     text = f"rospy.Subscriber('/steps', Float64, heard)\ndef heard(m):\n    {lines}\n"
     (tmp_path / "a.py").write_text(text, encoding="utf-8")
     assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "emptied"] == fixes
+
+
+@pytest.mark.parametrize(
+    ("lines", "told"),
+    [
+        ("f = open('a.csv', 'w')\nf.write('x\\n')", True),
+        ("with open('a.csv', 'w') as f:\n    f.write('x\\n')\n    rospy.spin()", True),
+        ("with open('a.csv', 'w') as f:\n    f.write('x\\n')", False),
+        ("f = open('a.csv', 'w')\nf.write('x\\n')\nf.close()", False),
+        ("f = open('a.csv', 'w')\nf.write('x\\n')\nf.flush()", False),
+        ("f = open('a.csv')", False),
+        ("f = open('b.csv', 'w')", False),
+    ],
+)
+def test_files_that_are_open_elsewhere_too(lines: str, told: bool, tmp_path: Path) -> None:
+    callback = "def heard(m):\n    with open('a.csv', 'w') as f: f.write(str(m.data))"
+    text = f"rospy.Subscriber('/steps', Float64, heard)\n{callback}\n{lines}\n"
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    [fix] = [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "emptied"]
+    assert ("`flush()` of the file that line 4 opens" in fix) is told

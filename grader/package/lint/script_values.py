@@ -508,6 +508,7 @@ def emptied_files(tree):
     """A topic's callback that opens its file with 'w' for each row that it writes."""
     functions = functions_in(tree)
     callbacks = {id(one): one for one in (callback_of(n, functions) for n in all_of(tree, ast.Call)) if one}
+    held = held_open(tree) if callbacks else {}
     for function in callbacks.values():
         inside = list(ast.walk(function))
         calls = [n for n in inside if isinstance(n, ast.Call)]
@@ -528,4 +529,24 @@ def emptied_files(tree):
                 "each call of `%s` opens the file with 'w', which deletes what was in it" % function.name
             )
             fix = "on line %d, write 'a' in place of 'w'" % opens[0].lineno
+            name = ast.dump(opens[0].args[0]) if opens[0].args else ""
+            kept = [n for n in held.get(name, ()) if n not in calls]
+            if kept:  # what it holds back is written over the rows at the end
+                fix += ", and let `flush()` of the file that line %d opens follow what is written to it"
+                fix %= kept[0].lineno
             yield slip(opens[0].lineno, "wrong-value", message, fix, "emptied")
+
+
+def held_open(tree):
+    """Return the calls that open a file to write, which is open while the node spins and which nothing flushes, by the
+    name of the file."""
+    held, parents = {}, parents_of(tree)
+    is_flushed, is_closed = calls_in(tree, "flush"), calls_in(tree, "close")
+    opens = [n for n in all_of(tree, ast.Call) if called_name(n) == "open" and n.args]
+    for node in opens[:USES_LIMIT] if not is_flushed else ():
+        mode, around = argument(node, 1, "mode"), parents[node]
+        block = parents[around] if isinstance(around, ast.withitem) else None
+        spins = calls_in(block, "spin", "sleep") if block is not None else not is_closed
+        if mode and text_of(mode[0]).startswith("w") and spins:
+            held.setdefault(ast.dump(node.args[0]), []).append(node)
+    return held
