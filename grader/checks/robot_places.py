@@ -583,18 +583,16 @@ def _outside(
     message = f"it is not {region.words} from {spot(first.point)} on, {after}; farthest out by {where}"
     if params.share < 1:
         message = f"only {inside:.0%} of the time it is {region.words}: farthest out by {where}"
-    return failed(message, hint=_keep(peak.point, region))
+    return failed(message, hint=_keep(path, peak.point, region))
 
 
-def _keep(point: Point, region: Region) -> str:
-    if (
-        isinstance(region, Band)
-        and region.min_m is not None
-        and Band(region.walls, region.min_m, None).out_m(point)
-    ):
+def _keep(path: Sequence[Pose], point: Point, region: Region) -> str:
+    if not isinstance(region, Band):
+        return "turn, or stop, before you are at the border"
+    if region.nearest_m(point) < (region.min_m or 0.0):
         if region.max_m is not None:
             return "steer away from what you follow while the distance is too small"
         return "turn away, or stop, earlier: look at all ranges in front of the robot, not only at the middle one"
-    if isinstance(region, Band):
-        return "steer towards what you follow while the distance is too large"
-    return "turn, or stop, before you are at the border"
+    if region.max_m and (kept_m := region.kept_m(path[:: 1 + len(path) // PLACES]) or 0) > region.max_m:
+        return f"for half of the time it is {metres(kept_m)} away or more: look at the distance that it steers by"
+    return "steer towards what you follow while the distance is too large"

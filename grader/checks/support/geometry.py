@@ -452,6 +452,13 @@ class Band(NamedTuple):
         """Return how far the nearest of the lines and points is (m)."""
         return nearest_m(point, self.walls)
 
+    def kept_m(self, path: Sequence[Pose]) -> float | None:
+        """Return how far away a path mostly is (m); None where that varies by more than this is wide."""
+        far = sorted(self.nearest_m(pose.point) for pose in path)
+        quarter = len(far) // 4
+        wide_m = (self.max_m or 0.0) - (self.min_m or 0.0)
+        return far[len(far) // 2] if far[-1 - quarter] - far[quarter] <= wide_m else None
+
     def towards(self, pose: Pose) -> Point:
         """Return a point beside the robot, where it is nearer to the nearest of the lines and points."""
         (x, y), off = pose.point, SAME_M
