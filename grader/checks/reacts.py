@@ -23,7 +23,7 @@ from grader.checks.support.fields import (
 )
 from grader.checks.support.processes import observed_until_ns, run_slips
 from grader.checks.support.recorder_losses import losses
-from grader.checks.support.scans import SCAN, has_angles, looks_elsewhere
+from grader.checks.support.scans import SCAN, has_angles, looks_elsewhere, read_too
 from grader.checks.support.text import near_names
 from grader.checks.support.topics import (
     cite,
@@ -156,7 +156,7 @@ def _with_ranges(
         return verdict
     seen = f"the one that is near is ranges[{index}]; " if params.trigger.items == "any" else ""
     around = "read all of them: `min(…)` is the smallest" if not has_angles(scan) else ""
-    hint = around or f"read ranges[{index}] too, and those around it"
+    hint = around or read_too(scan, index, reads)
     return verdict.explained(seen + join_words(said), hint, tuple(one.place for one in reads))
 
 

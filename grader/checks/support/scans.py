@@ -105,12 +105,24 @@ def looks_elsewhere(scan: Mapping[str, Any], index: int, reads: Sequence[PythonS
     return [re.sub(r"^(ranges\[\d+\]) on line (\d+) is \1$", r"line \2 reads \1 alone", one) for one in said]
 
 
+def read_too(scan: Mapping[str, Any], index: int, reads: Sequence[PythonSlip]) -> str:
+    """Return how to read a range of a LaserScan too, where a script reads none that is near it."""
+    for one in reads:
+        first, _, last = one.message.partition(":")
+        # `ranges[-45:45]`, which is meant to go on from the last range to the first one
+        is_around = indexes_read(one, len(scan["ranges"])) == range(0) and first[:1] == "-" and last.isdigit()
+        if is_around and one.name.endswith("ranges"):
+            right = f"{one.name}[{first}:] + {one.name}[:{last}]"
+            return f"on line {one.line}, write `{right}` in place of `{one.name}[{one.message}]`"
+    return f"read ranges[{index}] too, and those around it"
+
+
 def with_scan(verdict: Verdict, scan: Mapping[str, Any], reads: Sequence[PythonSlip]) -> Verdict:
     """Return the loss with the smallest range that the laser saw, and what a script reads that looks elsewhere."""
     index, far_m = nearest_seen(scan) or (0, 0.0)
     why = f"the smallest of its ranges is then ranges[{index}] of {scan['topic']}, {seen_at(scan, index)}, "
     why += f"with {far_m:.2f} m"
     if said := looks_elsewhere(scan, index, reads):
-        hint = f"read ranges[{index}] too, and those around it"
+        hint = read_too(scan, index, reads)
         return verdict.explained(f"{why}; {join_words(said)}", hint, tuple(one.place for one in reads))
     return verdict.explained(why, f"{verdict.hint}; {LOOK_AT}")
