@@ -183,6 +183,7 @@ def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
         _in_degrees(run)
         or _let_go(run, params)
         or _by_other_clock(run, params, course)
+        or _let_go(run, params, once=True)
         or what_is_wrong(taken, params.way, course, mirror=params.relative)
     )
     verdict = failed(words.message, hint=words.hint, measured=figures)
@@ -298,19 +299,21 @@ def _in_degrees(run: Run) -> Words | None:
     return Words(message, "a turn of 90 degrees is math.pi / 2, in radians: math.radians(90)")
 
 
-def _let_go(run: Run, params: PathParams) -> Words | None:
-    """A robot that stops by itself between two messages, and would take the right way if it did not."""
+def _let_go(run: Run, params: PathParams, *, once: bool = False) -> Words | None:
+    """A robot that stops by itself between two messages, and would take the right way if it did not; `once`: one that
+    is told each velocity once, whatever its way would be."""
     seconds = run_seconds(run)
     if seconds is None or not params.relative:
         return None
     for channel in run.student_channels():
         commands = [one._replace(time_s=seconds(time_ns)) for time_ns, one in commands_of(channel)]
-        gaps_s = [b.time_s - a.time_s for a, b in pairwise(commands) if a.speed or a.turn]
-        longest_s = max(gaps_s, default=0.0)
+        moves = [(a, b) for a, b in pairwise(commands) if a.speed or a.turn]
+        longest_s = max((b.time_s - a.time_s for a, b in moves), default=0.0)
         if longest_s <= (params.hold_s or math.inf):
             continue
         held = driven(commands, None, commands[-1].time_s + STOPS_AFTER_S)
-        if followed(relative(held), params.way.points, params.tolerance_m).done:
+        is_once = once and len(moves) > 2 and all(a[1:] != b[1:] for a, b in moves)
+        if is_once or followed(relative(held), params.way.points, params.tolerance_m).done:
             again = f"{longest_s:.1f} s pass before the next message on {channel.topic}"
             why = f"the robot stops by itself: {again}, and a velocity holds for {significant(params.hold_s or 0)} s"
             hint = "publish the velocity again and again, ten times a second, for as long as it should drive or turn"
