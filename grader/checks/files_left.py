@@ -15,6 +15,7 @@ from grader.checks.registry import ProcessName, Refers, check
 from grader.checks.support.clocks import excused, why_late
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.fields import bounds_text, is_within, refuse_disorder
+from grader.checks.support.launch import bag_not_opened, recorders
 from grader.checks.support.processes import GlobalName, TypeName, lives, not_started, plain_type
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite
@@ -22,7 +23,7 @@ from grader.errors import EvidenceError
 from grader.evidence.run import Channel, LeftFile, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, failed_or_blocked, inconclusive, passed
+from grader.model.verdict import Status, Verdict, failed, failed_or_blocked, inconclusive, passed
 from grader.wording import first_few, join_words, plural
 
 IN_PACKAGE = re.compile(r"~/catkin_ws/src/[^/]+/")
@@ -35,6 +36,8 @@ RECORDINGS = (".bag", ".mcap")
 _GAP = rb"\s+(?:#[^\n]*\n\s*)*"
 PGM = re.compile(rb"P[25]" + _GAP + rb"(\d{1,6})" + _GAP + rb"(\d{1,6})" + _GAP + rb"\d{1,5}\s")
 PGM_HEAD_BYTES = 1_000
+ENDS_IT = re.compile(r"(?<!\S)(?:--(?:duration|limit)[= ]|-l ?)(\d{1,6})([smh]?)(?!\S)")
+SECONDS = {"": 1, "s": 1, "m": 60, "h": 3600}
 NAMES_SHOWN = 4
 TABLE_BYTES_MAX = 4 << 20
 
@@ -169,11 +172,12 @@ def file_left(package: PackageFacts, run: Run, params: FileLeftParams) -> Verdic
         verdict = failed(message, hint="write only what the handout asks for")
     else:
         verdict = params.finding(found[0], run) or passed(f"{found[0].path} was written")
+        verdict = _cut_short(verdict, package, run, params)
     return verdict.about(
         expected=params.words,
         measured=verdict.measured
         or (f"{found[0].size_bytes} bytes" if found else plural(len(files), "file")),
-        citations=(cite(run, "/grader/actor"),),
+        citations=verdict.citations or (cite(run, "/grader/actor"),),
     )
 
 
@@ -200,9 +204,14 @@ def _not_left(files: Sequence[LeftFile], package: PackageFacts, run: Run, params
     if end := explain_early_end(package, run):
         return end.verdict(failed_or_blocked, f"{what}: the program ended before ({end.cause})")
     hint = f"write {params.file} before the program ends"
-    if paths:
-        return failed(f"{what}; what it wrote is {_list_paths(paths)}", hint=hint).if_repeated()
-    return failed(f"{what}, and no other file", hint=hint).if_repeated()
+    if unmade := bag_not_opened(package, run):
+        what, hint = f"{what}: {unmade.why}", unmade.hint
+    elif paths:
+        what = f"{what}; what it wrote is {_list_paths(paths)}"
+    else:
+        what = f"{what}, and no other file"
+    verdict = failed(what, hint=hint, citations=unmade.citations if unmade else ())
+    return verdict if unmade else verdict.if_repeated()
 
 
 def _list_paths(paths: Iterable[str]) -> str:
@@ -241,6 +250,23 @@ def _wrong_topic(
         verdict = failed(message, hint="record from the beginning to the end")
         return _short(verdict, run, count, wanted.at_least)
     return None
+
+
+def _cut_short(verdict: Verdict, package: PackageFacts, run: Run, params: FileLeftParams) -> Verdict:
+    """Return a loss of messages with the option of `rosbag record` that ends it before they come."""
+    least = max((one.at_least for one in params.topics.values()), default=0)
+    for place, node in (
+        recorders(package) if verdict.status is Status.FAIL and " holds " in verdict.message else ()
+    ):
+        for option in ENDS_IT.finditer(node.args or ""):
+            is_time = "duration" in option[0]
+            most = int(option[1]) * SECONDS[option[2]] * (10**9 if is_time else 1)
+            if most < (run.end_ns - run.start_ns if is_time else least):
+                what = "ends the recording after that time" if is_time else "keeps so many messages alone"
+                return verdict.explained(
+                    f"`{option[0]}` {what}", f"take `{option[0]}` out of the args", (place,)
+                )
+    return verdict
 
 
 def _short(verdict: Verdict, run: Run, count: int, least: int) -> Verdict:

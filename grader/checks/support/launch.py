@@ -369,6 +369,36 @@ TAKE_A_VALUE = re.compile(
     r"(?:-[OoblxN]|--(?:output-\w+|buffsize|chunksize|limit|duration|size|exclude|tcpnodelay))\s+\S+"
 )
 
+NOT_OPENED = re.compile(r"Error opening file: (.+?)(?:\.active)?$")
+BAG_NAME = re.compile(r"(?:-[oO]|--output-\w+)[= ]\s*((?:\$\([^)]*\)|\S)+)")
+
+
+def bag_not_opened(package: PackageFacts, run: Run) -> Absence | None:
+    """Return that `rosbag record` could not make its bag, as it says itself."""
+    lines = (without_colours(one.line) for _, one in run.console)
+    path = next((found[1] for line in lines if (found := NOT_OPENED.search(line))), None)
+    if path is None:
+        return None
+    name = PurePosixPath(path).name
+    why = f"rosbag record cannot open {shown(path)}: there is no such folder, or it may not write there"
+    for place, node in recorders(package):
+        given = BAG_NAME.search(node.args or "")
+        if given is not None and name.startswith(PurePosixPath(given[1]).stem):
+            hint = f"in args, write `{shown(PurePosixPath(given[1]).name)}` in place of `{shown(given[1])}`"
+            return Absence(why, hint, of_script=True, citations=(place,))
+    return Absence(why, f"record to {shown(name)}, without a folder before it", of_script=True)
+
+
+def recorders(package: PackageFacts) -> list[tuple[FileCitation, LaunchNode]]:
+    """Return each `<node>` of `rosbag record` in its launch files, with its place."""
+    nodes = ((file.path, node) for file in package.launch_files for node in file.nodes)
+    return [
+        (FileCitation(file=path, line=node.line), node)
+        for path, node in nodes
+        if (node.pkg, node.type) == ("rosbag", "record")
+    ]
+
+
 CHOOSES = re.compile(r"[^-]|-\w*[ae]|--(?:all|regex|node)\b")
 """A topic, or a flag that stands for several (`-a`, or `-ao` of two in one)."""
 
@@ -403,14 +433,18 @@ def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | Non
         return Absence(why, syntax_hint(fault), of_script=True, citations=(fault.place,))
     if script is not None and code in NOT_EXECUTED and any(shebang_obstacles(script)):
         return not_started(script)
-    if (node.pkg, node.type) == ("rosbag", "record") and _names_no_topic(node.args or ""):
-        topics = sorted({c.topic for c in run.student_channels() if not c.topic.startswith("/rosout")})
-        hint = f'write args="{shown(node.args or "")} {" ".join(topics) or "/…"}" in this <node>'
-        return Absence(
-            "rosbag record is told no topic to record", hint, of_script=True, citations=(node.place,)
-        )
     hint = 'write output="screen" in the <node>, and read what it prints last'
-    return Absence(f"it died with exit code {code}", hint, of_script=True)
+    unknown = Absence(f"it died with exit code {code}", hint, of_script=True)
+    return (_recorder_died(package, run, node) if node.pkg == "rosbag" else None) or unknown
+
+
+def _recorder_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | None:
+    unmade = bag_not_opened(package, run) if node.type == "record" else None
+    if unmade is not None or node.type != "record" or not _names_no_topic(node.args or ""):
+        return unmade
+    topics = sorted({c.topic for c in run.student_channels() if not c.topic.startswith("/rosout")})
+    hint = f'write args="{shown(node.args or "")} {" ".join(topics) or "/…"}" in this <node>'
+    return Absence("rosbag record is told no topic to record", hint, of_script=True, citations=(node.place,))
 
 
 def quoted(run: Run) -> str:
