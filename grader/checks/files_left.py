@@ -15,7 +15,7 @@ from grader.checks.registry import ProcessName, Refers, check
 from grader.checks.support.clocks import excused, why_late
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.fields import bounds_text, is_within, refuse_disorder
-from grader.checks.support.launch import bag_not_opened, recorders
+from grader.checks.support.launch import bag_not_made, recorders
 from grader.checks.support.processes import GlobalName, TypeName, lives, not_started, plain_type
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite
@@ -204,7 +204,7 @@ def _not_left(files: Sequence[LeftFile], package: PackageFacts, run: Run, params
     if end := explain_early_end(package, run):
         return end.verdict(failed_or_blocked, f"{what}: the program ended before ({end.cause})")
     hint = f"write {params.file} before the program ends"
-    if unmade := bag_not_opened(package, run):
+    if unmade := bag_not_made(package, run):
         what, hint = f"{what}: {unmade.why}", unmade.hint
     elif paths:
         what = f"{what}; what it wrote is {_list_paths(paths)}"

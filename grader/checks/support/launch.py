@@ -369,12 +369,20 @@ TAKE_A_VALUE = re.compile(
     r"(?:-[OoblxN]|--(?:output-\w+|buffsize|chunksize|limit|duration|size|exclude|tcpnodelay))\s+\S+"
 )
 
+BAG_VERB = re.compile(r"\s*(record|play)\b")
+"""As on the command line: `rosbag record …`."""
 NOT_OPENED = re.compile(r"Error opening file: (.+?)(?:\.active)?$")
 BAG_NAME = re.compile(r"(?:-[oO]|--output-\w+)[= ]\s*((?:\$\([^)]*\)|\S)+)")
 
 
-def bag_not_opened(package: PackageFacts, run: Run) -> Absence | None:
-    """Return that `rosbag record` could not make its bag, as it says itself."""
+def bag_not_made(package: PackageFacts, run: Run) -> Absence | None:
+    """Return why a launch file's `rosbag` never recorded: it was not found, or could not open its bag."""
+    nodes = [node for file in package.launch_files for node in file.nodes if node.pkg == "rosbag"]
+    absences = (_not_found(package, run, node) for node in nodes)
+    return next(filter(None, absences), None) or _bag_not_opened(package, run)
+
+
+def _bag_not_opened(package: PackageFacts, run: Run) -> Absence | None:
     lines = (without_colours(one.line) for _, one in run.console)
     path = next((found[1] for line in lines if (found := NOT_OPENED.search(line))), None)
     if path is None:
@@ -439,7 +447,7 @@ def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | Non
 
 
 def _recorder_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | None:
-    unmade = bag_not_opened(package, run) if node.type == "record" else None
+    unmade = _bag_not_opened(package, run) if node.type == "record" else None
     if unmade is not None or node.type != "record" or not _names_no_topic(node.args or ""):
         return unmade
     topics = sorted({c.topic for c in run.student_channels() if not c.topic.startswith("/rosout")})
@@ -479,6 +487,8 @@ def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | N
     hint = "type is the file's name, with .py for a script, and the file needs chmod +x"
     if near := near_names(str(node.type), PROGRAMS_OF.get(str(node.pkg), ())):
         why, hint = f"{why}; it has {near[0]}", f'write type="{near[0]}"'
+    elif node.pkg == "rosbag" and (verb := BAG_VERB.match(node.args or "")):
+        hint = f'write type="{verb[1]}", and take the word {verb[1]} out of args'
     elif owner is None:
         hint = programs_hint(str(node.pkg))
     elif made := program_of_source(owner, str(node.type)):
