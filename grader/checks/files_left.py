@@ -172,7 +172,7 @@ def file_left(package: PackageFacts, run: Run, params: FileLeftParams) -> Verdic
         verdict = failed(message, hint="write only what the handout asks for")
     else:
         verdict = params.finding(found[0], run) or passed(f"{found[0].path} was written")
-        verdict = _cut_short(verdict, package, run, params)
+        verdict = _cut_short(verdict, package, run)
     return verdict.about(
         expected=params.words,
         measured=verdict.measured
@@ -252,20 +252,19 @@ def _wrong_topic(
     return None
 
 
-def _cut_short(verdict: Verdict, package: PackageFacts, run: Run, params: FileLeftParams) -> Verdict:
+def _cut_short(verdict: Verdict, package: PackageFacts, run: Run) -> Verdict:
     """Return a loss of messages with the option of `rosbag record` that ends it before they come."""
-    least = max((one.at_least for one in params.topics.values()), default=0)
-    for place, node in (
-        recorders(package) if verdict.status is Status.FAIL and " holds " in verdict.message else ()
-    ):
+    said = verdict.excused or verdict.message
+    for place, node in recorders(package) if verdict.status is not Status.PASS and " holds " in said else ():
         for option in ENDS_IT.finditer(node.args or ""):
-            is_time = "duration" in option[0]
-            most = int(option[1]) * SECONDS[option[2]] * (10**9 if is_time else 1)
-            if most < (run.end_ns - run.start_ns if is_time else least):
-                what = "ends the recording after that time" if is_time else "keeps so many messages alone"
-                return verdict.explained(
-                    f"`{option[0]}` {what}", f"take `{option[0]}` out of the args", (place,)
-                )
+            number, wrote = int(option[1]), option[0].strip()
+            hint = f"take `{wrote}` out of the args"
+            if "duration" not in wrote and f" holds {plural(number, 'message')} " in said:
+                # as many as that, on any machine
+                return failed(said, hint=hint).explained(f"`{wrote}` keeps no more", hint, (place,))
+            is_short = number * SECONDS[option[2]] * 10**9 < run.end_ns - run.start_ns
+            if "duration" in wrote and is_short and verdict.status is Status.FAIL:
+                return verdict.explained(f"`{wrote}` ends the recording after that time", hint, (place,))
     return verdict
 
 

@@ -291,6 +291,31 @@ def test_a_handler_that_waits_again_and_again(tmp_path):
     ]
 
 
+@pytest.mark.parametrize(
+    ("body", "message", "fix"),
+    [
+        (
+            "while far(): rate.sleep()",
+            "the loop in the callback `add`, line 2, sleeps in each turn",
+            "keep in it only what came, and go through the loop of line 2 in the main program",
+        ),
+        (
+            "square()",
+            "the callback `add` calls `square` on line 2, which goes around a loop that sleeps",
+            "keep in it only that it was called, and call `square` in the main program",
+        ),
+        ("stop()", None, None),
+        ("Thread(target=square).start()", None, None),
+    ],
+)
+def test_a_handler_that_loops(body, message, fix, tmp_path):
+    code = f"def add(request):\n    {body}\n    return 1\nrospy.Service('/add', Add, add)\n"
+    code += "def drive():\n    while far(): rate.sleep()\ndef square(): drive()\ndef stop(): rate.sleep()\n"
+    (tmp_path / "a.py").write_text(code)
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "callback-waits"]
+    assert [(s.message, s.fix) for s in slips] == ([(message, fix)] if fix else [])
+
+
 ARGUMENTS = {
     "one": ("a = sys.argv[1]\n", ["a = int(sys.argv[1])"]),
     "several": ("a, b = rospy.myargv(sys.argv)[1:3]\n", ["a, b = map(int, rospy.myargv(sys.argv)[1:3])"]),

@@ -8,6 +8,7 @@ import ast
 import builtins
 import itertools
 
+from script_loops import CALLED_BACK, is_endless, is_short, lines_said
 from script_names import (
     all_of,
     argument,
@@ -532,3 +533,59 @@ def changes(node, found):
     if isinstance(node.op, ast.Add):
         return isinstance(other, ast.Constant) and not isinstance(other.value, str)
     return not (isinstance(node.op, ast.Mod) and not found[0][0])
+
+
+SLEEPS_SHOWN = 5
+
+
+def waiting_callbacks(tree):
+    """Callbacks of topics and services that do not come to their end, or late: nothing further is read before."""
+    functions, known = functions_in(tree), {}
+    slow = slow_functions(functions)
+    for node in walk(tree):
+        kind = called_name(node)
+        given = argument(node, 2, CALLED_BACK[kind]) if kind in CALLED_BACK else []
+        own = functions.get(dotted(given[0]).rpartition(".")[2]) if given else None
+        if own is not None and own not in known:
+            inside = list(ast.walk(own))
+            known[own] = set(inside), list(itertools.islice(waits_in(own, inside, slow), 1))
+        if own is not None and node not in known[own][0]:
+            yield from known[own][1]
+
+
+def waits_in(callback, inside, slow):
+    """Yield what keeps a callback from its end; `inside` is all that is in it, `slow` the functions that take long."""
+    for one in inside:
+        line, message, fix = getattr(one, "lineno", 0), "", ""
+        if isinstance(one, ast.While) and is_endless(one, callback):
+            message = "the loop in the callback `%s`, line %d, never ends" % (callback.name, line)
+            fix = "take the loop out of it"
+        elif is_call(one, "spin"):
+            message = "the callback `%s` calls spin() on line %d" % (callback.name, line)
+            fix = "move line %d out of it" % line
+        elif isinstance(one, ast.While) and any(map(is_long_sleep, ast.walk(one))):
+            message = "the loop in the callback `%s`, line %d, sleeps in each turn" % (callback.name, line)
+            fix = "keep in it only what came, and go through the loop of line %d in the main program" % line
+        elif called_name(one) in slow and called_name(one) != callback.name:
+            message = "the callback `%s` calls `%s` on line %d, which goes around a loop that sleeps"
+            message %= (callback.name, called_name(one), line)
+            fix = "keep in it only that it was called, and call `%s` in the main program" % called_name(one)
+        elif is_long_sleep(one):
+            again = sorted({n.lineno for n in inside if is_long_sleep(n)} - {line})[:SLEEPS_SHOWN]
+            message = "the callback `%s` sleeps on line %d" % (callback.name, line)
+            message += " and again on %s" % lines_said(again) if again else ""
+            fix = "delete %s" % lines_said([line, *again])
+        if message:
+            yield slip(line, "callback-waits", message, fix, callback.name)
+
+
+def is_long_sleep(node):
+    return called_name(node) == "sleep" and not is_short(node)
+
+
+def slow_functions(functions):
+    """Return the names of the functions in which a loop sleeps, and of those that call them."""
+    inside = {name: list(ast.walk(one)) for name, one in functions.items()}
+    loops = {name: [n for n in inside[name] if isinstance(n, ast.While)][:BELOW_LIMIT] for name in inside}
+    slow = {name for name in loops if any(is_long_sleep(n) for one in loops[name] for n in ast.walk(one))}
+    return slow | {name for name in inside if slow & {called_name(n) for n in inside[name]}}

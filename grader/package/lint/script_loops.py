@@ -6,7 +6,6 @@ Nothing is executed. Python 3.8, standard library only.
 
 import ast
 from collections import Counter
-from itertools import islice
 
 from script_names import (
     FUNCTIONS,
@@ -369,46 +368,6 @@ def publishes_twice(tree):
             message = "each pass through the loop publishes on " + listed(lines)
             fix = "delete all but one of " + listed(lines)
         yield slip(lines[1], "publish-twice", message, fix)
-
-
-SLEEPS_SHOWN = 5
-
-
-def waiting_callbacks(tree):
-    """Callbacks of topics and services that do not come to their end, or late: nothing further is read before."""
-    functions, known = functions_in(tree), {}
-    for node in walk(tree):
-        kind = called_name(node)
-        given = argument(node, 2, CALLED_BACK[kind]) if kind in CALLED_BACK else []
-        own = functions.get(dotted(given[0]).rpartition(".")[2]) if given else None
-        if own is not None and own not in known:
-            inside = list(ast.walk(own))
-            known[own] = set(inside), list(islice(waits_in(own, inside), 1))
-        if own is not None and node not in known[own][0]:
-            yield from known[own][1]
-
-
-def waits_in(callback, inside):
-    """Yield what keeps a callback from its end; `inside` is all that is in it."""
-    for one in inside:
-        line, message, fix = getattr(one, "lineno", 0), "", ""
-        if isinstance(one, ast.While) and is_endless(one, callback):
-            message = "the loop in the callback `%s`, line %d, never ends" % (callback.name, line)
-            fix = "take the loop out of it"
-        elif is_call(one, "spin"):
-            message = "the callback `%s` calls spin() on line %d" % (callback.name, line)
-            fix = "move line %d out of it" % line
-        elif is_long_sleep(one):
-            again = sorted({n.lineno for n in inside if is_long_sleep(n)} - {line})[:SLEEPS_SHOWN]
-            message = "the callback `%s` sleeps on line %d" % (callback.name, line)
-            message += " and again on %s" % lines_said(again) if again else ""
-            fix = "delete %s" % lines_said([line, *again])
-        if message:
-            yield slip(line, "callback-waits", message, fix, callback.name)
-
-
-def is_long_sleep(node):
-    return called_name(node) == "sleep" and not is_short(node)
 
 
 def lines_said(numbers):

@@ -52,7 +52,7 @@ def slips(tree):
         uncalled_and_asked, objects.names_of_objects, names.misspelt, rates.loop_rates, rates.nanoseconds,
         counters.resets, never_run, loops.never_reached, loops.stopped_loops, loops.published_before,
         loops.sleepless_loops, loops.sleeps_twice, loops.publishes_twice, callbacks.callbacks,
-        loops.waiting_callbacks, objects.queue_sizes, objects.graph_names,
+        callbacks.waiting_callbacks, objects.queue_sizes, objects.graph_names,
         objects.object_slips, said_texts, loops.deaf_loops, counters.clock_values, counters.counter_slips,
         counters.counter_starts, without_effect, values.assigned_late, objects.hidden_names, objects.subscribed_again,
         imports, objects.taken_off, objects.unstarted_servers, values.wrong_values, values.decided_conditions,
