@@ -54,7 +54,6 @@ LATE_P95_MS = 5.0
 LATE_TURNS = 4
 """Each turn may be late: at 1.6 rad/s, 25 ms in each of four are 0.16 rad, and 0.3 m beside a line of 2 m."""
 ORIGIN = (0.0, 0.0)
-STOPPED = "look at the condition that stops it: the distance is math.hypot(dx, dy), which is never below 0"
 DRIVE = "publish a velocity that is not 0, again and again for as long as it should drive"
 DEGREES_FROM = 20.0
 """Radians a second that no robot of a lab turns with, and that small angles in degrees come to."""

@@ -13,7 +13,6 @@ from pydantic import Field, model_validator
 from grader.checks.registry import Refers, check
 from grader.checks.robot_path import (
     DRIVE,
-    STOPPED,
     TURNS_S,
     drives_too_little,
     metres,
@@ -77,6 +76,8 @@ STEER = (
     "-pi and pi: math.remainder(angle, 2 * math.pi); dx and dy are the point minus the robot's place"
 )
 LEFT = "a positive angular.z turns to the left"
+STOPPED = "look at the condition that stops it: the distance is math.hypot(dx, dy), which is never below 0"
+NEXT = "take each goal that comes in place of the one before, and forget that that one was reached"
 FASTER = "drive faster, or take a shorter way"
 STILL_TURNS = "set angular.z to 0 where the way is free: a velocity keeps what was set in it before"
 CIRCLES = "make angular.z depend on where the wall is, ahead or beside the robot, and not only on how far away it is"
@@ -352,7 +353,7 @@ def _never_moves(
     if not sent or any(command.speed or command.turn for command in sent):
         return why_still(failed_or_blocked(message, hint=DRIVE).stuck(params.number), run)
     message += f": {plural(len(sent), 'velocity', 'velocities')} came, and {'all are' if len(sent) > 1 else 'it is'} 0"
-    return failed_or_blocked(message, hint=STOPPED)
+    return failed_or_blocked(message, hint=NEXT if params.number > 1 else STOPPED)
 
 
 def _fell_silent(
