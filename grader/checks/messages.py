@@ -434,8 +434,7 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
         values, one after the other.
 
     Why it matters on a robot
-        The robot also obeys a wrong constant, or a last command that is not a stop: it has nothing but the
-        message.
+        The robot also obeys a wrong constant, or a last command that is not a stop: it has nothing but the message.
 
     How it is measured
         The messages are decoded by the definition that their publisher sent. Numbers
@@ -581,8 +580,8 @@ def _why_first(
         topics = join_words(sorted(filter(None, after))) or "that"
         hint = f"publish once on {params.topic} before you wait for any message, as soon as the publisher is made"
         return f", which came only after {topics}", hint
-    sent = [c for c in run.channels if c.by_grader and c.messages and c.topic not in SYSTEM_TOPICS]
-    sent = [c for c in sent if not c.topic.startswith("/grader") and c.times_ns[0] <= found[0].time_ns]
+    sent = [c for c in run.channels if c.by_grader and c.messages and c.times_ns[0] <= found[0].time_ns]
+    sent = [c for c in sent if c.topic not in SYSTEM_TOPICS and not c.topic.startswith("/grader")]
     if beside or len(sent) != 1 or sent[0].topic == params.topic or len(sent[0].messages) <= len(found):
         return None
     topic, count = sent[0].topic, plural(len(sent[0].messages), "message")
@@ -592,8 +591,8 @@ def _why_first(
 
 def _waited_without_message(run: Run, topic: str, before_ns: int) -> bool:
     """Return whether the scenario had waited for a message on the topic, and none had come."""
-    waits = ((t, e.detail) for t, e in run.actors if e.action == "wait" and e.topic == topic)
-    return any(t < before_ns and "did not come" in detail for t, detail in waits)
+    waits = (e for t, e in run.actors if t < before_ns and e.action == "wait" and e.topic == topic)
+    return any("did not come" in one.detail for one in waits)
 
 
 def _values(asked: Sequence[Reading]) -> str:

@@ -73,15 +73,7 @@ def charge_repairs(
             _is_simulated(c, rubric) for c in criteria if repair in needs[c.id]
         ):
             continue  # the clock is only fast to save time
-        asking = [c for c in rubric.criteria if c.scenario is None and asks_for(first[c.id], repair)]
-        if repair.kind in OF_BUILDS:  # of a file with several faults, those that speak of this line
-            new = _new_words(repair)
-            better_by_it = better - {c.id for c in rubric.criteria if c.check == INSTALL}
-            told = {c.id for c in asking if is_told(repair, first[c.id].hint)}
-            asking = [c for c in asking if c.id in better_by_it | told or new & words_of(first[c.id].message)]
-        sought = [c for c in asking if _seeks(first[c.id], repair)]
-        asking = sought or [c for c in asking if _names(c, repair)] or asking
-        if asking:
+        if asking := _asking(rubric, first, better, repair):
             is_other = {c.id: repair.file not in texts_in(c.parameters) for c in asking}
             charges[repair] = {
                 min(asking, key=lambda c: (_lines_away(first[c.id], repair), is_other[c.id])).id
@@ -103,6 +95,20 @@ def charge_repairs(
         charges[repair] = set((counting if named else other or counting)[:1])
         misnamed |= charges[repair] if named else set()
     return charges
+
+
+def _asking(
+    rubric: Rubric, first: Mapping[str, Verdict], better: AbstractSet[str], repair: Repair
+) -> list[Criterion]:
+    """Return the criteria of the files that ask for what was wrong; at best those that ask for it by its name."""
+    asking = [c for c in rubric.criteria if c.scenario is None and asks_for(first[c.id], repair)]
+    if repair.kind in OF_BUILDS:  # of a file with several faults, those that speak of this line
+        new = _new_words(repair)
+        better_by_it = better - {c.id for c in rubric.criteria if c.check == INSTALL}
+        told = {c.id for c in asking if is_told(repair, first[c.id].hint)}
+        asking = [c for c in asking if c.id in better_by_it | told or new & words_of(first[c.id].message)]
+    sought = [c for c in asking if _seeks(first[c.id], repair)]
+    return sought or [c for c in asking if _names(c, repair)] or asking
 
 
 def _is_simulated(criterion: Criterion, rubric: Rubric) -> bool:

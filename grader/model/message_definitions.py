@@ -290,7 +290,8 @@ def meant_type(type_: str, own: Collection[str], known: Mapping[str, Collection[
     are types of the same package, `known` those of others."""
     base, bracket, size = type_.partition("[")
     if "/" in base:
-        return f"{_meant_full_name(*base.split('/', 1), known)}{bracket}{size}"
+        package, _, name = base.partition("/")
+        return f"{_meant_full_name(package, name, known)}{bracket}{size}"
     if base in {*BUILT_IN, *FULL_NAMES, *own}:
         return type_
     # Small letters on both sides: `pose` is meant for the package's own `Pose`.

@@ -280,12 +280,8 @@ def test_a_build_that_two_lines_stop_names_the_one_that_it_is_charged_with() -> 
     asked = rubric(
         {"id": "cmake", "check": "cmake", "with": {"name": "lab1"}}, {"id": "build", "check": "build"}
     )
-    calls = [
-        ["project", "other"],
-        ["find_package", "catkin"],
-        ["catkin_package"],
-        ["catkin_install_python", "PROGRAMS", "a.py"],
-    ]
+    calls = [["project", "other"], ["find_package", "catkin"], ["catkin_package"]]
+    calls.append(["catkin_install_python", "PROGRAMS", "a.py"])
     whole = {"name": "lab1", "path": "lab1", "manifest": {}, "files": [{"path": "CMakeLists.txt"}]}
     said = [
         "CMake Error at /usr/share/catkin/cmake/catkin_package_xml.cmake:54 (message):",

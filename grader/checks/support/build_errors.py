@@ -58,12 +58,8 @@ BACKSLASH = 'bad character with text "\\"'
 _QUOTES = dict.fromkeys(map(ord, "\u2018\u2019`"), "'")
 """As compilers and linkers write them."""
 OF_TARGETS = (
-    "add_executable",
-    "add_library",
-    "target_link_libraries",
-    "add_dependencies",
-    "set_target_properties",
-)
+    "add_executable", "add_library", "target_link_libraries", "add_dependencies", "set_target_properties",
+)  # fmt: skip
 OF_CATKIN = ("catkin_package", "catkin_install_python", "catkin_python_setup")
 """Commands that `find_package(catkin …)` defines."""
 
@@ -267,24 +263,24 @@ def no_types(package: PackageFacts) -> Explained | None:
     """Return which fields of the package's own definitions have types that do not exist; None where all do."""
     own = {posixpath.basename(one.path).partition(".")[0] for one in package.interfaces}
     faults = [one.fault for one in package.interfaces if one.fault is not None]
+    if faults:
+        hint = faults[0].fix or "write each line as a type and a name: `float64 speed`"
+        return Explained(f"{faults[0].file}: {faults[0].cause}", hint, place=faults[0].place)
     wrong = [
         (FileCitation(file=one.path, line=field.line), field, right)
         for one in package.interfaces
         for field in one.fields
         if (right := meant_field(field, own, noetic_messages())) != (field.type, field.name)
     ]
-    if faults:
-        hint = faults[0].fix or "write each line as a type and a name: `float64 speed`"
-        return Explained(f"{faults[0].file}: {faults[0].cause}", hint, place=faults[0].place)
     if not wrong:
         return None
     place, first, _ = wrong[0]
-    fixes = [f"on line {at.line} of {at.file}, write `{' '.join(right)}`" for at, _, right in wrong]
     listed = {word for call in cmake_calls(package, "generate_messages") for word in call.args}
     others = {right.partition("/")[0] for _, _, (right, _) in wrong if "/" in right} - listed
     named = f", and {join_words(sorted(others))} after DEPENDENCIES in generate_messages(…)" if others else ""
-    if len(wrong) == 1 and not others:
-        fixes = [f"write `{' '.join(wrong[0][2])}`"]
+    is_alone = len(wrong) == 1 and not others  # then the place is cited, and need not be told
+    where = "" if is_alone else "on line {0.line} of {0.file}, "
+    fixes = [f"{where.format(at)}write `{' '.join(right)}`" for at, _, right in wrong]
     why = f"line {place.line} of {place.file}: there is no field type `{shown(first.type)}`"
     return Explained(why, join_words(fixes) + named, place=place)
 
@@ -304,8 +300,8 @@ def _message_of_another(found: re.Match[str], package: PackageFacts, lines: Sequ
         why = f"{message} needs messages that generate_messages(DEPENDENCIES …) does not name"
         return Explained(why, FIRST_ERROR_HINT)
     why = f"{message} has a field of the type {named[2]}/{named[1]}, and generate_messages(…) does not name {named[2]}"
-    found_already = any(named[2] in call.args for call in cmake_calls(package, "find_package"))
-    more = "" if found_already else ", and in find_package(…) and package.xml"
+    found_already = {word for call in cmake_calls(package, "find_package") for word in call.args}
+    more = "" if named[2] in found_already else ", and in find_package(…) and package.xml"
     return Explained(why, f"write {named[2]} after DEPENDENCIES in generate_messages(…){more}")
 
 
@@ -314,8 +310,8 @@ def _unfound_dependency(found: re.Match[str], package: PackageFacts, _lines: Seq
     of_catkin = next((call.line for call in calls if call.args[:1] == ("catkin",)), None)
     where = f" on line {of_catkin}" if of_catkin else ""
     why = f"generate_messages(…) names {name}, and find_package(catkin …) does not"
-    manifest = package.manifest
-    kinds = ("build_depend", "run_depend") if manifest is not None and manifest.format == 1 else ("depend",)
+    is_old = package.manifest is not None and package.manifest.format == 1
+    kinds = ("build_depend", "run_depend") if is_old else ("depend",)
     lines = join_words(f"<{kind}>{name}</{kind}>" for kind in kinds)
     more = "" if _is_declared(name, package) else f"; in package.xml, add {lines}"
     return Explained(why, f"write {name} after COMPONENTS in the find_package(…){where}{more}")

@@ -142,27 +142,34 @@ def loop_ends(test):
     return test if is_call(test, "is_shutdown") else None
 
 
-def stopped_loops(tree):
-    """`spin()` in a loop that publishes: the loop does not come round. `break` or `return` in each of its turns, or so
-    many turns and no more. And `if` in place of `while`.
-    """
-    turned, called, is_robot = dict(turns(tree)), calls_made(tree), is_of_robot(tree)
-    for loop in walk(tree):
-        asks = isinstance(loop, ast.If) and is_call(getattr(loop.test, "operand", None), "is_shutdown")
-        name = getattr(turned[loop][0], "name", None)
+def loops_that_never_go_round(tree):
+    """`if` in place of `while`, and `while` without its `not`."""
+    turned, called = dict(turns(tree)), calls_made(tree)
+    for block in all_of(tree, ast.If, ast.While):
+        asks = isinstance(block, ast.If) and is_call(getattr(block.test, "operand", None), "is_shutdown")
         # what others call, or several lines, may run again
-        if asks and not turned[loop][1] and called[name] == 1 and calls_in(loop, "publish"):
-            message = "the `if` on line %d runs what follows it once" % loop.lineno
-            fix = "write `while` instead of `if` on line %d" % loop.lineno
-            yield slip(loop.lineno, "loop-left", message, fix)
-        ending = loop_ends(loop.test) if isinstance(loop, ast.While) else None
+        is_run_once = not turned[block][1] and called[getattr(turned[block][0], "name", None)] == 1
+        if asks and is_run_once and calls_in(block, "publish"):
+            message = "the `if` on line %d runs what follows it once" % block.lineno
+            fix = "write `while` instead of `if` on line %d" % block.lineno
+            yield slip(block.lineno, "loop-left", message, fix)
+        ending = loop_ends(block.test) if isinstance(block, ast.While) else None
         if ending is not None:
             message = "the loop on line %d runs only when the node should end: a `not` is missing"
-            message, asks = message % loop.lineno, dotted(ending.func)
-            fix = "on line %d, write `while not %s():`" % (loop.lineno, asks)
-            yield slip(loop.lineno, "loop-left", message, fix, asks)
-        if not isinstance(loop, LOOPS) or not calls_in(loop, "publish"):
+            message, asks = message % block.lineno, dotted(ending.func)
+            fix = "on line %d, write `while not %s():`" % (block.lineno, asks)
+            yield slip(block.lineno, "loop-left", message, fix, asks)
+
+
+def stopped_loops(tree):
+    """`spin()` in a loop that publishes: the loop does not come round. `break` or `return` in each of its turns, or so
+    many turns and no more."""
+    turned, called, is_robot = dict(turns(tree)), calls_made(tree), is_of_robot(tree)
+    for loop in all_of(tree, *LOOPS):
+        if not calls_in(loop, "publish"):
             continue
+        name = getattr(turned[loop][0], "name", None)
+        ending = loop_ends(loop.test) if isinstance(loop, ast.While) else None
         for spin in calls_in(loop, "spin")[:1]:
             message = "the loop stops at the spin() on line %d, which waits until the node ends" % spin.lineno
             fix = "remove spin(): the loop keeps the node alive"

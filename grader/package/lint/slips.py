@@ -50,7 +50,8 @@ def slips(tree):
     """What compiles and is not meant: names that are not called or not there, questions that wait for a keyboard."""
     finders = (
         uncalled_and_asked, objects.names_of_objects, names.misspelt, rates.loop_rates, rates.nanoseconds,
-        counters.resets, never_run, loops.never_reached, loops.stopped_loops, loops.published_before,
+        counters.resets, never_run, loops.never_reached, loops.loops_that_never_go_round,
+        loops.stopped_loops, loops.published_before,
         loops.sleepless_loops, loops.sleeps_twice, loops.publishes_twice, callbacks.callbacks,
         callbacks.waiting_callbacks, objects.queue_sizes, objects.graph_names,
         objects.object_slips, said_texts, loops.deaf_loops, counters.clock_values, counters.counter_slips,

@@ -144,14 +144,17 @@ def with_logger(text: str) -> Iterator[Step]:
     if "rospy" not in imported or inherits or LOGGER in bound_in(tree) | named:
         return
     edits, first = [], 0
-    for node in (n for n in nodes_in(tree) if isinstance(n, ast.Call) and isinstance(n.func, ast.Attribute)):
-        level, got = LEVELS.get(node.func.attr, ""), node.func.value
-        is_logger = (
-            isinstance(got, ast.Call) and isinstance(got.func, ast.Attribute) and got.func.attr == LOGGER
-        )
-        if not is_logger or last_name(got.func.value) not in {"self", "rospy", *given}:
+    for node in nodes_in(tree):
+        if not (
+            isinstance(node, ast.Call)
+            and isinstance(node.func, ast.Attribute)
+            and isinstance(got := node.func.value, ast.Call)
+            and isinstance(got.func, ast.Attribute)
+            and got.func.attr == LOGGER
+            and last_name(got.func.value) in {"self", "rospy", *given}
+        ):
             continue
-        span = span_of(lines, node.func)
+        level, span = LEVELS.get(node.func.attr, ""), span_of(lines, node.func)
         if not level or span is None or node.keywords or len(node.args) != 1:
             return  # how often it is to log is not known
         edits.append((*span, f"rospy.{level}"))

@@ -1,0 +1,200 @@
+"""Right scripts in styles that few students write: no finder of slips says anything of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from grader.package.python import check_syntax
+
+RIGHT = {
+    "pause-in-a-function": ("sleep-outside", """\
+def ok():
+    rate.sleep()
+    return not rospy.is_shutdown()
+
+while ok():
+    pub.publish(1)
+"""),
+    "ticks-of-a-generator": ("sleep-outside", """\
+def ticks(rate):
+    while not rospy.is_shutdown():
+        yield
+        rate.sleep()
+
+for _ in ticks(rospy.Rate(10)):
+    pub.publish(1)
+"""),
+    "several-publishers": ("sleep-outside", """\
+while not rospy.is_shutdown():
+    for pub in pubs:
+        pub.publish(1)
+    rate.sleep()
+"""),
+    "endless-generator": ("deaf", "def numbers():\n    while True:\n        yield from range(128)\n"),
+    "asks-in-a-function": ("deaf", """\
+def ok():
+    rate.sleep()
+    return not rospy.is_shutdown()
+
+while ok():
+    pub.publish(1)
+"""),
+    "ends-on-a-signal": ("deaf", """\
+def stop(number, frame):
+    rospy.signal_shutdown('signal')
+
+rospy.init_node('a', disable_signals=True)
+signal.signal(signal.SIGINT, stop)
+"""),
+    "robot-that-arrives": ("loop-left", """\
+while distance() > 0.1 and not rospy.is_shutdown():
+    twist.angular.z = 1
+    pub.publish(twist)
+    rate.sleep()
+pub.publish(Twist())
+rospy.spin()
+"""),
+    "set-above": ("object", """\
+class A:
+    def f(self):
+        self.reset()
+        return self.n
+
+    def reset(self):
+        self.n = 0
+"""),
+    "set-on-entering": ("object", """\
+class A:
+    def __enter__(self):
+        self.n = 0
+
+    def f(self):
+        return self.n
+"""),
+    "flag": ("not-called", """\
+class A:
+    def __init__(self):
+        self.is_shutdown = False
+
+    def f(self):
+        while not self.is_shutdown:
+            pass
+"""),
+    "property": ("not-called", """\
+class A:
+    @property
+    def is_shutdown(self):
+        return False
+
+    def f(self):
+        while not self.is_shutdown:
+            pass
+"""),
+    "own-timer": ("callback-values", "class Timer:\n    pass\n\ndef tick():\n    pass\n\nTimer(1, tick)\n"),
+    "both-Pythons": ("undefined", "import sys\nif sys.version_info[0] < 3:\n    range = xrange\n"),
+    "setter": ("undefined", """\
+class A:
+    @property
+    def n(self):
+        return 1
+
+    @n.setter
+    def n(self, n):
+        pass
+"""),
+    "default-of-a-class": ("undefined", """\
+class A:
+    LIMIT = 5
+
+    def f(self, n=LIMIT):
+        return n
+"""),
+    "maker-of-callbacks": ("callback-called", """\
+def made(topic):
+    def heard(msg):
+        print(topic, msg.data)
+    return heard
+
+rospy.Subscriber('a', String, made('a'))
+"""),
+    "maker-of-lambdas": ("callback-called", """\
+def made(topic):
+    return lambda msg: print(topic, msg)
+
+rospy.Subscriber('a', String, made('a'))
+"""),
+    "publisher-of-another-object": ("never-published", """\
+class A:
+    def __init__(self):
+        self.out = rospy.Publisher('a', Int8)
+
+a = A()
+a.out.publish(1)
+"""),
+    "publisher-of-a-class": ("never-published", """\
+class A:
+    pub = rospy.Publisher('a', Int8)
+
+    def f(self):
+        self.pub.publish(1)
+"""),
+    "publisher-of-a-type": ("never-published", """\
+class A:
+    def __init__(self):
+        type(self).pub = rospy.Publisher('a', Int8)
+"""),
+    "unregisters-on-leaving": ("unregistered", """\
+class A:
+    def __exit__(self, *why):
+        self.pub.unregister()
+"""),
+    "sleep-of-another-function": ("sleep-outside", """\
+def leave():
+    rospy.sleep(1)
+def burst():
+    for n in range(3):
+        pub.publish(n)
+"""),
+    "counter-of-an-inner-loop": ("set-in-loop", """\
+while not rospy.is_shutdown():
+    n = 0
+    while n < 4:
+        pub.publish(n)
+        n += 1
+"""),
+    "given-to-another-module": ("object", """\
+class A:
+    def __init__(self):
+        fill(self)
+        self.pub.publish(1)
+"""),
+    "class-in-a-method": ("object", """\
+class A:
+    def test(self):
+        class B:
+            def reset(self): pass
+        B().reset()
+"""),
+    "method-of-a-module": ("never-called", "class A:\n    def stop(self):\n        self.pub.publish(0)\n"),
+    "state-of-a-base": ("not-called", "class A(B):\n    def f(self):\n        if self.is_shutdown:\n            f()\n"),
+    "callback-of-a-base": ("callback-missing", "class A(B):\n    def hear(self, msg):\n        print(msg.data)\n"),
+    "next-axis": ("misspelt", "max_z = 1\nprint(max_x)\n"),
+    "asked-by-others": ("loop-left", "def send():\n    if not rospy.is_shutdown():\n        pub.publish(0)\n"),
+    "called-by-name": ("never-called", """\
+class A:
+    def __init__(self):
+        rospy.Subscriber('a', Int8, getattr(self, 'on_' + 'a'))
+
+    def on_a(self, msg):
+        self.pub.publish(msg)
+"""),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_a_style_that_few_students_write_is_no_slip(name: str, tmp_path: Path) -> None:
+    kind, text = RIGHT[name]
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    assert [s.message for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == kind] == []
