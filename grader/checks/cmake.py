@@ -20,13 +20,13 @@ from grader.checks.support.scripts import (
     names_script,
 )
 from grader.checks.support.text import near_names, shown
+from grader.model.file_fault import Fault
 from grader.model.package import (
     CMAKE,
     MAKES_PACKAGE,
     SIMPLE,
     CMakeCall,
     CMakeFacts,
-    Fault,
     PackageFacts,
     meant_command,
 )

@@ -26,7 +26,8 @@ from grader.checks.support.scripts import (
 from grader.checks.support.text import near_names, shown
 from grader.evidence.events import CATKIN_MAKE
 from grader.evidence.run import Run
-from grader.model.package import CMAKE, Fault, PackageFacts, SourceFile
+from grader.model.file_fault import Fault
+from grader.model.package import CMAKE, PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.repair import as_code
 from grader.model.submission import chmod_hint

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
 from grader.checks.support.text import shown
+from grader.model.file_fault import Fault
 from grader.model.message_definitions import (
     BUILT_IN,
     FULL_NAMES,
@@ -19,7 +20,7 @@ from grader.model.message_definitions import (
     parse_definition,
     refuse_unknown,
 )
-from grader.model.package import Fault, Interface, InterfaceField, PackageFacts
+from grader.model.package import Interface, InterfaceField, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed
 from grader.wording import closest, join_words, on_lines, plural

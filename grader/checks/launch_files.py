@@ -43,7 +43,8 @@ from grader.checks.support.scripts import CPP_SUFFIXES, RIGHT_SHEBANG, add_hint,
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
-from grader.model.package import LAUNCH_TAGS, LaunchFile, LaunchNode, PackageFacts, SourceFile
+from grader.model.launch_file import LAUNCH_TAGS, LaunchFile, LaunchNode
+from grader.model.package import PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Status, Verdict, failed, failed_or_blocked, joined, passed
 from grader.wording import join_words, plural, there_is

@@ -34,7 +34,8 @@ from grader.checks.support.parameters import (
 from grader.checks.support.scripts import add_hint, find_script
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
-from grader.model.package import LaunchFile, LaunchLoad, LaunchNode, PackageFacts
+from grader.model.launch_file import LaunchFile, LaunchLoad, LaunchNode
+from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, failed_or_blocked, passed
 from grader.wording import join_words, on_lines, significant, there_is

@@ -50,7 +50,8 @@ from grader.checks.support.scripts import asks_for_wrapper, shebang_obstacles
 from grader.checks.support.text import SPIN, near_names
 from grader.checks.support.topics import SYSTEM_TOPICS, cite, connected_nodes, nodes_on
 from grader.evidence.run import Run
-from grader.model.package import LaunchFile, LaunchNode, PackageFacts
+from grader.model.launch_file import LaunchFile, LaunchNode
+from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Status, Verdict, failed, failed_or_blocked, joined, passed
 from grader.wording import is_one_edit, join_words, plural, there_is

@@ -31,7 +31,8 @@ from grader.evidence.events import PACKAGE_RUN
 from grader.installable import noetic_messages
 from grader.judging.cited_lines import LINE_CHARS, LINES_READ
 from grader.judging.facts import Facts, language_of, scripts_of
-from grader.model.package import LaunchFile, PackageFacts
+from grader.model.launch_file import LaunchFile
+from grader.model.package import PackageFacts
 from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation, Status, Verdict, cited_lines
 from grader.rubric.model import Criterion, Rubric

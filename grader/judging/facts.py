@@ -23,7 +23,8 @@ from grader.checks.support.text import Language, near_names, texts_in
 from grader.checks.support.topics import unheard_programs
 from grader.evidence.events import PACKAGE_RUN, RECORDING_MISSING, RECORDING_PROBLEM
 from grader.evidence.run import Run
-from grader.model.package import LaunchFile, PackageFacts
+from grader.model.launch_file import LaunchFile
+from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, failed_or_blocked, inconclusive, machine_lacks

@@ -9,7 +9,8 @@ from collections.abc import Collection, Iterator, Mapping
 from difflib import get_close_matches
 from pathlib import PurePosixPath
 
-from grader.model.package import Fault, Interface, InterfaceField
+from grader.model.file_fault import Fault
+from grader.model.package import Interface, InterfaceField
 from grader.wording import is_one_edit
 
 FIELDS_MAX = 500

@@ -16,56 +16,17 @@ from typing import Literal
 
 from pydantic import Field
 
+from grader.model.file_fault import Fault
 from grader.model.git_ignores import IgnoreLine
+from grader.model.launch_file import LaunchFile
 from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
 from grader.model.submission import ModeSource
-from grader.model.verdict import FileCitation, Placed
+from grader.model.verdict import Placed
 from grader.wording import is_one_edit
 
 MANIFEST, CMAKE = "package.xml", "CMakeLists.txt"
 """The two files at the root of each package."""
-
-
-class Fault(Record):
-    """Why a file cannot be read as what it should be.
-
-    `kind` is the parser's own word (`XMLSyntaxError`, `TabError`). `cause` says the same in words for
-    students, and is empty if the message says enough; `fix` says what to do, and is empty if that is not
-    known. `unclosed` is the bracket that is opened on that line and never closed, `?` if Python does not
-    say which. `source` is the text of the line if the column is known. `further` says how to write other lines of the
-    file that cannot be read either.
-    """
-
-    file: str
-    line: int | None
-    column: int | None = None
-    kind: str
-    message: str
-    cause: str = ""
-    fix: str = ""
-    unclosed: str = ""
-    source: str = ""
-    further: tuple[str, ...] = Field(default=(), exclude_if=lambda value: not value)
-
-    @property
-    def explanation(self) -> str:
-        """What is wrong, and what to do if that is known."""
-        why = self.cause or self.message
-        return f"{why}: {self.fix}" if self.fix else why
-
-    @property
-    def place(self) -> FileCitation:
-        """The line, with its column if known."""
-        return FileCitation(file=self.file, line=self.line, column=self.column, source=self.source)
-
-    @property
-    def advice(self) -> str:
-        """What to do on which line; "" if that is not known."""
-        # Such a fix says its line itself.
-        named = self.line is None or re.match(r"(above|below|delete|write|make) line \d", self.fix)
-        where = "" if named else f"line {self.line}: "
-        return f"{where}{self.fix}" if self.fix else ""
 
 
 class Dependency(Record):
@@ -99,10 +60,6 @@ class Manifest(Record):
     advice: tuple[str, ...] = ()
 
 
-LAUNCH_TAGS = frozenset(
-    {"arg", "env", "group", "include", "machine", "master", "node", "param", "remap", "rosparam", "test"}
-)
-"""Below `<launch>`."""
 CMAKE_COMMANDS = (
     "add_action_files", "add_compile_options", "add_custom_target", "add_definitions", "add_dependencies",
     "add_executable", "add_library", "add_message_files", "add_rostest", "add_service_files",
@@ -295,130 +252,6 @@ class SourceFile(Record):
     def in_other_encoding(self) -> bool:
         """Whether it is not saved as UTF-8, as which the arena saves a script before it runs."""
         return self.encoding in {"utf-16", "unknown-8bit"}
-
-
-class LaunchLine(Placed, Record):
-    """A tag that gives the topics of nodes other names: a `<remap>`, `value` its `from`; `args`, the `args` of a
-    `<node>` with `old:=new` in them, `value` the old name; any other by its `ns`."""
-
-    tag: str
-    value: str
-    file: str
-    line: int
-
-
-class LateRemap(LaunchLine):
-    """A `<remap>` to the name `to` with no `<node>` behind it, and so without effect: its place is above the tag on
-    the line `above`. `namespace` is that of its group."""
-
-    namespace: str
-    to: str
-    above: int
-
-
-class LaunchArg(Placed, Record):
-    """An `<arg>` that has no value where `$(arg …)` asks for it. `declared`: there is an `<arg>`, without a default,
-    and `line` is its own; else the line that asks, where `meant` is the one with nearly that name."""
-
-    name: str
-    declared: bool
-    file: str
-    line: int
-    meant: str = Field(default="", exclude_if=lambda value: not value)
-
-
-class LaunchNode(Placed, Record):
-    """One `<node>`, with its attributes as written; a missing attribute is None.
-
-    `remaps` are those in force: those that come before it in `<launch>` and its `<group>`s, then its own.
-    `file` is the file that has it, `namespace` that of its groups, includes and its own `ns`, with both
-    slashes. `uncertain`: only roslaunch can tell whether it counts (`if="$(eval …)"`).
-    """
-
-    pkg: str | None
-    type: str | None
-    name: str | None
-    ns: str | None
-    output: str | None
-    launch_prefix: str | None
-    args: str | None
-    remaps: tuple[tuple[str, str], ...]
-    line: int
-    file: str = ""
-    namespace: str = "/"
-    machine: str | None = None
-    respawn: str | None = None
-    required: str | None = None
-    uncertain: bool = False
-    unknown: tuple[str, ...] = ()
-    """Attributes that roslaunch does not know."""
-    renaming: tuple[LaunchLine, ...] = ()
-    """The `<remap>`s and `ns` in force, in the file's order."""
-
-    @property
-    def full_name(self) -> str:
-        """The name in the graph, `/robot/talker`. What only roslaunch can resolve is still `$(…)` in it."""
-        return f"{self.namespace}{self.name or ''}"
-
-
-class LaunchParam(Placed, Record):
-    """One `<param>`, or `<rosparam param="…">` with its value in the tag; `name` is the full name on the server, which
-    `attribute` gives; `value` is None if a file or command gives it."""
-
-    name: str
-    value: str | None
-    type: str | None
-    file: str
-    line: int
-    attribute: str = "name"
-
-
-class LaunchLoad(Placed, Record):
-    """One `<rosparam>`; `source` is its `file` (None for text in the tag), `namespace` where its names go."""
-
-    source: str | None
-    command: str
-    namespace: str
-    file: str
-    line: int
-
-
-class LaunchFile(Record):
-    """`fault` is set if the file is not well-formed or does not begin with `<launch>`.
-
-    Nodes and includes that a literal `if="false"` or `unless="true"` switches off are left out. `nodes` are
-    the file's own. These fields say what `roslaunch` would do, with the package's own included files and
-    with `$(arg …)`, `$(dirname)` and namespaces resolved: `brings` (nodes), `tests` (`<test>`, which only
-    rostest runs), `params`, `loads`, `include_faults` (own files that cannot be included), `unset_args`. A
-    path inside the package is written as `$(find <package>)/…`. `unknown_tags` are tags that roslaunch
-    skips, with their lines, and others that are written like a node; `commented` has the `type`s of nodes in
-    comments; `switched_off` those of nodes that an `if` or `unless` leaves out, with its line and text.
-    `readable` are the nodes that can be read from a file that is not well-formed.
-    """
-
-    path: str
-    root: str | None
-    nodes: tuple[LaunchNode, ...]
-    includes: tuple[str, ...]
-    fault: Fault | None = None
-    brings: tuple[LaunchNode, ...] = ()
-    tests: tuple[LaunchNode, ...] = ()
-    params: tuple[LaunchParam, ...] = ()
-    loads: tuple[LaunchLoad, ...] = ()
-    include_faults: tuple[Fault, ...] = ()
-    unknown_tags: tuple[tuple[str, int], ...] = ()
-    commented: tuple[tuple[str, int], ...] = ()
-    switched_off: tuple[tuple[str, int, str], ...] = ()
-    unset_args: tuple[LaunchArg, ...] = ()
-    late_remaps: tuple[LateRemap, ...] = ()
-    readable: tuple[LaunchNode, ...] = ()
-    given: tuple[str, ...] = Field(default=(), exclude_if=lambda value: not value)
-    """The arguments with which it is read: `robot:=tb3`."""
-
-    def starts(self, programs: AbstractSet[str]) -> set[str]:
-        """Return which of these programs the file starts, by their names; the `.py` may be missing."""
-        types = {node.type for node in self.nodes}
-        return {name for name in programs if {name, name.removesuffix(".py")} & types}
 
 
 CLASSES_OF = {

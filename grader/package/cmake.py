@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 
 from cmake_parser import ast as nodes
 
-from grader.model.package import CMAKE, CMakeCall, CMakeFacts, Fault
+from grader.model.file_fault import Fault
+from grader.model.package import CMAKE, CMakeCall, CMakeFacts
 from grader.package.cmake_parse import commands_of, parse_cmake
 from grader.package.reading import printable, read_markup
 

@@ -9,7 +9,7 @@ from itertools import islice
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
-from grader.model.package import Fault
+from grader.model.file_fault import Fault
 from grader.model.python_slip import PythonSlip
 from grader.package.reading import SOURCE_LIMIT_BYTES, printable, read_markup
 

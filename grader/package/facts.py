@@ -20,8 +20,9 @@ from itertools import islice
 from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
 
+from grader.model.file_fault import Fault
 from grader.model.message_definitions import PARTS, parse_interface
-from grader.model.package import Fault, Interface, PackageFacts, Shebang, ShebangFault, SourceFile
+from grader.model.package import Interface, PackageFacts, Shebang, ShebangFault, SourceFile
 from grader.model.python_slip import PythonSlip
 from grader.model.submission import SourcePackage, Submission
 from grader.package.cpp import SUFFIXES, cpp_slips

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 from lxml import etree
 
-from grader.model.package import LAUNCH_TAGS, Fault, LaunchFile, LaunchNode
+from grader.model.file_fault import Fault
+from grader.model.launch_file import LAUNCH_TAGS, LaunchFile, LaunchNode
 from grader.package.launch_loader import KEPT_AS_WRITTEN, Scope, load, unknown_attributes, wanted
 from grader.package.reading import read_markup
 from grader.package.xml import line_of, parse_what_is_left, parse_xml

@@ -16,7 +16,8 @@ from lxml import etree
 from pydantic import Field
 
 from grader.installable import TUTORIALS, known_packages
-from grader.model.package import Fault, LateRemap, LaunchArg, LaunchLine, LaunchLoad, LaunchNode, LaunchParam
+from grader.model.file_fault import Fault
+from grader.model.launch_file import LateRemap, LaunchArg, LaunchLine, LaunchLoad, LaunchNode, LaunchParam
 from grader.model.record import Record
 from grader.package.line_corrections import ATTRIBUTES
 from grader.package.xml import line_of

@@ -16,7 +16,8 @@ from catkin_pkg.condition import evaluate_condition
 from catkin_pkg.package import InvalidPackage, Package, parse_package_string
 from lxml import etree
 
-from grader.model.package import MANIFEST, Dependency, Fault, Manifest, Person
+from grader.model.file_fault import Fault
+from grader.model.package import MANIFEST, Dependency, Manifest, Person
 from grader.package.line_corrections import TAGS
 from grader.package.reading import read_markup
 from grader.package.xml import find_strange, line_of, parse_xml

@@ -14,7 +14,7 @@ from typing import Literal, TypeVar
 from pydantic import Field
 
 from grader.limited_child import ChildLimits, run_limited
-from grader.model.package import Fault
+from grader.model.file_fault import Fault
 from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
 from grader.model.repair import as_code

@@ -7,7 +7,7 @@ import os
 import stat
 from pathlib import Path
 
-from grader.model.package import Fault
+from grader.model.file_fault import Fault
 
 MARKUP_LIMIT_BYTES = 1_000_000
 SOURCE_LIMIT_BYTES = 2_000_000

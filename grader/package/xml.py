@@ -9,7 +9,7 @@ from itertools import islice
 
 from lxml import etree
 
-from grader.model.package import Fault
+from grader.model.file_fault import Fault
 from grader.package.line_corrections import (
     ATTRIBUTES,
     DECLARATION,

@@ -10,7 +10,7 @@ from functools import cached_property
 from grader.checks.registry import Evidence
 from grader.evidence import events
 from grader.evidence.run import Channel, Message, Run
-from grader.model import package
+from grader.model import file_fault, launch_file, package
 from grader.model.record import field_docstrings
 from grader.model.verdict import Placed
 from scripts.reference.table import MADE, cell, table
@@ -29,8 +29,8 @@ EVENTS = (
 )  # fmt: skip
 FILES = (
     package.PackageFacts, package.SourceFile, package.Manifest, package.Dependency, package.Person, package.CMakeFacts,
-    package.CMakeCall, package.Shebang, package.LaunchFile, package.LaunchNode, package.LaunchParam,
-    package.LaunchLoad, package.PythonSlip, package.Fault,
+    package.CMakeCall, package.Shebang, launch_file.LaunchFile, launch_file.LaunchNode, launch_file.LaunchParam,
+    launch_file.LaunchLoad, package.PythonSlip, file_fault.Fault,
 )  # fmt: skip
 INNER = {"budget", "decoder", "read_json", "foreign"}
 

@@ -12,7 +12,7 @@ from grader.checks.support.launch_slips import right_remap
 from grader.checks.support.parameters import explain_yaml, explain_yaml_line
 from grader.evidence.run import Run
 from grader.judging.facts import NO_PACKAGE
-from grader.model.package import LaunchLine, LaunchNode
+from grader.model.launch_file import LaunchLine, LaunchNode
 from tests.package.trees import facts_of
 from tests.support.timeline import build_runs
 

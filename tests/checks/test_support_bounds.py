@@ -17,7 +17,7 @@ from grader.checks.support.text import NAMES_MAX, near_names
 from grader.evidence.events import ConsoleLine, ProcessEvent
 from grader.evidence.run import Run
 from grader.judging.facts import NO_PACKAGE
-from grader.model.package import LaunchNode
+from grader.model.launch_file import LaunchNode
 
 LINE_CHARS = 4096
 CPU_S = 20.0

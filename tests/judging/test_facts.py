@@ -8,7 +8,8 @@ import pytest
 from grader.checks.registry import collecting
 from grader.intake.open import open_submission
 from grader.judging.judge import judge_files
-from grader.model.package import CMakeCall, CMakeFacts, Fault, PackageFacts
+from grader.model.file_fault import Fault
+from grader.model.package import CMakeCall, CMakeFacts, PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.result import EarlyVerdict
 from grader.model.submission import SourcePackage

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from grader.installable import noetic_messages
+from grader.model.file_fault import Fault
 from grader.model.message_definitions import meant_field, parse_interface
-from grader.model.package import Fault, PackageFacts
+from grader.model.package import PackageFacts
 from grader.package.facts import python_paths, read_package, with_build_facts
 from tests.package.trees import CMAKE, MANIFEST, NODE, make_package
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.model.package import LaunchFile, PackageFacts
+from grader.model.launch_file import LaunchFile
+from grader.model.package import PackageFacts
 from grader.package.launch import parse_launch, read_launch_files
 from grader.package.launch_loader import _is_slip
 

@@ -32,16 +32,9 @@ from grader.installable import (
     known_packages,
     noetic_messages,
 )
+from grader.model.file_fault import Fault
 from grader.model.message_definitions import meant_field
-from grader.model.package import (
-    CMAKE,
-    INTERFACE_FOLDERS,
-    MANIFEST,
-    CMakeCall,
-    Fault,
-    PackageFacts,
-    meant_command,
-)
+from grader.model.package import CMAKE, INTERFACE_FOLDERS, MANIFEST, CMakeCall, PackageFacts, meant_command
 from grader.model.verdict import FileCitation
 from grader.wording import ON_THE_MACHINE, is_word_of, join_words, on_lines, there_is
 

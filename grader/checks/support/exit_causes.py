@@ -67,7 +67,8 @@ from grader.checks.support.text import (
 from grader.evidence.events import STOPPED
 from grader.evidence.run import Run
 from grader.installable import install_hint
-from grader.model.package import Fault, PackageFacts, SourceFile
+from grader.model.file_fault import Fault
+from grader.model.package import PackageFacts, SourceFile
 from grader.model.python_slip import PythonSlip
 from grader.model.verdict import Citations, FileCitation, Span, Verdict, machine_lacks
 from grader.syntax_fixes import COMMENTED_OUT, corrected, without_brace

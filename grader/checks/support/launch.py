@@ -31,7 +31,8 @@ from grader.checks.support.scripts import (
 from grader.checks.support.text import INIT, near_names, shown
 from grader.evidence.run import Run
 from grader.installable import install_hint, known_packages
-from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile
+from grader.model.launch_file import LaunchFile, LaunchNode
+from grader.model.package import PackageFacts, SourceFile
 from grader.model.submission import chmod_hint
 from grader.model.verdict import (
     FileCitation,

@@ -18,7 +18,8 @@ from grader.checks.support.processes import TYPES_HINT, disputed_types, run_scri
 from grader.checks.support.topics import End, nodes_on, topics_with
 from grader.evidence.events import GraphEvent
 from grader.evidence.run import Run
-from grader.model.package import LaunchFile, LaunchLine, LaunchNode, PackageFacts
+from grader.model.launch_file import LaunchFile, LaunchLine, LaunchNode
+from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.verdict import FileCitation, Verdict, failed
 from grader.wording import join_words, on_lines

@@ -23,7 +23,8 @@ from grader.checks.support.scripts import (
 )
 from grader.checks.support.text import near_names, shown
 from grader.installable import known_packages
-from grader.model.package import Executable, LaunchFile, LaunchLine, LaunchNode, PackageFacts, SourceFile
+from grader.model.launch_file import LaunchFile, LaunchLine, LaunchNode
+from grader.model.package import Executable, PackageFacts, SourceFile
 from grader.model.verdict import FileCitation, MistakeKind, Verdict, failed, failed_or_blocked
 from grader.wording import has_role_of, join_words, on_lines, there_is
 

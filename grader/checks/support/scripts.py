@@ -8,8 +8,9 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
+from grader.model.file_fault import Fault
 from grader.model.git_ignores import IgnoreLine, hiding_line
-from grader.model.package import CMakeCall, Executable, Fault, PackageFacts, SourceFile
+from grader.model.package import CMakeCall, Executable, PackageFacts, SourceFile
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.verdict import FileCitation
 from grader.wording import has_role_of, is_role

@@ -39,7 +39,8 @@ from grader.checks.support.text import (
 )
 from grader.evidence.events import MISFIT, UNHEARD, UNSENDABLE
 from grader.evidence.run import Channel, Run
-from grader.model.package import LaunchNode, PackageFacts
+from grader.model.launch_file import LaunchNode
+from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.verdict import (
     EvidenceCitation,

@@ -19,7 +19,8 @@ from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
 from grader.files import atomic_write, open_untrusted
-from grader.model.package import CMAKE, MANIFEST, Fault
+from grader.model.file_fault import Fault
+from grader.model.package import CMAKE, MANIFEST
 from grader.model.repair import Repair, RepairKind, added_lines, messages_of
 from grader.package.line_corrections import first_version
 from grader.package.reading import LEFT_OUT

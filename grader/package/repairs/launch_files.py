@@ -7,7 +7,8 @@ from collections.abc import Collection, Sequence
 from pathlib import PurePosixPath
 
 from grader.installable import known_packages, noetic_messages
-from grader.model.package import MANIFEST, LaunchFile, LaunchNode, PackageFacts
+from grader.model.launch_file import LaunchFile, LaunchNode
+from grader.model.package import MANIFEST, PackageFacts
 from grader.model.repair import RepairKind
 from grader.package.launch import parse_launch
 from grader.package.manifest import parse_manifest
