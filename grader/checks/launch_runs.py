@@ -497,7 +497,10 @@ def _not_up(package: PackageFacts, file: LaunchFile, run: Run, lacking: Wanted) 
     absence = why_not_up(package, run, node)
     name = node.full_name if is_exact(node) else f"the node of {node.type}"
     verdict = absence.verdict(f"{name} did not come up: {absence.why}", judged=not lacking.own)
-    return verdict.about(citations=(FileCitation(file=node.file or file.path, line=node.line),))
+    place = FileCitation(file=node.file or file.path, line=node.line)
+    if NOTHING_STARTS in absence.why:  # what keeps all nodes from starting stands anywhere in the file
+        place = absence.citations[0] if absence.citations else FileCitation(file=file.path)
+    return verdict.about(citations=(place,))
 
 
 def _are_connected(package: PackageFacts, run: Run, topic: str, names: list[str], *, alone: bool) -> bool:

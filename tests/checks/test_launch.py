@@ -39,6 +39,13 @@ def node(name: str, namespace: str = "/") -> LaunchNode:
             ["RLException: error loading <rosparam> tag: ", "\tfile does not exist [/w/config/cc.yaml]"],
             "cc.yaml",
         ),
+        (
+            [
+                "RLException: error loading <rosparam> tag: ",
+                "\tfile does not exist [$find(lab)/config/cc.yaml]",
+            ],
+            "$find(lab) is no substitution of roslaunch",
+        ),
         (["Resource not found: pubsub_exampl", "ROS path [0]=/tmp"], "no package pubsub_exampl"),
         (
             [

@@ -522,8 +522,7 @@ CASES = {
     "targets-by-other-names-and-above-what-makes-them": Case(
         {CMAKELISTS: CMAKE + "add_dependencies(men x)\nadd_executable(mean src/mean.cpp)\n"
                              "target_link_libraries(mean x)\ninstall(TARGET meann RUNTIM DESTINATION bin)\n",
-         "src/mean.cpp": "int main() {}\n"},
-        ["build-line"] * 4, "write mean instead of men",
+         "src/mean.cpp": "int main() {}\n"}, ["build-line"] * 4, "write mean instead of men",
         after={CMAKELISTS: "()\n\nadd_executable(mean src/mean.cpp)\nadd_dependencies(mean x)\ntarget_link_libraries("},
     ),
     "two-programs-that-nothing-is-linked-to": Case(

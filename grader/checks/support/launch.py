@@ -214,13 +214,26 @@ def refusal(run: Run, package: PackageFacts) -> Absence | None:
             if "multiple nodes" in pattern:
                 fix = namespace_meant(*(node for file in package.launch_files for node in file.brings)) or fix
             said = f"{NOTHING_STARTS}: {why.format(*words)}"
-            if pattern == BAD_FILE and (unread := _unread_yaml(text, package)):
-                return unread
-            if pattern == NO_PACKAGE and (lacking := _lacks_package(words[0], said, text, package)):
-                return lacking
-            cited = _declared(words[0], package) if pattern == _UNSET.pattern else ()
+            if special := _known_refusal(pattern, match, said, text, package):
+                return special
+            cited = _declared(words[0], package) if pattern == _UNSET.pattern else _node_told(text, package)
             return Absence(said, fix, citations=cited, refused=pattern, about="".join(words[:1]))
     return None
+
+
+def _known_refusal(
+    pattern: str, match: re.Match[str], said: str, text: str, package: PackageFacts
+) -> Absence | None:
+    """Return what more is known of a file that is no YAML or is not there, or of a package that is not there."""
+    if pattern == BAD_FILE:
+        return _unread_yaml(text, package)
+    if pattern == NO_PACKAGE:
+        return _lacks_package(shown(match[1]), said, text, package)
+    slip = _OTHER_SUBSTITUTION.search(match[1]) if pattern == NO_FILE else None
+    if slip is None:
+        return None
+    why = f"{NOTHING_STARTS}: {slip[0]} is no substitution of roslaunch"
+    return Absence(why, f"write $({slip[1]} {slip[2]}) in place of {slip[0]}", refused=pattern)
 
 
 def _lacks_package(name: str, said: str, text: str, package: PackageFacts) -> Absence | None:
@@ -243,6 +256,19 @@ def _unread_yaml(text: str, package: PackageFacts) -> Absence | None:
     cited = (FileCitation(file=path, line=words.line),) if path else ()
     said = f"{NOTHING_STARTS}: {shown(path or PurePosixPath(found[1]).name)} does not load: {words.why}"
     return Absence(said, words.hint, citations=cited, refused=BAD_FILE)
+
+
+_OTHER_SUBSTITUTION = re.compile(r"\$(?:(?=\w+\()|\{\s*)(find|arg|env|optenv|anon)[\s(]+([\w-]+)\s*[)}]")
+"""`$find(lab)` and `${find lab}`, which roslaunch leaves as they are."""
+_NODE_TOLD = re.compile(r"Node xml is <node\b[^\n>]*?\sname=[\"']([^\"'\n]+)")
+
+
+def _node_told(text: str, package: PackageFacts) -> tuple[FileCitation, ...]:
+    """Return the line of the node that roslaunch shows with its error."""
+    found = _NODE_TOLD.search(text)
+    nodes = [n for file in package.launch_files for n in file.brings if found and n.name == found[1]]
+    places = dict.fromkeys(FileCitation(file=node.file, line=node.line) for node in nodes)
+    return tuple(places) if len(places) == 1 else ()
 
 
 def _declared(name: str, package: PackageFacts) -> tuple[FileCitation, ...]:
