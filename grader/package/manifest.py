@@ -64,7 +64,7 @@ _CAUSES: tuple[tuple[str, ...], ...] = (
      "in format 2 and 3 `<run_depend>` is written `<exec_depend>`",
      "write exec_depend instead of run_depend, in the opening and in the closing tag of each of them"),
     (r"replace <exec_depend> tags with <run_depend>", "exec_depend",
-     'in format 1 `<exec_depend>` is written `<run_depend>`; or begin with `<package format="2">`'),
+     "format 1 has no `<exec_depend>`, which is `<run_depend>` there", 'begin the file with `<package format="2">`'),
     (r"generic dependency on '(.*?)' is redundant with: (.*)", "depend",
      "`<depend>{0}</depend>` says it all", "delete `<{1}>{0}</{1}>`"),
     (r'test dependency on "(.*?)" is redundant', "test_depend", "delete `<test_depend>{0}</test_depend>`"),

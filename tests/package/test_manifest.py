@@ -61,6 +61,12 @@ def test_what_catkin_warns_of_is_advice(old, new, advice, capfd):
         ('"ada@example.org"', '""', 6, '`<maintainer>` needs email="name@place.org"'),
         (' email="ada@example.org"', "", 6, '`<maintainer>` needs email="...": write email="..." in the tag'),
         (' format="2"', "", 9, '`<depend>`: begin the file with `<package format="2">`'),
+        (
+            '<package format="2">',
+            '<package format="1">',
+            9,
+            '`<depend>`: begin the file with `<package format="2">`',
+        ),
         ("<license>", '<license a="b">', 7, "takes no attribute `a`: delete `a` with its value"),
         ("<license>MIT</license>", "", 2, "`<license>` is missing"),
         ("<depend>rospy</depend>", "<run_depend>rospy</run_depend>", 9, "`<exec_depend>`"),
@@ -189,3 +195,10 @@ def test_never_raises(noise, at):
     for data in (noise, text[:at] + noise + text[at:], text[:at]):
         manifest, fault = parse_manifest(data)
         assert (manifest is None) != (fault is None)
+
+
+def test_a_manifest_of_format_1_with_tags_of_format_2_is_told_its_format() -> None:
+    tags = ("<depend>rospy</depend>", "<exec_depend>rospy</exec_depend>")
+    _, fault = parse_manifest(changed(*tags).replace(b'format="2"', b'format="1"'))
+    assert fault is not None
+    assert fault.fix == 'begin the file with `<package format="2">`'

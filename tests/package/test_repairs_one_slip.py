@@ -87,6 +87,7 @@ SLIPS = {
         ('<package format="2">', '<package format="2\'>', 'write `<package format="2">`'),
         ('<package format="2">', '<package ormat="2">', "`<package>` has no attribute `ormat`"),
         ('<package format="2">', "<package>", 'the tags below belong to `format="2"`'),
+        ('<package format="2">', "<package format='1'>", 'the tags below belong to `format="2"`'),
         ('<package format="2">\n', '<package format="2">\n<package format="2">\n', "delete line 3"),
         ("<name>lab", "name>lab", "write `<name>lab</name>`"),
         ("<name>lab", "(name>lab", "write `<name>lab</name>`"),

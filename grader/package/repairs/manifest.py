@@ -16,8 +16,8 @@ from grader.wording import is_one_edit, is_word_of, the_same_on
 
 FORMAT_1 = r"<package(\s+format\s*=\s*[\"']1[\"'])?\s*>"
 VALUES = (
-    (r"(<package)(?=>(?:.|\n)*<(?:exec_depend|build_export_depend|depend)>)", r'\1 format="2"',
-     'the tags below belong to `format="2"`'),
+    (r"(<package)(?:\s+format\s*=\s*[\"']1[\"'])?(?=>(?:.|\n)*<(?:exec_depend|build_export_depend|depend)>)",
+     r'\1 format="2"', 'the tags below belong to `format="2"`'),
     (r"(<package\s+format\s*=\s*[\"'])(?![123][\"'])[^\"']*", r"\g<1>2", "there is no such format"),
     (r"(<version>)(?!\s*\d+\.\d+\.\d+\s*<)[^<]*(?=<)", r"\g<1>0.0.0", "this is not a version"),
     (r"(<maintainer\b[^>]*email=[\"'])(?![^\"'@]+@[\w-]+(?:\.[\w-]+)+[\"'])[^\"']*", r"\1you@example.org",
