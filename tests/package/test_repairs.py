@@ -492,6 +492,7 @@ RIGHT_BUILDS = {
     "linked-all-at-once": {
         CMAKELISTS: CPP_CMAKE.replace("add_exe", "link_libraries(${catkin_LIBRARIES})\nadd_exe")
     },
+    "variable-of-its-own": {CMAKELISTS: CPP_CMAKE + "set(catkin_LIBRARY x)\n" + LINKED.replace("RARIES", "RARY")},
     "another-name-of-a-program": {CMAKELISTS: CPP_CMAKE + LINKED + "add_executable(lab::a ALIAS a)\n"},
     "left-out-of-all": {CMAKELISTS: CPP_CMAKE.replace("(a ", "(a EXCLUDE_FROM_ALL ") + LINKED},
     "made-source": {CMAKELISTS: CPP_CMAKE.replace("add_exe", "configure_file(b.in b.cpp)\nadd_exe").replace(

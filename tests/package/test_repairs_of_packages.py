@@ -521,9 +521,9 @@ CASES = {
     ),
     "targets-by-other-names-and-above-what-makes-them": Case(
         {CMAKELISTS: CMAKE + "add_dependencies(men x)\nadd_executable(mean src/mean.cpp)\n"
-                             "target_link_libraries(mean x)\ninstall(TARGET meann RUNTIM DESTINATION bin)\n",
-         "src/mean.cpp": "int main() {}\n"}, ["build-line"] * 4, "write mean instead of men",
-        after={CMAKELISTS: "()\n\nadd_executable(mean src/mean.cpp)\nadd_dependencies(mean x)\ntarget_link_libraries("},
+                      "target_link_libraries(mean ${catkin_LIBRARY})\ninstall(TARGET meann RUNTIM DESTINATION b)\n",
+         "src/mean.cpp": "int main() {}\n"}, ["build-line"] * 5, "write mean instead of men",
+        after={CMAKELISTS: "()\n\nadd_executable(mean src/mean.cpp)\nadd_dependencies(mean x)\n"},
     ),
     "two-programs-that-nothing-is-linked-to": Case(
         {CMAKELISTS: CMAKE + "add_executable(a src/a.cpp)\nadd_executable(b src/b.cpp)\n",

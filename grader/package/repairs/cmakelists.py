@@ -47,6 +47,7 @@ from grader.package.repairs.programs import (
     link_programs,
     name_programs,
     name_targets,
+    spell_variables,
 )
 from grader.wording import is_one_edit, join_words, numbers_text
 
@@ -119,6 +120,7 @@ def repair_cmake(
         below = (GENERATE, "find_package", "project")
         add_call(files, "catkin_package()", "catkin_package()", below)
     name_targets(files)
+    spell_variables(files)
     wait_for_headers(files, package, name)
     if needs_interfaces(files, package, name, scripts):
         make_interfaces(files, package, name, scripts, wanted)

@@ -66,6 +66,26 @@ def name_targets(files: Files) -> None:
             return
 
 
+OF_CATKIN = ("catkin_LIBRARIES", "catkin_INCLUDE_DIRS", "catkin_EXPORTED_TARGETS")
+"""Variables that find_package(catkin …) sets."""
+_VARIABLE = re.compile(r"\$\{(\w+)\}")
+
+
+def spell_variables(files: Files) -> None:
+    """Write catkin's variables for slips of them, which CMake takes for empty."""
+    plain = {token.value for token in all_words(files)}
+    for call in reversed(calls_of(files, "target_link_libraries", "include_directories", "add_dependencies")):
+        for token in reversed(words_of(call)):  # places in front stay
+            name = found[1] if (found := _VARIABLE.fullmatch(token.value)) else ""
+            singular = name.replace("LIBRARY", "LIBRARIES")
+            right = next(
+                (one for one in OF_CATKIN if one != name and (singular == one or is_near(name, one))), ""
+            )
+            if right and name not in plain:  # nothing sets it
+                why, fix = f"there is no variable {name}", f"write ${{{right}}} instead of ${{{name}}}"
+                change_word(files, token, f"${{{right}}}", why, fix, call=call)
+
+
 def _correct_target(files: Files, made: Mapping[str, Command]) -> bool:
     """Write the name of a target in place of one that is not there; return whether there was one."""
     for name in (*OF_TARGETS[1:], "install"):
