@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import math
 import re
 from collections.abc import Collection, Iterator, Mapping
@@ -146,6 +145,8 @@ def corrected_line(text: str, path: str) -> str:
     `#`; "" where that is not plain."""
     code = text.partition("#")[0].strip()
     bare = code.partition("//")[0].strip().rstrip(";, ")
+    if len(code) > _CHARS_MAX:
+        return ""
     if not bare:
         return f"# {code.lstrip('/ ')}" if code.startswith("//") else ""
     # Also dashes that a word processor made of `---`.
@@ -209,11 +210,9 @@ def _is_value(value: str, type_: str) -> bool:
     try:
         if limits is not None:
             return limits[0] <= int(value) <= limits[1]
-        if type_ == "bool":
-            ast.literal_eval(value)
-        else:
+        if type_ != "bool" or value not in {"True", "False"}:
             float(value)
-    except (ValueError, SyntaxError, MemoryError, RecursionError, TypeError):
+    except ValueError:
         return False
     return True
 
