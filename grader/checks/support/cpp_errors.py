@@ -293,6 +293,9 @@ def _missing_target(found: re.Match[str], package: PackageFacts, _lines: Sequenc
 OF_INSTALL = ("TARGETS", "PROGRAMS", "DIRECTORY", "FILES", "ARCHIVE", "LIBRARY", "RUNTIME", "DESTINATION")
 
 
+_UNKNOWN_KEYWORD = r'install (?:called with unknown mode|does not recognize sub-command|TARGETS given unknown argument) "?(\w+)'
+
+
 def _unknown_keyword(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     near = near_names(found[1], OF_INSTALL)
     hint = f"write {near[0]} instead of {found[1]}" if near else "check the spelling of its words in capitals"
@@ -372,7 +375,10 @@ CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
     (r'dependencies to non-existent target "([^"]+)"', _missing_target),
     (r'link libraries for target "([^"]+)" which is not built', _missing_target),
     (r'install TARGETS given target "([^"]+)" which does not exist', _missing_target),
-    (r'install (?:called with unknown mode|TARGETS given unknown argument) "?(\w+)', _unknown_keyword),
+    (
+        _UNKNOWN_KEYWORD,
+        _unknown_keyword,
+    ),
 )
 
 
