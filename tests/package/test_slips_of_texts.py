@@ -487,3 +487,18 @@ def test_a_publisher_that_nothing_uses_is_to_publish_where_the_script_works(
     (tmp_path / "a.py").write_text(text, encoding="utf-8")
     found = [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "never-published"]
     assert found == [f"call `pub.publish(…)` {where}"]
+
+
+@pytest.mark.parametrize(
+    ("source", "asks"),
+    [
+        ("word = getpass.getpass()", True),
+        ("word = getpass('Password: ')", True),
+        ("word = getpass.getuser()", False),
+        ("def getpass():\n    return 1\nword = getpass()", False),
+    ],
+)
+def test_a_password_is_typed_too(source: str, asks: bool, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"{source}\n", encoding="utf-8")
+    found = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "input"]
+    assert len(found) == asks

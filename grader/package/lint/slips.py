@@ -205,9 +205,10 @@ def asked(node, functions):
     if not isinstance(node, ast.Call):
         return None
     name = dotted(node.func)
-    if name in ("input", "raw_input"):
+    if name in ("input", "raw_input", "getpass"):
         return None if name in functions else name
-    return name if name in ("sys.stdin.read", "sys.stdin.readline", "sys.stdin.readlines") else None
+    readers = ("sys.stdin.read", "sys.stdin.readline", "sys.stdin.readlines", "getpass.getpass")
+    return name if name in readers else None
 
 
 def how_often(node, tree):
