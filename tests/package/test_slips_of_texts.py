@@ -502,3 +502,11 @@ def test_a_password_is_typed_too(source: str, asks: bool, tmp_path: Path) -> Non
     (tmp_path / "a.py").write_text(f"{source}\n", encoding="utf-8")
     found = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "input"]
     assert len(found) == asks
+
+
+@pytest.mark.parametrize("call", ["eval('2 * dumps')", "exec('dumps(1)')", "globals()['dumps']"])
+def test_a_name_that_a_text_may_use_is_not_said_to_be_unused(call: str, tmp_path: Path) -> None:
+    text = f"from json import dumps\npub = rospy.Publisher('a', Int8)\ndef f():\n    pass\nprint({call})\n"
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    kinds = {s.kind for s in check_syntax(tmp_path, ["a.py"]).slips}
+    assert not kinds & {"unused-import", "never-published", "never-called"}

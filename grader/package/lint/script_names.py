@@ -34,6 +34,11 @@ def all_of(tree, *kinds):
     return [n for n in walk(tree) if isinstance(n, kinds)]
 
 
+def reads_names_in_texts(tree):
+    """Return whether a text of the module may use a name of it, as in `eval('2 * pi')`."""
+    return any(called_name(n) in ("locals", "globals", "vars", "eval", "exec", "getattr") for n in walk(tree))
+
+
 def parents_of(tree):
     """Return the node around each node of a module: kept, as above."""
     if not hasattr(tree, "all_parents"):

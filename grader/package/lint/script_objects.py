@@ -28,6 +28,7 @@ from script_names import (
     names_in,
     parents_of,
     published_type,
+    reads_names_in_texts,
     set_in,
     slip,
     targets_of,
@@ -396,6 +397,8 @@ def unused_publishers(tree):
     """Yield each `pub = Publisher(…)` whose `pub` nothing in the script uses, so that nothing is published by it."""
     # of an attribute, another object's name may stand for `self`, and a class's own is read by `self`
     read = {dotted(n).rpartition(".")[2] for n in walk(tree) if isinstance(getattr(n, "ctx", None), ast.Load)}
+    if reads_names_in_texts(tree):
+        return
     answers = calls_in(tree, "Subscriber", "Timer") and not all_of(tree, ast.While)
     where = " in the callback" if answers else " inside the loop" if all_of(tree, *LOOPS) else ""
     for node in all_of(tree, ast.Assign):
@@ -411,8 +414,7 @@ def unsent_messages(tree):
     """Yield where a message is made and its fields are set, and nothing takes it."""
     froms = all_of(tree, ast.ImportFrom)
     of_messages = {a.asname or a.name for n in froms for a in n.names if is_of_messages(n.module)}
-    calls = all_of(tree, ast.Call)
-    if any(called_name(n) in ("locals", "globals", "vars", "eval", "exec", "getattr") for n in calls):
+    if reads_names_in_texts(tree):
         return
     parents, made = parents_of(tree), []
     for node in all_of(tree, ast.Assign):

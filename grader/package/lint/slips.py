@@ -35,6 +35,7 @@ from script_names import (
     is_call_alone,
     names_in,
     parents_of,
+    reads_names_in_texts,
     slip,
     statements_of,
     targets_of,
@@ -133,7 +134,7 @@ def never_run(tree):
     plain = [n for n in tree.body if not isinstance(n, (ast.FunctionDef, ast.ClassDef))]
     calls = any(isinstance(n, ast.Call) for one in plain for n in ast.walk(one))
     is_module = not calls and not does_something(tree)
-    if any(called_name(n) in ("getattr", "globals", "locals", "eval", "exec") for n in walk(tree)):
+    if reads_names_in_texts(tree):
         named |= {n.name for n in all_of(tree, ast.FunctionDef)}  # each may be called by its name
     made = [n for n in all_of(tree, ast.Assign) if isinstance(n.value, ast.Call)]
     made_of = {dotted(n.value.func): dotted(n.targets[0]) for n in made}
@@ -258,6 +259,7 @@ def imports(tree):
     used = {n.id for n in every} - hidden
     tried = {id(n) for one in all_of(tree, ast.Try) for n in ast.walk(one)}
     found = [n for n in all_of(tree, ast.Import, ast.ImportFrom) if id(n) not in tried]
+    in_texts = reads_names_in_texts(tree)
     for node in found[:IMPORTS_LIMIT]:
         listed = [alias.name for alias in node.names]
         modules = listed if isinstance(node, ast.Import) else [node.module or ""]
@@ -265,7 +267,7 @@ def imports(tree):
         bound = [alias.asname or alias.name.partition(".")[0] for alias in node.names]
         if len(modules) > 1 or getattr(node, "level", 0) or module in counters.PLAIN_MODULES - {"numpy"}:
             continue
-        if not used.intersection(bound) and bound != ["*"] and "__all__" not in used:
+        if not used.intersection(bound) and bound != ["*"] and "__all__" not in used and not in_texts:
             why = (
                 "the script gives `%s` a value of its own"
                 if hidden.issuperset(bound)
