@@ -158,7 +158,9 @@ def _index(message: str, source: str, marked: tuple[int, int] | None) -> Meaning
             )
             return f"`{name}` has fewer than {parts}", hint
         return f"`{name}` has fewer than {parts}", f"check `len({name}) > {index}` first: {NUMBER_OF_PARTS}"
-    return f"`{name}` has no element {index}", f"check `len({name})` first: {NUMBER_OF_PARTS}"
+    own = f"keep `{index}` below `len({name})`, or give `{name}` more elements"
+    hint = f"check `len({name})` first: {NUMBER_OF_PARTS}" if index.startswith("-") else own
+    return f"`{name}` has no element {index}", hint
 
 
 def _subscript(source: str, marked: tuple[int, int] | None) -> ast.Subscript | None:
