@@ -163,6 +163,14 @@ CASES = {
     "no-quotes": Case(swapped(LAUNCHED, ('"talker.py"', "talker.py")), ["launch-syntax"], "has no quotes around it"),
     "tag-open-and-type": Case(swapped(LAUNCHED, ("/>", ">"), ("talker.py", "talker")),
                           ["launch-syntax", "launch-type"], 'type="talker" should be'),
+    "second-node-of-a-name": Case(
+        {"src/hear.py": SCRIPT, LAUNCHED: LAUNCH.replace(NODE, f"{NODE}\n{NODE.replace('talker.py', 'hear.py')}")},
+        ["launch-syntax"], 'line 3 of launch/lab.launch: name="talker" should be name="hear"',
+    ),
+    "nodes-of-a-name-in-two-places": Case({LAUNCHED: LAUNCH.replace(NODE, NODE + NODE.replace("/>", ' ns="b"/>'))}, []),
+    "nodes-of-a-name-one-of-which-may-start": Case(
+        {LAUNCHED: LAUNCH.replace(NODE, NODE + NODE.replace("/>", ' if="$(eval 1)"/>'))}, []
+    ),
     "pkg-that-no-one-knows": Case(swapped(LAUNCHED, ('pkg="lab"', 'pkg="my_robot"')), ["package-name"],
                                   'pkg="my_robot" should be'),
     "pkg-of-another": Case(swapped(LAUNCHED, ('pkg="lab"', 'pkg="turtlesim"')), []),

@@ -73,6 +73,7 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
                 _set_attribute(files, launch.path, node.line, ("type", kind, right), kind="launch-type")
     _repair_nodes(files, package, wanted)
     for launch in package.launch_files:
+        _rename_second_nodes(files, launch)
         _repair_params(files, launch, wanted)
 
 
@@ -135,6 +136,22 @@ def _repair_nodes(files: Files, package: PackageFacts, wanted: Wanted) -> None:
             if right and name not in names:
                 _set_attribute(files, launch.path, node.line, ("name", name, right), kind="node-name")
                 taken.add(right)
+
+
+def _rename_second_nodes(files: Files, launch: LaunchFile) -> None:
+    """Name a node after its program where another one has its name: roslaunch refuses the file."""
+    nodes = [node for node in launch.brings if not node.uncertain and "$(" not in node.full_name]
+    taken: set[str] = set()
+    for node in nodes:
+        name = PurePosixPath(node.type or "").stem
+        if node.full_name in taken and node.file == launch.path and name:
+            free = f"{node.namespace}{name}" not in {one.full_name for one in nodes} | taken
+            new = name if free else f"{name}_{len(taken) + 1}"
+            _set_attribute(
+                files, launch.path, node.line, ("name", node.name or "", new), kind="launch-syntax"
+            )
+            taken.add(f"{node.namespace}{new}")
+        taken.add(node.full_name)
 
 
 def _set_attribute(
