@@ -30,7 +30,6 @@ from grader.checks.support.geometry import (
     Area,
     Band,
     Command,
-    Point,
     Pose,
     PoseFields,
     Region,
@@ -584,13 +583,14 @@ def _outside(
     message = f"it is not {region.words} from {spot(first.point)} on, {after}; farthest out by {where}"
     if params.share < 1:
         message = f"only {inside:.0%} of the time it is {region.words}: farthest out by {where}"
-    return failed(message, hint=_keep(path, peak.point, region))
+    # what comes after it is too near follows from that
+    return failed(message, hint=_keep(path, [peak, first] if params.share == 1 else [peak], region))
 
 
-def _keep(path: Sequence[Pose], point: Point, region: Region) -> str:
+def _keep(path: Sequence[Pose], out: Sequence[Pose], region: Region) -> str:
     if not isinstance(region, Band):
         return "turn, or stop, before you are at the border"
-    if region.nearest_m(point) < (region.min_m or 0.0):
+    if any(region.nearest_m(pose.point) < (region.min_m or 0.0) for pose in out):
         if region.max_m is not None:
             return "steer away from what you follow while the distance is too small"
         return "turn away, or stop, earlier: look at all ranges in front of the robot, not only at the middle one"
