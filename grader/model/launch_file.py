@@ -104,6 +104,10 @@ class LaunchLoad(Placed, Record):
     file: str
     line: int
 
+    def loads(self, path: str) -> bool:
+        """Return whether it loads this file of the package."""
+        return self.command == "load" and (self.source or "").endswith(f")/{path}")
+
 
 class LaunchFile(Record):
     """`fault` is set if the file is not well-formed or does not begin with `<launch>`.

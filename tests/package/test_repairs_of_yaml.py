@@ -1,4 +1,4 @@
-"""Parameter files whose keys are in other levels than the lab asks for, or in lists."""
+"""Parameter files whose keys are in other levels than the lab asks for, or in lists, and into what they are loaded."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.package.repairing import LEVELS, NESTED, Case, check
+from tests.package.repairing import LAUNCHED, LEVELS, NESTED, TALKER, Case, asking, check, swapped
 
 # fmt: off
 CASES = {
@@ -41,3 +41,46 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_keys_are_written_in_the_levels_of_the_lab(name: str, tmp_path: Path) -> None:
     check(CASES[name], tmp_path)
+
+
+RIGHT = LEVELS.replace("\n  y", "\n    y")
+OF_ARM = asking(files=("config/my.yaml",), params=("/arm/b/x", "/arm/b/y", "/arm/c/z"))
+BELOW_A = "b:\n  x: 1\n  y: 2\nc:\n  z: 3\n"
+
+
+def loaded(namespace: str, names: str, node: str = "") -> dict[str, str | bytes]:
+    load = f'  <rosparam file="$(find lab)/config/my.yaml" {namespace}/>\n</launch>'
+    changed = swapped(LAUNCHED, ("</launch>", load), ("<node ", f"<node {node}"))
+    return {"config/my.yaml": names, **changed}
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        Case(
+            loaded('ns="/robot"', RIGHT),
+            ["parameter-name"],
+            'on line 3, delete ns="/robot"',
+            wanted=NESTED,
+            after={LAUNCHED: '<rosparam file="$(find lab)/config/my.yaml"/>'},
+        ),
+        Case(
+            loaded('ns="arms"', BELOW_A),
+            ["parameter-name"],
+            'ns="arms" should be ns="/arm"',
+            wanted=OF_ARM,
+            after={LAUNCHED: 'my.yaml" ns="/arm"/>'},
+        ),
+        Case(loaded('ns="a"', BELOW_A), [], wanted=NESTED),
+        Case(
+            {**loaded('ns="robot"', RIGHT), **swapped(TALKER, ("'~rate'", "'/robot/a/b/x'"))},
+            [],
+            wanted=NESTED,
+        ),
+        Case(loaded('ns="robot"', RIGHT, node='ns="robot" '), [], wanted=NESTED),
+        Case(loaded('ns="robot"', "speed: 3\n"), [], wanted=NESTED),
+    ],
+    ids=["too-much", "misspelt", "right", "read-there", "of-the-node-too", "other-names"],
+)
+def test_a_namespace_of_loaded_parameters(case: Case, tmp_path: Path) -> None:
+    check(case, tmp_path)

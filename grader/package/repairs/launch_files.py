@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 from pathlib import PurePosixPath
 
 from grader.installable import known_packages, noetic_messages
-from grader.model.launch_file import LaunchFile, LaunchNode
+from grader.model.launch_file import LaunchFile, LaunchLoad, LaunchNode
 from grader.model.package import MANIFEST, PackageFacts
 from grader.model.repair import RepairKind
 from grader.package.launch import parse_launch
@@ -15,6 +15,7 @@ from grader.package.manifest import parse_manifest
 from grader.package.repairs.editing import Files, keep_first_version, repair_xml
 from grader.package.repairs.manifest import OF_ROS
 from grader.package.repairs.names import CPP, Wanted, is_near
+from grader.package.repairs.yaml_files import namespace_wanted
 from grader.wording import the_same_on
 
 TAG_LINES_MAX = 20
@@ -75,6 +76,7 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
     for launch in package.launch_files:
         _rename_second_nodes(files, launch)
         _repair_params(files, launch, wanted)
+        _repair_namespaces(files, launch, package, wanted)
 
 
 def _complete_node(files: Files, file: str, node: LaunchNode, own: str, scripts: set[str]) -> None:
@@ -118,6 +120,36 @@ def _repair_params(files: Files, launch: LaunchFile, wanted: Wanted) -> None:
         if right and param.file == launch.path and param.name not in wanted.params:
             old, new = param.name.rpartition("/")[2], right.rpartition("/")[2]
             _set_attribute(files, launch.path, param.line, (param.attribute, old, new), kind="parameter-name")
+
+
+def _repair_namespaces(files: Files, launch: LaunchFile, package: PackageFacts, wanted: Wanted) -> None:
+    for load in launch.loads:
+        if load.file == launch.path:
+            _repair_namespace(files, load, package, wanted)
+
+
+def _repair_namespace(files: Files, load: LaunchLoad, package: PackageFacts, wanted: Wanted) -> None:
+    """Load a parameter file without `ns`, or with the one that the lab's names have, where no program has the other."""
+    text = files.text(load.file) or ""
+    given = load.namespace.strip("/")
+    found = re.findall(r"\bns\s*=\s*[\"']([^\"']*)", text)
+    ours = [file.path for file in package.files if load.loads(file.path)]
+    if not given or [one.strip("/") for one in found] != [given] or len(ours) != 1:
+        return
+    programs = [file.path for file in package.files if file.path.endswith((".py", *CPP))]
+    if any(given in (files.text(path) or "") for path in programs):
+        return
+    meant = namespace_wanted(files.text(ours[0]) or "", wanted)
+    if meant is None or meant == f"/{given}":
+        return
+    if meant and is_near(given, meant.strip("/")):
+        _set_attribute(files, load.file, load.line, ("ns", found[0], meant), kind="parameter-name")
+    elif not meant:
+        attribute = re.compile(r"\s+\bns\s*=\s*([\"'])[^\"']*\1")
+        after = attribute.sub("", text, count=1)
+        line = text[: text.index(found[0])].count("\n") + 1
+        message = f'line {line} of {load.file}: ns="{found[0]}" puts what {ours[0]} sets below /{given}'
+        files.change("parameter-name", load.file, after, message, f'on line {line}, delete ns="{found[0]}"')
 
 
 def _is_among(source: str, paths: Sequence[str]) -> bool:

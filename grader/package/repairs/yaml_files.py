@@ -38,7 +38,13 @@ def repair_yaml_files(files: Files, package: PackageFacts, wanted: Wanted) -> No
         name = PurePosixPath(path).name
         if name in named or any(name in text for text in launches):
             _repair_file(files, path, wanted)
-        if name in named:
+        loads = [one for launch in package.launch_files for one in launch.loads if one.loads(path)]
+        below = any(one.namespace.strip("/") for one in loads) and namespace_wanted(
+            files.text(path) or "", wanted
+        )
+        if (
+            name in named and not below
+        ):  # its names are those of a namespace, into which a launch file loads them
             _nest_keys(files, path, wanted)
 
 
@@ -202,6 +208,19 @@ def _fault_in(text: str) -> int | None:
     except (yaml.YAMLError, RecursionError):
         return 0
     return None
+
+
+def namespace_wanted(text: str, wanted: Wanted) -> str | None:
+    """Return below what a file's names have to be loaded to be those of the lab, "" for nothing; None where no
+    namespace makes them so."""
+    if text.count("\n") > YAML_LINES_MAX or _fault_in(text) is not None:
+        return None
+    names = {f"/{'/'.join(path)}" for path in _paths(text)}
+    asked = [f"/{name.strip('/')}" for name in wanted.params]
+    before = [{one.removesuffix(name) for name in names if one.endswith(name)} for one in asked]
+    known = [one for one in before if one]
+    right = set.intersection(*known) if known else set[str]()
+    return right.pop() if len(right) == 1 else None
 
 
 def _paths(text: str) -> set[tuple[str, ...]]:
