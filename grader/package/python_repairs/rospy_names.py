@@ -124,6 +124,12 @@ def with_attributes(text: str) -> Iterator[Step]:
             return
 
 
+def _is_logger(node: ast.expr, owners: set[str]) -> bool:
+    """Return whether it is `self.get_logger()`."""
+    called = node.func if isinstance(node, ast.Call) else None
+    return isinstance(called, ast.Attribute) and called.attr == LOGGER and last_name(called.value) in owners
+
+
 def with_logger(text: str) -> Iterator[Step]:
     """`rospy.loginfo(…)` in place of each `self.get_logger().info(…)` of ROS 2, in a script that has no such method."""
     tree, lines = tree_of(text), text.split("\n")
@@ -144,17 +150,11 @@ def with_logger(text: str) -> Iterator[Step]:
     if "rospy" not in imported or inherits or LOGGER in bound_in(tree) | named:
         return
     edits, first = [], 0
-    for node in nodes_in(tree):
-        if not (
-            isinstance(node, ast.Call)
-            and isinstance(node.func, ast.Attribute)
-            and isinstance(got := node.func.value, ast.Call)
-            and isinstance(got.func, ast.Attribute)
-            and got.func.attr == LOGGER
-            and last_name(got.func.value) in {"self", "rospy", *given}
-        ):
+    for node in (n for n in nodes_in(tree) if isinstance(n, ast.Call) and isinstance(n.func, ast.Attribute)):
+        level = LEVELS.get(node.func.attr, "")
+        if not _is_logger(node.func.value, {"self", "rospy", *given}):
             continue
-        level, span = LEVELS.get(node.func.attr, ""), span_of(lines, node.func)
+        span = span_of(lines, node.func)
         if not level or span is None or node.keywords or len(node.args) != 1:
             return  # how often it is to log is not known
         edits.append((*span, f"rospy.{level}"))
