@@ -100,6 +100,7 @@ def test_the_logger_of_ros_2_is_one_slip(of: str, tmp_path: Path) -> None:
         [(LOOP, f"        log.get_logger().info('x')\n{LOOP}")],
         [(LOOP, f"        self.get_logger().info('x', once=True)\n{LOOP}")],
         [(LOOP, f"        self.get_logger().log('x', 10)\n{LOOP}")],
+        [(LOOP, f"        self.get_logger().info('x')\n{LOOP}"), ("import rospy", "import rospy as ros")],
         [
             (LOOP, f"        self.get_logger().info('x')\n{LOOP}"),
             ("def main", "def get_logger(): pass\n\n\ndef main"),

@@ -133,9 +133,7 @@ def _is_logger(node: ast.expr, owners: set[str]) -> bool:
 def with_logger(text: str) -> Iterator[Step]:
     """`rospy.loginfo(…)` in place of each `self.get_logger().info(…)` of ROS 2, in a script that has no such method."""
     tree, lines = tree_of(text), text.split("\n")
-    imported = {
-        a.name.partition(".")[0] for n in nodes_in(tree) if isinstance(n, ast.Import) for a in n.names
-    }
+    imported = {a.asname or a.name for n in nodes_in(tree) if isinstance(n, ast.Import) for a in n.names}
     inherits = {
         last_name(base) for n in nodes_in(tree) if isinstance(n, ast.ClassDef) for base in n.bases
     } - {"object"}
