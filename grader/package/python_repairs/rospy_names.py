@@ -148,10 +148,11 @@ def with_logger(text: str) -> Iterator[Step]:
     if "rospy" not in imported or inherits or LOGGER in bound_in(tree) | named:
         return
     edits, first = [], 0
-    for node in (n for n in nodes_in(tree) if isinstance(n, ast.Call) and isinstance(n.func, ast.Attribute)):
-        level = LEVELS.get(node.func.attr, "")
-        if not _is_logger(node.func.value, {"self", "rospy", *given}):
+    for node in (n for n in nodes_in(tree) if isinstance(n, ast.Call)):
+        called = node.func
+        if not isinstance(called, ast.Attribute) or not _is_logger(called.value, {"self", "rospy", *given}):
             continue
+        level = LEVELS.get(called.attr, "")
         span = span_of(lines, node.func)
         if not level or span is None or node.keywords or len(node.args) != 1:
             return  # how often it is to log is not known
