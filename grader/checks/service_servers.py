@@ -21,7 +21,7 @@ from grader.checks.support.processes import (
     life_of,
     plain_type,
 )
-from grader.checks.support.text import SERVICE, SPIN, imports, near_names, service_call, shown
+from grader.checks.support.text import SERVICE, SPIN, both, imports, near_names, service_call, shown
 from grader.checks.support.topics import cite, no_node, why_unreached
 from grader.evidence.events import MISFIT, NO_ANSWER
 from grader.evidence.run import Run
@@ -202,8 +202,10 @@ def _exchanged(pairs: Sequence[tuple[Exchange, dict[str, Any]]], params: Service
             for one, wanted in pairs
         ):
             kind = pairs[0][0].type.partition("/")[2]
-            fields = f"{first}=…, {second}=…"
-            return f"{first} and {second} have each other's values: write each by its name, {kind}Response({fields})"
+            by_name = both(
+                f"{kind}Response({first}=…, {second}=…)", f"response.{first} = …; response.{second} = …;"
+            )
+            return f"{first} and {second} have each other's values: write each by its name, {by_name}"
     return ""
 
 
