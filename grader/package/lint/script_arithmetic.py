@@ -4,8 +4,19 @@ Nothing is executed. Python 3.8, standard library only.
 """
 
 import ast
+import re
 
-from script_names import all_of, called_name, dotted, key_of, listed, names_in, parents_of, slip, text_of
+from script_names import (
+    all_of,
+    called_name,
+    dotted,
+    key_of,
+    listed,
+    names_in,
+    parents_of,
+    slip,
+    text_of,
+)
 from script_values import IN_DEGREES
 
 SIDES = ("width", "height")
@@ -98,6 +109,9 @@ def wrong_step(node, key, sides, axes):
         yield slip(node.lineno, "wrong-value", message, fix, "step")
 
 
+SENSED = re.compile(r"(?i)accel|magnet|gyro|imu|(?:^|[._]|d)z$")
+
+
 def turned_atan(tree, axes):
     """`math.atan2(dx, dy)`, which takes y first."""
     named = {
@@ -115,7 +129,9 @@ def turned_atan(tree, axes):
             continue
         found = []
         for one in call.args:
-            names = [dotted(n) for n in ast.walk(one) if isinstance(n, (ast.Name, ast.Attribute))]
+            names = names_in(one)
+            if any(SENSED.search(name) for name in names):
+                break  # how a sensor is tilted is another angle
             last = {
                 axes[name][0] if name in axes else named.get(name.rpartition(".")[2].lower())
                 for name in names
@@ -130,10 +146,17 @@ def turned_atan(tree, axes):
 def multiplied_cells(tree):
     """`column = int(p.x * resolution)`, where a cell is so many metres long."""
     lines = []
+    # `resolution = 1 / 0.05`, and 20: so many cells are a metre.
+    inverse = {
+        dotted(n.targets[0])
+        for n in all_of(tree, ast.Assign)
+        if isinstance(getattr(n.value, "op", None), ast.Div)
+        or (isinstance(n.value, ast.Constant) and type(n.value.value) in (int, float) and n.value.value >= 1)
+    }
     for node in all_of(tree, ast.BinOp) if any("resolution" in name for name in names_in(tree)) else ():
         sides = [node.left, node.right] if is_product(node) else []
         points = [one for one in sides if any(map(is_point, ast.walk(one)))]
-        lengths = [one for one in sides if "resolution" in dotted(one)]
+        lengths = [one for one in sides if "resolution" in dotted(one) and dotted(one) not in inverse]
         around = parents_of(tree)[node]
         if points and lengths and called_name(around) in WHOLE:
             lines.append(node.lineno)
@@ -149,11 +172,17 @@ def is_point(node):
 
 def mixed_units(tree):
     """`math.degrees(math.atan2(dy, dx)) - pose.theta`, of which one is in degrees, and the other in radians."""
+    # A name of the script's own may be in degrees.
+    stored = [n for n in all_of(tree, ast.Name, ast.Attribute) if isinstance(n.ctx, ast.Store)]
+    own = {dotted(n).rpartition(".")[2] for n in stored}
     for node in all_of(tree, ast.BinOp):
         sides = [node.left, node.right]
         degrees = [one for one in sides if called_name(one) in IN_DEGREES]
         radians = [
-            n for n in sides if getattr(n, "attr", "") == "theta" or called_name(n) in ("atan2", "radians")
+            n
+            for n in sides
+            if (getattr(n, "attr", "") == "theta" and "theta" not in own)
+            or called_name(n) in ("atan2", "radians")
         ]
         if isinstance(node.op, (ast.Add, ast.Sub)) and len(degrees) == len(radians) == 1:
             name = called_name(degrees[0])
@@ -162,16 +191,23 @@ def mixed_units(tree):
             yield slip(node.lineno, "wrong-value", message, fix, "mixed")
 
 
+KEEP_SIGNS = ("min", "max", "float", "clip")
+
+
 def turned_errors(tree):
     """`error = pose.theta - math.atan2(dy, dx)`, by which the robot turns without a minus."""
     given = all_of(tree, ast.Assign)
     turns = [n.value for n in given if dotted(n.targets[0]).endswith(".angular.z")]
     inside = [n for value in turns for n in ast.walk(value)]
-    # a number of its own, a sign or a choice may put it right
+    # a number of its own, a sign, a choice or a function may put it right
     if not inside or any(isinstance(n, (ast.USub, ast.Sub, ast.IfExp)) for n in inside):
         return
+    if any(called_name(n) not in KEEP_SIGNS for n in inside if isinstance(n, ast.Call)):
+        return
+    used = {name for value in turns for name in names_in(value)}
+    of_turns = [n for one in given if dotted(one.targets[0]) in used for n in ast.walk(one.value)]
     if any(isinstance(n, ast.Constant) and n.value for n in turns) or any(
-        isinstance(getattr(n.value, "op", None), ast.USub) for n in given
+        isinstance(n, ast.USub) for n in of_turns
     ):
         return
     towards = {dotted(n.targets[0]) for n in given if called_name(n.value) in ("atan2", "arctan2")}
