@@ -39,8 +39,12 @@ ASKS = re.compile(
     rb"|not[ \t]+[\w.]+\.wait_for_server\([^;]*\)|" + POLLS.pattern
 )
 """A part of the condition of a loop that goes on until something is there."""
-HARMLESS = re.compile(rb"(?:print|rospy\.log\w+|[\w.]*sleep)\([^;]*\)|pass|continue")
-INTERRUPTED = re.compile(rb"except[ \t(]+(?:[\w.]+\.)?(?:ROSInterruptException|KeyboardInterrupt)\b")
+HARMLESS = re.compile(rb"(?:print|rospy\.log\w+|(?:[\w.]+\.)?sleep)\([^;]*\)|pass|continue")
+ENDED = rb"(?:[\w.]+\.)?(?:ROSInterruptException|KeyboardInterrupt)"
+INTERRUPTED = re.compile(
+    rb"except[ \t(]+" + ENDED + rb"(?:[ \t]*,[ \t]*" + ENDED + rb")*[ \t]*\)?(?:[ \t]+as[ \t]+\w+)?[ \t]*:"
+)
+"""What only Ctrl-C raises: another error in the same brackets may be that the wait is over."""
 COMMENT = re.compile(rb"(?:^|[ \t]+)#[^'\"]*$")
 LINE_BYTES_MAX, LOOP_LINES_MAX = 200, 40
 

@@ -233,6 +233,12 @@ RETRYING = """def ask():
             True,
         ),
         ("rospy.sleep(0.5)", "break", True),
+        (
+            "            rospy.logwarn('not yet')  # again\n            rospy.sleep(0.5)\n",
+            "            return\n",
+            True,
+        ),
+        ("rospy.sleep(0.5)", "self.exit_or_sleep()", True),
         ("rospy.sleep(0.5)", "raise", True),
         ("rospy.sleep(0.5)", "tries += 1", True),
         ("            rospy.sleep(0.5)\n", "        if late():\n            break\n", True),
@@ -249,6 +255,22 @@ RETRYING = """def ask():
 def test_a_client_that_asks_again_without_end_does_not_give_up(old: str, new: str, gives: bool) -> None:
     assert old in RETRYING
     assert gives_up(RETRYING.replace(old, new, 1).encode()) is gives
+
+
+@pytest.mark.parametrize(
+    ("caught", "gives"),
+    [
+        ("rospy.ROSInterruptException as e", False),
+        ("(rospy.ROSInterruptException, KeyboardInterrupt)", False),
+        ("(rospy.ROSInterruptException, rospy.ROSException)", True),
+        ("(KeyboardInterrupt, Exception) as e", True),
+    ],
+)
+def test_only_a_handler_of_ctrl_c_ends_no_wait(caught: str, gives: bool) -> None:
+    handled = RETRYING.replace(
+        "            break\n", f"            break\n        except {caught}:\n            return\n"
+    )
+    assert gives_up(handled.encode()) is gives
 
 
 @pytest.mark.parametrize(
