@@ -37,9 +37,16 @@ _DEFINES_MAIN = re.compile(r"\b(?:int|void)\s+main\s*\([^;{}()]*\)\s*{")
 _LOOP = re.compile(r"\bwhile\s*\([^;{}]*\bok\s*\(\s*\)")
 _OPENS = re.compile(r"\s*\)?\s*\{")
 _SLEEP = re.compile(
-    r"\b(?:ros::)?(?:Wall)?Duration\s*\(\s*(?P<s>[\d.]+)\s*\)\s*\.\s*sleep\s*\(|\bus?leep\s*\(\s*(?P<us>\d+)"
+    r"\b(?:ros::)?(?:Wall)?Duration\s*\(\s*(?:(?P<s>[\d.]+)|(?P<of>\w+))\s*\)\s*\.\s*sleep\s*\("
+    r"|\bus?leep\s*\(\s*(?P<us>\d+)|\b(?P<name>\w+)\s*\.\s*sleep\s*\("
     r"|\bsleep_for\s*\(\s*(?:std::)?(?:chrono::)?milliseconds\s*\(\s*(?P<ms>\d+)|\bsleep(?:_for)?\s*\("
 )
+_NUMBER = r"(?:\d+\.?\d*|\.\d+)"
+_PAUSE = re.compile(
+    rf"\bDuration\s+(?P<name>\w+)\s*(?:=\s*[\w:]+\s*)?[({{]\s*(?P<s>{_NUMBER})\s*[)}}]"
+    rf"|\b(?:double|float|define)\s+(?P<constant>\w+)\s*=?\s*(?P<value>{_NUMBER})\s*[;\n]"
+)
+"""Names of lengths in seconds: `Duration pause(0.01)`, `double DT = 0.01`."""
 _DEGREES = r"\*\s*180(?:\.0*f?)?\s*/\s*(?:M_PI|3\.14\d*f?|PI|pi)\b"
 _IN_DEGREES = re.compile(rf"\b(?P<name>[A-Za-z_]\w*)\s*=\s*[^;=]*{_DEGREES}")
 _OF_ANGLE = re.compile(
@@ -135,8 +142,10 @@ def _whole_numbers(path: str, text: str, code: str) -> Iterator[PythonSlip]:
 
 
 def _waiting(path: str, code: str) -> Iterator[PythonSlip]:
+    made = _PAUSE.finditer(code)
+    pauses_s = {one["name"] or one["constant"]: float(one["s"] or one["value"]) for one in made}
     for body in dict.fromkeys(_callbacks(code)):
-        found = next(_waits_in(body, code), None)
+        found = next(_waits_in(body, code, pauses_s), None)
         if found is not None:
             at, message, fix = found
             line, begins = _line(code, at), f"line {_line(code, body.start)}"
@@ -309,7 +318,7 @@ def _line(text: str, at: int) -> int:
     return text.count("\n", 0, at) + 1
 
 
-def _waits_in(body: _Body, code: str) -> Iterator[tuple[int, str, str]]:
+def _waits_in(body: _Body, code: str, pauses_s: dict[str, float]) -> Iterator[tuple[int, str, str]]:
     """Yield where the function does not come to its end, or late, with what to say and to do."""
     for match in _ENDLESS.finditer(code, body.start, body.end):
         brace = code.find("{", match.end(), body.end)
@@ -323,12 +332,14 @@ def _waits_in(body: _Body, code: str) -> Iterator[tuple[int, str, str]]:
     for match in _SPIN.finditer(code, body.start, body.end):
         yield match.start(), "the callback {name} calls spin() on line {line}", "move line {line} out of it"
     for match in _SLEEP.finditer(code, body.start, body.end):
-        if _seconds(match) >= SHORT_S:
+        if _seconds(match, pauses_s) >= SHORT_S:
             yield match.start(), "the callback {name} sleeps on line {line}", "delete line {line}"
 
 
-def _seconds(match: re.Match[str]) -> float:
+def _seconds(match: re.Match[str], pauses_s: dict[str, float]) -> float:
     """Return how long a call sleeps; of one that does not say it, that it is long."""
+    if (name := match["name"] or match["of"]) in pauses_s:
+        return pauses_s[name]
     for unit, factor in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
         if match[unit] and re.fullmatch(r"\d+\.?\d*|\.\d+", match[unit]):
             return float(match[unit]) * factor

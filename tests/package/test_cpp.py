@@ -46,6 +46,8 @@ def _told(line: str, given: str = "hear") -> list[str]:
         ("ros::Duration(1.0).sleep();", "the callback `hear` sleeps on line 5"),
         ("usleep(500000);", "the callback `hear` sleeps on line 5"),
         ("rate.sleep();", "the callback `hear` sleeps on line 5"),
+        ("ros::Duration d(1); d.sleep();", "the callback `hear` sleeps on line 5"),
+        ("double wait = 2; ros::Duration(wait).sleep();", "the callback `hear` sleeps on line 5"),
         (
             "std::this_thread::sleep_for(std::chrono::milliseconds(300));",
             "the callback `hear` sleeps on line 5",
@@ -101,6 +103,9 @@ def test_a_lambda_that_waits() -> None:
         "message.data = cos(yaw);",
         "double a = yaw * 180 / M_PI; x = cos(a * M_PI / 180) + cos(radians(a));",
         "message.data = sin(3.14159);",
+        "ros::Duration d(0.01); d.sleep();",
+        "ros::Duration d = ros::Duration(.05); d.sleep();",
+        "const double DT = 0.01; ros::Duration(DT).sleep();",
     ],
 )
 def test_a_callback_that_is_right(line: str) -> None:

@@ -17,6 +17,7 @@ OLD_NAMES = {
     "xrange", "raw_input", "unicode", "basestring", "unichr", "long", "reduce", "reload", "execfile", "cmp",
 }  # fmt: skip
 """Of Python 2: the traceback is explained by what Python 3 has in their place."""
+EXCEPTIONS = {name for name in dir(builtins) if name.endswith(("Error", "Exception", "Interrupt"))}
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 LOOPS = (ast.While, ast.For)
 COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
@@ -180,6 +181,9 @@ def misspelt(tree):
     for node in unknown[:USES_LIMIT]:
         kind, line, message = "undefined", node.lineno, ""
         fitting = stored if id(node) in texts else own - functions if is_value(node, tree) else own
+        fitting = (
+            fitting | EXCEPTIONS if isinstance(parents_of(tree).get(node), ast.ExceptHandler) else fitting
+        )
         near = "" if node.id in known | OLD_NAMES else spelt_alike(node.id, fitting, attributes)
         near = "" if made.get(near) == node.id else near  # `twist = Twist()` lacks an import
         if id(node) in outside and (node.id == "self" or node.id not in known):
@@ -501,14 +505,17 @@ def unnamed_exception(node, tree):
     parents, one = parents_of(tree), node
     while one is not None and not isinstance(one, ast.ExceptHandler):
         one = parents.get(one)
-    if one is None or one.name or one.type is None or isinstance(one.type, ast.Tuple):
+    if one is None or one.name:
         return None
+    kinds = getattr(one.type, "elts", [one.type])
     in_clause = isinstance(one.type, ast.Call) and node in one.type.args
     if not in_clause and node.id not in EXCEPTION_NAMES:
         return None
-    caught = dotted(getattr(one.type, "func", one.type))
-    if "..." in caught:
+    named = [dotted(getattr(kind, "func", kind)) for kind in kinds if kind is not None]
+    named = [kind for kind in named if kind != node.id] or ["Exception"]
+    if any("..." in kind for kind in named):
         return None
+    caught = "(%s)" % ", ".join(named) if len(named) > 1 else named[0]
     caught = caught[: -len(node.id) - 1] if caught.endswith("." + node.id) else caught
     message = "`%s` would be the exception, which line %d does not name" % (node.id, one.lineno)
     return message, "on line %d, write `except %s as %s:`" % (one.lineno, caught, node.id)
