@@ -112,7 +112,9 @@ class _Names:
         is_type = f"{first.string}.{second.string}" in self._types and first.string[:1].isupper()
         is_class = is_type and first.string in self.known - self._given
         is_named = second.type == tokenize.NAME and second.string in self.bound - self.own
-        return is_named and (first.type == tokenize.STRING or is_class)
+        # a text has methods, whatever else in the script is called like one of them
+        of_text = first.type == tokenize.STRING and not hasattr(str, second.string)
+        return is_named and (of_text or is_class)
 
 
 def _dots(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
