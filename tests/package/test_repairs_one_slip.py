@@ -518,6 +518,8 @@ LEFT_ALONE = {
     "other-axis": "class A:\n    def __init__(self):\n        self.max_z = 1\n        print(self.max_x)\n",
     "other-side": "left_l = 1\nprint(left_r)\n",
     "method-of-a-text": "from os.path import join\nformat = 3\nprint(join('a', '{}'.format(format)), ','.join('ab'))\n",
+    "commented-callback": "def f():\n    a = 1\n    # rospy.Subscriber('a', A, g)\n\n\n    print(a)\nf()\n",
+    "made-of-a-class-that-is-not-there": "battery = Battery()\nprint(battery)\n",
     "commented": "while a:\n    if b:\n        # c()\n    d()\n",
     "window": f"{NODE}rospy.Subscriber('a', A, print)\ngtk.main()\n",
     "test": f"{NODE}rospy.Subscriber('a', A, print)\nrostest.rosrun('a', 'b', T)\n",

@@ -248,6 +248,7 @@ def with_names(text: str) -> Iterator[Step]:
             of_python = next((one for one in OF_PYTHON if is_slip(name, one)), "")
             meant = OBVIOUS_NAMES.get(name) or ("__name__" if guards else "")
             near = own - functions if name in values else own
+            near = {one for one in near if given.get(one) != name}  # `twist = Twist()` lacks an import
             meant = meant or meant_by(name, near, near - loaded) or idle.get(name, "")
             meant = meant or ("pass" if name in alone else of_python)
             meant = meant or meant_by_use(name, member_of.get(name, ""), given, loaded)

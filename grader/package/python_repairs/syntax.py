@@ -299,8 +299,9 @@ def _with_def(lines: list[str], at: int) -> Iterator[str]:
 def lost_head(text: str, body: str) -> str:
     """Return the first line of the one function that the file names as a callback, or calls, and does not have; ""
     where there is not just one. `body` are the lines that belong below it."""
-    named = dict.fromkeys(re.findall(r"\b(?:Subscriber|Service|Timer)\s*\(.*,\s*(\w+)\s*[,)]", text), "msg")
-    named |= dict.fromkeys(re.findall(r"^\s*(\w+)\(\)\s*$", text, re.MULTILINE), "")
+    code = re.sub(r"#[^\n]*", "", text)
+    named = dict.fromkeys(re.findall(r"\b(?:Subscriber|Service|Timer)\s*\(.*,\s*(\w+)\s*[,)]", code), "msg")
+    named |= dict.fromkeys(re.findall(r"^\s*(\w+)\(\)\s*$", code, re.MULTILINE), "")
     given = set(re.findall(r"\b(?:def|class|import)\s+(\w+)|^\s*(\w+)\s*=", text, re.MULTILINE))
     lost = [name for name in named if name not in {one for pair in given for one in pair}]
     if len(lost) != 1 or lost[0] in dir(builtins):
