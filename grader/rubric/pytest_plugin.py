@@ -26,6 +26,7 @@ from grader.checks.registry import NoSuchScenario, NotRecorded
 from grader.checks.support.console_output import Frame, Traceback
 from grader.checks.support.exit_causes import MAIN, explain_traceback
 from grader.installable import exists_somewhere, install_hint
+from grader.model.python_slip import PythonSlip
 from grader.model.verdict import Status, machine_lacks
 from grader.rubric.pytest_check import Outcome, SessionOutcome, TestOutcome
 from grader.wording import shorten
@@ -36,6 +37,7 @@ SAYING = (AssertionError, NotRecorded, pytest.fail.Exception, pytest.skip.Except
 # An object's address in a message differs from run to run, and the same evidence must give the same bytes.
 _ADDRESS = re.compile(r"\b0x[0-9a-fA-F]{6,}\b")
 _EVIDENCE = pytest.StashKey[Evidence]()
+_CALLED = pytest.StashKey[set[tuple[str, str]]]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -83,7 +85,8 @@ def _ask(pytestconfig: pytest.Config) -> Ask:
 @pytest.fixture
 def student(request: pytest.FixtureRequest, _ask: Ask) -> Callable[[str], StudentFile]:
     """Return the functions of a file of the package: `student("src/kinematics.py").forward(0.1, 0.2)`."""
-    return lambda file: StudentFile(file, request.node.name, _ask)
+    called = request.node.stash.setdefault(_CALLED, set[tuple[str, str]]())
+    return lambda file: StudentFile(file, request.node.name, _ask, called)
 
 
 class _Notes:
@@ -135,6 +138,10 @@ class _Notes:
         message = "" if outcome == "passed" else self._message(error, report)
         own = error if isinstance(error, StudentError) else StudentError("")
         cause, hint = self._explanation(own)
+        unreached = None if cause or hint or outcome != "failed" else self._unreached(item)
+        if unreached is not None:
+            message = f"{message}; line {unreached.line} of {unreached.file}: {unreached.message}"
+            hint = f"in {unreached.file}, {unreached.fix}"
         noted = self._tests.get(item.nodeid)
         # A teardown that fails counts, too, but does not take the place of what failed before it.
         if noted is None or noted.outcome == "passed":
@@ -145,10 +152,20 @@ class _Notes:
                 message=self._short(f"{own.call} raises {cause}") if cause else message,
                 points=self._points(item),
                 hint=hint,
-                file=own.file,
-                line=own.line or None,
+                file=unreached.file if unreached else own.file,
+                line=unreached.line if unreached else own.line or None,
                 late=own.late,
             )
+
+    def _unreached(self, item: pytest.Item) -> PythonSlip | None:
+        """Return why a function that the test called never comes to its `return`."""
+        try:
+            slips = self._evidence.package.slips
+        except NotRecorded:
+            return None
+        called = item.stash.get(_CALLED, set[tuple[str, str]]())
+        found = (s for s in slips if s.kind == "wrong-value" and s.name == "unreached")
+        return next((s for s in found if (s.file, s.message.split("`")[1]) in called), None)
 
     def _explanation(self, error: StudentError) -> tuple[str, str]:
         """Return the cause and the hint of what a student's function raised; neither while a run is recorded."""
@@ -224,8 +241,8 @@ class StudentError(AssertionError):
 class StudentFile:
     """A Python file of the package; its attributes are its functions."""
 
-    def __init__(self, file: str, test: str, ask: Ask) -> None:
-        self._file, self._test, self._ask = file, test, ask
+    def __init__(self, file: str, test: str, ask: Ask, called: set[tuple[str, str]]) -> None:
+        self._file, self._test, self._ask, self._called = file, test, ask, called
 
     def __getattr__(self, function: str) -> Callable[..., Any]:
         # Python itself asks for such attributes (`__iter__`): they are no functions of the student's.
@@ -239,6 +256,7 @@ class StudentFile:
                 raise ValueError(
                     f"the arguments of {function} are longer than {REQUEST_CHARS_MAX} characters"
                 )
+            self._called.add((self._file, function))
             answer = self._ask(request)
             return _value(answer, _call_text(function, args, kwargs))
 

@@ -510,3 +510,24 @@ def test_a_name_that_a_text_may_use_is_not_said_to_be_unused(call: str, tmp_path
     (tmp_path / "a.py").write_text(text, encoding="utf-8")
     kinds = {s.kind for s in check_syntax(tmp_path, ["a.py"]).slips}
     assert not kinds & {"unused-import", "never-published", "never-called"}
+
+
+@pytest.mark.parametrize(
+    ("body", "fixes"),
+    [
+        ("    if x > 1:\n        raise ValueError()\n        y = 2\n        return y\n",
+         ["indent lines 4 to 5 only as far as the `if` on line 2"]),
+        ("    if x > 1:\n        return\n        return 2\n", ["indent line 4 only as far as the `if` on line 2"]),
+        ("    if x > 1:\n        y = 1\n    else:\n        raise ValueError()\n        return y\n",
+         ["indent line 6 only as far as the `if` on line 2"]),
+        ("    if x > 1:\n        raise ValueError()\n    return 2\n", []),
+        ("    if x > 1:\n        return 1\n        return 2\n", []),
+        ("    if x > 1:\n        raise ValueError()\n        print(x)\n    return 2\n", []),
+        ("    raise NotImplementedError()\n    return 2\n", []),
+        ("    if x > 1:\n        raise ValueError()\n        x = 1\n", []),
+    ],
+)  # fmt: skip
+def test_a_return_that_is_never_reached(body: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"def f(x):\n{body}", encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.fix for s in slips] == fixes

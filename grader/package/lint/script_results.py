@@ -34,6 +34,7 @@ def results(tree):
     yield from listed_answers(tree)
     yield from filled_fields(tree)
     yield from narrow_handlers(tree)
+    yield from unreached_returns(tree)
 
 
 def dropped_results(tree):
@@ -150,3 +151,28 @@ def narrow_handlers(tree):
             last, end = node.handlers[-1], node.body[-1].end_lineno
             lines = "%d-%d" % (node.body[0].lineno, end)
             yield slip(last.lineno, "catches", " ".join(sorted(caught)), last.name or "", lines)
+
+
+def unreached_returns(tree):
+    """Functions of which every `return` with a value stands in an `if`, behind a `raise` or a plain `return`."""
+    for own in all_of(tree, ast.FunctionDef):
+        nodes = list(walk_own(own))
+        returned = [n for n in nodes if isinstance(n, ast.Return) and n.value is not None]
+        blocks = [(n, block) for n in nodes if isinstance(n, ast.If) for block in (n.body, n.orelse)]
+        for condition, block in blocks if returned else ():
+            ends = (i for i, n in enumerate(block) if is_plain_end(n))
+            at = next(ends, len(block))
+            behind = block[at + 1 :]
+            if behind and all(behind[0].lineno <= n.lineno <= behind[-1].end_lineno for n in returned):
+                word = "raise" if isinstance(block[at], ast.Raise) else "return"
+                parts = (own.name, returned[0].lineno, word, block[at].lineno)
+                message = "`%s` never comes to its `return` on line %d: the `%s` on line %d ends it" % parts
+                first, last = behind[0].lineno, behind[-1].end_lineno
+                lines = "line %d" % first if first == last else "lines %d to %d" % (first, last)
+                fix = "indent %s only as far as the `if` on line %d" % (lines, condition.lineno)
+                yield slip(first, "wrong-value", message, fix, "unreached")
+
+
+def is_plain_end(node):
+    """Whether a statement ends its function without a value."""
+    return isinstance(node, ast.Raise) or (isinstance(node, ast.Return) and node.value is None)
