@@ -329,6 +329,9 @@ CASES = {
                       "indented further than the one above"),
     "terminal": Case(swapped(TALKER, ("import rospy\n", "$ chmod +x talker.py\nimport rospy\n")), ["python-syntax"],
                  "a command for the terminal"),
+    "import-of-header": Case(
+        swapped(TALKER, ("publish(1)", "publish(Header())")), ["missing-import"], "talker.py uses Header",
+    ),
     "import": Case(swapped(TALKER, ("import Int8", "import String")), ["missing-import"], "talker.py uses Int8"),
     "leading-slash": Case(
         swapped(TALKER, ("'numeric_chatter'", "'/numeric_chatter'")), ["topic-name"],

@@ -183,6 +183,7 @@ def with_imports(text: str, types: list[str]) -> Iterator[Step]:
     if "*" in bound:
         return
     packages = {name: package for package, names in MESSAGES.items() for name in names.split()}
+    packages |= {"Header": "std_msgs", "TransformStamped": "geometry_msgs"}
     packages |= {name: package for package, _, name in (kind.partition("/") for kind in types)}
     parts = [n for n in nodes_in(tree) if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)]
     modules = {last_name(n.value) for n in parts}
