@@ -59,6 +59,9 @@ FILES = {
     "launch/lab.launch": LAUNCH,
 }
 TALKER, XML, CMAKELISTS, LAUNCHED = FILES
+OWN = {"msg/Level.msg": "float64 level\n", "src/level.py": "from lab.msg import Level\n"}
+OWN_CMAKE = CMAKE.replace("rospy)\n", "message_generation rospy)\nadd_message_files(FILES Level.msg)\n")
+RUN_OWN = {**OWN, TALKER: SCRIPT.replace("import Int8\n", "import Int8\nfrom lab.msg import Level\n")}
 
 
 def package(folder: Path, changes: dict[str, str | bytes | None] | None = None) -> Path:

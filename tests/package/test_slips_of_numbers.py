@@ -536,49 +536,6 @@ def test_angles_and_distances(text: str, names: list[str], tmp_path: Path) -> No
     assert [s.name for s in slips] == names
 
 
-RIGHT = {
-    "squares-compared": "distance = a ** 2 + b ** 2\nprint(distance > R ** 2)\n",
-    "root-below": "dist = a ** 2 + b ** 2\nprint(math.sqrt(dist))\n",
-    "nearest": "def distance(p):\n    return p.x ** 2 + p.y ** 2\nprint(min(points, key=distance))\n",
-    "halved-in-place": "yaw /= 2\nq = Quaternion(0, 0, sin(yaw), cos(yaw))\n",
-    "halved-inside": "a = radians(turn / 2)\nq = Quaternion(0, 0, sin(a), cos(a))\n",
-    "half-given": "def f(half):\n    return Quaternion(0, 0, sin(half), cos(half))\n",
-    "square-grid": "m.info.width = n\nm.info.height = n\nm.data = cells\nprint(m.data[row * n + column])\n",
-    "own-order": "w = m.info.width\nh = m.info.height\nprint(seen[x * h + y], m.data[y * w + x])\n",
-    "none-left": "def f(a):\n    n = int(a / 2)\n    if n == 0 or n > 0:\n        print(n)\n",
-    "not-below-0": "def f(a):\n    n = int(a / 2)\n    if n < 0:\n        n = 0\n    print(n)\n",
-    "own-secs": "class A:\n    def f(self):\n        self.secs = rospy.get_time()\n",
-    "other-mean": "print(m.ranges[0], sum(speeds) / len(speeds))\n",
-    "own-theta": "print(math.radians(args.theta))\n",
-    "own-response": "def sendResponse(a):\n    print(a)\nsendResponse(1)\n",
-    "set-first": "if not rospy.has_param('a'):\n    rospy.set_param('a', 1)\n    print(rospy.get_param('a'))\n",
-    "each-range": "for r in m.ranges:\n    if r < 1:\n        t = 'a'\n    else:\n        t = 'b'\n    p.publish(t)\n",
-    "given-by-name": "s = Namespace(go=True)\ndef f(m):\n    s.go = False\nwhile s.go:\n    p.publish(1)\n",
-    "given-by-base": "class A(Robot):\n    def f(self):\n        self.go = False\n"
-                     "        while self.go:\n            p()\n",
-    "waited-for": "while not rospy.is_shutdown():\n    e = TransformListener()\n    e.waitForTransform(a, b, t, d)\n",
-    "zero-by-key": "t = Twist()\ndef f(m):\n    if m.a:\n        t.linear.x = 1\n    elif m.b:\n"
-                   "        t.linear.x = 0\n    p.publish(t)\n",
-    "made-again": "class A:\n    def f(self):\n        self.t = Twist()\n    def g(self, m):\n        self.f()\n"
-                  "        if m.a:\n            self.t.linear.x = 1\n        p.publish(self.t)\n",
-    "made-twice": "class A:\n    def g(self, m):\n        self.t = Twist()\n        if m.a:\n"
-                  "            self.t.linear.x = 1\n        p.publish(self.t)\n"
-                  "    def f(self):\n        self.t = Twist()\n",
-    "part": "from g.msg import Twist, Vector3\nt = Twist()\nt.linear = Vector3()\nt.linear.x = 1\np.publish(t)\n",
-    "timer-of-python": "def f():\n    print(1)\nthreading.Timer(1, f).start()\n",
-    "timer-imported": "from threading import Timer\ndef f():\n    print(1)\nTimer(1, f).start()\n",
-}  # fmt: skip
-"""Lines that are right, although they look like slips."""
-
-
-@pytest.mark.parametrize("text", RIGHT.values(), ids=RIGHT)
-def test_what_is_right_is_no_slip(text: str, tmp_path: Path) -> None:
-    (tmp_path / "a.py").write_text(text, encoding="utf-8")
-    kinds = {"wrong-value", "loop-left", "object", "callback-values"}
-    told = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind in kinds]
-    assert [s.message for s in told if "had not been reached" not in s.message] == []
-
-
 def test_an_attribute_that_is_filled_from_outside(tmp_path: Path) -> None:
     head = "class A:\n def __init__(self):\n  self.p = None\n  Subscriber('/p', Pose, self.f)\n def f(self, m):\n"
     (tmp_path / "a.py").write_text(f"{head}  self.p.x = m.x\na = A()\na.p = Pose()\n", encoding="utf-8")

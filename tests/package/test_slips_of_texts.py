@@ -470,14 +470,14 @@ def test_what_becomes_of_results(
 @pytest.mark.parametrize(
     ("around", "where"),
     [
-        ("rospy.Subscriber('a', Int8, heard)\n", "in the callback"),
-        ("rospy.Timer(rospy.Duration(1), heard)\n", "in the callback"),
-        ("while not rospy.is_shutdown():\n    rate.sleep()\n", "inside the loop"),
+        ("rospy.Subscriber('a', Int8, heard)\n", " in the callback"),
+        ("rospy.Timer(rospy.Duration(1), heard)\n", " in the callback"),
+        ("while not rospy.is_shutdown():\n    rate.sleep()\n", " inside the loop"),
         (
             "rospy.Subscriber('a', Int8, heard)\nwhile not rospy.is_shutdown():\n    rate.sleep()\n",
-            "inside the loop",
+            " inside the loop",
         ),
-        ("rospy.spin()\n", "inside the loop"),
+        ("rospy.spin()\n", ""),
     ],
 )
 def test_a_publisher_that_nothing_uses_is_to_publish_where_the_script_works(
@@ -486,7 +486,7 @@ def test_a_publisher_that_nothing_uses_is_to_publish_where_the_script_works(
     text = f"def heard(msg):\n    print(msg)\npub = rospy.Publisher('b', Int8, queue_size=1)\n{around}"
     (tmp_path / "a.py").write_text(text, encoding="utf-8")
     found = [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "never-published"]
-    assert found == [f"call `pub.publish(…)` {where}"]
+    assert found == [f"call `pub.publish(…)`{where}"]
 
 
 @pytest.mark.parametrize(

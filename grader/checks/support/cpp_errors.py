@@ -293,7 +293,10 @@ def _missing_target(found: re.Match[str], package: PackageFacts, _lines: Sequenc
 OF_INSTALL = ("TARGETS", "PROGRAMS", "DIRECTORY", "FILES", "ARCHIVE", "LIBRARY", "RUNTIME", "DESTINATION")
 
 
-_UNKNOWN_KEYWORD = r'install (?:called with unknown mode|does not recognize sub-command|TARGETS given unknown argument) "?(\w+)'
+_UNKNOWN_KEYWORD = (
+    r"install (?:called with unknown mode|does not recognize sub-command|TARGETS given unknown argument) "
+    r'"?(\w+)'
+)
 
 
 def _unknown_keyword(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:

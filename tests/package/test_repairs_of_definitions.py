@@ -1,0 +1,239 @@
+"""Mistakes in a package's own messages, services and actions, in one table: definitions, and what makes them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from grader.model.message_definitions import parse_definition
+from tests.package.repairing import (
+    CMAKE,
+    CMAKELISTS,
+    MANIFEST,
+    OWN,
+    OWN_CMAKE,
+    RUN_OWN,
+    SCRIPT,
+    TALKER,
+    XML,
+    Case,
+    asking,
+    check,
+    swapped,
+)
+
+pytestmark = pytest.mark.usefixtures("without_processes")
+
+GENERATED = OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")
+SERVICE = {**OWN, "srv/Two.srv": "int64 a\n---\n", "src/level.py": "from lab.srv import Two\n"}
+SERVICE_CMAKE = CMAKE.replace(
+    "rospy)\n", "message_generation rospy)\nadd_service_files(FILES Two.srv)\ngenerate_messages()\n"
+)
+ACTION_CMAKE = CMAKE.replace(
+    "rospy)\n",
+    """message_generation actionlib_msgs rospy)
+add_action_files(FILES Go.action)
+generate_messages(DEPENDENCIES actionlib_msgs std_msgs)
+""",
+)
+GO_FIELDS = tuple(parse_definition("int32 n\n---\nbool there\n---\nint32 left\n", ".action"))
+TWO_FIELDS = tuple(parse_definition("int64 a\n---\nint64 sum", ".srv"))
+LEVEL_FIELDS = tuple(
+    parse_definition("float64 level\nstring[] names\nint8 b", ".msg")
+)  # a number of another size and another name of a type are left as they are
+TEMPLATE = """\
+# add_message_files(
+#   FILES
+#   Message1.msg
+# )
+# generate_messages(
+#   DEPENDENCIES
+#   std_msgs
+# )"""
+
+CASES = {
+    "definitions-that-nothing-uses": Case(
+        {CMAKELISTS: OWN_CMAKE + "generate_messages(DEPENDENCIES std_msgs)\n"},
+        ["build-line"], "add_message_files(…) needs the folder msg/, which is not there",
+        after={CMAKELISTS: "message_generation rospy)\n\ncatkin_package"},
+    ),
+    "own-name": Case({XML: MANIFEST.replace(">lab<", ">mine<"), CMAKELISTS: CMAKE.replace("lab", "mine")},
+                 ["package-name"], "the package is called mine, not lab"),
+    "own-package-misspelt": Case(
+        {**OWN, **swapped(TALKER, ("import Int8\n", "import Int8\nfrom alb.msg import Level\n")), CMAKELISTS: OWN_CMAKE,
+         XML: MANIFEST.replace("rospy</depend>", "rospy</depend><build_depend>message_generation</build_depend>")},
+        ["build-line", "missing-import"], "there is no package alb", after={TALKER: "from lab.msg import Level"}),
+    "own-message": Case(
+        {**RUN_OWN, CMAKELISTS: CMAKE}, ["build-line"] * 3, "write message_generation after COMPONENTS",
+        after={CMAKELISTS: OWN_CMAKE.replace("\ncatkin_p", "\ngenerate_messages()\ncatkin_p")},
+    ),
+    "own-message-that-nothing-uses": Case({**SERVICE, CMAKELISTS: SERVICE_CMAKE}, [], ""),
+    "own-message-in-a-service": Case(
+        {**SERVICE, "srv/Two.srv": "Level[] a\n---\n", CMAKELISTS: SERVICE_CMAKE}, ["build-line"],
+        "add `add_message_files(FILES Level.msg)`",
+    ),
+    "own-message-of-the-template": Case(
+        {**RUN_OWN, CMAKELISTS: CMAKE.replace("catkin_p", f"{TEMPLATE}\ncatkin_p")}, ["build-line"] * 3,
+        "lines 8 to 11; CMakeLists.txt: in place of lines 4 to 7 write add_message_files(FILES Level.msg)",
+    ),
+    "own-message-of-another-exercise": Case({**OWN, CMAKELISTS: CMAKE}, []),
+    "own-message-of-another-exercise-beside-one-that-is-made": Case(
+        {**RUN_OWN, "msg/Tilt.msg": "float64 tilt\n", "src/tilt.py": "from lab.msg import Tilt\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")}, [],
+    ),
+    "own-message-beside-one-that-is-made": Case(
+        {**RUN_OWN, "msg/Tilt.msg": "float64 tilt\n", "msg/Level.msg": "Tilt[] level\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")},
+        ["build-line"], "write Tilt.msg after FILES",
+    ),
+    "own-message-of-another-exercise-that-the-build-asks-for": Case(
+        {**OWN, CMAKELISTS: f"{CMAKE}add_dependencies(talker lab_generate_messages_cpp)\n"}, ["build-line"] * 3,
+    ),
+    "own-message-and-services-of-no-file": Case(
+        {**RUN_OWN, CMAKELISTS: OWN_CMAKE.replace(
+            "catkin_p", "add_service_files(\n  FILES\n)\ngenerate_messages()\ncatkin_p")}, ["build-line"],
+        "delete lines 5 to 7, add_service_files(…)",
+        after={CMAKELISTS: OWN_CMAKE.replace("catkin_p", "\n\n\ngenerate_messages()\ncatkin_p")},
+    ),
+    "own-message-after-package": Case(
+        {**OWN, CMAKELISTS: OWN_CMAKE + "generate_messages(\n)\n"}, ["build-line"],
+        "move generate_messages(…), from line 6, above catkin_package(…)",
+    ),
+    "own-message-named-otherwise": Case(
+        {**OWN, CMAKELISTS: OWN_CMAKE.replace("Level", "level").replace("catkin_p", "generate_messages()\ncatkin_p")},
+        ["build-line"], "write Level.msg instead of level.msg",
+    ),
+    "own-message-of-another": Case(
+        {**OWN, "msg/Level.msg": "Header header\ngeometry_msgs/Point at\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES std_msgs)\ncatkin_p")},
+        ["build-line"] * 2, "write geometry_msgs after DEPENDENCIES",
+        after={CMAKELISTS: "DEPENDENCIES geometry_msgs std"},
+    ),
+    "own-message-with-a-header-that-another-package-brings": Case(
+        {**OWN, "msg/Level.msg": "Header header\ngeometry_msgs/Point at\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES geometry_msgs)\ncatkin_p")}, [],
+    ),
+    "own-messages-of-a-folder": Case(
+        {**OWN, "msg/Old.msg": "geometry_msgs/Point at\n",
+         CMAKELISTS: OWN_CMAKE.replace("FILES Level.msg", "DIRECTORY msg")
+         .replace("catkin_p", "generate_messages(DEPENDENCIES std_msgs)\ncatkin_p")},
+        ["build-line"] * 2, "write geometry_msgs after DEPENDENCIES",
+    ),
+    "messages-of-no-definition": Case(
+        {CMAKELISTS: CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES std_msgs)\ncatkin_p")}, ["build-line"],
+        "delete line 4, generate_messages(…)", after={CMAKELISTS: "rospy)\n\ncatkin_package()"},
+    ),
+    "own-action-without-its-messages": Case(
+        {"src/go.py": "from lab.msg import GoAction\n", "action/Go.action": "int32 n\n---\nint32 n\n---\nint32 n\n",
+         CMAKELISTS: ACTION_CMAKE.replace("actionlib_msgs std", "std")},
+        ["build-line"], "write actionlib_msgs after DEPENDENCIES",
+    ),
+    "own-action-whose-messages-find-genmsg": Case(
+        {"src/go.py": "from lab.msg import GoAction\n", "action/Go.action": "int32 n\n---\nint32 n\n---\nint32 n\n",
+         CMAKELISTS: ACTION_CMAKE.replace("message_generation ", "")}, [],
+    ),
+    "own-action-and-no-calls": Case(
+        {"src/talker.py": "#!/usr/bin/env python3\nfrom lab.msg import GoAction\n",
+         "action/Go.action": "int32 n\n---\nint32 n\n---\nint32 n\n"},
+        ["build-line"] * 3, "write actionlib_msgs message_generation after",
+        after={CMAKELISTS: "generate_messages(DEPENDENCIES actionlib_msgs)"},
+    ),
+    "messages-and-services-without-generation": Case(
+        {"src/talker.py": "#!/usr/bin/env python3\nfrom lab.msg import Num\n", "msg/Num.msg": "int8 a\n",
+         "srv/Add.srv": "---\n",
+         CMAKELISTS: CMAKE.replace("rospy)\n", "message_generation rospy)\nadd_message_files(FILES Num.msg)\n"
+                                                "add_service_files(FILES Add.srv)\n")},
+        ["build-line"], "does not call generate_messages(…)",
+        after={CMAKELISTS: "add_service_files(FILES Add.srv)\ngenerate_messages()\n"},
+    ),
+    "own-action-in-another-order": Case(
+        {"src/go.py": "from lab.msg import GoAction\n",
+         "action/Go.action": "int32 n  # how far\n---\nint32 left\n---\nbool there\n",
+         CMAKELISTS: ACTION_CMAKE},
+        ["build-line"], "result and feedback have changed places",
+        asking(definitions=(("action/Go.action", GO_FIELDS),)),
+        {"action/Go.action": "int32 n  # how far\n---\nbool there\n---\nint32 left\n"},
+    ),
+    "own-action-without-its-dividers": Case(
+        {"src/go.py": "from lab.msg import GoAction\n", "action/Go.action": "int32 n\nbool there\nint32 left",
+         CMAKELISTS: ACTION_CMAKE},
+        ["build-line"], "write a line `---` below lines 1 and 2",
+        asking(definitions=(("action/Go.action", GO_FIELDS),)),
+        {"action/Go.action": "int32 n\n---\nbool there\n---\nint32 left"},
+    ),
+    "own-service-without-its-divider": Case(
+        {**SERVICE, "srv/Two.srv": "int64 a\nint64 sum\n", TALKER: SCRIPT + "from lab.srv import Two\n",
+         CMAKELISTS: SERVICE_CMAKE}, ["build-line"], "below line 1 add `---`",
+        asking(definitions=(("srv/Two.srv", TWO_FIELDS),)), {"srv/Two.srv": "int64 a\n---\nint64 sum\n"},
+    ),
+    "own-action-with-fields-mixed": Case(
+        {"src/go.py": "from lab.msg import GoAction\n", "action/Go.action": "int32 n\nint32 left\nbool there\nint8 s\n",
+         CMAKELISTS: ACTION_CMAKE}, [], wanted=asking(definitions=(("action/Go.action", GO_FIELDS),)),
+    ),
+    "own-action-with-another-number": Case(
+        {"src/go.py": "from lab.msg import GoAction\n",
+         "action/Go.action": "int8 n\n---\nbool there\n---\nint32 left\n",
+         CMAKELISTS: ACTION_CMAKE},
+        ["build-line"], "line 1 of action/Go.action: goal.n is int8, but the handout asks for int32",
+        asking(definitions=(("action/Go.action", GO_FIELDS),)), {"action/Go.action": "int32 n\n---\nbool"},
+    ),
+    "own-message-with-a-text-for-a-list": Case(
+        {**OWN, "msg/Level.msg": "float32 level\nstring  names  # of all\nbyte b\n", CMAKELISTS: GENERATED},
+        ["build-line"], "write `string[] names`", asking(definitions=(("msg/Level.msg", LEVEL_FIELDS),)),
+        {"msg/Level.msg": "float32 level\nstring[]  names  # of all\nbyte b\n"},
+    ),
+    "own-message-of-no-type": Case(
+        {**OWN, "msg/Level.msg": "Float64 level\n", CMAKELISTS: GENERATED}, ["build-line"], "write `float64 level`",
+    ),
+    "own-message-of-a-package-of-no-such-name": Case(
+        {**OWN, "msg/Level.msg": "std_msg/Header header\nstd_msgs/float32[] levels # all\n",
+         CMAKELISTS: GENERATED.replace("messages()", "messages(DEPENDENCIES std_msgs)")},
+        ["build-line"] * 2, "there is no field type `std_msg/Header`",
+        after={"msg/Level.msg": "std_msgs/Header header\nstd_msgs/Float32[] levels # all\n"},
+    ),
+    "own-message-with-lines-that-are-no-fields": Case(
+        {**OWN, "msg/Level.msg": "uint8 OK 0  # good\nfloat64: level\nfloat64\ttilt\nfloat64 my-speed\n",
+         CMAKELISTS: GENERATED},
+        ["build-line"] * 4, "`uint8 OK 0  # good` on line 1 is not a field",
+        after={"msg/Level.msg": "uint8 OK = 0  # good\nfloat64 level\nfloat64 tilt\nfloat64 my_speed\n"},
+    ),
+    "own-message-with-constants-without-their-sign": Case(
+        {**OWN, "msg/Level.msg": "uint8 LOW 0\nuint8 HIGH: 1\nfloat64 level;\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")},
+        ["build-line"] * 3, "`uint8 LOW 0` on line 1 is not a field",
+        after={"msg/Level.msg": "uint8 LOW = 0\nuint8 HIGH = 1\nfloat64 level\n"},
+    ),
+    "own-message-with-a-line-of-no-meaning": Case(
+        {**OWN, "msg/Level.msg": "the level of the water\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")}, [],
+    ),
+    "own-message-of-a-misspelt-package": Case(
+        {**OWN, "msg/Level.msg": "geometry_msg/Point at\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES geometry_msgs)\ncatkin_p")},
+        ["build-line"], "there is no field type `geometry_msg/Point`",
+        after={"msg/Level.msg": "geometry_msgs/Point at\n"},
+    ),
+    "own-message-of-no-use": Case({"msg/Level.msg": "float64 level\n"}, []),
+    "own-service-behind-generation": Case(
+        {**SERVICE, CMAKELISTS: CMAKE.replace(
+            "rospy)\n", "message_generation rospy)\ngenerate_messages()\nadd_service_files(\n  FILES Two.srv)\n")},
+        ["build-line"], "move add_service_files(…), from line 5, above generate_messages(…)",
+        after={CMAKELISTS: "add_service_files(\n  FILES Two.srv)\n\ngenerate_messages()\ncatkin_package()"},
+    ),
+    "own-service-called-a-message": Case(
+        {**SERVICE, CMAKELISTS: SERVICE_CMAKE.replace("service_files", "message_files")},
+        ["build-line"], "write add_service_files instead of add_message_files",
+        after={CMAKELISTS: "add_service_files(FILES Two.srv)"},
+    ),
+    "own-service-with-two-dashes": Case(
+        {**SERVICE, "srv/Two.srv": "int64 a\n--\nint64 b\n", CMAKELISTS: SERVICE_CMAKE},
+        ["build-line"], "line 2 does not divide its parts: that takes three of `-`",
+        after={"srv/Two.srv": "int64 a\n---\nint64 b\n"},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_mistake_in_a_definition_is_found_and_repaired(name: str, tmp_path: Path) -> None:
+    check(CASES[name], tmp_path)
