@@ -286,13 +286,15 @@ class _ClockTrial:
             return
         if not self._topic:
             self._begin(now_s)
-        elif now_s > self._began_s + max(TRIAL_S, TRIAL_MESSAGES / self._hz):
+        elif now_s > self._began_s + self._length_s():
             self._is_over = True
             came_hz = (self._arena.live.topics[self._topic].count - self._count) / (now_s - self._began_s)
             if came_hz < SLOWED * self._hz:
                 self._set(self._scenario.warp, "the node follows the simulated clock, which runs fast again")
             else:
                 self._set(1, "the node does not follow the simulated clock; the run goes on in real time")
+        if self._topic:
+            self._arena.live.graph_changed_s = now_s  # what pauses now is not silent
 
     def _begin(self, now_s: float) -> None:
         live = self._arena.live
@@ -308,9 +310,12 @@ class _ClockTrial:
                     self._set(1, "the node is slow; the clock shows whether the node follows it")
                 return
 
+    def _length_s(self) -> float:
+        # a run is over once a topic has been silent for so long
+        return min(max(TRIAL_S, TRIAL_MESSAGES / self._hz), self._scenario.until.silent_s / 2)
+
     def _set(self, warp: float, detail: str) -> None:
         self._arena.send(do="rewarp", warp=warp, detail=detail)
-        self._arena.live.graph_changed_s = time.monotonic()  # what pauses now is not silent
 
 
 def process_specs(start: Start, place: ProcessEnvironment, numbers: Iterator[int]) -> Iterator[ProcessSpec]:

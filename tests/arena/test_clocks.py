@@ -78,11 +78,8 @@ def test_node_that_sleeps_by_the_wall_is_noticed_and_goes_on_in_real_time(tmp_pa
     assert any("does not follow" in event.detail for _, event in run.actors)
 
 
-@pytest.mark.parametrize("hz", [0.5, 0.2])
-def test_a_slow_node_that_follows_the_clock_is_not_taken_for_one_of_real_time(
-    hz: float, tmp_path: Path
-) -> None:
-    code = COUNTER.format(prepare=f"rate = rospy.Rate({hz})", sleep="rate.sleep()")
+def test_a_slow_node_that_follows_the_clock_is_not_taken_for_one_of_real_time(tmp_path: Path) -> None:
+    code = COUNTER.format(prepare="rate = rospy.Rate(0.2)", sleep="rate.sleep()")
     run = run_script(tmp_path, code, clock="warped", messages={"/count": 60}, limit_s=50)
     assert _values(run)[:60] == list(range(60))
     assert run.outcome.outcome == "complete"
