@@ -107,6 +107,7 @@ def _steps(text: str, types: list[str], known: Known, *, is_run: bool = True) ->
     for step in make_readable(text):
         text = step["text"]
         yield step
+    seen = {text}
     if syntax_error(text) is None:
         for repair in (
             _without_old_names,
@@ -136,7 +137,10 @@ def _steps(text: str, types: list[str], known: Known, *, is_run: bool = True) ->
             *((_with_main, _with_server_started, _with_spin) if is_run else ()),
         ):
             for step in repair(text):
+                if step["text"] in seen:  # two repairs that undo each other would do so for ever
+                    break
                 text = step["text"]
+                seen.add(text)
                 yield step
 
 
