@@ -88,7 +88,8 @@ def charge_repairs(
         possible = [c for c in criteria if repair in needs[c.id] and _may_ask_for(first[c.id], repair)]
         named = [c for c in possible if repair.kind in NAMES and _names(c, repair)]
         failing = [c for c in possible if first[c.id].status is not Status.BLOCKED]
-        citing = [c for c in failing if cites_file(first[c.id], repair)]
+        # where nothing was printed, the line that is cited would print it, and is not to blame
+        citing = [c for c in failing if cites_file(first[c.id], repair) and not first[c.id].silent]
         builds = [c for c in possible if repair.kind in OF_BUILDS and c.check == BUILD]
         counting = [c.id for c in (*builds, *named, *citing, *failing, *possible) if c.points > 0]
         other = [name for name in counting if name not in misnamed]
