@@ -352,7 +352,7 @@ def _never_moves(
     if not sent or any(command.speed or command.turn for command in sent):
         return why_still(failed_or_blocked(message, hint=DRIVE).stuck(params.number), run)
     message += f": {plural(len(sent), 'velocity', 'velocities')} came, and {'all are' if len(sent) > 1 else 'it is'} 0"
-    return failed_or_blocked(message, hint=NEXT if params.number > 1 else STOPPED)
+    return failed_or_blocked(message, hint=f"{NEXT}; {STOPPED}" if params.number > 1 else STOPPED)
 
 
 def _fell_silent(
