@@ -206,7 +206,7 @@ def _not_printed(
         why := _unserved(asked, lacking, own, run, never)
         or unheard_of
         or _unseen(one, package, run, params, never)
-        or unprinted_result(package, one.start.script or "", never, params.words, params.found_in)
+        or unprinted_result(package, one, never, params.words, params.found_in)
     ):
         return why
     if not own:

@@ -15,7 +15,7 @@ from functools import partial
 from itertools import accumulate
 from typing import Literal, NamedTuple
 
-from grader.checks.support.processes import run_slips
+from grader.checks.support.processes import Life, run_slips
 from grader.checks.support.text import VALUE, line_pattern, words_pattern
 from grader.evidence.run import Run, once_for_each_run
 from grader.model.package import PackageFacts
@@ -537,16 +537,18 @@ def not_reached(verdict: Verdict, slip: PythonSlip) -> Verdict:
 
 
 def unprinted_result(
-    package: PackageFacts, script: str, never: str, words: str, found_in: Callable[[Line], Iterable[object]]
+    package: PackageFacts, one: Life, never: str, words: str, found_in: Callable[[Line], Iterable[object]]
 ) -> Verdict | None:
     """Return the loss where a function of the script returns the words, or the number in them, and nothing prints what
     it returns; `never` begins the message."""
+    script = one.start.script or ""
     own = [s for s in package.slips if (s.kind, s.file) == ("drops-result", script)]
     texts = [s for s in own if any(found_in(Line(0, filled(s))))]
     numbers = [s for s in own if s.message == "{}" and re.search(r"\d|<number>", words)]
     slip = next(iter(texts or numbers), None)
     if slip is None:
-        return _unreached(package, script, never, found_in)
+        # a script that still waits for what it calls may yet catch something
+        return _unreached(package, script, never, found_in) if one.ended_early else None
     call = f"`{slip.name}(…)` on line {slip.line}"
     why = f"line {slip.fix} of {slip.file} returns {'it' if texts else 'the number'}"
     hint = f"print what {call} returns" if texts else f"print {words} above line {slip.fix}"

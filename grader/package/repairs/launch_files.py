@@ -172,9 +172,9 @@ def _repair_nodes(files: Files, package: PackageFacts, wanted: Wanted) -> None:
 
 def _rename_second_nodes(files: Files, launch: LaunchFile) -> None:
     """Name a node after its program where another one has its name: roslaunch refuses the file. Where nodes have
-    namespaces, one of these may be wrong instead."""
+    namespaces or groups, one of these may be wrong instead."""
     nodes = [node for node in launch.brings if not node.uncertain and "$(" not in node.full_name]
-    if any(node.namespace != "/" for node in nodes):
+    if any(node.namespace != "/" for node in nodes) or re.search(r"<group\b", files.text(launch.path) or ""):
         return
     taken: set[str] = set()
     for node in nodes:
