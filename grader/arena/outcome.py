@@ -50,8 +50,9 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
     silent = silent or _in_namespaces(live, until, now_s)
     if silent:
         return "silent", silent
-    slow = "" if wanting else _too_slow(live, until, given, now_s)
-    late = slow or (now_s - live.started_s > until.limit_s and f"not complete after {until.limit_s:g} s")
+    late = "" if wanting else _too_slow(live, until, given, now_s)
+    if not late and now_s - live.started_s > until.limit_s:
+        late = f"not complete after {until.limit_s:g} s"
     return ("timeout", late) if late else None
 
 

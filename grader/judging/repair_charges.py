@@ -75,9 +75,8 @@ def charge_repairs(
             continue  # the clock is only fast to save time
         if asking := _asking(rubric, first, better, repair):
             is_other = {c.id: repair.file not in texts_in(c.parameters) for c in asking}
-            charges[repair] = {
-                min(asking, key=lambda c: (_lines_away(first[c.id], repair), is_other[c.id])).id
-            }
+            nearest = min(asking, key=lambda c: (_lines_away(first[c.id], repair), is_other[c.id]))
+            charges[repair] = {nearest.id}
             continue
         own = [c for c in rubric.criteria if repair.kind == "node-name" and _names(c, repair)]
         if any(first[c.id].status.is_lost and c.id not in better for c in own):

@@ -561,9 +561,7 @@ def _unreached(
 ) -> Verdict | None:
     """Return the loss where an `except` prints the words, and what is above it raised nothing."""
     own = [s for s in package.slips if s.file == script]
-    said = [
-        s for s in own if s.kind == "prints" and any(found_in(Line(0, re.sub(r"\{\w*\}", "0", s.message))))
-    ]
+    said = [s for s in own if s.kind == "prints" and any(found_in(Line(0, filled(s))))]
     caught = {s.line + 1: s for s in own if s.kind == "catches"}
     if len(said) != 1 or said[0].line not in caught:
         return None

@@ -114,11 +114,9 @@ def with_attributes(text: str) -> Iterator[Step]:
         if edit is None and meant and span is not None:
             line, _, end = span
             edit = (line, end - len(node.attr), end, meant)
-        for step in (
-            step_to("attribute", node.lineno, text, edited(text, [edit]), f"rospy.{node.attr}")
-            if edit
-            else ()
-        ):
+        if edit is None:
+            continue
+        for step in step_to("attribute", node.lineno, text, edited(text, [edit]), f"rospy.{node.attr}"):
             yield step
             yield from with_attributes(step["text"])
             return

@@ -93,7 +93,7 @@ _LISTED = re.compile(r"""^( *)- (?=["']?[A-Za-z_][\w-]*["']?:(?:\s|$))""")
 
 
 def _in_levels(files: Files, path: str, text: str, names: list[tuple[str, ...]]) -> None:
-    """Write a file anew that has all names of one root, and nothing else, by names that are too short."""
+    """Rewrite a file that holds all the names below one root, and nothing else, without their upper levels."""
     values = _values(text)
     found = {name: [one for one in values if one[-1] in _flat(name)] for name in names if len(name) > 1}
     root = next((name[0] for name, own in found.items() if own), "")
@@ -103,7 +103,7 @@ def _in_levels(files: Files, path: str, text: str, names: list[tuple[str, ...]])
     if not fix or sorted(used) != sorted(values) or any(len(own) != 1 for own in meant.values()):
         return
     if any(name in values for name in meant):
-        return  # which is moved by itself
+        return  # only the names at the wrong level have to move: another repair does that
     lines = text.split("\n")
     nested = [*(line for line in lines if line.startswith("#")), f"{root}:"]
     for block in dict.fromkeys(name[1] for name in meant):
