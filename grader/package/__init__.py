@@ -4,5 +4,5 @@ A `Submission` comes in, `PackageFacts` go out. Nothing of the student's is exec
 wrong is for `checks` to say.
 
 `repairs/` holds the kinds of repair, a file for each kind of file. The lines that they write are worked out here:
-`line_corrections` for text and XML, `cmake_corrections` for CMake; for Python `python_repairs/`.
+`line_corrections` for any text, `xml_corrections` for XML, `cmake_corrections` for CMake; for Python `python_repairs/`.
 """

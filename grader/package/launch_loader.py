@@ -19,8 +19,8 @@ from grader.installable import TUTORIALS, known_packages
 from grader.model.file_fault import Fault
 from grader.model.launch_file import LateRemap, LaunchArg, LaunchLine, LaunchLoad, LaunchNode, LaunchParam
 from grader.model.record import Record
-from grader.package.line_corrections import ATTRIBUTES
 from grader.package.xml import line_of
+from grader.package.xml_corrections import ATTRIBUTES
 from grader.wording import PAIR, is_one_edit
 
 INCLUDES_MAX = 50

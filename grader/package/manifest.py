@@ -18,9 +18,9 @@ from lxml import etree
 
 from grader.model.file_fault import Fault
 from grader.model.package import MANIFEST, Dependency, Manifest, Person
-from grader.package.line_corrections import TAGS
 from grader.package.reading import read_markup
 from grader.package.xml import find_strange, line_of, parse_xml
+from grader.package.xml_corrections import TAGS
 from grader.syntax_fixes import Reason
 
 _TEXT_CHARS_MAX = 4_000
