@@ -23,8 +23,8 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def significant(value: float) -> str:
-    """Return a measured number with four significant digits: `9.98`, `0.001234`; whole numbers as they are."""
-    return f"{value:.10g}" if float(value).is_integer() else f"{value:.4g}"
+    """Return a measured number with four significant digits: `9.98`, `0.001234`; whole numbers as they are, -0 as 0."""
+    return f"{value + 0:.10g}" if float(value).is_integer() else f"{value:.4g}"
 
 
 def hertz(rate_hz: float) -> str:

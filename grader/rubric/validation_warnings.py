@@ -71,6 +71,7 @@ def warnings(rubric: WrittenRubric) -> Iterator[Fault]:
     yield from _other_rates(rubric)
     yield from _not_private(rubric)
     yield from _ends_and_lives(rubric)
+    yield from _never_quiet(rubric)
     yield from _answers_waited_for(rubric)
     yield from _more_values(rubric)
     yield from _numbers_as_text(rubric)
@@ -450,6 +451,17 @@ def _ends_and_lives(rubric: WrittenRubric) -> Iterator[Fault]:
             if ended in starts and (of := lives.get(_what(starts[ended]))) and not stopped:
                 fault = f"{of} wants {ended} to stay alive, and this run waits for its end"
                 yield ("scenarios", name, "until", "ended", index), fault
+
+
+def _never_quiet(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield runs that wait for silence, though a criterion asks for a topic that comes again and again."""
+    for criterion in rubric.criteria:
+        quiet_s = as_map(criterion.scenario.get("until")).get("quiet_s")
+        topic, rate_hz = criterion.given.get("topic"), criterion.given.get("rate_hz")
+        if criterion.check == "rate" and is_number(quiet_s) and is_number(rate_hz) and quiet_s * rate_hz > 1:
+            often = f"{criterion.id} asks for {topic} at {rate_hz:g} Hz"
+            fault = f"{often}: leave this out, unless the node stops by itself, or the run lasts until its limit_s"
+            yield ("scenarios", criterion.run, "until", "quiet_s"), fault
 
 
 def _what(start: dict[str, Any]) -> str:

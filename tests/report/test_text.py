@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from lxml import html as parser
 
 from grader.report.text import csv_text, html, markdown, markdown_code, visible
-from grader.wording import did_you_mean, number
+from grader.wording import did_you_mean, number, significant
 from tests.report.markdown_readers import FOUND_BY_FORGES, HARMLESS, MARKDOWN, QUICK_ACTION, prose
 from tests.report.nasty import STEERING, TEXTS
 
@@ -231,6 +231,7 @@ def test_a_number_of_ours_stays_a_number_and_text_stays_text(cell, shown):
 
 def test_numbers_carry_no_idle_zeros():
     assert [number(x) for x in (10, 100.0, 87.5, 0, 0.1 + 0.2)] == ["10", "100", "87.5", "0", "0.3"]
+    assert [significant(x) for x in (2.0, -0.0, 9.98765, -0.001234)] == ["2", "0", "9.988", "-0.001234"]
 
 
 @pytest.mark.parametrize(
