@@ -126,9 +126,8 @@ WORKS = ("init_node", "publish", "spin", "sendTransform", "send_goal", "set_para
 
 
 def never_run(tree):
-    """Functions that make a node, publish or wait, and that nothing names; and `__name__` beside another word than
-    `__main__`.
-    """
+    """Functions that make a node, publish or wait, and that nothing names; and an `if __name__ == '__main__':` that
+    compares with another word, or another name."""
     named = {n.id for n in all_of(tree, ast.Name) if isinstance(n.ctx, ast.Load)}
     named |= {n.attr for n in all_of(tree, ast.Attribute)}
     plain = [n for n in tree.body if not isinstance(n, (ast.FunctionDef, ast.ClassDef))]
@@ -156,10 +155,39 @@ def never_run(tree):
                 owner = owner and (made_of.get(owner) or owner + "()") + "."
                 fix = handed_over(node, tree, owner)
                 yield slip(node.lineno, "never-called", message, fix, owner + node.name)
-        elif isinstance(node, ast.Compare) and getattr(node.left, "id", "") == "__name__":
-            word = getattr(node.comparators[0], "value", "__main__")
-            if word != "__main__" and isinstance(node.ops[0], (ast.Eq, ast.Is)):
-                yield slip(node.lineno, "main-guard", "`__name__` is never %r" % (word,))
+        elif isinstance(node, ast.If) and isinstance(node.test, ast.Compare):
+            message = never_main(node, tree)
+            if message:
+                yield slip(node.lineno, "main-guard", message)
+
+
+def never_main(node, tree):
+    """Return why `if __name__ == '__main__':`, or what stands in its place, never holds; "" where it may hold."""
+    sides = [node.test.left, node.test.comparators[0]]
+    words = [one.value if isinstance(one, ast.Constant) else None for one in sides]
+    named = [getattr(one, "id", "") for one in sides]
+    if isinstance(node.test.ops[0], NEVER):
+        plain = [one for one in tree.body if not isinstance(one, (ast.FunctionDef, ast.ClassDef))]
+        running = [one for one in plain if any(isinstance(n, ast.Call) for n in ast.walk(one))]
+        hides = running == [node] and not node.orelse and "__name__" in named and "__main__" in words
+        return "`__name__` is '__main__' whenever the script is run" if hides else ""
+    if not isinstance(node.test.ops[0], (ast.Eq, ast.Is)):
+        return ""
+    if "__name__" in named:
+        word = words[1 - named.index("__name__")]
+        return "" if word in ("__main__", None) else "`__name__` is never %r" % (word,)
+    if "__main__" not in words:
+        return ""
+    at = 1 - words.index("__main__")
+    given = {n.id for n in all_of(tree, ast.Name) if isinstance(n.ctx, ast.Store)}
+    given |= {n.arg for n in all_of(tree, ast.arg)}
+    name = named[at] if named[at] not in given else ""
+    name = repr(words[at]) if isinstance(words[at], str) and words[at] != "__main__" else name
+    return "`%s` is never '__main__'" % name if name else ""
+
+
+NEVER = (ast.NotEq, ast.Lt, ast.Gt)
+"""Comparisons that do not hold between equal values."""
 
 
 def handed_over(function, tree, owner):

@@ -410,7 +410,7 @@ WORDS: dict[Cause, tuple[str, str]] = {
      "write `global {word}` as the first line of the function"),
     "kept": ("{place}: the function around it gives a value to a {word} of its own, not to that of the file",
      "write `global {word}` as the first line of the function"),
-    "guard": ("{place}: `__name__` is never {word!r}", ""),
+    "guard": ("{place}: {word}", ""),
     "line": ("{place}: the line `{word}` is missing", ""),
     "twice": ("{place}: this line repeats the one above", "delete line {line}"),
     "turned": ("lines {line} and {below} of {file} are the wrong way round", "write line {below} above line {line}"),
