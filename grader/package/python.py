@@ -356,7 +356,7 @@ def _reason_of_block(message: str, text: str, *, mixed: bool) -> Reason | None:
         why = f"there is nothing in the block on line {empty[1]}"
         return Reason(why, f"below line {empty[1]}, write `pass`")
     if empty and (commented or (_NEXT_BLOCK.match(text) and "class" not in message)):
-        why = f"there are only comments in the block on line {empty[1]}"
+        why = f"there {'are only comments' if commented else 'is nothing'} in the block on line {empty[1]}"
         return Reason(why, f"below line {empty[1]}, write what it should do")
     return None
 

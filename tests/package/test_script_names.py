@@ -351,6 +351,11 @@ def test_an_exception_gets_the_name_that_is_used(caught: str, meant: str, tmp_pa
             "class A:\n    def go(self):\n        pass\n    self.go()\n",
             ["indent line 4 like the lines of the method above it, or delete it"],
         ),
+        (
+            "class A:\n    def __init__(self, naMe):\n        self.name = name\n",
+            ["write naMe instead of name"],
+        ),
+        ("while 1:\n    breka\n", ["write break instead of breka"]),
         ("class A:\n    print('made')\n", []),
         ("twist = Twist()\n", []),
         ("from a import *\ncounter = 0\nprint(conter)\n", []),
@@ -374,6 +379,7 @@ def test_a_name_that_is_not_there_and_one_that_is_spelt_alike(tmp_path, text, to
         ("def talk():\n    pass\nrospy.init_node(talker)", ["'talker'"]),
         ("chatter = 'chatter'\nrospy.Publisher(chatter, String, queue_size=1)", []),
         ("print(chatter)", []),
+        ("rospy.Publisher(topic_name, String, queue_size=1)", []),
     ],
 )
 def test_names_that_ros_is_given_without_quotes(tmp_path, code, fixes):

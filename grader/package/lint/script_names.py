@@ -18,6 +18,10 @@ OLD_NAMES = {
 }  # fmt: skip
 """Of Python 2: the traceback is explained by what Python 3 has in their place."""
 EXCEPTIONS = {name for name in dir(builtins) if name.endswith(("Error", "Exception", "Interrupt"))}
+OF_VARIABLES = ("name", "topic")
+"""So ends the name of a variable that has a name for its value."""
+FITTING = {ast.ExceptHandler: EXCEPTIONS, ast.Expr: {"pass", "break", "continue", "return"}}
+"""What a name is meant for by where it stands, besides names."""
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 LOOPS = (ast.While, ast.For)
 COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
@@ -163,9 +167,8 @@ def published_type(call):
 def misspelt(tree):
     """Names that are read where nothing has given them a value: `misspelt` where one that is bound is spelt alike, or
     `self` has one of that name, else `undefined`."""
-    names = all_of(tree, ast.Name)
+    names, imported = all_of(tree, ast.Name), {a.name for n in all_of(tree, ast.Import) for a in n.names}
     own = given_names(tree, names)
-    imported = {a.name for n in all_of(tree, ast.Import) for a in n.names}
     if "*" in own or len(own) > NAMES_LIMIT:
         return
     attributes = {dotted(n) for n in all_of(tree, ast.Attribute) if isinstance(n.ctx, ast.Store)}
@@ -181,11 +184,13 @@ def misspelt(tree):
     for node in unknown[:USES_LIMIT]:
         kind, line, message = "undefined", node.lineno, ""
         fitting = stored if id(node) in texts else own - functions if is_value(node, tree) else own
-        fitting = (
-            fitting | EXCEPTIONS if isinstance(parents_of(tree).get(node), ast.ExceptHandler) else fitting
-        )
-        near = "" if node.id in known | OLD_NAMES else spelt_alike(node.id, fitting, attributes)
+        around = parents_of(tree).get(node)
+        fitting = fitting | FITTING.get(type(around), set())
+        # what an object has is not meant by `name` in `self.name = name`
+        others = attributes.difference(map(dotted, getattr(around, "targets", ())))
+        near = "" if node.id in known | OLD_NAMES else spelt_alike(node.id, fitting, others)
         near = "" if made.get(near) == node.id else near  # `twist = Twist()` lacks an import
+        near = "__name__" if node.id == "name" and is_guard(node, tree) else near
         if id(node) in outside and (node.id == "self" or node.id not in known):
             message = "line %d is in the class, but in none of its methods, so it runs before them" % line
             fix = "indent line %d like the lines of the method above it, or delete it" % line
@@ -202,7 +207,7 @@ def misspelt(tree):
         elif node.id not in known and (argument := unread_argument(node, tree)):
             kind, message = "misspelt", "the argument of `%s` is called `%s`" % argument
             fix = "write %s instead of %s" % (argument[1], node.id)
-        elif id(node) in unbound and id(node) in texts:
+        elif id(node) in unbound and id(node) in texts and not node.id.endswith(OF_VARIABLES):
             message = "`%s` is written here without quotes" % node.id
             fix = "on line %d, write `'%s'`" % (line, node.id)
         elif id(node) in unbound:
@@ -315,7 +320,7 @@ def spelt_alike(name, own, attributes):
     """Return the name that is meant, "" where none is alike."""
     if "self." + name in attributes:
         return "self." + name
-    if name.strip("_") == "name":
+    if name.strip("_") == "name" != name:
         return "__name__"
     stem = name.rstrip(DIGITS)
     if name[0].islower() and any(one != stem != name and one.rstrip(DIGITS) == stem for one in own):
@@ -324,7 +329,8 @@ def spelt_alike(name, own, attributes):
         own = {one for one in own if one[:1].isupper() or one.lower() == name.lower()}
     own = {one for one in own if not is_of_series(name, one)}
     near = difflib.get_close_matches(name[:TEXT_LIMIT], sorted(own), 1, 0.8)
-    return next(iter(near or [one for one in sorted(own) if sorted(one) == sorted(name)]), "")
+    near = near or [n for n in sorted(own) if sorted(n) == sorted(name) or n.lower() == name.lower()]
+    return near[0] if near else ""
 
 
 def is_value(node, tree):
@@ -458,8 +464,6 @@ MODULES = {
 }  # fmt: skip
 GIVEN_BY_NAME = {"queue_size": "10", "anonymous": "True", "latch": "True"}
 """Arguments of rospy's functions that are written with their name, and a value that most labs give them."""
-
-
 CALL_BACK = ("Subscriber", "Service", "Timer")
 """What is given a function that rospy calls."""
 EXCEPTION_NAMES = {"e", "err", "error", "ex", "exc", "exception"}

@@ -17,7 +17,7 @@ from itertools import chain, pairwise
 from typing import Literal, NamedTuple, TypeGuard
 
 from grader.package.python_repairs.members import with_place
-from grader.package.python_repairs.names import bound_in
+from grader.package.python_repairs.names import bound_in, is_kept_by_self
 from grader.package.python_repairs.syntax import (
     Step,
     edited,
@@ -395,6 +395,7 @@ def _names_of_objects(tree: ast.Module) -> Iterator[Argument]:
         for method in (n for n in methods if n.args.args and n.args.args[0].arg == "self"):
             known = shared | {name for part in method.body for name in _bound_in(part)}
             known |= {n.arg for n in nodes_in(method) if isinstance(n, ast.arg)}
+            known |= {n.value.id for n in nodes_in(method) if is_kept_by_self(n)}  # type: ignore[attr-defined]
             names = (n for n in nodes_in(method) if isinstance(n, ast.Name))
             for name in (n for n in names if n.id in attributes - known):
                 yield Argument([(name, f"self.{name.id}")], f"`{name.id}` belongs to the class {one.name}")

@@ -205,6 +205,7 @@ def _with_quotes(text: str) -> Iterator[Step]:
     arguments = {n.arg for n in nodes_in(tree) if isinstance(n, ast.arg)}
     texts = [n for n in _texts_of_ros(tree) if isinstance(n, ast.Name)]
     missing = [n for n in texts if n.id not in known and not meant_by(n.id, set(stored))]
+    missing = [n for n in missing if n.id != "topic" and not n.id.endswith("name")]  # a variable, by its name
     assigned = [n for n in nodes_in(tree) if isinstance(n, ast.Assign)]
     own = {id(inner): last_name(n.targets[0]) for n in assigned for inner in nodes_in(n.value)}
     keys = [n for n in _keys_of_parameters(tree) if n.id not in arguments]

@@ -32,9 +32,11 @@ MEMBERS = {
     "message": ("data",),
 }
 """By what makes the object, or a message of std_msgs: what belongs to it."""
-NAME_CHARS_MIN = 4
+ALONE = ("pass", "break", "continue", "return")
+"""What a statement of one word says."""
 IDLE_MAX = 20
 """So many functions that nothing names are tried for a call."""
+NAME_CHARS_MIN = 4
 """Of shorter names, a letter that is not the same is the larger part."""
 SHORT_NAME_CHARS_MIN = 2
 """Names of one letter are different names."""
@@ -235,22 +237,30 @@ def with_names(text: str) -> Iterator[Step]:
         own = shared | (bound_in(ast.Module([block], [])) if isinstance(block, ast.FunctionDef) else set())
         missing = [n for n in nodes_in(block) if isinstance(n, ast.Name) and n.id not in known]
         missing += _read_for_themselves(block, shared)
-        stated = (n.value for n in nodes_in(block) if isinstance(n, ast.Expr))
+        stated = [
+            n.value.id for n in nodes_in(block) if isinstance(n, ast.Expr) and isinstance(n.value, ast.Name)
+        ]
         parts_of = [n for n in nodes_in(block) if isinstance(n, ast.Attribute)]
         member_of = {n.value.id: n.attr for n in parts_of if isinstance(n.value, ast.Name)}
         given = {one: kind for one, kind in made_by(nodes_in(tree)).items() if one in own}
         values, idle = _values_in(block), _meant_calls(unread, block)
-        # what the object has is meant with `self.` before it
-        missing = [n for n in missing if f"self.{n.id}" not in kept] if "self" in bound else missing
-        alone = {n.id for n in stated if isinstance(n, ast.Name) and is_one_edit(n.id.lower(), "pass")}
+        # what the object has is meant with `self.` before it, but not in `self.name = name`
+        taken = {n.value.id for n in nodes_in(block) if is_kept_by_self(n)}  # type: ignore[attr-defined]
+        missing = (
+            [n for n in missing if n.id in taken or f"self.{n.id}" not in kept]
+            if "self" in bound
+            else missing
+        )
+        alone = {one: word for one in stated for word in ALONE if is_one_edit(one.lower(), word)}
+        called = {getattr(n.func, "id", "") for n in nodes_in(block) if isinstance(n, ast.Call) and n.args}
         for name in dict.fromkeys(n.id for n in missing):
-            guards = name == "name" and any(_is_guard(one) for one in tree.body)
-            of_python = next((one for one in OF_PYTHON if is_slip(name, one)), "")
+            guards = name == "name" and _is_guard(block)
+            of_python = next((one for one in OF_PYTHON if name in called and is_slip(name, one)), "")
             meant = OBVIOUS_NAMES.get(name) or ("__name__" if guards else "")
             near = own - functions if name in values else own
             near = {one for one in near if given.get(one) != name}  # `twist = Twist()` lacks an import
             meant = meant or meant_by(name, near, near - loaded) or idle.get(name, "")
-            meant = meant or ("pass" if name in alone else of_python)
+            meant = meant or alone.get(name, of_python)
             meant = meant or meant_by_use(name, member_of.get(name, ""), given, loaded)
             spans = [span for n in missing if n.id == name and (span := span_of(lines, n))]
             if meant and spans:
@@ -259,6 +269,13 @@ def with_names(text: str) -> Iterator[Step]:
                     yield step
                     yield from with_names(step["text"])
                     return
+
+
+def is_kept_by_self(node: ast.AST) -> bool:
+    """Return whether it is `self.name = name`."""
+    if not isinstance(node, ast.Assign) or not isinstance(node.value, ast.Name):
+        return False
+    return ast.unparse(node.targets[0]) == f"self.{node.value.id}"
 
 
 def _values_in(block: ast.stmt) -> set[str]:
