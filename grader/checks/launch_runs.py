@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import Annotated, NamedTuple
 
@@ -33,6 +33,7 @@ from grader.checks.support.launch_connections import (
     blame_same_script,
     over_another_topic,
     together_s,
+    wrong_name,
 )
 from grader.checks.support.launch_slips import (
     Slip,
@@ -301,8 +302,8 @@ def _right_parts(
     """Return the share of what is asked that is right, and what that is: nodes that came up and live, their
     connection, and parameters. Nothing is where no node came up."""
     nodes = {PurePosixPath(script).name: _of_script(package, file, run, script) for script in params.scripts}
-    for name, pkg in params.nodes.items():
-        wrong = _wrong_name(file, name, pkg) or _find_swap(file, name, params)
+    for name in params.nodes:
+        wrong = _wrong_name(file, name, params.nodes) or _find_swap(file, name, params)
         nodes[name] = [] if wrong else _nodes_named(file, name)[:1]
     nodes |= {program: list(nodes_of_program(file, program)[:1]) for program in params.programs}
     up = [
@@ -425,50 +426,52 @@ def _misnamed(file: LaunchFile, name: str, pkg: str) -> list[LaunchNode]:
 
 
 def _wrong_names(file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
-    """Return all nodes that only have another name or package than the lab asks for, or else the first that is lost
-    otherwise."""
-    slips = []
-    misnamed = ((name, node) for name, pkg in params.nodes.items() for node in _misnamed(file, name, pkg))
-    for wanted, node in misnamed:
-        why = f"the node of {node.type} is called {node.full_name}, not {wanted}"
-        # Inside a namespace, another `name` alone would not make the full name right.
-        if node.namespace == "/":
-            fix = f'on line {node.line}, write name="{wanted.lstrip("/")}"'
-            slips.append(Slip(node.file, node.line, why, fix).verdict())
-    of_others = (n for n in params.nodes.items() if _nodes_named(file, n[0]))
-    slips += filter(None, (_wrong_name(file, name, pkg) for name, pkg in of_others))
-    others = (
-        _wrong_name(file, name, pkg) or _find_swap(file, name, params) for name, pkg in params.nodes.items()
-    )
-    return joined(slips) or next(filter(None, others), None)
+    """Return all nodes that have another name or package than the lab asks for, or are not there."""
+    wrong = (_wrong_name(file, name, params.nodes) or _find_swap(file, name, params) for name in params.nodes)
+    return joined([one for one in wrong if one is not None])
 
 
-def _wrong_name(file: LaunchFile, name: str, pkg: str) -> Verdict | None:
-    found = _nodes_named(file, name)
+def _wrong_name(file: LaunchFile, name: str, wanted: Mapping[str, str]) -> Verdict | None:
+    found, pkg = _nodes_named(file, name), wanted[name]
     # What only roslaunch can work out may well be right.
     if any(n.pkg == pkg or "$(" in (n.pkg or "") for n in found):
         return None
     if found:
         why, at = f'{name} is a node of the package "{found[0].pkg}", not of {pkg}', found[0].line
         return Slip(found[0].file, at, why, f'on line {at}, write pkg="{pkg}"').verdict()
+    meant = _meant_node(file, name, wanted)
+    meant = _meant_node(file, name, wanted)
+    if meant is not None:
+        return wrong_name(meant, name).verdict()
     others = [n.full_name for n in file.brings]
     near = near_names(name, others) or tuple(others)
     seen = f"; it has {join_words(near)}" if near else ""
-    moved = [n for n in file.brings if n.pkg == pkg and f"/{n.name}" == name and n.namespace != "/"]
-    spaces = [line for node in moved for line in node.renaming if line.tag not in RENAMES]
-    if len(moved) == len(spaces) == 1:
-        why = f"{file.path} has no node {name}{seen}"
-        hint = f'remove ns="{spaces[0].value}" on line {spaces[0].line}: then {name.lstrip("/")} is {name}'
-        return failed(why, hint=hint, citations=(spaces[0].place,))
     space, _, own = name.lstrip("/").rpartition("/")
     inside = f' ns="{space}"' if space else ""
-    hint = f'write <node pkg="{pkg}" name="{own}"{inside} …/>'
-    twice = next(
-        (n for n in file.brings if n.ns and n.full_name.replace(f"/{n.ns.strip('/')}/", "/", 1) == name), None
+    return failed(
+        f"{file.path} has no node {name}{seen}", hint=f'add <node pkg="{pkg}" name="{own}"{inside} …/>'
     )
-    if twice is not None:
-        hint = f'on line {twice.line}, delete ns="{twice.ns}": the names of two namespaces are joined'
-    return failed(f"{file.path} has no node {name}{seen}", hint=hint)
+
+
+def _meant_node(file: LaunchFile, name: str, wanted: Mapping[str, str]) -> LaunchNode | None:
+    """Return the node that only has another name or namespace than the one that is asked for; None where several, or
+    none, may be meant. `wanted` are all that are asked for, with their packages."""
+    lacking = [one for one in wanted if not _nodes_named(file, one)]
+    meant = {one: _free_node(file, one, wanted) for one in lacking}
+    rivals = [one for one in lacking if meant[one] == meant[name]]
+    node = meant[name]
+    return node if node and name == (near_names(node.full_name, rivals) or rivals)[0] else None
+
+
+def _free_node(file: LaunchFile, name: str, wanted: Mapping[str, str]) -> LaunchNode | None:
+    own, others = name.rpartition("/")[2], [n for n in file.brings if n.full_name not in wanted]
+    programs = {one.rpartition("/")[2] for one in wanted} - {own}
+    stems = {n.full_name: PurePosixPath(n.type or "").stem for n in others if n.pkg == wanted[name]}
+    near = near_names(name, [full for full, stem in stems.items() if stem not in programs])
+    near = near or tuple(full for full, stem in stems.items() if stem == own)
+    of_space = [full for full in near if full.rpartition("/")[0] == name.rpartition("/")[0]]
+    meant = of_space[0] if len(of_space) == 1 else near[0] if near else ""
+    return next((n for n in others if n.full_name == meant and is_exact(n)), None)
 
 
 def _find_swap(file: LaunchFile, name: str, params: LaunchRunsParams) -> Verdict | None:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from grader.checks.registry import Check
 from grader.checks.support.launch import nodes_up
-from grader.checks.support.launch_slips import own_script
+from grader.checks.support.launch_slips import Slip, own_script
 from grader.checks.support.processes import TYPES_HINT, disputed_types, run_scripts
 from grader.checks.support.topics import End, nodes_on, topics_with
 from grader.evidence.events import GraphEvent
@@ -157,6 +157,31 @@ def _described(uses: Sequence[_Use], topic: str, *, drop_ns: bool, drop_remaps: 
 def _in_lines(found: Sequence[LaunchLine]) -> str:
     numbers = sorted({line.line for line in found})
     return f" on {on_lines(numbers)}" if numbers else ""
+
+
+def wrong_name(node: LaunchNode, name: str) -> Slip:
+    """Return the line that gives a node another full name than this one, and what to write there."""
+    space, _, own = name.rpartition("/")
+    lines = [line for line in node.renaming if line.tag not in RENAMES]
+    spaces = [line.value.strip("/") for line in lines]
+    spare = [n for n in range(len(lines)) if "/".join(spaces[:n] + spaces[n + 1 :]) == space.strip("/")]
+    at: LaunchLine | LaunchNode = node
+    fixes = [] if node.name == own else [f'on line {node.line}, write name="{own}"']
+    adds = f'add ns="{space.strip("/")}" to the <node>'
+    if node.namespace == f"{space}/":
+        pass
+    elif spare:
+        at = lines[spare[-1]]
+        then = "the names of two namespaces are joined" if len(lines) > 1 else f"then {own} is {name}"
+        fixes.insert(0, f'remove ns="{at.value}" on line {at.line}: {then}')
+    elif len(lines) == 1:
+        at = lines[0]
+        fixes.insert(0, f'on line {at.line}, write ns="{space.strip("/")}", not ns="{at.value}"')
+    else:
+        before = "take the <node> out of its groups, and " if lines else ""
+        fixes.insert(0, f"on line {node.line}, {before}{adds}")
+    why = f"the node of {node.type} is called {node.full_name}, not {name}"
+    return Slip(at.file, at.line, why, "; ".join(fixes))
 
 
 def over_another_topic(run: Run, topic: str, said: str = "") -> Verdict:
