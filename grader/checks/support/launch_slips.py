@@ -465,6 +465,10 @@ def right_remap(
     """Return the line of a node's only `<remap>`, with what to write there; else the node's, with where to look."""
     lines = [one for one in node.renaming if one.tag == "remap"]
     names = [name for name in published if name.rpartition("/")[0] in {node.namespace.rstrip("/"), ""}]
+    if not node.remaps:
+        name = published[0].removeprefix(node.namespace) if len(published) == 1 else "…"
+        tag = f'<remap from="{name}" to="{topic.removeprefix(node.namespace)}"/>'
+        return node, f"add `{tag}` to the <node> on line {node.line}: `from` is the name in the script"
     if len(lines) != 1 or len(names) != 1:
         return node, "look at its <remap>: `from` is the name in the script, `to` the new one"
     name, to = names[0].rpartition("/")[2], topic.removeprefix(node.namespace)

@@ -181,9 +181,11 @@ def _judge_misnamed(
     near, measured = near_names(topic, published), join_words(published)
     if node := _namespaced_node(package, run, topic):
         own = [name for name in published if name.startswith(node.namespace)]
-        message = f"{what}; the node publishes on {join_words(own or near or published)}"
-        line, hint = right_remap(node, topic, own or [*published])
-        return of_node(message, measured=measured, hint=hint).about(citations=(line.place,))
+        if node.remaps or (own and not near_names(topic, own)):
+            message = f"{what}; the node publishes on {join_words(own or near or published)}"
+            line, hint = right_remap(node, topic, own or [*published])
+            return of_node(message, measured=measured, hint=hint).about(citations=(line.place,))
+        near = near_names(topic, own) or near
     if not near:
         return None
     hint = f"name the topic {topic} in {PUBLISHER}"
@@ -192,10 +194,13 @@ def _judge_misnamed(
 
 
 def _namespaced_node(package: PackageFacts, run: Run, topic: str) -> LaunchNode | None:
-    """Return the launch file's remapped node in whose namespace the topic is, where the run is a launch file's."""
+    """Return the launch file's node in whose namespace the topic is, or that is remapped, where the run is a launch
+    file's."""
     if not lives(run) or any(run_scripts(run)):
         return None
-    nodes = [n for f in package.launch_files for n in f.brings if n.remaps and topic.startswith(n.namespace)]
+    nodes = [n for f in package.launch_files for n in f.brings if topic.startswith(n.namespace)]
+    heard = {n for name in topics_with(run, "publishers") for n in nodes_on(run, name, "publishers")}
+    nodes = [n for n in nodes if n.remaps or (n.namespace != "/" and n.full_name in heard)]
     # Of namespaces in one another, the innermost is the node's.
     return max(nodes, key=lambda n: len(n.namespace), default=None)
 
