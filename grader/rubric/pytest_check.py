@@ -337,14 +337,25 @@ def _score_tests(counted: list[TestOutcome], score: float) -> Verdict:
     passing = f"{len(counted) - len(lost)} of {len(counted)} tests pass"
     what_to_do = dict.fromkeys(t.hint for t in lost if t.hint)
     untold = [t for t in lost if not t.hint]
-    each = [*what_to_do, *(f"{t.name}: {t.message}" for t in untold)]
+    same = {
+        message: [t for t in untold if t.message == message]
+        for message in dict.fromkeys(t.message for t in untold)
+    }
+    each = [*what_to_do, *(f"{_names(tests)}: {message}" for message, tests in same.items())]
     hint = "; ".join(each[:HINTS])
     if len(each) > HINTS:
         hint += f"; and {len(each) - HINTS} more"
+    places = dict.fromkeys(t.place for t in untold if t.place)
+    hint += f"; what these tests call is {join_words(places)}" if places else ""
     if score >= 1:
         return passed(passing, hint=hint)
     message = f"{passing}; failed: {lost[0].title.rstrip('.') or lost[0].name} ({lost[0].message})"
     return partial_(score, message, hint=hint) if score > 0 else failed(message, hint=hint)
+
+
+def _names(tests: list[TestOutcome]) -> str:
+    more = f" and {len(tests) - 1} more" if len(tests) > 1 else ""
+    return f"{tests[0].name}{more}"
 
 
 def _sub_scores(tests: tuple[TestOutcome, ...]) -> str:
@@ -363,8 +374,8 @@ def _sub_score(test: TestOutcome) -> str:
 class TestOutcome(Record):
     """One test. `open`: a run that it asks for was not recorded. `message` is one line, empty where it passed.
 
-    `hint` says what to do, where that is known. `file` and `line` are the student's where an exception came from,
-    `late` says that a function took too long.
+    `hint` says what to do, where that is known. `file` and `line` are the student's where an exception came from, or
+    where the tested function is, of which `place` names all lines. `late` says that a function took too long.
     """
 
     __test__ = False
@@ -377,6 +388,7 @@ class TestOutcome(Record):
     hint: str = ""
     file: str = ""
     line: int | None = None
+    place: str = ""
     late: bool = False
 
 

@@ -14,8 +14,10 @@ import json
 import pickle
 import re
 import socket
+import time
 from collections import defaultdict, deque
 from collections.abc import Callable, Generator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +31,7 @@ from grader.installable import exists_somewhere, install_hint
 from grader.model.python_slip import PythonSlip
 from grader.model.verdict import Status, machine_lacks
 from grader.rubric.pytest_check import Outcome, SessionOutcome, TestOutcome
-from grader.wording import shorten
+from grader.wording import lines_text, shorten
 
 MESSAGE_CHARS = 300
 SAYING = (AssertionError, NotRecorded, pytest.fail.Exception, pytest.skip.Exception)
@@ -38,6 +40,14 @@ SAYING = (AssertionError, NotRecorded, pytest.fail.Exception, pytest.skip.Except
 _ADDRESS = re.compile(r"\b0x[0-9a-fA-F]{6,}\b")
 _EVIDENCE = pytest.StashKey[Evidence]()
 _CALLED = pytest.StashKey[set[tuple[str, str]]]()
+_CALLS = pytest.StashKey["ArenaCalls"]()
+_AGAIN = pytest.StashKey[Callable[[], object]]()
+CHANGES_S = 10.0
+CHANGES_MAX = 300
+CHANGES_SHOWN = 2
+"""How long small changes of functions are tried at most, how many of one function, and how many of them are shown."""
+NAMED = frozenset({"NameError", "UnboundLocalError", "AttributeError", "ImportError", "ModuleNotFoundError"})
+"""Exceptions that say themselves what to change."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -53,6 +63,9 @@ def pytest_configure(config: pytest.Config) -> None:
     data = config.getoption("--grader-evidence").read_bytes()
     config.stash[_EVIDENCE] = pickle.loads(data)  # noqa: S301 - written by the grader, in a folder of its own
     config.pluginmanager.register(_Notes(config.getoption("--grader-outcome"), config))
+    number = config.getoption("--grader-calls")
+    if number is not None:
+        config.stash[_CALLS] = ArenaCalls(socket.socket(fileno=number))
 
 
 @pytest.fixture(scope="session")
@@ -76,10 +89,8 @@ def package(evidence: Evidence) -> PackageFacts:
 @pytest.fixture(scope="session")
 def _ask(pytestconfig: pytest.Config) -> Ask:
     """Return what calls a student's functions; where the run is over, what answers as they did."""
-    number = pytestconfig.getoption("--grader-calls")
-    if number is not None:
-        return ask_arena(socket.socket(fileno=number))
-    return ask_evidence(pytestconfig.stash[_EVIDENCE].run)
+    calls = pytestconfig.stash.get(_CALLS, None)
+    return calls or ask_evidence(pytestconfig.stash[_EVIDENCE].run)
 
 
 @pytest.fixture
@@ -121,9 +132,46 @@ class _Notes:
             self._faults.append(f"{item.name}: {text or f'there is no fixture {fixture!r}'}")
         elif call.excinfo is not None and report.failed and not isinstance(error, SAYING):
             self._faults.append(self._exception(item, call.excinfo))
+        if report.when == "call":
+            self._remember(item, error)
         if report.when == "call" or not report.passed:
             self._note(item, error, report)
         return report
+
+    def _remember(self, item: pytest.Item, error: BaseException | None) -> None:
+        """Keep what calls the test again, unless its exception says itself what to change."""
+        raised = error.raised if isinstance(error, StudentError) else None
+        if isinstance(item, pytest.Function) and not (raised and raised.kind in NAMED):
+            given = {
+                name: value
+                for name, value in item.funcargs.items()
+                if name in inspect.signature(item.obj).parameters
+            }
+            again: Callable[[], object] = partial(item.obj, **given)
+            item.stash[_AGAIN] = again
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtestloop(self, session: pytest.Session) -> Generator[None, object, object]:
+        """While a run is recorded, look for a small change of a function with which all its tests would pass."""
+        done = yield
+        calls = session.config.stash.get(_CALLS, None)
+        tests, until_s = defaultdict[tuple[str, str], list[pytest.Item]](list), time.monotonic() + CHANGES_S
+        for item in session.items if calls else ():
+            called = item.stash.get(_CALLED, set[tuple[str, str]]())
+            if len(called) == 1 and item.nodeid in self._tests:
+                tests[min(called)].append(item)
+        for (file, function), items in tests.items():
+            failed = [item for item in items if self._tests[item.nodeid].outcome == "failed"]
+            again = [item.stash.get(_AGAIN, None) for item in (*failed, *items)]
+            known = [test for test in again if test is not None]
+            if (
+                calls
+                and failed
+                and len(known) == len(again)
+                and (found := _small_changes(calls, known, until_s))
+            ):
+                calls({"test": "", "file": file, "function": function, "small_changes": found})
+        return done
 
     def pytest_sessionfinish(self) -> None:
         """Write the outcome down."""
@@ -142,6 +190,9 @@ class _Notes:
         if unreached is not None:
             message = f"{message}; line {unreached.line} of {unreached.file}: {unreached.message}"
             hint = f"in {unreached.file}, {unreached.fix}"
+        changed = {} if hint or outcome != "failed" else self._found_changes(item)
+        hint = changed.get("hint", hint)
+        at: Answer = {"file": own.file, "line": own.line or None} if own.file and not hint else changed
         noted = self._tests.get(item.nodeid)
         # A teardown that fails counts, too, but does not take the place of what failed before it.
         if noted is None or noted.outcome == "passed":
@@ -152,8 +203,9 @@ class _Notes:
                 message=self._short(f"{own.call} raises {cause}") if cause else message,
                 points=self._points(item),
                 hint=hint,
-                file=unreached.file if unreached else own.file,
-                line=unreached.line if unreached else own.line or None,
+                file=unreached.file if unreached else at.get("file", own.file),
+                line=unreached.line if unreached else at.get("line", own.line or None),
+                place=changed.get("place", ""),
                 late=own.late,
             )
 
@@ -166,6 +218,27 @@ class _Notes:
         called = item.stash.get(_CALLED, set[tuple[str, str]]())
         found = (s for s in slips if s.kind == "wrong-value" and s.name == "unreached")
         return next((s for s in found if (s.file, s.message.split("`")[1]) in called), None)
+
+    def _found_changes(self, item: pytest.Item) -> Answer:
+        """Return where the function is that the test called, and a small change with which its tests pass."""
+        called = item.stash.get(_CALLED, set[tuple[str, str]]())
+        try:
+            found = _recorded_changes(self._evidence.run) if len(called) == 1 else {}
+        except (NoSuchScenario, NotRecorded):
+            return {}
+        file, function = min(called, default=("", ""))
+        change = found.get((file, function))
+        if change is None:
+            return {}
+        first, last = change["lines"]
+        passing = change["passing"]
+        if not passing:
+            lacks = "" if change.get("returns", True) else ", which has no `return` with a value"
+            place = f"`{function}`, {lines_text(first - 1, last - 1)} of {file}{lacks}"
+            return {"file": file, "line": first, "place": place}
+        writes = [f"write `{one['after']}`{_indent(one)} in line {one['line']}" for one in passing]
+        hint = f"in {file}, {' or '.join(writes)}: with that, each test of `{function}` passes"
+        return {"file": file, "line": passing[0]["line"], "hint": hint}
 
     def _explanation(self, error: StudentError) -> tuple[str, str]:
         """Return the cause and the hint of what a student's function raised; neither while a run is recorded."""
@@ -206,6 +279,48 @@ class _Notes:
         text = text.replace(self._folder, "…").replace(f"{self._rootdir}/", "")
         text = _ADDRESS.sub("0x…", text)
         return shorten(text, MESSAGE_CHARS)
+
+
+def _small_changes(calls: ArenaCalls, tests: list[Callable[[], object]], until_s: float) -> Answer:
+    """Return the function's lines, and up to `CHANGES_SHOWN` small changes with which all tests pass."""
+    found: Answer = {}
+    passing: list[Answer] = []
+    for number in range(CHANGES_MAX):
+        calls.change, calls.changed = number, {}
+        passes = all(_passes(test) for test in tests)
+        tried = "line" in calls.changed
+        if passes and tried:
+            passing.append(calls.changed)
+        found = calls.changed or found
+        over = not tried and (number == 0 or "lines" in calls.changed)
+        if over or len(passing) == CHANGES_SHOWN or time.monotonic() > until_s:
+            break
+    calls.change = None
+    return {**found, "passing": passing} if found else {}
+
+
+def _passes(test: Callable[[], object]) -> bool:
+    try:
+        test()
+    except (Exception, pytest.fail.Exception, pytest.skip.Exception):  # noqa: BLE001 - an answer may be anything
+        return False
+    return True
+
+
+class ArenaCalls:
+    """Calls functions in the run that is being recorded; with a number in `change`, as that small change makes them,
+    which is `changed` then."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self._ask = ask_arena(connection)
+        self.change: int | None = None
+        self.changed: Answer = {}
+
+    def __call__(self, request: Answer) -> Answer:
+        answer = self._ask(request if self.change is None else {**request, "change": self.change})
+        changed = answer.get("changed")
+        self.changed = changed if isinstance(changed, dict) else self.changed
+        return answer
 
 
 CALLED, ANSWERED = "type", "answer"
@@ -353,6 +468,28 @@ def ask_evidence(run: Run) -> Ask:
         return found.popleft()
 
     return ask
+
+
+def _recorded_changes(run: Run) -> dict[tuple[str, str], Answer]:
+    """Return what was found of the functions whose tests fail, by file and function."""
+    typed = [_answer(e.value) for _, e in run.actors if e.action == CALLED and e.actor == "grader"]
+    found = [(one, one["small_changes"]) for one in typed if isinstance(one.get("small_changes"), dict)]
+    return {(one["file"], one["function"]): changes for one, changes in found if _is_sound(changes)}
+
+
+def _is_sound(changes: Answer) -> bool:
+    """Return whether all is there and of its type: it comes from the sandbox."""
+    lines, passing = changes.get("lines"), changes.get("passing")
+    if not (isinstance(lines, list) and len(lines) == 2 and isinstance(passing, list)):
+        return False
+    numbers = [*lines, *(n for one in passing for n in (one.get("line"), one.get("spaces", 0)))]
+    return all(isinstance(n, int) for n in numbers) and all(
+        isinstance(one.get("after"), str) for one in passing
+    )
+
+
+def _indent(change: Answer) -> str:
+    return f" with {change['spaces']} spaces before it" if "spaces" in change else ""
 
 
 def _answer(text: object) -> Answer:

@@ -1,26 +1,44 @@
 """Calls functions of a package's Python files, one JSON request a line on stdin: `functions.py PACKAGE_FOLDER`.
 
 The answers are lines on stdout, `@grader` and JSON. A request has `id`, `test`, `file`, `function`, `args` and
-`kwargs`. Each test has a child process of its own, which imports the files. What it prints goes to stderr.
+`kwargs`. Each test has a child process of its own, which imports the files. What it prints goes to stderr. With
+`change`, a number, the function is called as the small change of that number makes it.
 
 Standard library only, Python 3.8. This process imports nothing of the package's.
 """
 
+import ast
 import contextlib
 import importlib.util
+import io
 import json
 import os
 import select
 import signal
 import sys
 import time
+import tokenize
 import traceback
 from pathlib import Path
 
 MARK = "@grader"
 LIMIT_S = 10.0
+CHANGED_LIMIT_S = 1.0
 ANSWER_BYTES_MAX = 3900
 MESSAGE_CHARS = 300
+OTHERS_MAX = 8
+SOURCE_CHARS_MAX = 100000
+WRITTEN_FOR = {
+    "+": ["-", "*"], "-": ["+", ""], "*": ["/", "+", "**"], "/": ["*", "//"], "//": ["/"], "**": ["*"], "^": ["**"],
+    "+=": ["-="], "-=": ["+="], "*=": ["/="], "/=": ["*="],
+    "<": ["<=", ">"], "<=": ["<", ">="], ">": [">=", "<"], ">=": [">", "<="], "==": ["!="], "!=": ["=="],
+    "and": ["or"], "or": ["and"], "not": [""], "True": ["False"], "False": ["True"],
+    "sin": ["cos"], "cos": ["sin"], "asin": ["acos"], "acos": ["asin"], "tan": ["atan"], "atan": ["tan", "atan2"],
+    "min": ["max"], "max": ["min"], "floor": ["ceil"], "ceil": ["floor"], "radians": ["degrees", ""],
+    "degrees": ["radians", ""], "abs": [""], "int": ["round", ""], "round": ["int", ""],
+}  # fmt: skip
+"""What beginners write one for the other, or where it isn't needed."""
+BEFORE_SIGN = frozenset(["(", ",", "=", "return", "*", "/", "["])
 
 
 def main(folder):
@@ -30,11 +48,13 @@ def main(folder):
     for line in sys.stdin:
         request = json.loads(line)
         # A new process for each test: what one test changes in a module must not reach the next
-        if child is None or child.ended or request["test"] != test:
+        about = request["test"], request.get("change")
+        if child is None or child.ended or about != test:
             if child is not None:
                 child.end()
-            child, test = Child(folder), request["test"]
-        print(MARK, request["id"], child.answer(line), flush=True)
+            child, test = Child(folder), about
+        limit_s = CHANGED_LIMIT_S if "change" in request else LIMIT_S
+        print(MARK, request["id"], child.answer(line, limit_s), flush=True)
 
 
 class Child:
@@ -53,9 +73,9 @@ class Child:
         os.close(requests)
         os.close(answers)
 
-    def answer(self, line):
+    def answer(self, line, limit_s):
         """Return the answer as JSON. Without one, the child has ended, or is ended."""
-        data, until_s = b"", time.monotonic() + LIMIT_S
+        data, until_s = b"", time.monotonic() + limit_s
         with contextlib.suppress(BrokenPipeError):  # the answers end, too
             os.write(self._requests, line.encode())
         # The child writes as it likes: part of a line, nothing, or too much
@@ -92,29 +112,36 @@ def serve(folder, requests, answers):
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     # Otherwise a script that reads its arguments would find the folder in them
     sys.argv = [""]
-    modules = {}
+    modules, changed = {}, {}
     with os.fdopen(requests) as lines:
         for line in lines:
             # `json.dumps` writes ASCII only and no line ends, so that an answer is one line
-            data = json.dumps(answer(folder, json.loads(line), modules)).encode()
+            found = answer(folder, json.loads(line), modules, changed)
+            data = json.dumps(dict(found, changed=changed) if changed else found).encode()
             os.write(answers, data + b"\n")
     os._exit(0)
 
 
-def answer(folder, request, modules):
-    name, function = request["file"], request["function"]
+def answer(folder, request, modules, changed):  # noqa: PLR0911 - each answer is one
+    """Return what came of the call; the small change that it was made with, if any, is noted in `changed`."""
+    name, function, source = request["file"], request["function"], None
     try:
         if name not in modules:
             path = find(folder, name)
             if path is None:
                 return {"missing": "the package has no " + name}
             try:
-                modules[name] = load(path)
+                if "change" in request:
+                    changed.update(change(path, function, request["change"]))
+                    source = changed.pop("source", None)
+                    if source is None:
+                        return {"missing": "no more changes"}
+                modules[name] = load(path, source)
             except BaseException as error:  # noqa: BLE001 - as below
                 return dict(describe(error, folder), imports=name)
         called = getattr(modules[name], function, None)
         if not callable(called):
-            return {"missing": "{} has no function {}".format(name, function)}
+            return {"missing": "{} has no function {}{}".format(name, function, others(modules[name]))}
         given = called(*decode(request["args"]), **dict(decode(request["kwargs"])))
     except BaseException as error:  # noqa: BLE001 - whatever the package's code raises, SystemExit too
         return describe(error, folder)
@@ -132,16 +159,119 @@ def find(folder, name):
     return next((path for path in found if path.is_file()), None)
 
 
-def load(path):
-    """Import the file, which finds what lies beside it. Its name is not `__main__`."""
+def load(path, source=None):
+    """Import the file, which finds what lies beside it. Its name is not `__main__`. `source` takes the place of what it
+    holds."""
     # As Python does for a script that it runs
     sys.path.insert(0, str(path.parent))
     spec = importlib.util.spec_from_file_location(path.stem, str(path))
     module = importlib.util.module_from_spec(spec)
     # Before it is executed, as `import` does, for modules that import each other
     sys.modules[path.stem] = module
-    spec.loader.exec_module(module)
+    if source is None:
+        spec.loader.exec_module(module)
+    else:
+        exec(compile(source, str(path), "exec"), module.__dict__)  # noqa: S102 - in the sandbox
     return module
+
+
+def others(module):
+    """Return which functions the file has instead, with their lines."""
+    given = [f for f in vars(module).values() if hasattr(f, "__code__")]
+    found = [f for f in given if f.__module__ == module.__name__]
+    shown = ["{} (line {})".format(f.__name__, f.__code__.co_firstlineno) for f in found[:OTHERS_MAX]]
+    return ", only " + ", ".join(shown) if shown else ""
+
+
+def change(path, function, number):
+    """Return the `line` that the small change of this number changes, what it is `after` that, and the new `source`;
+    where there are no more, the function's own `lines`."""
+    with tokenize.open(str(path)) as file:
+        source = file.read(SOURCE_CHARS_MAX)
+    tree = ast.parse(source)
+    called = next((n for n in tree.body if isinstance(n, ast.FunctionDef) and n.name == function), None)
+    if called is None:
+        return {}
+    lines = source.splitlines(True)
+    found = list(small_changes(called, tree, source))
+    returns = any(isinstance(node, ast.Return) and node.value is not None for node in ast.walk(called))
+    about = {"lines": [called.lineno, called.end_lineno], "returns": returns}
+    if number >= len(found):
+        return about
+    line, begin, end, text = found[number]
+    old = lines[line - 1]
+    new = lines[line - 1] = old[:begin] + text + old[end:]
+    if begin == 0:
+        about["spaces"] = len(text)
+    return dict(about, line=line, after=new.strip()[:MESSAGE_CHARS], source="".join(lines))
+
+
+def small_changes(called, tree, source):
+    """Yield the small changes of a function's lines, and of the constants that it reads, of which beginners' formulas
+    often need one, the likeliest first: line, first column, the column behind the last, and what is to be there."""
+    lines = source.splitlines()
+    read = {node.id for node in ast.walk(called) if isinstance(node, ast.Name)}
+    constants = [
+        n for n in tree.body if isinstance(n, ast.Assign) and getattr(n.targets[0], "id", "") in read
+    ]
+    own = {called.lineno + 1 + i for i in range(called.end_lineno - called.lineno)} | {
+        n.lineno for n in constants
+    }
+    tokens = [t for t in tokenize.generate_tokens(io.StringIO(source).readline) if t.start[0] in own]
+    for token in tokens:
+        for other in WRITTEN_FOR.get(token.string, ()):
+            yield token.start[0], token.start[1], token.end[1], other
+    for node in ast.walk(called):
+        yield from other_orders(node, lines)
+        if isinstance(node, ast.Return) and node.col_offset > called.body[0].col_offset:
+            yield node.lineno, 0, node.col_offset, " " * called.body[0].col_offset
+    for before, token in zip(tokens, tokens[1:]):  # noqa: B905, RUF007 - Python 3.8
+        for other in other_numbers(token.string) if token.type == tokenize.NUMBER else ():
+            yield token.start[0], token.start[1], token.end[1], "%.12g" % other
+        if before.string in BEFORE_SIGN and token.type in (tokenize.NAME, tokenize.NUMBER):
+            yield token.start[0], token.start[1], token.start[1], "-"
+    yield from other_names(called)
+
+
+def other_numbers(text):
+    if text.isdigit():
+        return [int(text) - 1, int(text) + 1, int(text) * 2]
+    return [float(text) * 10, float(text) / 10] if text.replace(".", "").isdigit() else []
+
+
+def other_orders(node, lines):
+    """Yield the changes that swap two values of an expression, or put a product below a division into brackets."""
+    values = {ast.Call: "args", ast.Tuple: "elts", ast.List: "elts", ast.arguments: "args"}.get(type(node))
+    in_order = getattr(node, values) if values else []
+    if isinstance(node, ast.BinOp) and not isinstance(node.op, (ast.Add, ast.Mult)):
+        in_order = [node.left, node.right]
+    for one, two in zip(in_order, in_order[1:]):  # noqa: B905, RUF007 - Python 3.8
+        line = lines[one.lineno - 1]
+        if one.lineno == two.end_lineno and line.isascii():
+            first, second = (
+                line[one.col_offset : one.end_col_offset],
+                line[two.col_offset : two.end_col_offset],
+            )
+            between = line[one.end_col_offset : two.col_offset]
+            yield one.lineno, one.col_offset, two.end_col_offset, second + between + first
+    left = node
+    while isinstance(left, ast.BinOp) and isinstance(left.op, ast.Mult):
+        left = left.left
+    if left is not node and isinstance(left, ast.BinOp) and isinstance(left.op, ast.Div):
+        begin, end = left.right.col_offset, node.end_col_offset
+        if left.right.lineno == node.end_lineno:
+            yield node.end_lineno, begin, end, "(" + lines[node.end_lineno - 1][begin:end] + ")"
+
+
+def other_names(called):
+    """Yield the changes that read another of the function's values, or another of the constants that it reads."""
+    names = [node for node in ast.walk(called) if isinstance(node, ast.Name)]
+    values = {node.id for node in names if isinstance(node.ctx, ast.Store) or node.id.isupper()}
+    values.update(argument.arg for argument in called.args.args)
+    for node in names:
+        if isinstance(node.ctx, ast.Load) and node.id in values:
+            for other in sorted(values - {node.id}):
+                yield node.lineno, node.col_offset, node.end_col_offset, other
 
 
 def describe(error, folder):
