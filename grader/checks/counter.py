@@ -111,18 +111,23 @@ def _cite_start(
     early = added_early(first, run, package, params.start)
     if early is not None:
         return cite_early(verdict, early)
-    value = first.values[0]
+    added = slips_of(package, run, first.callerid, "added-first")
+    count_up = {one.name: one.line for one in added}
     starts = slips_of(package, run, first.callerid, "start-value")
-    wrong = [one for one in starts if int(one.message) == value]
-    # Of several such lines, or with one added first, none is known to be what made the first value.
-    if len(wrong) != 1 or slips_of(package, run, first.callerid, "added-first"):
+    wrong = [one for one in starts if int(one.message) + (one.name in count_up) == first.values[0]]
+    # Of several such lines, or where several add one, none is known to be what made the first value.
+    if len(wrong) != 1 or len(count_up) < len(added):
         if first.values[0] > params.start and first.is_flood(run, params.rate_hz):
             return judge_flood(params.topic, "drops the first values", params.rate_hz)
         return verdict
     slip = wrong[0]
     where = f"line {slip.line} of {slip.file}"
     why = f"{where} sets `{slip.name}` to {slip.message}"
-    return verdict.explained(why, f"on {where}, set `{slip.name}` to {params.start}", (slip.place,))
+    start = params.start
+    if slip.name in count_up:
+        why += f", and line {count_up[slip.name]} adds one before it is published"
+        start -= 1
+    return verdict.explained(why, f"on {where}, set `{slip.name}` to {start}", (slip.place,))
 
 
 def judge_start(first: Count, run: Run, params: StartParams) -> Verdict:

@@ -116,6 +116,8 @@ def test_where_a_counter_goes_back_is_known(tmp_path, code, found):
         ("n = 1\nm = 2\npub.publish(n)", []),
         ("class A:\n    def __init__(self):\n        self.n = 3\n    def f(self):\n        self.n = self.n + 1",
          [("start-value", 3, "3")]),
+        ("n = -2\nwhile True:\n    n += 1\n    if n == 9:\n        n = 0\n    pub.publish(n)",
+         [("start-value", 1, "-2"), ("added-first", 3, "")]),
     ],
 )  # fmt: skip
 def test_where_a_counter_begins_is_known(tmp_path, code, found):
@@ -124,19 +126,24 @@ def test_where_a_counter_begins_is_known(tmp_path, code, found):
     assert [(s.kind, s.line, s.message) for s in slips if s.kind in {"start-value", "added-first"}] == found
 
 
-def test_what_is_added_too_early_is_moved_below_the_line_that_publishes_it(tmp_path):
-    choice = (
-        "n = 0\nwhile True:\n    if n < 127:\n        n += 1\n    else:\n        n = 0\n    pub.publish(n)\n"
-    )
-    (tmp_path / "a.py").write_text(choice)
-    (tmp_path / "b.py").write_text(
-        "n = 0\nwhile True:\n    n += 1\n    m.data = n\n    say(m)\n    pub.publish(\n        m)\n"
-    )
-    slips = check_syntax(tmp_path, ["a.py", "b.py"]).slips
-    assert [s.fix for s in slips if s.kind == "added-first"] == [
-        "move lines 3 to 6 below line 7",
-        "move line 3 below line 7",
-    ]
+@pytest.mark.parametrize(
+    ("body", "fix"),
+    [
+        ("if n < 127:\n n += 1\nelse:\n n = 0\npub.publish(n)", "move lines 3 to 6 below line 7"),
+        ("n += 1\nm.data = n\nsay(m)\npub.publish(\n    m)", "move line 3 below line 7"),
+        ("n += 1\nif n > 127:\n n = 0\npub.publish(n)", "move line 3 below line 6"),
+        # moved, it would let the reset keep the last number from being published
+        ("n = n + 1\npub.publish(n)\nif n >= 127:\n n = 0",
+         "delete line 3, and below line 6 write `else:` with `n += 1` in it"),
+        ("n += 1\npub.publish(n)\nif n == 127:\n n = -1", "set `n` to -1 before the loop, as line 5 does"),
+        ("n += 1\npub.publish(n)\nif n == 127:\n say(n)", "move line 3 below line 4"),
+    ],
+)  # fmt: skip
+def test_what_is_added_too_early_is_added_after_the_line_that_publishes_it(tmp_path, body, fix):
+    indented = "".join(f"    {line}\n" for line in body.splitlines())
+    (tmp_path / "a.py").write_text(f"n = 0\nwhile True:\n{indented}")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.fix for s in slips if s.kind == "added-first"] == [fix]
 
 
 @pytest.mark.parametrize(

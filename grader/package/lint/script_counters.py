@@ -95,6 +95,13 @@ def whole(node):
     return node.value if number else None
 
 
+def signed(node):
+    """Return a whole number that may have a minus before it."""
+    minus = isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub)
+    number = whole(node.operand if minus else node)
+    return -number if minus and number is not None else number
+
+
 def is_increment(node, target, value):
     """Whether a name is given what it was before, and something more: `n += 1`, `n = (n + 1) % 128`."""
     if isinstance(node, ast.AugAssign):
@@ -166,7 +173,7 @@ def counter_starts(tree):
     changed = all_of(tree, ast.Assign, ast.AugAssign)
     counted = {dotted(t) for n in changed for t in increments(n)}
     for node in changed:
-        value = whole(node.value) if isinstance(node, ast.Assign) else None
+        value = signed(node.value) if isinstance(node, ast.Assign) else None
         if value is not None and id(node) not in later and dotted(node.targets[0]) in counted:
             yield slip(node.lineno, "start-value", "%d" % value, name=dotted(node.targets[0]))
     for loop in loops:
@@ -184,9 +191,20 @@ def added_first(body):
             first = (used or sent or [at])[0]
             below = [body[i] for i in sent if i >= first]
             if at < first and below:
-                lines = lines_from(one.lineno, one.end_lineno)
-                fix = "move %s below line %d" % (lines, below[0].end_lineno)
-                yield slip(one.lineno, "added-first", "", fix, name)
+                after = body[body.index(below[0]) + 1 :]
+                yield slip(one.lineno, "added-first", "", added_later(one, name, below[0], after), name)
+
+
+def added_later(one, name, publishes, after):
+    """Return how to publish first and then add one, or, where an `if` below resets the counter, do that instead."""
+    lines = lines_from(one.lineno, one.end_lineno)
+    reset = next((n for n in after if isinstance(n, ast.If) and name in reset_in(n) and not n.orelse), None)
+    to = [signed(n.value) for n in all_of(reset, ast.Assign) if dotted(n.targets[0]) == name] if reset else []
+    if len(to) != 1 or to[0] is None or isinstance(one, ast.If):
+        return "move %s below line %d" % (lines, publishes.end_lineno)
+    if to[0] < 0:
+        return "set `%s` to %d before the loop, as line %d does" % (name, to[0], reset.lineno)
+    return "delete %s, and below line %d write `else:` with `%s += 1` in it" % (lines, reset.end_lineno, name)
 
 
 def put_in_messages(node):
@@ -226,7 +244,9 @@ def increments(node):
 
 def constants_in(statements):
     assigned = (n for n in statements if isinstance(n, ast.Assign))
-    return [n.targets[0] for n in assigned if isinstance(n.value, ast.Constant)]
+    return [
+        n.targets[0] for n in assigned if isinstance(n.value, ast.Constant) or signed(n.value) is not None
+    ]
 
 
 def reset_in(node):
