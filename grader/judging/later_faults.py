@@ -309,7 +309,11 @@ class Later:
             for number, line in enumerate(self._lines(one.path), 1)
             if ASKS.match(line[:LINE_CHARS])
         }
-        return set() if asked & cited_lines(self._verdict.citations) else asked
+        # A line that does not parse is cited for that, and not for its question.
+        unread = {
+            (f.path, f.python_fault.line) for f in files if f.python_fault and f.python_fault.kind in SYNTAX
+        }
+        return set() if asked & (cited_lines(self._verdict.citations) - unread) else asked
 
     def _rate(self) -> Iterator[Fix]:
         hz, numbers = float(str(self._wanted["rate_hz"])), self._of("rate-number")

@@ -393,12 +393,15 @@ def test_a_text_that_takes_the_place_of_input_is_told_once(call: str) -> None:
     assert hint.count("hello world") == hint.count("`rate.sleep()`") == 1
 
 
-def test_a_question_in_a_script_that_does_not_compile_is_named() -> None:
-    fault = {"file": FILE, "line": 5, "kind": "TabError", "message": "inconsistent use of tabs"}
+@pytest.mark.parametrize("line", [4, 5])
+def test_a_question_in_a_script_that_does_not_compile_is_named(line: int) -> None:
+    fault = {"file": FILE, "line": line, "kind": "TabError", "message": "inconsistent use of tabs"}
     own = [{**one, "python_fault": fault} if one["path"] == FILE else one for one in PACKAGE["files"]]
     source = "# input()\n\nwhile True:\n    word = raw_input('?')\n\tprint(word)\n"
+    lines = [f'  File "/ws/src/lab1/{FILE}", line {line}', "TabError: inconsistent use of tabs"]
+    died = {**DIES, "console": [{**DIES["console"][0], "lines": lines}]}
     runs = {
-        "runs": {"talker": DIES, "package": {"attachments": {FILE: source}}},
+        "runs": {"talker": died, "package": {"attachments": {FILE: source}}},
         "package": {**PACKAGE, "files": own},
     }
     found = {c.id: c.hint for c in judge(rubric(*TALKER), build_runs(runs))}
