@@ -305,14 +305,32 @@ def explain_by_misplaced_parameter(
 
 
 def _without_colon(package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
-    """Return a lost mark with an argument `_color=red` of a node, which roslaunch takes for no parameter."""
+    """Return a lost mark with an argument `_color=red` of a node, which roslaunch takes for no parameter, or with one
+    that the launch file gives another node alone."""
     nodes = _publishing(verdict, run)
     for node in (one for file in package.launch_files for one in file.brings if one.full_name in nodes):
         if given := _NO_COLON.search(node.args or ""):
             why = f"`{shown(given[0])}` in args on line {node.line} of {node.file} sets no parameter"
             hint = f"write `{shown(given[0].replace('=', ':=', 1))}`"
             return verdict.explained(why, hint, (node.place,), cause=why)
+        if (own := _given_to_another(package, run, node)) and not verdict.cause:
+            why = f"nothing sets {node.full_name}/{own}, which other nodes of {node.type} are given"
+            hint = f'add <param name="{own}" value="…"/> to the <node> on line {node.line} of {node.file}'
+            return verdict.explained(why, f"{hint}: {verdict.hint}", (node.place,), cause=why)
     return verdict
+
+
+def _given_to_another(package: PackageFacts, run: Run, node: LaunchNode) -> str:
+    """Return a private parameter that the node asks for, and that only another one of its program has; else ""."""
+    same = [
+        n for file in package.launch_files for n in file.brings if (n.pkg, n.type) == (node.pkg, node.type)
+    ]
+    names = {n.full_name for n in same}
+    reads = [(e, absolute_name(e.topic or "")) for _, e in run.actors if e.action == "read"]
+    own = [(e, n.removeprefix(f"{e.actor}/")) for e, n in reads if n.startswith(f"{e.actor}/")]
+    got = {name for event, name in own if event.actor in names and not event.detail}
+    lacks = (name for event, name in own if event.actor == node.full_name and event.detail)
+    return next((name for name in lacks if name in got), "")
 
 
 def explain_by_overwritten_parameter(
