@@ -79,8 +79,15 @@ def loaded(namespace: str, names: str, node: str = "") -> dict[str, str | bytes]
         ),
         Case(loaded('ns="robot"', RIGHT, node='ns="robot" '), [], wanted=NESTED),
         Case(loaded('ns="robot"', "speed: 3\n"), [], wanted=NESTED),
+        Case(loaded('ns="$(arg side)"', RIGHT), [], wanted=NESTED),
+        Case(
+            loaded('ns="/robot"', RIGHT), [], wanted=NESTED.model_copy(update={"nodes": ("/robot/talker",)})
+        ),
     ],
-    ids=["too-much", "misspelt", "right", "read-there", "of-the-node-too", "other-names"],
+    ids=[
+        *("too-much", "misspelt", "right", "read-there", "of-the-node-too", "other-names", "of-an-argument"),
+        "of-a-node-of-the-lab",
+    ],
 )
 def test_a_namespace_of_loaded_parameters(case: Case, tmp_path: Path) -> None:
     check(case, tmp_path)

@@ -134,6 +134,8 @@ def _repair_namespace(files: Files, load: LaunchLoad, package: PackageFacts, wan
     given = load.namespace.strip("/")
     found = re.findall(r"\bns\s*=\s*[\"']([^\"']*)", text)
     ours = [file.path for file in package.files if load.loads(file.path)]
+    if "$(" in given or any(f"/{given}/" in f"/{name}" for name in (*wanted.nodes, *wanted.topics)):
+        return
     if not given or [one.strip("/") for one in found] != [given] or len(ours) != 1:
         return
     programs = [file.path for file in package.files if file.path.endswith((".py", *CPP))]
