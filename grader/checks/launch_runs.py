@@ -37,6 +37,7 @@ from grader.checks.support.launch_connections import (
 )
 from grader.checks.support.launch_slips import (
     Slip,
+    include_slips,
     later_fixes,
     nodes_of_program,
     nodes_of_script,
@@ -443,6 +444,8 @@ def _wrong_name(file: LaunchFile, name: str, wanted: Mapping[str, str]) -> Verdi
     meant = _meant_node(file, name, wanted)
     if meant is not None:
         return wrong_name(meant, name).verdict()
+    if slip := next(include_slips(file), None):
+        return slip.verdict()  # what an <include> does not bring may be the node
     others = [n.full_name for n in file.brings]
     near = near_names(name, others) or tuple(others)
     seen = f"; it has {join_words(near)}" if near else ""

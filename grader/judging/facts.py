@@ -16,7 +16,7 @@ from grader.checks.reacts import ReactsParams
 from grader.checks.registry import Check, Evidence
 from grader.checks.support.build_errors import unreadable_file
 from grader.checks.support.exit_causes import syntax_hint
-from grader.checks.support.launch_slips import own_script, read_launch
+from grader.checks.support.launch_slips import own_script, read_launch, refusals, refusals_unrun
 from grader.checks.support.processes import ended_programs, failed_program, plain_type
 from grader.checks.support.scripts import CPP_SUFFIXES, SYNTAX, find_script, programs, syntax_fault
 from grader.checks.support.text import Language, near_names, texts_in
@@ -193,7 +193,15 @@ class Facts:
             file = None if self._judges(OF_BUILD_FILES) else unreadable_file(package)
             cited = (file.place,) if file and file.place else ()
             return failed_or_blocked(file.why, hint=file.hint, citations=cited) if file else None
-        return self.unreadable_launch(scenario) or self._unparsed_scripts(criterion)
+        launch = self.unreadable_launch(scenario)
+        if launch is not None and self._is_later(criterion):
+            launch = launch.model_copy(update={"unjudged": True})
+        return launch or self._unparsed_scripts(criterion)
+
+    def _is_later(self, criterion: Criterion) -> bool:
+        """Return whether it requires another criterion of the same run."""
+        required = (one for one in self.rubric.criteria if one.id in criterion.requires)
+        return any(one.scenario == criterion.scenario for one in required)
 
     def _judges(self, checks: Collection[str], file: str = "") -> bool:
         """Return whether the rubric has a criterion with one of the checks, for the file if it is given."""
@@ -203,8 +211,7 @@ class Facts:
     def _unparsed_scripts(self, criterion: Criterion) -> Verdict | None:
         """Return why Python parses none of the scripts that the criterion names, or else that its run starts."""
         known = self.rubric.scenarios.get(criterion.scenario or "")
-        required = (one for one in self.rubric.criteria if one.id in criterion.requires)
-        if known is None or any(one.scenario == criterion.scenario for one in required):
+        if known is None or self._is_later(criterion):
             return None
         starts = [start for start in known.start if not start.program]
         texts = texts_in(criterion.parameters)
@@ -219,22 +226,24 @@ class Facts:
         return failed_or_blocked(why, hint=syntax_hint(first), citations=(first.place,))
 
     def unreadable_launch(self, scenario: str) -> Verdict | None:
-        """Return why roslaunch cannot read what the scenario launches: that shows without a run."""
+        """Return why roslaunch starts nothing of what the scenario launches, as far as that shows without a run."""
         known = self.rubric.scenarios.get(scenario)
         if known is None or self.package is None or known.recording is not None:
             return None
-        packages = {start.name: self.package_of(start) for start in known.start}
-        read = [
-            read_launch(package, s.launch)
-            for s in known.start
-            if s.launch and (package := packages[s.name]) and s.launch in _launch_names(package)
-        ]
-        found = next((one for one in read if isinstance(one, Verdict)), None)
-        if found is None and known.until.connected:
-            found = next(
-                filter(None, (self._too_few_parse(one) for one in read if isinstance(one, LaunchFile))), None
-            )
-        return found.model_copy(update={"unjudged": True}) if found else None
+        launched = [(package, s.launch) for s in known.start if s.launch and (package := self.package_of(s))]
+        for package, name in launched:
+            file = read_launch(package, name) if name in _launch_names(package) else None
+            slip = next(refusals(package, file), None) if isinstance(file, LaunchFile) else None
+            lost = slip.verdict() if slip is not None else file
+            if isinstance(lost, Verdict):
+                return lost.model_copy(update={"unjudged": self._judges({"launch-xml"}, name)})
+            slip = next(refusals_unrun(lost), None) if lost is not None else None
+            few = self._too_few_parse(lost) if lost is not None and known.until.connected else None
+            if slip is not None or few is not None:
+                return (
+                    slip.verdict() if slip is not None else few and few.model_copy(update={"unjudged": True})
+                )
+        return None
 
     def _too_few_parse(self, launch: LaunchFile) -> Verdict | None:
         """Return why no two of the file's nodes can be connected: scripts that Python cannot parse."""

@@ -17,6 +17,8 @@ LAUNCH_TAGS = frozenset(
     {"arg", "env", "group", "include", "machine", "master", "node", "param", "remap", "rosparam", "test"}
 )
 """Below `<launch>`."""
+SUBSTITUTION = "Substitution"
+"""The kind of a fault of a `$(…)`."""
 
 
 class LaunchLine(Placed, Record):
@@ -115,7 +117,8 @@ class LaunchFile(Record):
     Nodes and includes that a literal `if="false"` or `unless="true"` switches off are left out. `nodes` are
     the file's own. These fields say what `roslaunch` would do, with the package's own included files and
     with `$(arg …)`, `$(dirname)` and namespaces resolved: `brings` (nodes), `tests` (`<test>`, which only
-    rostest runs), `params`, `loads`, `include_faults` (own files that cannot be included), `unset_args`. A
+    rostest runs), `params`, `loads`, `include_faults` (own files that cannot be included, and each `$(…)` that
+    roslaunch refuses), `unset_args`. A
     path inside the package is written as `$(find <package>)/…`. `unknown_tags` are tags that roslaunch
     skips, with their lines, and others that are written like a node; `commented` has the `type`s of nodes in
     comments; `switched_off` those of nodes that an `if` or `unless` leaves out, with its line and text.

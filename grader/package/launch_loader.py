@@ -17,7 +17,15 @@ from pydantic import Field
 
 from grader.installable import TUTORIALS, known_packages
 from grader.model.file_fault import Fault
-from grader.model.launch_file import LateRemap, LaunchArg, LaunchLine, LaunchLoad, LaunchNode, LaunchParam
+from grader.model.launch_file import (
+    SUBSTITUTION,
+    LateRemap,
+    LaunchArg,
+    LaunchLine,
+    LaunchLoad,
+    LaunchNode,
+    LaunchParam,
+)
 from grader.model.record import Record
 from grader.package.xml import line_of
 from grader.package.xml_corrections import ATTRIBUTES
@@ -35,6 +43,8 @@ _TOO_MUCH = "launch files that hold more than a robot can start"
 _FOUND = re.compile(r"\$\(find\s+([^()\s]+)\s*\)/+(.+)")
 _SUBSTITUTION = re.compile(r"\$\(([^()]*)\)")
 _ARGUMENT = re.compile(r"\$\(arg\s+([^()\s]+)\s*\)")
+_WORDS = re.compile(r"\$\((\w+)\s*([\w-]*)[^()]*\)")
+SUBSTITUTIONS = ("find", "arg", "env", "optenv", "anon", "eval", "dirname")
 _UNSET_MAX = 20
 _OFF_MAX = 20
 _SLASHES = re.compile(r"//+")
@@ -191,11 +201,32 @@ class _Loader:
         name = element.get("name") or ""
         if element.tag == "arg" and _with_arg(element, scope) is scope and name not in scope.args:
             found[file, name] = LaunchArg(name=name, declared=True, file=file, line=line)
+        self._note_unresolved(element, scope)
         for asked in (name for value in element.attrib.values() for name in _ARGUMENT.findall(str(value))):
             if asked not in scope.args and len(found) < _UNSET_MAX:
                 meant = next((one for one in islice(scope.args, _UNSET_MAX) if _is_slip(asked, one)), "")
                 arg = LaunchArg(name=asked, declared=False, file=file, line=line, meant=meant)
                 found.setdefault((file, asked), arg)
+
+    def _note_unresolved(self, element: etree._Element, scope: Scope) -> None:
+        """Note a `$(…)` that is none of roslaunch's, or that finds a package of nearly this one's name."""
+        own, fault = next(iter(scope.own), ""), ("", "")
+        for value in () if scope.of(element).uncertain else element.attrib.values():
+            for word, name in _WORDS.findall(str(value)):
+                if word not in SUBSTITUTIONS:
+                    near = (one for one in SUBSTITUTIONS if is_one_edit(word.lower(), one))
+                    right = "find" if name in scope.own else next(near, "arg" if name else "find")
+                    fault = f"roslaunch does not know $({word} …)", f"write $({right} {name or '…'})"
+                elif word == "find" and is_one_edit(name, own) and not self._is_known(name, scope):
+                    if element.tag == "include":  # `_include` notes it
+                        continue
+                    fault = f"there is no package {name}: this one is called {own}", f"write $(find {own})"
+        if fault[0]:
+            noted = _fault(element, scope, *fault)
+            self.loaded.faults.append(noted.model_copy(update={"kind": SUBSTITUTION}))
+
+    def _is_known(self, name: str, scope: Scope) -> bool:
+        return name in scope.own or name in self._others or name in known_packages()
 
     def _param(self, element: etree._Element, scope: Scope) -> Scope:
         param = _param(element, scope)

@@ -12,7 +12,8 @@ from grader.checks.support.launch_slips import right_remap
 from grader.checks.support.parameters import explain_yaml, explain_yaml_line
 from grader.evidence.run import Run
 from grader.judging.facts import NO_PACKAGE
-from grader.model.launch_file import LaunchLine, LaunchNode
+from grader.model.file_fault import Fault
+from grader.model.launch_file import LaunchFile, LaunchLine, LaunchNode
 from tests.package.trees import facts_of
 from tests.support.timeline import build_runs
 
@@ -100,6 +101,19 @@ def test_refusals(said: list[str], why: str) -> None:
     assert why in found.why
     assert found.hint
     assert not found.of_script
+
+
+def test_a_refused_file_is_named_with_its_line() -> None:
+    fault = Fault(file="launch/b.launch", line=3, kind="XMLSyntaxError", message="x", fix="write `</launch>`")
+    file = LaunchFile(path="launch/b.launch", root=None, nodes=(), includes=(), fault=fault)
+    package = NO_PACKAGE.model_copy(update={"launch_files": (file,)})
+    found = refusal(
+        printed(RED.format("RLException: Invalid roslaunch XML syntax: no element found")), package
+    )
+    assert found is not None
+    assert "launch/b.launch is not well-formed" in found.why
+    assert found.hint == fault.advice
+    assert found.citations == (fault.place,)
 
 
 def test_no_refusal() -> None:

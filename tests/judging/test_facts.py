@@ -133,6 +133,31 @@ def test_what_does_not_parse_is_told_before_anything_runs(tmp_path) -> None:
     assert talker.reproduce == "python3 -m py_compile src/numeric_talker.py"
 
 
+@pytest.mark.parametrize(
+    ("tags", "says"),
+    [
+        (
+            '<node pkg="lab1" type="numeric_talker.py" name="a" output="Screen"/>',
+            'output="Screen" is neither',
+        ),
+        ('<rosparam file="$(find lab11)/a.yaml"/>', "there is no package lab11: this one is called lab1"),
+        ('<include file="$(fnd lab1)/launch/b.launch"/>', "roslaunch does not know $(fnd …)"),
+        ('<param name="a" value="$(args b)"/>', "roslaunch does not know $(args …)"),
+        ('<param name="a" value="$(arg b)"/>', "no <arg> declares $(arg b)"),
+        ('<node pkg="lab1" type="numeric_talker.py" name="a/b"/>', "has a slash in it"),
+        ('<node pkg="lab1" type="numeric_talker.py" name="a" output="log"/>', ""),
+        ('<arg name="b"/><param name="a" value="$(arg b) $(optenv C d) $(env E) $(anon f)"/>', ""),
+        ('<rosparam file="$(find rospy)/a.yaml"/><param name="p" textfile="$(find other)/b"/>', ""),
+        ('<rosparam file="$(find lab11)/a.yaml" if="$(eval 1 == 2)"/>', ""),
+    ],
+)
+def test_what_roslaunch_refuses_is_told_before_anything_runs(tags, says, tmp_path) -> None:
+    facts = facts_of(tmp_path, **{"launch/lab1.launch": f"<launch>\n{tags}\n</launch>"})
+    found = early_of("leeds-comp3631-lab1", facts)
+    launch = [one.criterion for name, one in found.items() if name == "launch"]
+    assert [says in one.message and one.citations[0].line for one in launch] == ([2] if says else [])
+
+
 def test_a_launch_file_whose_nodes_do_not_parse_connects_none(tmp_path) -> None:
     node = '<node pkg="lab1" type="{0}.py" name="{0}"/>'
     faulty = {

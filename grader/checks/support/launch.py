@@ -31,7 +31,7 @@ from grader.checks.support.scripts import (
 from grader.checks.support.text import INIT, near_names, shown
 from grader.evidence.run import Run
 from grader.installable import install_hint, known_packages
-from grader.model.launch_file import LaunchFile, LaunchNode
+from grader.model.launch_file import SUBSTITUTION, LaunchFile, LaunchNode
 from grader.model.package import PackageFacts, SourceFile
 from grader.model.submission import chmod_hint
 from grader.model.verdict import (
@@ -64,6 +64,7 @@ NO_PACKAGE = r"Resource not found: (?:The following package was not found in .*:
 NO_FILE = r"file does not exist \[([^\[\]\n]+)\]"
 BAD_FILE = r"error loading <rosparam> tag"
 _NO_YAML = re.compile(r"file (\S+) contains invalid YAML")
+NOT_WELL_FORMED = r"Invalid roslaunch XML syntax"
 IGNORE = "CATKIN_IGNORE"
 YAML = {".yaml", ".yml"}
 _NO_LAUNCH_FILE = "is neither a launch file in package"
@@ -106,7 +107,7 @@ _REFUSALS = (
     (r"invalid bool value for (\w+): (\S+?)\.?(?:\s|$)", '{0}="{1}" is neither true nor false',
      'write {0}="true" or {0}="false"'),
     # Last, as the errors above may begin with these words.
-    (r"Invalid roslaunch XML syntax", "it is not well-formed", "close every element"),
+    (NOT_WELL_FORMED, "it is not well-formed", "close every element"),
 )  # fmt: skip
 
 
@@ -214,10 +215,11 @@ def refusal(run: Run, package: PackageFacts) -> Absence | None:
             if "multiple nodes" in pattern:
                 fix = namespace_meant(*(node for file in package.launch_files for node in file.brings)) or fix
             said = f"{NOTHING_STARTS}: {why.format(*words)}"
+            noted = _substituted(package) if pattern == NO_PACKAGE or "substitution" in pattern else ()
             if special := _known_refusal(pattern, match, said, text, package):
-                return special
+                return special._replace(citations=special.citations or noted)
             cited = _declared(words[0], package) if pattern == _UNSET.pattern else _node_told(text, package)
-            return Absence(said, fix, citations=cited, refused=pattern, about="".join(words[:1]))
+            return Absence(said, fix, citations=cited or noted, refused=pattern, about="".join(words[:1]))
     return None
 
 
@@ -227,6 +229,10 @@ def _known_refusal(
     """Return what more is known of a file that is no YAML or is not there, or of a package that is not there."""
     if pattern == BAD_FILE:
         return _unread_yaml(text, package)
+    faults = [file.fault for file in package.launch_files if file.fault is not None]
+    if pattern == NOT_WELL_FORMED and len(faults) == 1:
+        why = f"{NOTHING_STARTS}: {faults[0].file} is not well-formed: {faults[0].explanation}"
+        return Absence(why, faults[0].advice, citations=(faults[0].place,), refused=pattern)
     if pattern == NO_PACKAGE:
         return _lacks_package(shown(match[1]), said, text, package)
     slip = _OTHER_SUBSTITUTION.search(match[1]) if pattern == NO_FILE else None
@@ -269,6 +275,12 @@ def _node_told(text: str, package: PackageFacts) -> tuple[FileCitation, ...]:
     nodes = [n for file in package.launch_files for n in file.brings if found and n.name == found[1]]
     places = dict.fromkeys(FileCitation(file=node.file, line=node.line) for node in nodes)
     return tuple(places) if len(places) == 1 else ()
+
+
+def _substituted(package: PackageFacts) -> tuple[FileCitation, ...]:
+    """Return the first `$(…)` that roslaunch refuses."""
+    faults = (fault for file in package.launch_files for fault in file.include_faults)
+    return tuple(fault.place for fault in faults if fault.kind == SUBSTITUTION)[:1]
 
 
 def _declared(name: str, package: PackageFacts) -> tuple[FileCitation, ...]:

@@ -23,7 +23,8 @@ from grader.checks.support.scripts import (
 )
 from grader.checks.support.text import near_names, shown
 from grader.installable import known_packages
-from grader.model.launch_file import LaunchFile, LaunchLine, LaunchNode
+from grader.model.file_fault import Fault
+from grader.model.launch_file import SUBSTITUTION, LaunchFile, LaunchLine, LaunchNode
 from grader.model.package import Executable, PackageFacts, SourceFile
 from grader.model.verdict import FileCitation, MistakeKind, Verdict, failed, failed_or_blocked
 from grader.wording import has_role_of, join_words, on_lines, there_is
@@ -300,7 +301,11 @@ def namespace_meant(*nodes: LaunchNode) -> str:
 
 def include_slips(file: LaunchFile) -> Iterator[Slip]:
     """Yield why an `<include>` brings nothing."""
-    for fault in file.include_faults:
+    yield from _of_faults(file, (fault for fault in file.include_faults if fault.kind != SUBSTITUTION))
+
+
+def _of_faults(file: LaunchFile, faults: Iterable[Fault]) -> Iterator[Slip]:
+    for fault in faults:
         yield Slip(fault.file or file.path, fault.line or 1, fault.message, fault.advice)
 
 
@@ -326,6 +331,20 @@ def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
         # time that a file is included.
         if not node.uncertain and UNRESOLVED not in node.full_name:
             seen.setdefault(node.full_name, node)
+
+
+def refusals_unrun(file: LaunchFile) -> Iterator[Slip]:
+    """Yield what else makes roslaunch start nothing, of which it says enough itself once it is run."""
+    yield from _of_faults(file, (fault for fault in file.include_faults if fault.kind == SUBSTITUTION))
+    for arg in file.unset_args:
+        add = f'below <launch>, add <arg name="{arg.name}" default="…"/>'
+        fix = f"write $(arg {arg.meant})" if arg.meant else add
+        if not arg.declared:
+            yield Slip(arg.file, arg.line, f"no <arg> declares $(arg {arg.name})", fix)
+    for node in file.brings:
+        if node.output not in {None, "", "screen", "log"} and UNRESOLVED not in str(node.output):
+            why = f'output="{shown(str(node.output))}" is neither "screen" nor "log"'
+            yield _slip(node, why, 'write output="screen"')
 
 
 def nodes_of_script(package: PackageFacts, file: LaunchFile, script: str) -> tuple[LaunchNode, ...]:
