@@ -92,6 +92,10 @@ def node(name: str, namespace: str = "/") -> LaunchNode:
             "can read its <arg>s, and no parameters",
         ),
         (["RLException: Unknown substitution command [findpkg p]. Valid commands are"], "findpkg p"),
+        (
+            ["TypeError: cannot marshal None unless allow_none is enabled"],
+            "a name in a <rosparam> has no value",
+        ),
         (["RLException: Invalid roslaunch XML syntax: mismatched tag: line 3, column 2"], "not well-formed"),
     ],
 )

@@ -64,6 +64,7 @@ NO_PACKAGE = r"Resource not found: (?:The following package was not found in .*:
 NO_FILE = r"file does not exist \[([^\[\]\n]+)\]"
 BAD_FILE = r"error loading <rosparam> tag"
 _NO_YAML = re.compile(r"file (\S+) contains invalid YAML")
+NO_VALUE = r"cannot marshal None unless allow_none"
 NOT_WELL_FORMED = r"Invalid roslaunch XML syntax"
 IGNORE = "CATKIN_IGNORE"
 YAML = {".yaml", ".yml"}
@@ -106,6 +107,7 @@ _REFUSALS = (
      "the file {0} that <include> names does not exist", "push {0}, or start its nodes here, with a <node> for each"),
     (r"invalid bool value for (\w+): (\S+?)\.?(?:\s|$)", '{0}="{1}" is neither true nor false',
      'write {0}="true" or {0}="false"'),
+    (NO_VALUE, "a parameter has no value", "write a value behind each name, or names with values below it"),
     # Last, as the errors above may begin with these words.
     (NOT_WELL_FORMED, "it is not well-formed", "close every element"),
 )  # fmt: skip
@@ -233,6 +235,16 @@ def _known_refusal(
     if pattern == NOT_WELL_FORMED and len(faults) == 1:
         why = f"{NOTHING_STARTS}: {faults[0].file} is not well-formed: {faults[0].explanation}"
         return Absence(why, faults[0].advice, citations=(faults[0].place,), refused=pattern)
+    if pattern == NO_VALUE:
+        loads = [load for file in package.launch_files for load in file.loads if load.source]
+        files = join_words(
+            dict.fromkeys(re.sub(r"^\$\([^)]*\)/*", "", load.source or "") for load in loads), "or"
+        )
+        why = f"{NOTHING_STARTS}: a name in {files or 'a <rosparam>'} has no value"
+        hint = (
+            f"{'in ' if files else ''}{files}, write a value behind each name, or names with values below it"
+        )
+        return Absence(why, hint.lstrip(", "), citations=tuple(dict.fromkeys(load.place for load in loads)))
     if pattern == NO_PACKAGE:
         return _lacks_package(shown(match[1]), said, text, package)
     slip = _OTHER_SUBSTITUTION.search(match[1]) if pattern == NO_FILE else None
