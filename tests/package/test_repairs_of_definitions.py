@@ -37,6 +37,16 @@ add_action_files(FILES Go.action)
 generate_messages(DEPENDENCIES actionlib_msgs std_msgs)
 """,
 )
+
+
+def own_from(module: str) -> dict[str, str]:
+    """Return a package with a message, which its talker imports from this module."""
+    return {
+        **OWN,
+        **swapped(TALKER, ("import Int8\n", f"import Int8\nfrom {module} import Level\nlevel = Level\n")),
+    }
+
+
 GO_FIELDS = tuple(parse_definition("int32 n\n---\nbool there\n---\nint32 left\n", ".action"))
 TWO_FIELDS = tuple(parse_definition("int64 a\n---\nint64 sum", ".srv"))
 LEVEL_FIELDS = tuple(
@@ -64,6 +74,20 @@ CASES = {
         {**OWN, **swapped(TALKER, ("import Int8\n", "import Int8\nfrom alb.msg import Level\n")), CMAKELISTS: OWN_CMAKE,
          XML: MANIFEST.replace("rospy</depend>", "rospy</depend><build_depend>message_generation</build_depend>")},
         ["build-line", "missing-import"], "there is no package alb", after={TALKER: "from lab.msg import Level"}),
+    "own-message-of-another-package": Case(
+        {**own_from("std_msgs.msg"), CMAKELISTS: GENERATED}, ["missing-import"],
+        "line 4 of src/talker.py: std_msgs.msg has no Level", after={TALKER: "from lab.msg import Level\n"}),
+    "own-message-of-the-tutorial": Case(
+        {**own_from("beginner_tutorials.msg"), CMAKELISTS: GENERATED}, ["missing-import"],
+        "beginner_tutorials.msg has no Level", after={TALKER: "from lab.msg import Level\n"}),
+    "own-message-among-services": Case(
+        {**own_from("lab.srv"), CMAKELISTS: GENERATED}, ["missing-import"], "lab.srv has no Level",
+        after={TALKER: "from lab.msg import Level\n"}),
+    "own-message-of-a-package-that-may-have-it": Case(
+        {**own_from("kobuki_msgs.msg"), CMAKELISTS: GENERATED}, []),
+    "own-service-of-a-package-that-has-it": Case(
+        {**SERVICE, **swapped(TALKER, ("import Int8\n", "import Int8\nfrom std_srvs.srv import Empty\nused = Empty\n")),
+         "srv/Empty.srv": "---\n", CMAKELISTS: SERVICE_CMAKE.replace("Two.srv", "Two.srv Empty.srv")}, []),
     "own-message": Case(
         {**RUN_OWN, CMAKELISTS: CMAKE}, ["build-line"] * 3, "write message_generation after COMPONENTS",
         after={CMAKELISTS: OWN_CMAKE.replace("\ncatkin_p", "\ngenerate_messages()\ncatkin_p")},

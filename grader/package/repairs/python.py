@@ -163,19 +163,52 @@ def _delete_manifests(files: Files, scripts: Sequence[str], package: PackageFact
 
 
 def _spell_package(files: Files, scripts: Sequence[str], package: PackageFacts) -> None:
-    """Write the package's own name in place of a slip of it, where its messages and services are imported."""
-    own = [one.name for one in (package, *package.also) if one.interfaces]
+    """Write the package's own name in place of a slip of it, or of a package that has no such classes, where its
+    messages and services are imported."""
+    own = [one for one in (package, *package.also) if one.interfaces]
+    names = [one.name for one in own]
     for file in scripts:
         lines = (files.text(file) or "").split("\n")
         for number, line in enumerate(lines, start=1):
-            found = re.match(r"\s*(?:from|import)\s+(\w+)\.(?:msg|srv|action)\b", line)
-            name = found[1] if found else ""
-            meant = [one for one in own if is_one_edit(name, one) or name.lower() == one.lower()]
-            if found and len(meant) == 1 and name not in {*own, *known_packages()}:
-                changed = line[: found.start(1)] + meant[0] + line[found.end(1) :]
-                lines[number - 1] = changed
-                message = f"line {number} of {file}: there is no package {name}"
+            found = re.match(r"\s*(?:from|import)\s+((\w+)\.(?:msg|srv|action))\b", line)
+            if found is None:
+                continue
+            module, name = found.groups()
+            meant = [one for one in names if is_one_edit(name, one) or name.lower() == one.lower()]
+            what, end = f"there is no package {name}", found.end(2)
+            if len(meant) != 1 or name in {*names, *known_packages()}:
+                meant, end = _makers(line, own), found.end(1)
+                what = f"{module} has no {join_words(_names_from(line))}"
+            if len(meant) == 1:
+                lines[number - 1] = line[: found.start(1)] + meant[0] + line[end:]
+                message = f"line {number} of {file}: {what}"
                 files.change("missing-import", file, "\n".join(lines), message)
+
+
+def _names_from(line: str) -> list[str]:
+    """Return the names that a line imports from the messages or services of a package; none of any other line."""
+    found = re.fullmatch(r"from \w+\.(?:msg|srv|action) import \(?([\w, ]+)\)?\s*(?:#.*)?", line.strip())
+    return re.split(r"\s*,\s*", found[1].strip(" ,")) if found else []
+
+
+def _makers(line: str, own: Sequence[PackageFacts]) -> list[str]:
+    """Return the modules that the build makes with all that a line imports from another one, which has none of it."""
+    module, names = [*line.split(), "", ""][1], set(_names_from(line))
+    package, _, inner = module.partition(".")
+    made: dict[str, set[str]] = {}
+    for each in own:
+        for one in each.interfaces:
+            made.setdefault(f"{each.name}.{one.module}", set()).update(one.classes)
+    there = made.get(module, set()) | {*noetic_messages().get(package, ())} | {*SERVICES_OF_ROS}
+    is_known = package in {*noetic_messages(), "std_srvs", *(one.name for one in own)}
+    has_others = not is_known and exists_somewhere(package, [one.name for one in own])
+    if not names or names & there or has_others or (package, inner) == ("turtlesim", "srv"):
+        return []
+    return [module for module, classes in made.items() if names <= classes]
+
+
+SERVICES_OF_ROS = ("Empty", "SetBool", "Trigger", "GetMap", "GetPlan", "LoadMap", "SetMap", "SetCameraInfo")
+"""Services of ROS's own packages of messages."""
 
 
 LOADED = re.compile(r"""(?:import roslib\s*;\s*)?roslib\.load_manifest\(["']([\w-]+)["']\)\s*(?:#.*)?""")
