@@ -42,6 +42,10 @@ EMPTY_EXCEPT = re.compile(r"expected an indented block after 'except' statement 
 OF_BLOCK = re.compile(r"(elif|else|except|finally|try)\b")
 ROSPY_COMMA = re.compile(r"(?<![\w.])rospy\s*[,;:]\s*(?=[A-Za-z]\w*\s*[(:])")
 FUTURE = re.compile(r"\s*from\s+__future__\s+import\s+[\w \t,]+(#.*)?")
+DEFINES = re.compile(r"(def|class)\s")
+ENDS_BLOCK = re.compile(r"(return|raise|break|continue)\b|(sys\.)?exit\(")
+TELLS_ERROR = re.compile(r"[%{(,+]\s*(e|ex|exc|err|error|exception)(?=\s*(?:[]}).,:!]|$))")
+"""A line that prints the error that an `except … as e:` above it caught."""
 CONTINUES = re.compile(r"(elif|else|except|finally)\b")
 
 Step = dict[str, Any]
@@ -253,11 +257,24 @@ def _with_line_back(lines: list[str], at: int, message: str) -> Iterator[str]:
             lambda line: not line.strip() or len(_indentation(line)) > len(own), lines[first + 1 :]
         )
         end = first + 1 + len("\n".join(inside).rstrip().split("\n"))
-        added = [f"{own}except rospy.ROSInterruptException:", f"{own}    pass"]
-        yield "\n".join([*lines[:end], *added, *lines[end:]])
+        told = [(n, found[1]) for n in range(first + 2, end) if (found := TELLS_ERROR.search(lines[n]))]
+        text = "\n".join(lines)
+        caught = f"{own}except {_error_to_catch(text)}"
+        for number, name in told:
+            if not re.search(rf"\b{name}\s*=|as {name}\b", text):
+                yield "\n".join([*lines[:number], f"{caught} as {name}:", *lines[number:]])
+        yield "\n".join([*lines[:end], f"{caught}:", f"{own}    pass", *lines[end:]])
     elif message.startswith(("unexpected indent", "unindent does not match")):
         yield from _with_try(lines, at)
         yield from _with_def(lines, at)
+
+
+def _error_to_catch(text: str) -> str:
+    """Return what an `except` is to catch in this script, which has none for it yet."""
+    module = re.search(r"^\s*import rospy(?: as (\w+))?", text, re.MULTILINE)
+    of_service = "ServiceProxy" in text and "ServiceException" not in text
+    error = "ServiceException" if of_service else "ROSInterruptException"
+    return f"{module[1] or 'rospy'}.{error}" if module else "Exception"
 
 
 def _with_lines_in_try(lines: list[str], at: int) -> Iterator[str]:
@@ -321,10 +338,15 @@ def _with_block_moved(lines: list[str], at: int) -> Iterator[str]:
         (i for i, width in enumerate(reversed(above)) if width >= own), 0
     )  # lines further out than their block
     level_before = next((width for width in reversed(above[: len(above) - odd]) if width <= own), None)
+    below = range(at + 1, len(lines))
+    end = next((i for i in below if lines[i].strip() and _width(lines[i]) < own), len(lines))
     if own > above[-1] and 0 < odd <= ODD_LINES_MAX and level_before == own:
-        first = numbers[-odd]
+        first, behind = numbers[-odd], lines[numbers[-odd - 1]].strip()
         moved_in = [" " * (own - _width(lines[first])) + line for line in lines[first:at]]
-        if not any(OUTERMOST.match(lines[number]) for number in numbers[-odd:]):
+        is_shorter = odd <= 1 + sum(bool(line.strip()) for line in lines[at:end])
+        # no line behind a `return` is ever reached
+        is_inner = not any(OUTERMOST.match(one) or DEFINES.match(one) for one in map(str.strip, moved_in))
+        if is_shorter and is_inner and not ENDS_BLOCK.match(behind):
             yield "\n".join([*lines[:first], *moved_in, *lines[at:]])
     if OUTERMOST.match(lines[at].strip()):
         level = 0
@@ -334,8 +356,6 @@ def _with_block_moved(lines: list[str], at: int) -> Iterator[str]:
         distance, level = min((abs(width - own), width) for width in above)
         if {own - distance, own + distance} <= set(above):
             return  # as near to one as to the other
-    below = range(at + 1, len(lines))
-    end = next((i for i in below if lines[i].strip() and _width(lines[i]) < own), len(lines))
     moved = [
         " " * (_width(line) - own + level) + line.lstrip() if line.strip() else line for line in lines[at:end]
     ]

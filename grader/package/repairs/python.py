@@ -22,7 +22,7 @@ from grader.model.record import Record
 from grader.model.repair import Repair, RepairKind, as_code
 from grader.package.python import reason_of
 from grader.package.repairs.editing import KEEP_ONE, Files, emptied_lines
-from grader.syntax_fixes import COMMENTED_OUT, DELETE_LINE, MERGED, OUT_OF_BLOCK, Reason
+from grader.syntax_fixes import COMMENTED_OUT, DELETE_LINE, MERGED, OUT_OF_BLOCK, TOO_FAR_IN, Reason
 from grader.wording import is_one_edit, join_words, numbers_text, plural
 
 EXAMINE = "grader.package.python_repairs.examine:examine"
@@ -399,12 +399,15 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
         return f"{place}: {reason.text or (error.message if error else 'not Python 3')}", fix
     names = ", ".join(dict.fromkeys(step.word for step in steps))
     calls = ", ".join(f"{one}()" for one in word.split(", "))
-    meant = {"commented": COMMENTED_OUT, "level": OUT_OF_BLOCK if error and first.line < error.line else ""}
-    told = reason_of(meant.get(cause) or (error.message if error else "")).text
+    further = _further_in(before, after, first.line)
+    told = COMMENTED_OUT if cause == "commented" else error.message if error else ""
+    if cause == "level" and error and (first.line < error.line or "indent" not in told):
+        told = TOO_FAR_IN if further.startswith("-") else OUT_OF_BLOCK
+    told = reason_of(told).text
     known = {
         "file": file, "place": place, "line": first.line, "below": first.line + 1, "word": word, "names": names,
         "calls": calls, "told": told, "emptied": emptied_lines(before, after),
-        "further": _further_in(before, after, first.line),
+        "further": further,
     }  # fmt: skip
     said, fix = (words.format(**known) for words in WORDS[cause])
     if cause == "quotes":
