@@ -74,6 +74,7 @@ _MESSAGES: tuple[tuple[str, ...], ...] = (
      "this line's indentation matches none of the lines above it", "start it exactly below a line of the same block"),
     (r"unexpected indent",
      "this line is indented further than the one above for no reason", "start it exactly below that one"),
+    (r"the same line twice", "this line repeats the one above", DELETE_LINE),
     (r"expected an indented block",
      "the line after a `:` must be indented", "start it four spaces further to the right than the one above"),
     (r"Missing parentheses in call to '(\w+)'", "`{0}` has no brackets, as in Python 2", "write `{0}(...)`"),
@@ -352,14 +353,15 @@ def _reason_of_block(message: str, text: str, *, mixed: bool) -> Reason | None:
     if other_quotes(text) or (message.startswith("f-string") and _SAME_QUOTES.search(text)):
         why = "the quote inside the braces of this f-string ends it"
         return Reason(why, "write the other kind of quotes inside the braces")
-    commented = re.match(r"only comments in the block on line (\d+)", message)
-    empty = commented or _EMPTY_BLOCK.match(message)
-    if empty and not commented and _EXCEPT.match(text):
-        why = f"there is nothing in the block on line {empty[1]}"
-        return Reason(why, f"below line {empty[1]}, write `pass`")
-    if empty and (commented or (_NEXT_BLOCK.match(text) and "class" not in message)):
-        why = f"there {'are only comments' if commented else 'is nothing'} in the block on line {empty[1]}"
-        return Reason(why, f"below line {empty[1]}, write what it should do")
+    told = re.match(r"(only comments|nothing) in the block on line (\d+)", message)
+    number = told[2] if told else empty[1] if (empty := _EMPTY_BLOCK.match(message)) else ""
+    if number and _EXCEPT.match(text) and not message.startswith("only"):
+        return Reason(f"there is nothing in the block on line {number}", f"below line {number}, write `pass`")
+    if number and (told or (_NEXT_BLOCK.match(text) and "class" not in message)):
+        found = "are only comments" if message.startswith("only") else "is nothing"
+        return Reason(
+            f"there {found} in the block on line {number}", f"below line {number}, write what it should do"
+        )
     return None
 
 

@@ -159,6 +159,11 @@ def assert_cases(report):
             "class A:\n    def f(self):\n    def g(self):\n        pass\n",
             "in the block on line 2: below line 2, write",
         ),
+        (
+            "def f(x):\n    for i in x:\n        if i:\n    return i\n",
+            "nothing in the block on line 3: below",
+        ),
+        ("def f(x):\n    if x:\n    if x:\n        return 1\n", "repeats the one above: delete this line"),
         ("class A:\ndef f(self):\n    pass\n", "must be indented"),
         ("def f():\nx = 1\n", "must be indented"),
     ],

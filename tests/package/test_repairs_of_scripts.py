@@ -140,6 +140,11 @@ CASES = {
         ["python-syntax"],
         "the line after a `:` must be indented",
     ),
+    "no-body": Case(
+        swapped(TALKER, ("        rate.sleep()\n", "        if 1:\n    rate.sleep()\n")),
+        ["python-syntax"],
+        "line 12 of src/talker.py: this block needs a line of its own",
+    ),
     "pass-further-out": Case(
         swapped(TALKER, ("\nmain()", "\nif 1:\n    try:\n        main()\n    except Exception:\npass")),
         ["python-syntax"],

@@ -336,6 +336,12 @@ def block_fault(lines, line, message):
     if any(len(blanks_of(lines[n])) > len(blanks_of(lines[head])) for n in comments):
         told = "only comments in the block on line %d" % (head + 1)
         return fault("IndentationError", line, 1, told, text=lines[line - 1])
+    if head is not None and "expected an indented" in message:
+        if lines[line - 1].strip() == lines[head].strip():
+            return fault("IndentationError", line, 1, "the same line twice", text=lines[line - 1])
+        if len(blanks_of(lines[line - 1])) < len(blanks_of(lines[head])):
+            told = "nothing in the block on line %d" % (head + 1)
+            return fault("IndentationError", line, 1, told, text=lines[line - 1])
     head = commented_head(lines, line) if indented else None
     if head is not None:
         at, text = lines[head].index("#") + 1, lines[head]

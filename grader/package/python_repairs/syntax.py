@@ -100,7 +100,7 @@ def _one_step(text: str, error: Error) -> Step | None:
 
 def _step(cause: str, text: str, candidate: str, error: Error) -> Step:
     word = re.match(r"name '(\w+)'", error["message"])
-    is_elsewhere = cause in ("merged", "braces", "commented", "level", "line", "twice", "turned")
+    is_elsewhere = cause in ("merged", "braces", "commented", "level", "line", "twice", "turned", "empty")
     line = _first_changed(text, candidate) if is_elsewhere else error["line"]
     added = candidate.split("\n")[line - 1].strip() if cause == "line" else ""
     return {
@@ -192,6 +192,7 @@ def _in_their_blocks(lines: list[str], at: int, message: str) -> Iterator[tuple[
         yield "level", with_line(lines, at - 1, lines[at - 1].lstrip())
     if message.startswith(("expected an indented block", "unindent does not match")):
         yield from (("indent", candidate) for candidate in _with_body_indented(lines, at))
+        yield from (("empty", candidate) for candidate in _with_a_body(lines, at))
     if message.startswith("expected 'except' or 'finally'"):
         yield from (("level", candidate) for candidate in _with_lines_in_try(lines, at))
     yield from (("line", candidate) for candidate in _with_line_back(lines, at, message))
@@ -233,6 +234,16 @@ def _with_body_indented(lines: list[str], at: int) -> Iterator[str]:
     does_nothing = lines[at].partition("#")[0].strip() == "pass" and around.startswith(own) and is_head
     if does_nothing or (lines[at].strip() and own == around and ends):
         yield with_line(lines, at, f"{around}    {lines[at].lstrip()}")
+
+
+def _with_a_body(lines: list[str], at: int) -> Iterator[str]:
+    """Yield the text with a `pass` in the block above the line, which begins further out than that block's head."""
+    above = next((n for n in range(at - 1, -1, -1) if without_texts(lines[n]).strip()), at)
+    head = lines[above]
+    if _width(lines[at]) < _width(head) and not head.lstrip().startswith("while"):
+        candidate = "\n".join([*lines[: above + 1], f"{_indentation(head)}    pass", *lines[above + 1 :]])
+        if syntax_error(candidate) is None:
+            yield candidate
 
 
 def _with_head_uncommented(lines: list[str], at: int) -> Iterator[str]:

@@ -38,7 +38,7 @@ Cause = Literal[
     "merged", "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
     "old-name", "module", "other-module", "import", "name", "quotes", "attribute", "value", "call", "quoted",
     "callback", "argument", "unbound", "kept", "guard", "inside", "start", "main", "server", "spin", "line", "twice",
-    "turned",
+    "turned", "empty",
 ]  # fmt: skip
 CALLS = (
     "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument", "unbound", "kept", "guard",
@@ -448,6 +448,7 @@ WORDS: dict[Cause, tuple[str, str]] = {
      "write `global {word}` as the first line of the function"),
     "guard": ("{place}: {word}", ""),
     "line": ("{place}: the line `{word}` is missing", ""),
+    "empty": ("{place}: this block needs a line of its own", "write there what it should do, or `pass` if nothing"),
     "twice": ("{place}: this line repeats the one above", "delete line {line}"),
     "turned": ("lines {line} and {below} of {file} are the wrong way round", "write line {below} above line {line}"),
     "start": ("{place}: the lines from here on belong to {calls}, so nothing runs them", ""),
