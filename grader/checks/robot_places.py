@@ -10,6 +10,7 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field, model_validator
 
+from grader.checks.odometry import misplaced
 from grader.checks.registry import Refers, check
 from grader.checks.robot_path import (
     DRIVE,
@@ -185,7 +186,8 @@ def ends_at(package: PackageFacts, run: Run, params: EndsAtParams) -> Verdict:
     verdict = verdict or (None if asked else _not_asked(package, run, params))
     if verdict is None and found is not None and asked is not None:
         judged = path_to_judge(found, asked, params)
-        verdict = _judge_arrival(judged, asked, run, params) if judged else _too_late(asked, params)
+        none = f"no position came on {params.topic} in the {asked.to_s - asked.from_s:.1f} s of this goal"
+        verdict = _judge_arrival(judged, asked, run, params) if judged else grade_again(none)
         verdict = _fell_silent(package, run, judged, asked, params) or verdict
         verdict = _answers_late(tell_end(verdict, package, run), run)
         verdict = _excused_end(verdict, judged, run, params) if judged else verdict
@@ -234,17 +236,13 @@ def _not_asked(package: PackageFacts, run: Run, params: EndsAtParams) -> Verdict
     return failed_or_blocked(f"no node listens to {params.asked_on}, so no goal could be sent", hint=hint)
 
 
-def _too_late(asked: Stretch, params: EndsAtParams) -> Verdict:
-    message = f"no position came on {params.topic} in the {asked.to_s - asked.from_s:.1f} s of this goal"
-    return grade_again(message)
-
-
 def _judge_arrival(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtParams) -> Verdict:
     last = judged[-1]
     apart_m = math.dist(last.point, params.goal)
     figures = f"{metres(apart_m)} from the goal, at {spot(last.point)}"
     if not params.is_there(last):
-        return _elsewhere(judged, asked, run, params).about(measured=figures)
+        lost = misplaced(judged, params, run) if params.asked_on is None else None
+        return (lost or _elsewhere(judged, asked, run, params)).about(measured=figures)
     outside = [index for index, pose in enumerate(judged) if not params.is_there(pose)]
     came_s = judged[outside[-1] + 1 if outside else 0].time_s - asked.began_s(judged)
     figures += f", after {came_s:.1f} s"
@@ -271,9 +269,10 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
             f"it never moves, and stays {metres(math.dist(last.point, params.goal))} from {spot(params.goal)}"
         )
         return _never_moves(never, judged, asked, run, params)
-    there = next((pose for pose in judged if params.is_near(pose)), None)
+    began_s = asked.began_s(judged)
+    there = next((pose for pose in judged if pose.time_s >= began_s and params.is_near(pose)), None)
     if there is not None:
-        message = f"it is there after {there.time_s - asked.began_s(judged):.1f} s, but keeps moving: {at}"
+        message = f"it is there after {there.time_s - began_s:.1f} s, but keeps moving: {at}"
         hint = "publish a zero velocity once you are there"
         if params.asked_on is None:  # it may be a place on its way
             hint = f"see on the map where it goes on; if it has to stop there, {hint}"
