@@ -135,6 +135,24 @@ CASES = {
         {"src/hear.py": SCRIPT, LAUNCHED: LAUNCH.replace(NODE, f"{NODE}\n{NODE.replace('talker.py', 'hear.py')}")},
         ["launch-syntax"], 'line 3 of launch/lab.launch: name="talker" should be name="hear"',
     ),
+    "launched-in-nearly-the-namespace": Case(
+        {LAUNCHED: f'<launch>\n<group ns="Left">\n{NODE}</group>\n</launch>\n'},
+        ["node-name"], 'line 2 of launch/lab.launch: ns="Left" should be ns="left"', after={LAUNCHED: 'ns="left"'},
+        wanted=asking(launched=(("lab.launch", "/left/talker"),)),
+    ),
+    "launched-by-nearly-the-name": Case(
+        {LAUNCHED: f'<launch>\n<group ns="left">\n{NODE}</group>\n</launch>\n'},
+        ["node-name"], 'name="talker" should be name="talkers"', after={LAUNCHED: 'ns="left"'},
+        wanted=asking(nodes=(), launched=(("lab.launch", "/left/talkers"),)),
+    ),
+    "launched-by-another-file": Case(
+        {LAUNCHED: LAUNCH.replace(NODE, NODE.replace('name="talker"', 'name="talker2"'))}, [],
+        wanted=asking(nodes=(), launched=(("other.launch", "/talker"),)),
+    ),
+    "launched-besides": Case(
+        {LAUNCHED: LAUNCH.replace(NODE, NODE + NODE.replace('name="talker"', 'name="talker2"'))}, [],
+        wanted=asking(nodes=(), launched=(("lab.launch", "/talker"),)),
+    ),
     "nodes-of-a-name-in-two-places": Case({LAUNCHED: LAUNCH.replace(NODE, NODE + NODE.replace("/>", ' ns="b"/>'))}, []),
     "nodes-of-a-name-one-of-which-may-start": Case(
         {LAUNCHED: LAUNCH.replace(NODE, NODE + NODE.replace("/>", ' if="$(eval 1)"/>'))}, []

@@ -170,6 +170,25 @@ def _repair_nodes(files: Files, package: PackageFacts, wanted: Wanted) -> None:
             if right and name not in names:
                 _set_attribute(files, launch.path, node.line, ("name", name, right), kind="node-name")
                 taken.add(right)
+        _repair_full_names(files, launch, wanted)
+
+
+def _repair_full_names(files: Files, launch: LaunchFile, wanted: Wanted) -> None:
+    """Give a node the name, or its only namespace, that the lab asks for in this launch file."""
+    there = {node.full_name for node in launch.brings}
+    asked = [name for file, name in wanted.launched if file == PurePosixPath(launch.path).name]
+    for right in (name for name in asked if name not in there):
+        space, _, own = right.rpartition("/")
+        for node in (one for one in launch.brings if one.full_name not in asked and one.file == launch.path):
+            spaces = [line for line in node.renaming if line.tag not in {"remap", "args"}]
+            change: tuple[str, str, str] | None = None
+            if node.namespace == f"{space}/" and is_near(node.name or "", own):
+                line, change = node.line, ("name", node.name or "", own)
+            elif node.name == own and len(spaces) == 1 and is_near(spaces[0].value, space.strip("/")):
+                line, change = spaces[0].line, ("ns", spaces[0].value, space.strip("/"))
+            if change is not None:
+                _set_attribute(files, launch.path, line, change, kind="node-name")
+                break
 
 
 def _rename_second_nodes(files: Files, launch: LaunchFile) -> None:

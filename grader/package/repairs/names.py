@@ -48,6 +48,8 @@ class Wanted(Record):
     """Topics that the command line gives another name (`state:=light`), as the scripts have to write them."""
     started: tuple[tuple[str, str], ...] = ()
     """Launch files, and the names of the scripts that each has to start."""
+    launched: tuple[tuple[str, str], ...] = ()
+    """Launch files, and the full names of the nodes that each has to bring up."""
     does: tuple[tuple[str, Doing, str], ...] = ()
     """Scripts that a scenario starts alone, each with a name that it has to use: of its node, a topic or a service."""
 
@@ -83,9 +85,16 @@ def wanted_of(rubric: Rubric, package: str = "") -> Wanted:
         if "launch" in c.parameters and c.check in STARTED_BY
         for script in (*c.parameters.get("scripts", ()), *filter(None, [c.parameters.get("script")]))
     )
+    launched = (
+        (c.parameters["launch"], f"/{name.lstrip('/')}")
+        for c in criteria
+        if c.check == "launch-runs"
+        for name in c.parameters.get("nodes", ())
+    )
     return Wanted(
         package=package,
         started=tuple(started),
+        launched=tuple(dict.fromkeys(launched)),
         definitions=tuple(_definitions(criteria)),
         does=tuple(dict.fromkeys(_of_scripts(rubric, criteria))),
         **{field: tuple(names) for field, names in found.items()},
