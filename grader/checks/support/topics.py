@@ -454,6 +454,8 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
     if check.name == "action-result" and verdict.wrong != "nothing" and ends_twice(run):
         kinds.append("goes-on")
     found = [s for s in package.slips if s.kind in kinds and s.file in files]
+    # feedback that is not sent explains only what is missing of it
+    found = [s for s in found if "publish_feedback" not in s.fix or "feedback" in verdict.message]
     wrong = verdict.wrong
     steers = STEERING if check.name in OF_STEERING else ()
     sure = [
