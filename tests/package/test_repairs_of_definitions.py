@@ -88,6 +88,12 @@ CASES = {
     "own-service-of-a-package-that-has-it": Case(
         {**SERVICE, **swapped(TALKER, ("import Int8\n", "import Int8\nfrom std_srvs.srv import Empty\nused = Empty\n")),
          "srv/Empty.srv": "---\n", CMAKELISTS: SERVICE_CMAKE.replace("Two.srv", "Two.srv Empty.srv")}, []),
+    "own-message-that-nothing-makes": Case(
+        {**OWN, **swapped(TALKER, ("import Int8\n", "import Int8\nfrom lab.msg import Level\nlevel.level = 1\n")),
+         CMAKELISTS: GENERATED}, []),
+    "own-message-in-small-letters": Case(
+        {**OWN, **swapped(TALKER, ("import Int8\n", "import Int8\nfrom lab.msg import Level\nhigh = level()\n")),
+         CMAKELISTS: GENERATED}, ["missing-call"], "level is not defined", after={TALKER: "high = Level()"}),
     "own-message": Case(
         {**RUN_OWN, CMAKELISTS: CMAKE}, ["build-line"] * 3, "write message_generation after COMPONENTS",
         after={CMAKELISTS: OWN_CMAKE.replace("\ncatkin_p", "\ngenerate_messages()\ncatkin_p")},

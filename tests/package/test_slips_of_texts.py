@@ -405,6 +405,24 @@ def test_messages_that_are_filled_in_and_not_sent(text: str, fixes: list[str], t
     assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "unsent"] == fixes
 
 
+@pytest.mark.parametrize(
+    ("text", "fixes"),
+    [
+        ("def f():\n    reading.cells = 1\n", ["above line 3, write `reading = Reading()`"]),
+        ("rospy.wait_for_service('/clamp')\nprint(clamp(1))\n",
+         ["above line 3, write `clamp = rospy.ServiceProxy('/clamp', Clamp)`"]),
+        ("pub = rospy.Publisher('/r', reading)\nm = reading()\n", []),
+        ("reading = Reading()\nreading.cells = 1\n", []),
+        ("def f(clamp):\n    clamp(1)\n", []),
+    ],
+)  # fmt: skip
+def test_objects_that_no_line_makes(text: str, fixes: list[str], tmp_path: Path) -> None:
+    head = "from lab.msg import Reading; from lab.srv import Clamp; "
+    (tmp_path / "a.py").write_text(f"{head}import rospy\n{text}", encoding="utf-8")
+    found = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.fix for s in found if "gives `" in s.message] == fixes
+
+
 def test_fields_of_an_attribute_that_is_always_none(tmp_path: Path) -> None:
     head = "class A:\n def __init__(self):\n  self.p = None\n  Subscriber('/p', Pose, self.f)\n def f(self, m):\n"
     (tmp_path / "a.py").write_text(

@@ -23,6 +23,7 @@ from script_names import (
     calls_in,
     dotted,
     functions_in,
+    given_names,
     is_call,
     listed,
     names_in,
@@ -439,6 +440,25 @@ def unsent_messages(tree):
 
 def is_of_messages(module):
     return ".%s" % (module or "").rpartition(".")[2] in (".msg", ".srv")
+
+
+def lost_objects(tree):
+    """Yield where a name is used that is called like a class of messages or services, and gets no object of it."""
+    froms = [n for n in all_of(tree, ast.ImportFrom) if is_of_messages(n.module)]
+    kinds = {a.name.lower(): (a.name, n.module.endswith(".srv")) for n in froms for a in n.names}
+    names, waits = all_of(tree, ast.Name), calls_in(tree, "wait_for_service")
+    own = given_names(tree, names) if kinds else set()
+    topic = next((text_of(n.args[0]) for n in waits if n.args), "") or "…"
+    for node in (n for n in names if n.id in kinds and n.id not in own):
+        (kind, of_service), around = kinds[node.id], parents_of(tree).get(node)
+        is_set = isinstance(around, ast.Attribute) and isinstance(around.ctx, ast.Store)
+        if is_set or (of_service and getattr(around, "func", None) is node):
+            made = "%s()" % kind if is_set else "rospy.ServiceProxy('%s', %s)" % (topic, kind)
+            fix = "above line %d, write `%s = %s`" % (node.lineno, node.id, made)
+            yield slip(
+                node.lineno, "undefined", "nothing in the file gives `%s` a value" % node.id, fix, node.id
+            )
+            return  # the first is where the script ends
 
 
 def scope_of(node, tree, parents):

@@ -231,6 +231,7 @@ def with_names(text: str) -> Iterator[Step]:
     functions = {n.name for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)}
     kept = made_by(nodes_in(tree))
     unread = [one for one in tree.body if isinstance(one, ast.FunctionDef) and one.name not in loaded]
+    objects = {one: used - bound for one, used in _used_as_objects(tree).items()}
     parts = (one for one in tree.body if not isinstance(one, ast.Import | ast.ImportFrom))
     blocks = (inner for one in parts for inner in (one.body if isinstance(one, ast.ClassDef) else [one]))
     for block in blocks:
@@ -259,6 +260,8 @@ def with_names(text: str) -> Iterator[Step]:
             meant = OBVIOUS_NAMES.get(name) or ("__name__" if guards else "")
             near = own - functions if name in values else own
             near = {one for one in near if given.get(one) != name}  # `twist = Twist()` lacks an import
+            # `reading.state = 0` lacks `reading = Reading()`
+            near = {one for one in near if one.lower() != name.lower() or name not in objects.get(one, ())}
             meant = meant or meant_by(name, near, near - loaded) or idle.get(name, "")
             meant = meant or alone.get(name, of_python)
             meant = meant or meant_by_use(name, member_of.get(name, ""), given, loaded)
@@ -276,6 +279,30 @@ def is_kept_by_self(node: ast.AST) -> bool:
     if not isinstance(node, ast.Assign) or not isinstance(node.value, ast.Name):
         return False
     return ast.unparse(node.targets[0]) == f"self.{node.value.id}"
+
+
+def _used_as_objects(tree: ast.Module) -> dict[str, set[str]]:
+    """Return by the classes of messages and services that the script imports which names stand for no class: whose
+    fields are set, that are called as a service is, or that are published."""
+    froms = [n for n in nodes_in(tree) if isinstance(n, ast.ImportFrom)]
+    nodes, used = nodes_in(tree), set[str]()
+    used |= {
+        last_name(n.value) for n in nodes if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)
+    }
+    calls = [n for n in nodes if isinstance(n, ast.Call)]
+    used |= {last_name(a) for n in calls if last_name(n.func).startswith("publish") for a in n.args}
+    called = {n.func.id for n in calls if isinstance(n.func, ast.Name)}
+    return {
+        one.name: used
+        | (called if str(node.module).endswith(".srv") and not MADE.search(one.name) else set())
+        for node in froms
+        if str(node.module).endswith((".msg", ".srv"))
+        for one in node.names
+    }
+
+
+MADE = re.compile("(Request|Response)$")
+"""Classes of a service of which a script makes objects."""
 
 
 def _values_in(block: ast.stmt) -> set[str]:
