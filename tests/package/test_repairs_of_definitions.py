@@ -90,7 +90,8 @@ CASES = {
          "srv/Empty.srv": "---\n", CMAKELISTS: SERVICE_CMAKE.replace("Two.srv", "Two.srv Empty.srv")}, []),
     "own-message-that-nothing-makes": Case(
         {**OWN, **swapped(TALKER, ("import Int8\n", "import Int8\nfrom lab.msg import Level\nlevel.level = 1\n")),
-         CMAKELISTS: GENERATED}, []),
+         CMAKELISTS: GENERATED}, ["missing-call"], "line 5 of src/talker.py: level is not defined",
+        after={TALKER: "level = Level()\nlevel.level = 1\n"}),
     "own-message-in-small-letters": Case(
         {**OWN, **swapped(TALKER, ("import Int8\n", "import Int8\nfrom lab.msg import Level\nhigh = level()\n")),
          CMAKELISTS: GENERATED}, ["missing-call"], "level is not defined", after={TALKER: "high = Level()"}),

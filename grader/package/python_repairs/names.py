@@ -13,7 +13,16 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from string import digits
 
-from grader.package.python_repairs.syntax import Step, edited, last_name, nodes_in, span_of, step_to, tree_of
+from grader.package.python_repairs.syntax import (
+    Step,
+    edited,
+    last_name,
+    nodes_in,
+    span_of,
+    step_to,
+    tree_of,
+    with_line,
+)
 from grader.wording import is_one_edit, plural
 
 OF_PYTHON = (
@@ -261,7 +270,11 @@ def with_names(text: str) -> Iterator[Step]:
             near = own - functions if name in values else own
             near = {one for one in near if given.get(one) != name}  # `twist = Twist()` lacks an import
             # `reading.state = 0` lacks `reading = Reading()`
-            near = {one for one in near if one.lower() != name.lower() or name not in objects.get(one, ())}
+            lost = [one for one in near if one.lower() == name.lower() and name in objects.get(one, ())]
+            if lost and (first := _first_set(block, name)):
+                yield from _with_object(text, first, name, lost[0])
+                return
+            near -= {*lost}
             meant = meant or meant_by(name, near, near - loaded) or idle.get(name, "")
             meant = meant or alone.get(name, of_python)
             meant = meant or meant_by_use(name, member_of.get(name, ""), given, loaded)
@@ -279,6 +292,26 @@ def is_kept_by_self(node: ast.AST) -> bool:
     if not isinstance(node, ast.Assign) or not isinstance(node.value, ast.Name):
         return False
     return ast.unparse(node.targets[0]) == f"self.{node.value.id}"
+
+
+def _first_set(block: ast.stmt, name: str) -> int:
+    """Return the line that uses a name first, where it sets a field of it; 0 where it does something else."""
+    uses = [n for n in nodes_in(block) if isinstance(n, ast.Attribute) and last_name(n.value) == name]
+    first = min(uses, key=lambda n: (n.lineno, isinstance(n.ctx, ast.Load)), default=None)
+    alone = {n.lineno for n in nodes_in(block) if isinstance(n, ast.Name) and n.id == name}
+    is_set = first is not None and isinstance(first.ctx, ast.Store) and first.lineno == min(alone)
+    return first.lineno if first is not None and is_set else 0
+
+
+def _with_object(text: str, line: int, name: str, kind: str) -> Iterator[Step]:
+    """`reading = Reading()` above the line that sets a field of it."""
+    lines, at = text.split("\n"), line - 1
+    blanks = lines[at][: len(lines[at]) - len(lines[at].lstrip())]
+    for step in step_to(
+        "name", line, text, with_line(lines, at, f"{blanks}{name} = {kind}()\n{lines[at]}"), name
+    ):
+        yield step
+        yield from with_names(step["text"])
 
 
 def _used_as_objects(tree: ast.Module) -> dict[str, set[str]]:
