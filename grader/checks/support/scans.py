@@ -105,6 +105,23 @@ def looks_elsewhere(scan: Mapping[str, Any], index: int, reads: Sequence[PythonS
     return [re.sub(r"^(ranges\[\d+\]) on line (\d+) is \1$", r"line \2 reads \1 alone", one) for one in said]
 
 
+def _looks_ahead(scan: Mapping[str, Any], read: PythonSlip) -> bool:
+    numbers = indexes_read(read, len(scan["ranges"])) or ()
+    return not has_angles(scan) or any(abs(_degrees(scan, n)) < NEAR_DEG / 2 for n in numbers)
+
+
+def opposite(scan: Mapping[str, Any], index: int, read: PythonSlip) -> str:
+    """Return the slice that looks to the other side, or ahead in place of behind, if a range is in it; "" else."""
+    count = len(scan["ranges"])
+    numbers = indexes_read(read, count) or range(0)
+    for first in (count - numbers[-1] - 1, numbers[0] + count // 2) if len(numbers) > 1 else ():
+        start, end = first % count, first % count + len(numbers)
+        if index in range(start, end) or index + count in range(start, end):
+            parts = (f"{start}:{end}",) if end <= count else (f"{start}:", f":{end - count}")
+            return " + ".join(f"{read.name}[{part}]" for part in parts)
+    return ""
+
+
 def read_too(scan: Mapping[str, Any], index: int, reads: Sequence[PythonSlip]) -> str:
     """Return how to read a range of a LaserScan too, where a script reads none that is near it."""
     for one in reads:
@@ -113,6 +130,10 @@ def read_too(scan: Mapping[str, Any], index: int, reads: Sequence[PythonSlip]) -
         is_around = indexes_read(one, len(scan["ranges"])) == range(0) and first[:1] == "-" and last.isdigit()
         if is_around and one.name.endswith("ranges"):
             right = f"{one.name}[{first}:] + {one.name}[:{last}]"
+            return f"on line {one.line}, write `{right}` in place of `{one.name}[{one.message}]`"
+    aside = [one for one in reads if not _looks_ahead(scan, one)]
+    for one, right in [(one, opposite(scan, index, one)) for one in aside]:
+        if right and len(aside) == 1:
             return f"on line {one.line}, write `{right}` in place of `{one.name}[{one.message}]`"
     return f"read ranges[{index}] too, and those around it"
 

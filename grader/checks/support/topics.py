@@ -437,7 +437,7 @@ SEEN_AS = {
 }  # fmt: skip
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so; others always show."""
 
-STEERING = ("swapped", "mixed", "rootless", "inf", "angle", "turned")
+STEERING = ("swapped", "mixed", "rootless", "inf", "angle", "turned", "negative")
 OF_STEERING = ("ends-at", "stays-within", "path", "reacts")
 """What leads a robot astray wherever its script computes so, and the checks of what a robot does."""
 
@@ -450,7 +450,7 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
     are always or never true."""
     files = _files_that_run(package, run)
     of_values = check.of_callbacks or check.name in OF_VALUES or (check.name == "prints" and verdict.silent)
-    kinds = ["wrong-value"] if of_values and not verdict.cause else []
+    kinds = ["wrong-value", "compared"] if of_values and not verdict.cause else []
     if check.name == "action-result" and verdict.wrong != "nothing" and ends_twice(run):
         kinds.append("goes-on")
     found = [s for s in package.slips if s.kind in kinds and s.file in files]
@@ -461,15 +461,16 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
     sure = [
         s
         for s in found
-        if s.kind == "goes-on" or s.name in steers or (wrong and SEEN_AS.get(s.name) == wrong)
+        if s.kind in ("goes-on", "compared") or s.name in steers or (wrong and SEEN_AS.get(s.name) == wrong)
     ]
     turns = any(word in verdict.message for word in OF_TURNS)
     sure = [s for s in sure if s.name != "half" or turns]
     maybe = [s for s in found if not (SEEN_AS.get(s.name) or (wrong and s.name in SEEN_AS))]
     for slip in sure[:1] or maybe[:4]:
-        why, hint = f"line {slip.line} of {slip.file}: {slip.message}", f"{verdict.hint}; {slip.fix}"
-        cause = slip.message if sure else ""
-        verdict = verdict.explained(why, slip.fix if sure else hint, (slip.place,), cause=cause)
+        why = f"line {slip.line} of {slip.file}: {slip.message}"
+        fix = f"on line {slip.line}, {slip.fix}" if slip.kind == "compared" else slip.fix
+        hint, cause = fix if sure else f"{verdict.hint}; {fix}", slip.message if sure else ""
+        verdict = verdict.explained(why, hint, (slip.place,), cause=cause)
     return verdict
 
 

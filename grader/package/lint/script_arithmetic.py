@@ -5,6 +5,7 @@ Nothing is executed. Python 3.8, standard library only.
 
 import ast
 import re
+from collections import Counter
 
 from script_names import (
     all_of,
@@ -17,7 +18,7 @@ from script_names import (
     slip,
     text_of,
 )
-from script_values import IN_DEGREES
+from script_values import IN_DEGREES, function_around, number_of
 
 SIDES = ("width", "height")
 
@@ -41,6 +42,8 @@ def arithmetic_slips(tree):
     yield from mixed_units(tree)
     yield from turned_errors(tree)
     yield from exact_distances(tree)
+    yield from mixed_points(tree)
+    yield from mixed_coordinates(tree)
     yield from float_seconds(tree)
     yield from without_root(tree)
 
@@ -127,8 +130,14 @@ def turned_atan(tree, axes):
     for call in all_of(tree, ast.Call):
         if called_name(call) not in ("atan2", "arctan2") or len(call.args) != 2:
             continue
+        if [called_name(one) for one in call.args] in (["cos", "sin"], ["sin", "sin"], ["cos", "cos"]):
+            angles = [ast.dump(one.args[0]) for one in call.args if one.args]
+            if len(angles) == len(call.args) and angles[0] == angles[1]:
+                message = "an angle is brought between -pi and pi by its sine, and then its cosine"
+                fix = "on line %d, write `%s(sin(…), cos(…))`" % (call.lineno, dotted(call.func))
+                yield slip(call.lineno, "wrong-value", message, fix, "swapped")
         found = []
-        for one in call.args:
+        for one in () if is_compass(call, tree) else call.args:
             names = names_in(one)
             if any(SENSED.search(name) for name in names):
                 break  # how a sensor is tilted is another angle
@@ -141,6 +150,27 @@ def turned_atan(tree, axes):
             message = "`%s` takes y first, and then x" % called_name(call)
             fix = "on line %d, swap the two values in the brackets of `%s`" % (call.lineno, called_name(call))
             yield slip(call.lineno, "wrong-value", message, fix, "swapped")
+
+
+COMPASS = re.compile(r"bearing|compass|azimuth|north", re.IGNORECASE)
+
+
+def is_compass(call, tree):
+    """Whether an angle is meant from the north, clockwise: by its name, or since it is taken from a quarter turn."""
+    parents, node = parents_of(tree), call
+    while not isinstance(node, ast.stmt):
+        node = parents[node]
+    names = {dotted(one) for one in getattr(node, "targets", ())}
+    if any(map(COMPASS.search, [*names, function_around(call, tree)])):
+        return True
+    quarters = [n for n in all_of(tree, ast.BinOp) if is_difference(n) and is_quarter(n.left)]
+    return any(n.right is call or call in ast.walk(n.right) or names & names_in(n.right) for n in quarters)
+
+
+def is_quarter(node):
+    return getattr(node, "value", None) == 90 or (
+        is_quotient(node) and any(n.endswith("pi") for n in names_in(node))
+    )
 
 
 def multiplied_cells(tree):
@@ -192,6 +222,7 @@ def mixed_units(tree):
 
 
 KEEP_SIGNS = ("min", "max", "float", "clip")
+HEADINGS = ("theta", "yaw", "heading")
 
 
 def turned_errors(tree):
@@ -213,15 +244,19 @@ def turned_errors(tree):
     towards = {dotted(n.targets[0]) for n in given if called_name(n.value) in ("atan2", "arctan2")}
     for node in all_of(tree, ast.BinOp):
         is_direction = called_name(node.right) in ("atan2", "arctan2") or dotted(node.right) in towards
-        if isinstance(node.op, ast.Sub) and getattr(node.left, "attr", "") == "theta" and is_direction:
+        is_heading = dotted(node.left).rpartition(".")[2].lower() in HEADINGS
+        if isinstance(node.op, ast.Sub) and is_heading and is_direction:
             message = "the angle to turn by is the direction of the goal minus the heading, and not the other way round"
             fix = "on line %d, swap what stands on the two sides of the minus" % node.lineno
             yield slip(node.lineno, "wrong-value", message, fix, "swapped")
 
 
+NEVER_NEGATIVE = ("sqrt", "hypot", "dist", "abs", "fabs")
+
+
 def exact_distances(tree):
-    """`while distance != 0`, of a distance that is worked out."""
-    roots = ("sqrt", "hypot", "dist")
+    """`while distance != 0` and `abs(error) > -0.1`, of what is worked out and never below 0."""
+    roots = NEVER_NEGATIVE[:3]
     made = {dotted(n.targets[0]) for n in all_of(tree, ast.Assign) if called_name(n.value) in roots}
     made |= {
         one.name
@@ -229,13 +264,109 @@ def exact_distances(tree):
         if any(called_name(getattr(n, "value", None)) in roots for n in one.body if isinstance(n, ast.Return))
     }
     for node in all_of(tree, ast.Compare):
-        asked = called_name(node.left) or dotted(node.left)
-        is_zero = getattr(node.comparators[0], "value", None) == 0 and len(node.ops) == 1
-        if is_zero and isinstance(node.ops[0], (ast.Eq, ast.NotEq)) and (asked in made or asked in roots):
+        asked, number = called_name(node.left) or dotted(node.left), number_of(node.comparators[0])
+        if number is None or len(node.ops) > 1 or asked not in {*made, *NEVER_NEGATIVE}:
+            continue
+        if number < 0:
+            message = "`%s` is never below 0, and this compares it with %g" % (asked, number)
+            fix = "on line %d, write `%g` in place of `%g`" % (node.lineno, -number, number)
+            yield slip(node.lineno, "wrong-value", message, fix, "negative")
+        elif number == 0 and isinstance(node.ops[0], (ast.Eq, ast.NotEq)) and asked not in NEVER_NEGATIVE[3:]:
             message = "a distance that is worked out is hardly ever exactly 0"
             sign = ">" if isinstance(node.ops[0], ast.NotEq) else "<"
             fix = "on line %d, compare it with how near is near enough: `%s 0.1`" % (node.lineno, sign)
             yield slip(node.lineno, "wrong-value", message, fix, "exact")
+
+
+COORDINATE = re.compile(r"(?:(.*[._])|(d)?)([xy])", re.IGNORECASE)
+
+
+def point_of(node):
+    """Return whose coordinate a value is, and which: `("goal.", "x")` of `goal.x`; None of all else."""
+    found = COORDINATE.fullmatch(dotted(node))
+    return (found.group(1) or "", found.group(3).lower()) if found and not found.group(2) else None
+
+
+def pairs_of(tree):
+    """Return each target of an assignment with its value, also of `x, y = a, b`."""
+    pairs = []
+    for node in all_of(tree, ast.Assign):
+        target, value = node.targets[0], node.value
+        both = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
+        targets, values = (target.elts, value.elts) if both else ([target], [value])
+        pairs += [(one, values[at]) for at, one in enumerate(targets[: len(values)])]
+    return pairs
+
+
+GOALS = re.compile(r"goal|target|dest|waypoint", re.IGNORECASE)
+
+
+def mixed_points(tree):
+    """`atan2(goal.y - y, x - goal.x)`, of which one difference is turned, and `goal.x - pose.y`."""
+    given = [(dotted(target), value) for target, value in pairs_of(tree)]
+    counts = Counter(name for name, _ in given)
+    once = {name: value for name, value in given if counts[name] == 1}
+    for node in all_of(tree, ast.Call):
+        is_angle = called_name(node) in ("atan2", "arctan2") and len(node.args) == 2
+        values = [once.get(dotted(one), one) for one in node.args] if is_angle else []
+        sides = [(n, point_of(n.left), point_of(n.right)) for n in values if is_difference(n)]
+        owners = [(left[0], right[0], n.lineno) for n, left, right in sides if left and right]
+        turned = [line for left, right, line in owners if GOALS.search(right) and not GOALS.search(left)]
+        if len({one for pair in owners for one in pair[:2]}) == len(owners) == len(turned) + 1 == 2:
+            message = (
+                "`%s` gets one difference from the place to the goal, and one from the goal to the place"
+            )
+            fix = "on line %d, swap what stands on the two sides of the minus" % turned[0]
+            yield slip(turned[0], "wrong-value", message % called_name(node), fix, "turned")
+    for node in filter(is_difference, all_of(tree, ast.BinOp)):
+        left, right = point_of(node.left), point_of(node.right)
+        if left and right and left[0] != right[0] and left[1] != right[1]:
+            message = "`%s - %s` mixes an x with a y" % (dotted(node.left), dotted(node.right))
+            fix = "on line %d, take x from x, and y from y" % node.lineno
+            yield slip(node.lineno, "wrong-value", message, fix, "mixed")
+
+
+def is_difference(node):
+    return isinstance(node, ast.BinOp) and isinstance(node.op, ast.Sub)
+
+
+def mixed_coordinates(tree):
+    """`y = msg.x` beside `x = msg.x` in a callback, and an `x = msg.x` there alone, where `y` never changes."""
+    read = {dotted(n) for n in all_of(tree, ast.Name, ast.Attribute) if isinstance(n.ctx, ast.Load)}
+    values = {}
+    for target, value in pairs_of(tree):
+        values.setdefault(dotted(target), []).append(value)
+    for function in all_of(tree, ast.FunctionDef):
+        taken = {}
+        for target, value in pairs_of(function):
+            owner = dotted(value).partition(".")[0]
+            points = [point_of(target), point_of(value)]
+            if None not in points and owner != "self" and owner in {one.arg for one in function.args.args}:
+                taken.setdefault((points[0][0], points[1][0]), {})[points[0][1]] = (points[1][1], target)
+        for (own, whose), found in taken.items():
+            axis, (read_axis, target) = next(iter(found.items()))
+            other = "y" if axis == "x" else "x"
+            name, right = own + other, "`%s%s = %s%s`" % (own, other, whose, other)
+            if other in found and found[other][0] == read_axis:
+                wrong = other if read_axis == axis else axis
+                line, message = found[wrong][1].lineno, "`%s%s` gets the %s" % (own, wrong, read_axis)
+                fix = "on line %d, write `%s%s = %s%s`" % (line, own, wrong, whose, wrong)
+                yield slip(line, "wrong-value", message, fix, "mixed")
+            elif other not in found and axis == read_axis and name in read and all_constant(values.get(name)):
+                message = "nothing gives `%s` the value that comes, as line %d does for `%s%s`"
+                message %= (name, target.lineno, own, axis)
+                yield slip(
+                    target.lineno,
+                    "wrong-value",
+                    message,
+                    "below line %d, write %s" % (target.lineno, right),
+                    "mixed",
+                )
+
+
+def all_constant(values):
+    """Whether there are any, and each is a number that stands in the script, or None."""
+    return bool(values) and all(isinstance(one, ast.Constant) for one in values)
 
 
 def axes_of(tree):

@@ -236,7 +236,9 @@ def speeds_in(block):
 def ranges_read(tree):
     """Which ranges of a scan a script reads (`0:45`), where each index is a number, or a part of their count."""
     parents, found = parents_of(tree), []
-    held = {dotted(t) for n in all_of(tree, ast.Assign) if is_ranges(n.value) for t in n.targets} - {"..."}
+    copies = {dotted(t): n.value for n in all_of(tree, ast.Assign) if copied(n.value) for t in n.targets}
+    held = copies.keys() - {"..."}
+    copied_from = {id(copied(value)) for name, value in copies.items() if name in held}
     stored = [n for n in all_of(tree, ast.Name, ast.Attribute) if isinstance(n.ctx, ast.Store)]
     counts = Counter([dotted(n) for n in stored] + [n.arg for n in all_of(tree, ast.arg)])
     given = [(dotted(target), n.value) for n in all_of(tree, ast.Assign) for target in n.targets]
@@ -245,7 +247,12 @@ def ranges_read(tree):
         if not isinstance(node.ctx, ast.Load) or not (is_ranges(node) or dotted(node) in held):
             continue
         around = parents[node]
-        if isinstance(around, ast.Assign) or called_name(around) == "len" or is_truth(node, around):
+        if (
+            id(node) in copied_from
+            or isinstance(around, ast.Assign)
+            or called_name(around) == "len"
+            or is_truth(node, around)
+        ):
             continue
         indexes = []
         if isinstance(around, ast.Subscript) and around.value is node:
@@ -254,6 +261,16 @@ def ranges_read(tree):
             return  # here it may read any of them
         found += [slip(line, "ranges-read", index, name=dotted(node)) for line, index in indexes]
     yield from found
+
+
+def copied(value):
+    """Return the ranges that a value has all of, in their order: `msg.ranges`, `list(msg.ranges)`, and a list of what
+    is made of each; None of all else."""
+    if called_name(value) in ("list", "tuple", "array", "asarray", "nan_to_num", "clip") and value.args:
+        value = value.args[0]
+    if isinstance(value, ast.ListComp) and len(value.generators) == 1 and not value.generators[0].ifs:
+        value = value.generators[0].iter
+    return value if is_ranges(value) else None
 
 
 def is_truth(node, around):

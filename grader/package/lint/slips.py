@@ -342,4 +342,7 @@ def without_effect(tree):
                 right = value.comparators[0]
                 right = repr(right.value) if isinstance(right, ast.Constant) else dotted(right)
                 message = "`%s ==` compares and gives no value" % name
-                yield slip(node.lineno, "compared", message, "write `%s = %s`" % (name, right))
+                fix = (
+                    "write `%s = %s`" % (name, right) if "..." not in right else "write `=` in place of `==`"
+                )
+                yield slip(node.lineno, "compared", message, fix)
