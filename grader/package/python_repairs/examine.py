@@ -91,8 +91,8 @@ def examine(
     imported = {part for name in modules for part in re.findall(r"\w+", name)}
     for file, text in files:
         try:
-            is_run = PurePosixPath(file).stem not in imported
-            steps = list(_steps(text, types, Known(ROSPY, fields), is_run=is_run))
+            name = PurePosixPath(file).stem
+            steps = list(_steps(text, types, Known(ROSPY, fields), name, is_run=name not in imported))
             names = _names(steps[-1]["text"] if steps else text)
         except (RecursionError, MemoryError):
             steps, names = [], []
@@ -102,8 +102,8 @@ def examine(
 IMPORTED = re.compile(r"^\s*(?:from|import)\s+([\w.]+(?:\s+import\s+\w+)?)", re.MULTILINE)
 
 
-def _steps(text: str, types: list[str], known: Known, *, is_run: bool = True) -> Iterator[Step]:
-    """Yield what is wrong in a script that `is_run`, or in a module that others import."""
+def _steps(text: str, types: list[str], known: Known, name: str, *, is_run: bool = True) -> Iterator[Step]:
+    """Yield what is wrong in a script of this name that `is_run`, or in a module that others import."""
     for step in make_readable(text):
         text = step["text"]
         yield step
@@ -134,7 +134,11 @@ def _steps(text: str, types: list[str], known: Known, *, is_run: bool = True) ->
             with_lines_turned,
             _with_lines_inside,
             _with_start,
-            *((_with_main, _with_server_started, _with_spin) if is_run else ()),
+            *(
+                (_with_main, lambda t: _with_init(t, name), _with_server_started, _with_spin)
+                if is_run
+                else ()
+            ),
         ):
             for step in repair(text):
                 if step["text"] in seen:  # two repairs that undo each other would do so for ever
@@ -342,6 +346,37 @@ def _never_main(guard: ast.If, test: ast.Compare, tree: ast.Module) -> str:
     given = {n.id for n in nodes_in(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
     given |= {n.arg for n in nodes_in(tree) if isinstance(n, ast.arg)}
     return f"`{other[0]}` is never '__main__'" if other and other[0] not in given else ""
+
+
+def _with_init(text: str, name: str) -> Iterator[Step]:
+    """A script that publishes or subscribes, and never makes its node: it gets the script's name."""
+    tree, lines = tree_of(text), text.split("\n")
+    of_rospy = [n.func.value for n in nodes_in(tree) if isinstance(n, ast.Call)
+                and isinstance(n.func, ast.Attribute) and n.func.attr in {"Publisher", "Subscriber"}]  # fmt: skip
+    rospy = next((a.asname or a.name for n in nodes_in(tree) if isinstance(n, ast.Import)
+                  for a in n.names if a.name == "rospy"), "")  # fmt: skip
+    runs = [one for one in _runs(tree) if any(isinstance(n, ast.Call) for n in nodes_in(one))]
+    if "init_node" in text or not runs or rospy not in map(ast.unparse, of_rospy) or not name.isidentifier():
+        return
+    first: ast.stmt = runs[0]
+    while isinstance(first, ast.If | ast.Try):
+        first = first.body[0]
+    called = first.value.func if isinstance(first, ast.Expr) and isinstance(first.value, ast.Call) else None
+    own = [
+        n for n in tree.body if isinstance(n, ast.FunctionDef) and called and n.name == ast.unparse(called)
+    ]
+    first = next((one for function in own for one in function.body if not _is_head(one)), first)
+    at, line = first.lineno - 1, f"{rospy}.init_node('{name}')"
+    before = lines[at][: first.col_offset]
+    if not before.strip():
+        after = "\n".join([*lines[:at], before + line, *lines[at:]])
+        yield from step_to("init", at + 1, text, after, line)
+
+
+def _is_head(statement: ast.stmt) -> bool:
+    """Return whether it is a docstring or a `global`, which come first."""
+    constant = isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
+    return constant or isinstance(statement, ast.Global)
 
 
 def _with_server_started(text: str) -> Iterator[Step]:

@@ -37,12 +37,12 @@ ATTEMPTS = 3
 Cause = Literal[
     "merged", "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
     "old-name", "module", "other-module", "import", "name", "quotes", "attribute", "value", "call", "quoted",
-    "callback", "argument", "unbound", "kept", "guard", "inside", "start", "main", "server", "spin", "line", "twice",
-    "turned", "empty",
+    "callback", "argument", "unbound", "kept", "guard", "inside", "start", "main", "init", "server", "spin", "line",
+    "twice", "turned", "empty",
 ]  # fmt: skip
 CALLS = (
     "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument", "unbound", "kept", "guard",
-    "inside", "start", "main", "server", "spin",
+    "inside", "start", "main", "init", "server", "spin",
 )  # fmt: skip
 KINDS: dict[str, RepairKind] = {
     **dict.fromkeys(("module", "other-module", "import"), "missing-import"),
@@ -115,7 +115,7 @@ def _until(steps: Sequence[_Step], causes: Collection[Cause]) -> Iterator[_Step]
     return takewhile(lambda step: step.cause not in causes, steps)
 
 
-OF_START: tuple[Cause, ...] = ("inside", "start", "main", "server", "spin")
+OF_START: tuple[Cause, ...] = ("inside", "start", "main", "init", "server", "spin")
 """Causes that keep a script from starting, which come last."""
 
 
@@ -455,6 +455,7 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "inside": ("{place}: from here on the lines are outside of {calls}, which makes the node",
      "change the indentation: "),
     "main": ("{place}: nothing calls {calls}", "add `if __name__ == '__main__':`, and {calls} below it"),
+    "init": ("{file} never calls `rospy.init_node(…)`, so it makes no node", ""),
     "server": ("{place}: the action server of line {line} is never started", "below line {line}, write `{word}`"),
     "spin": ("{file} ends as soon as it is set up, because nothing keeps it running",
      "write {word} as the last line of the code that makes the node"),
