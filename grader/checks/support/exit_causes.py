@@ -404,7 +404,12 @@ def _of_broken_machine(found: Traceback, broken: str, place: FileCitation | None
     return Ending(cause, hint, (place,) if place else (), of_machine=True)
 
 
-OF_OTHER_LINES = {"unregistered()": "unregistered", "integer' when writing 'header": "secs", "'~": "unset"}
+OF_OTHER_LINES = {
+    "unregistered()": "unregistered",
+    "integer' when writing 'header": "secs",
+    "'~": "unset",
+    "by zero": "new-field",
+}
 
 
 def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:

@@ -46,6 +46,42 @@ def arithmetic_slips(tree):
     yield from mixed_coordinates(tree)
     yield from float_seconds(tree)
     yield from without_root(tree)
+    yield from unset_fields(tree)
+
+
+def unset_fields(tree):
+    """A field of a new message that is compared or calculated with, and that no line gives a value."""
+    imports = [n for n in all_of(tree, ast.ImportFrom, ast.Import) if "msg" in ast.dump(n)]
+    messages = {a.asname or a.name for n in imports for a in n.names}
+    made, filled = {}, {n.attr for n in all_of(tree, ast.Attribute) if isinstance(n.ctx, ast.Store)}
+    for node in all_of(tree, ast.Assign):
+        for target in node.targets:
+            made.setdefault(dotted(target), []).append(node)
+    calls = all_of(tree, ast.Call)
+    given = [
+        v for n in calls if called_name(n) != "publish" for v in [*n.args, *(k.value for k in n.keywords)]
+    ]
+    other = {dotted(one) for one in given} | {n.arg for n in all_of(tree, ast.arg)}
+    new = {}
+    for name, nodes in made.items():
+        call = nodes[0].value
+        is_new = isinstance(call, ast.Call) and not call.args + call.keywords and "..." not in name
+        if is_new and len(nodes) == 1 and name not in other and dotted(call.func).split(".")[0] in messages:
+            new[name] = nodes[0].lineno
+    told = set()
+    for node in all_of(tree, ast.BinOp, ast.Compare):
+        sides = [node.left, node.right] if isinstance(node, ast.BinOp) else [node.left, *node.comparators]
+        for field in map(dotted, sides):
+            owner = next((name for name in new if field.startswith(name + ".")), "")
+            parts = field[len(owner) + 1 :].split(".")
+            wholes = {owner + "." + ".".join(parts[:end]) for end in range(1, len(parts))}
+            if owner and field not in told and not filled & set(parts) and not wholes & other:
+                told.add(field)
+                beside = [m for m in made if m.rpartition(".")[0] == field.rpartition(".")[0]]
+                line = max([new[owner], *(n.lineno for m in beside for n in made[m])])
+                message = "no line gives `%s` a value, so it is that of a new message, 0 or empty" % field
+                fix = "below line %d, write `%s = …`" % (line, field)
+                yield slip(node.lineno, "wrong-value", message, fix, "new-field")
 
 
 def is_quotient(node):
