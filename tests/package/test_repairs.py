@@ -460,6 +460,9 @@ RIGHT = {
                                "        return self.speed * self.limit\n"),
     "a window": ("def f(root):\n    rospy.init_node('talker')\n    rospy.Subscriber('a', Int8, print)\n"
                  "    root.mainloop()\n"),
+    "fields of turtlesim": ("from turtlesim.msg import Pose\npose = Pose()\nprint(pose.linear_velocity)\n"),
+    "kept beside a message": ("from geometry_msgs.msg import Twist\n\n\nclass Robot:\n    def f(self):\n"
+                              "        self.twist = Twist()\n        self.liner = self.twist.linear\n"),
     "own timer": "class Timer:\n    pass\n\n\ndef tick():\n    pass\n\n\nTimer(0.1, tick)\n",
     "star import": "from math import *\n\n\nclass A:\n    def f(self, a):\n        self.degrees = degrees(a)\n",
     "global of another function": ("class A:\n    def f(self, pub):\n        self.pub = pub\n\n    def g(self):\n"

@@ -509,6 +509,15 @@ CASES = {
         ["build-line"],
         "add `find_package(catkin REQUIRED COMPONENTS`",
     ),
+    "fields-of-messages": Case(
+        swapped(TALKER,
+                ("import rospy\n", "import rospy\nfrom geometry_msgs.msg import PoseArray, Twist\n"),
+                ("def main", "def on_poses(got):\n    print(got.poses[0].positon.x, got.poses.count(1))\n\ndef main"),
+                ("    rate = ", "    twist = Twist()\n    twist.linaer.x = 1\n    twist.Angular = 2\n    rate = "),
+                ("\nmain()", "    rospy.Subscriber('poses', PoseArray, on_poses)\n\nmain()")),
+        ["missing-call"] * 3, "write `twist.linear.x = 1`",
+        after={TALKER: "twist.linear.x = 1\n    twist.angular = 2\n"},
+    ),
     "statement-misspelt": Case(
         {TALKER: SCRIPT.replace("        rate.sleep()\n", "        rate.sleep()\n        contineu\n        brek\n")},
         ["missing-call", "missing-call"], after={TALKER: "        continue\n        break\n"},

@@ -34,6 +34,26 @@ KEYWORDS = {
 PLACE = re.compile(r"(?:(?<=\s)|^)[^\w\s%]?([sdf])$")
 """What is left of the `%s` at the end of a text."""
 
+FIELD_NAMES = (
+    "accel action_feedback action_goal action_result altitude angle_increment angle_max angle_min angular "
+    "angular_velocity angular_velocity_covariance array axes binning_x binning_y buttons capacity cell_height "
+    "cell_temperature cell_voltage cell_width cells channels charge child_frame_id count covariance current data "
+    "data_offset datatype deserialize design_capacity distortion_model do_rectify echoes effort encoding feedback "
+    "field_of_view fields fluid_pressure force format frame_id goal goal_id header height illuminance inertia "
+    "info intensities intensity is_bigendian is_dense is_zero joint_names label latitude layout linear "
+    "linear_acceleration linear_acceleration_covariance location longitude magnetic_field "
+    "magnetic_field_covariance map_load_time max_range min_range name nsecs offset orientation "
+    "orientation_covariance origin percentage point point_step points polygon pose poses position "
+    "position_covariance position_covariance_type power_supply_health power_supply_status power_supply_technology "
+    "present quaternion radiation_type range range_max range_min ranges relative_humidity resolution result "
+    "rotation row_step scan_time secs serial_number serialize service size source stamp status step stride "
+    "temperature theta time_increment time_ref to_nsec to_sec torque transform transforms translation twist type "
+    "values variance vector velocity voltage width wrench x_offset y_offset "
+)
+OF_MESSAGES = tuple(FIELD_NAMES.split())
+"""What belongs to messages of `OF_ROS`, without names of three letters and less, and to their times."""
+OF_ROS = tuple(f"{one}_msgs.msg" for one in ("std", "geometry", "nav", "sensor"))
+
 Edit = tuple[tuple[int, int, int], str]
 """Line (from 0), start and end of what is replaced, and what is written for it."""
 
@@ -169,7 +189,8 @@ def _misspelt_members(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
     inside = {id(n): name for one, name in named if name in own for n in nodes_in(one)}
     stored = {n.attr for n in nodes_in(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
     fields_of, lacking = known.fields(tree), _Lacking(tree)
-    messages = _messages_of_callbacks(tree, fields_of)
+    of_ros = _inside_messages(tree, kinds)
+    messages = {**_messages_of_callbacks(tree, fields_of), **of_ros}
     for node in (n for n in nodes_in(tree) if isinstance(n, ast.Attribute)):
         members: Collection[str] = messages.get(id(node.value), ())
         of_text = isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
@@ -177,7 +198,8 @@ def _misspelt_members(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
         kind = inside.get(id(node), "") if owner == "self" else kinds.get(owner, owner.removesuffix("()"))
         fields = fields_of.get(kind, ()) if kind not in own else ()
         members = OF_TEXTS if of_text else own.get(kind) or MEMBERS.get(kind) or fields or members
-        known_attr = node.attr in {*members, *(stored if not fields else ())}
+        is_message = bool(fields) or id(node.value) in of_ros  # nothing else can be stored in one
+        known_attr = node.attr in {*members, *(() if is_message else stored)}
         right = "" if known_attr else _near(node.attr, members)
         if not known_attr and not right and kind in ("Publisher", "Rate") and kind not in own:
             right = next(iter(get_close_matches(node.attr, members, 1, 0.85)), "")  # `pub.publisher(…)`
@@ -262,6 +284,23 @@ def _messages_of_callbacks(
         for use in nodes_in(function)
         if isinstance(use, ast.Name) and use.id == function.args.args[-1].arg
     }
+
+
+def _inside_messages(tree: ast.Module, kinds: Mapping[str, str]) -> dict[int, Collection[str]]:
+    """Return what may belong to what messages of ROS hold, by the identity of each use. `kinds` are the classes of
+    names."""
+    imports = [n for n in nodes_in(tree) if isinstance(n, ast.ImportFrom) and n.module in OF_ROS]
+    classes = {a.asname or a.name for n in imports for a in n.names}
+    made = {name for name, kind in kinds.items() if kind in classes}
+    heard = _messages_of_callbacks(tree, dict.fromkeys(classes, OF_MESSAGES))
+    found: dict[int, Collection[str]] = {}
+    for node in (n for n in nodes_in(tree) if isinstance(n, ast.Attribute)):
+        root = node.value
+        while isinstance(root, ast.Attribute | ast.Subscript) and ast.unparse(root) not in made:
+            root = root.value
+        if len(node.attr) > 1 and (heard.get(id(root)) == OF_MESSAGES or ast.unparse(root) in made):
+            found[id(node.value)] = OF_MESSAGES
+    return found
 
 
 def _misspelt_keywords(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
