@@ -10,6 +10,7 @@ from grader.checks import CHECKS
 from grader.judging import judge
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status, Verdict, partial
+from grader.package.launch import parse_launch_files
 from grader.rubric.message_fields import said_types
 from tests.support.rubrics import (
     ALL,
@@ -534,3 +535,27 @@ def test_a_build_that_also_runs_is_blocked_by_the_manifest_too() -> None:
         rubric(named, built), build_runs({"runs": runs, "package": {"files": [{"path": "CMakeLists.txt"}]}})
     )
     assert [c.status.value for c in found] == ["fail", "blocked"]
+
+
+@pytest.mark.parametrize(("named", "status"), [("lab1", "fail"), ("lab_1", "blocked")])
+def test_what_a_manifest_lacks_is_no_reason_for_a_launch_file_with_another_name(
+    named: str, status: str
+) -> None:
+    """With the right name in it, the launch file's is wrong; with another one, both are put right there."""
+    manifest = {"id": "manifest", "check": "manifest", "with": {"name": "lab1", "dependencies": ["rospy"]}}
+    launch = {
+        "id": "launch-xml",
+        "check": "launch-xml",
+        "with": {"launch": "a.launch", "scripts": ["src/a.py"]},
+        "requires": ["manifest"],
+    }
+    text = b'<launch>\n  <node pkg="week1" type="a.py" name="a"/>\n</launch>\n'
+    package = {
+        "name": named,
+        "path": "week1",
+        "files": [{"path": "src/a.py"}],
+        "manifest": {"name": named},
+        "launch_files": [one.model_dump() for one in parse_launch_files({"launch/a.launch": text}, (named,))],
+    }
+    found = judge(rubric(manifest, launch), build_runs({"runs": {}, "package": package}))
+    assert [c.status.value for c in found] == ["fail", status]
