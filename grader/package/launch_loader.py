@@ -272,7 +272,8 @@ class _Loader:
             return
         if root is None:
             reason = f"it is not well-formed: {fault.explanation}" if fault else "it is not in the package"
-            fix = f"first fix {path}" if fault else f"write {path}, or push it"
+            advice = f": {fault.advice}" if fault and fault.advice else ""
+            fix = f"first fix {path}{advice}" if fault else f"write {path}, or push it"
             self.loaded.faults.append(_fault(element, scope, f"it includes {path}, and {reason}", fix))
         elif wanted(root, scope):
             self.walk(root, _included(element, scope, path), depth + 1)

@@ -74,6 +74,17 @@ def test_attributes_that_are_not_there_are_none():
             "`<node>` on line 2 is still open where `</launch>` comes",
         ),
         ("<launch>\n</node>\n</launch>", 2, "`</node>` closes nothing"),
+        (
+            '<launch>\n<group ns="a">\n<remap from="a" to="b"/>\n</node>\n</group>\n</launch>',
+            4,
+            "no `<node>` is open there",
+        ),
+        (
+            '<launch>\n<group>\n<!-- <node name="a"> -->\n<remap from="a" to="b"/>\n</node>\n</group>\n</launch>',
+            3,
+            "`<node>` is in a comment, and `</node>` on line 5 is not",
+        ),
+        ("<launch>\n<group>\n<!-- </group> -->\n</launch>", 3, "only a part of an element is in a comment"),
         ("<launch>\n<node/>\n", 1, "`<launch>` on line 1 is never closed"),
         ('<launch\n<node pkg="a"/></launch>', 1, "the tag `<launch` is not finished"),
         ('<launch>\n<node pkg="a"type="b"/>\n</launch>', 2, "a space before each attribute"),

@@ -306,7 +306,7 @@ def explain_by_refused_launch(_check: Check, package: PackageFacts, run: Run, ve
     ended = early_end(run)
     refused = refusal(run, package) if ended is not None and ended.start.argv[:1] == ("roslaunch",) else None
     is_told = NOTHING_STARTS in verdict.message or (refused is not None and refused.why in verdict.message)
-    if refused is None or is_told or not verdict.cause:
+    if refused is None or is_told or not verdict.cause or (refused.hint and refused.hint in verdict.hint):
         return verdict
     message = verdict.message.replace(f" ({verdict.cause})", "").replace(f": {verdict.cause}", "")
     update = {"message": f"{message}: {refused.why}", "hint": refused.hint, "cause": refused.why}
