@@ -420,51 +420,6 @@ def test_values_are_put_into_the_string(old: str, new: str, right: str | None, t
     assert (folder / LISTENER).read_text() == FILES[LISTENER].replace(old, new if right is None else right)
 
 
-NAMED = """\
-import rospy
-
-
-class Node:
-    def __init__(self, {taken}):
-        self.name = name
-        rospy.init_node(self.name)
-
-    def wait(self):
-        try:
-            rospy.spin()
-        except rospy.ROSInterruptException:
-            {alone}
-
-
-Node('talker').wait()
-"""
-
-
-@pytest.mark.parametrize(
-    ("taken", "alone", "changed"),
-    [
-        ("naMe", "pass", ("= name", "= naMe")),
-        ("nam", "pass", ("= name", "= nam")),
-        ("name", "retrun", ("retrun", "return")),
-        ("name", "pas", ("pas", "pass")),
-        ("label", "pass", ("", "")),
-    ],
-)
-def test_what_a_method_takes_and_words_alone(
-    taken: str, alone: str, changed: tuple[str, str], tmp_path: Path
-) -> None:
-    text = NAMED.format(taken=taken, alone=alone)
-    (step,) = list(examine([["a.py", text]], [], {}, ""))
-    last = step["steps"][-1]["text"] if step["steps"] else text
-    assert last == text.replace(*changed)
-
-
-def test_no_function_of_python_is_meant_where_it_would_get_no_value() -> None:
-    text = "import rospy\nrospy.init_node('a')\nrospy.spin()\nmain()\n"
-    (step,) = list(examine([["a.py", text]], [], {}, ""))
-    assert step["steps"] == []
-
-
 def test_the_function_keeps_its_name_in_what_is_said(tmp_path: Path) -> None:
     text = FILES[LISTENER].replace("callback(msg)", "callback(msg, topic)").replace("callback", "on_msg")
     said = [one.message for one in repair_all(package(tmp_path, {**FILES, LISTENER: text}), WANTED)]

@@ -41,6 +41,7 @@ from grader.package.python_repairs.names import (
     with_names,
     with_parameters,
     with_self,
+    with_targets,
 )
 from grader.package.python_repairs.rospy_names import ROSPY, with_attributes, with_logger, with_rospy
 from grader.package.python_repairs.syntax import (
@@ -120,6 +121,7 @@ def _steps(text: str, types: list[str], known: Known, name: str, *, is_run: bool
             lambda t: with_members(t, known),
             _with_quotes,
             with_names,
+            with_targets,
             with_methods,
             with_parameters,
             with_attributes,
@@ -248,9 +250,16 @@ def _keys_of_parameters(tree: ast.Module) -> Iterator[ast.Name]:
 
 
 def _with_start(text: str) -> Iterator[Step]:
-    """A function that goes on after two blank lines: the first line of the next one is missing; or, where it makes the
-    node or calls a function there, the line that begins the script's own part."""
+    """A function or class whose first line is a comment, and that the script uses; or one that goes on after two blank
+    lines: the first line of the next one is missing; or, where it makes the node or calls a function there, the line
+    that begins the script's own part."""
     tree, lines = tree_of(text), text.split("\n")
+    used = {n.id for n in nodes_in(tree) if isinstance(n, ast.Name)} - bound_in(tree)
+    for number, found in enumerate(map(COMMENTED_HEAD.match, lines)):
+        changed = "\n".join([*lines[:number], *([found[1]] if found else []), *lines[number + 1 :]])
+        if found and found[2] in used and syntax_error(changed) is None:
+            yield from step_to("commented", number + 1, text, changed, found[2])
+            return
     functions = [n for n in tree.body if isinstance(n, ast.FunctionDef)]
     started = any(isinstance(n, ast.Call) for one in _runs(tree) for n in nodes_in(one))
     for function in functions:
@@ -267,6 +276,9 @@ def _with_start(text: str) -> Iterator[Step]:
             if line and syntax_error(changed) is None:
                 yield from step_to("start", after.lineno, text, changed, function.name)
                 return
+
+
+COMMENTED_HEAD = re.compile(r"#[#\s]*((?:def|class)\s+(\w+).*:)\s*$")
 
 
 def _runs(tree: ast.Module) -> Iterator[ast.stmt]:

@@ -287,6 +287,62 @@ def with_names(text: str) -> Iterator[Step]:
                     return
 
 
+def with_targets(text: str) -> Iterator[Step]:
+    """`self.cout = self.count + 1` and `couner = 0`: a value is given to a name that nothing reads, and is meant for
+    one that is nearly the same; and `count = 0` in `__init__`, which is meant for `self.count`."""
+    tree, lines = tree_of(text), text.split("\n")
+    nodes = [n for n in nodes_in(tree) if isinstance(n, ast.Name | ast.Attribute)]
+    read = {ast.unparse(n) for n in nodes if isinstance(n.ctx, ast.Load)}
+    stored = [ast.unparse(n) for n in nodes if isinstance(n.ctx, ast.Store)]
+    assigned = [n for n in nodes_in(tree) if isinstance(n, ast.Assign | ast.AugAssign)]
+    given: dict[str, list[ast.expr]] = {}
+    for one in assigned:
+        target = one.targets[0] if isinstance(one, ast.Assign) else one.target
+        given.setdefault(ast.unparse(target), []).append(one.value)
+    local = {*_only_in_init(tree)}
+    for one in assigned:
+        target = one.targets[0] if isinstance(one, ast.Assign) else one.target
+        name, span = ast.unparse(target), span_of(lines, target)
+        if name in read or stored.count(name) != 1 or span is None:
+            continue
+        near = [f"self.{name}"] if target in local and f"self.{name}" in read else []
+        near = near or [other for other in given if other in read and _is_alike(name, other)]
+        used = {ast.unparse(n) for n in nodes_in(one.value)} if near else set()
+        same = isinstance(one, ast.AugAssign) or (near and (near[0] in used or near[0].endswith(f".{name}")))
+        same = same or (near and _are_constants([one.value, *given[near[0]]]))
+        if len(near) == 1 and same:
+            why = f"nothing reads `{name}`, to which a value is given here: `{near[0]}` is meant"
+            for step in step_to("argument", span[0] + 1, text, edited(text, [(*span, near[0])]), why):
+                yield step
+                yield from with_targets(step["text"])
+                return
+
+
+def _only_in_init(tree: ast.Module) -> Iterator[ast.Name]:
+    """Yield the variables that get a value in an `__init__` which gives none to the object's attribute of that name."""
+    for init in (n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef) and n.name == "__init__"):
+        stored = [n for n in nodes_in(init) if isinstance(getattr(n, "ctx", None), ast.Store)]
+        own = {n.attr for n in stored if isinstance(n, ast.Attribute)}
+        yield from (n for n in stored if isinstance(n, ast.Name) and n.id not in own)
+
+
+def _is_alike(name: str, other: str) -> bool:
+    """Return whether two names of one object, or of none, differ by one edit or by capitals alone."""
+    (owner, _, last), (other_owner, _, other_last) = name.rpartition("."), other.rpartition(".")
+    is_other = is_of_series(last, other_last) or last[-1].isdigit() or last.isupper()
+    plural_of_it = f"{last}s" == other_last or f"{other_last}s" == last
+    if owner != other_owner or last == other_last or is_other or plural_of_it:
+        return False
+    long = min(len(last), len(other_last)) >= NAME_CHARS_MIN
+    return last.lower() == other_last.lower() or (long and is_one_edit(last, other_last))
+
+
+def _are_constants(values: Iterable[ast.expr]) -> bool:
+    """Return whether only numbers, texts and truth values of one kind are given."""
+    kinds = {type(value.value) if isinstance(value, ast.Constant) else None for value in values}
+    return len(kinds) == 1 and None not in kinds
+
+
 def is_kept_by_self(node: ast.AST) -> bool:
     """Return whether it is `self.name = name`."""
     if not isinstance(node, ast.Assign) or not isinstance(node.value, ast.Name):

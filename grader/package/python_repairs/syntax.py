@@ -325,15 +325,25 @@ def _with_def(lines: list[str], at: int) -> Iterator[str]:
 
 
 def lost_head(text: str, body: str) -> str:
-    """Return the first line of the one function that the file names as a callback, or calls, and does not have; ""
-    where there is not just one. `body` are the lines that belong below it."""
+    """Return the first line of the one function that the file names as a callback, or calls, and does not have, or of
+    the one class; "" where there is not just one. `body` are the lines that belong below it."""
     code = re.sub(r"#[^\n]*", "", text)
     named = dict.fromkeys(re.findall(r"\b(?:Subscriber|Service|Timer)\s*\(.*,\s*(\w+)\s*[,)]", code), "msg")
     named |= dict.fromkeys(re.findall(r"^\s*(\w+)\(\)\s*$", code, re.MULTILINE), "")
-    given = set(re.findall(r"\b(?:def|class|import)\s+(\w+)|^\s*(\w+)\s*=", text, re.MULTILINE))
-    lost = [name for name in named if name not in {one for pair in given for one in pair}]
+    of_class = re.match(r"\s*def\s+\w+\s*\(\s*self\b", body)
+    if of_class:
+        named = dict.fromkeys(re.findall(r"(?<![\w.])([A-Z]\w*)\(", code), "")
+    imported = re.findall(r"^\s*(?:from\s.*)?import\s+(.*)", code, re.MULTILINE)
+    given = set(re.findall(r"\w+", " ".join(imported)))
+    given |= {
+        *re.findall(r"\b(?:def|class)\s+(\w+)", text),
+        *re.findall(r"^\s*(\w+)\s*=", text, re.MULTILINE),
+    }
+    lost = [name for name in named if name not in given]
     if len(lost) != 1 or lost[0] in dir(builtins):
         return ""
+    if of_class:
+        return f"class {lost[0]}:"
     value = re.search(r"\b(\w+)\.data\b", body) if named[lost[0]] else None
     return f"def {lost[0]}({value[1] if value else named[lost[0]]}):"
 

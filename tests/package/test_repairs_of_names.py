@@ -1,0 +1,122 @@
+"""Names in a script that nothing reads, or that nothing gives a value: which of them are repaired, and how."""
+
+from __future__ import annotations
+
+import pytest
+
+from grader.package.python_repairs.examine import examine
+
+NAMED = """\
+import rospy
+
+
+class Node:
+    def __init__(self, {taken}):
+        self.name = name
+        rospy.init_node(self.name)
+
+    def wait(self):
+        try:
+            rospy.spin()
+        except rospy.ROSInterruptException:
+            {alone}
+
+
+Node('talker').wait()
+"""
+
+
+@pytest.mark.parametrize(
+    ("taken", "alone", "changed"),
+    [
+        ("naMe", "pass", ("= name", "= naMe")),
+        ("nam", "pass", ("= name", "= nam")),
+        ("name", "retrun", ("retrun", "return")),
+        ("name", "pas", ("pas", "pass")),
+        ("label", "pass", ("", "")),
+    ],
+)
+def test_what_a_method_takes_and_words_alone(taken: str, alone: str, changed: tuple[str, str]) -> None:
+    text = NAMED.format(taken=taken, alone=alone)
+    (step,) = list(examine([["a.py", text]], [], {}, ""))
+    last = step["steps"][-1]["text"] if step["steps"] else text
+    assert last == text.replace(*changed)
+
+
+COUNTS = """\
+import rospy
+from std_msgs.msg import Int8
+
+
+class Counter:
+    def __init__(self):
+        self.count = 0
+        self.pub = rospy.Publisher('numbers', Int8, queue_size=1)
+        rospy.Timer(rospy.Duration(0.1), self.tick)
+
+    def tick(self, event):
+        self.pub.publish(self.count)
+        self.count = self.count + 1
+        if self.count > 127:
+            self.count = 0
+
+
+def main():
+    rospy.init_node('counter')
+    Counter()
+    rospy.spin()
+
+
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "says"),
+    [
+        ("self.count = self", "self.cout = self", "nothing reads `self.cout`"),
+        ("self.count = self.count + 1", "self.cuont += 1", "nothing reads `self.cuont`"),
+        ("    self.count = 0\n\n", "    self.Count = 0\n\n", "`self.count` is meant"),
+        ("self.count = 0\n        self.pub", "count = 0\n        self.pub", "`self.count` is meant"),
+        ("class Counter:\n", "", "class Counter:"),
+        ("def main():\n", "# def main():\n", "main"),
+        ("self.count = self", "self.last = self", None),
+        ("self.count = self", "self.counts = self", None),
+        ("self.count = self", "self.count2 = self", None),
+        ("rospy.Timer(", "self.COUNT = 0\n        rospy.Timer(", None),
+        ("rospy.Timer(", "coun = rospy.Timer(", None),
+    ],
+)
+def test_names_that_get_a_value_for_nothing(right: str, wrong: str, says: str | None) -> None:
+    (found,) = list(examine([["a.py", COUNTS.replace(right, wrong, 1)]], [], {}, ""))
+    assert says is not None or not found["steps"]
+    for step in found["steps"]:
+        assert says in step["word"]
+        assert step["text"] == COUNTS.replace(
+            "self.count = self.count + 1",
+            "self.count += 1" if "+=" in wrong else "self.count = self.count + 1",
+        )
+
+
+def test_no_function_of_python_is_meant_where_it_would_get_no_value() -> None:
+    text = "import rospy\nrospy.init_node('a')\nrospy.spin()\nmain()\n"
+    (step,) = list(examine([["a.py", text]], [], {}, ""))
+    assert step["steps"] == []
+
+
+@pytest.mark.parametrize(
+    ("printed", "right"),
+    [
+        ("'Received: ' + data", "'Received: ' + str(data.data)"),
+        ("rospy.get_name() + ' heard ' + data", "rospy.get_name() + ' heard ' + str(data.data)"),
+        ("'Received: ' + data.data", None),
+        ("'Received: ' + str(data)", None),
+        ("data + 1", None),
+        ("('' + data for data in 'ab')", None),
+    ],
+)
+def test_a_message_is_not_added_to_a_string(printed: str, right: str | None) -> None:
+    text = "import rospy\nfrom std_msgs.msg import String\n\n\ndef hear(data):\n    print({})\n\n\n"
+    text += "rospy.init_node('listener')\nrospy.Subscriber('chatter', String, hear)\nrospy.spin()\n"
+    (found,) = list(examine([["a.py", text.format(printed)]], [], {}, ""))
+    assert [step["text"] for step in found["steps"]] == ([text.format(right)] if right else [])
