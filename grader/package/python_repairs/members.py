@@ -84,6 +84,7 @@ def with_members(text: str, known: Known) -> Iterator[Step]:
         _misspelt_keywords,
         _lost_values,
         _lost_places,
+        _whole_messages,
         _values_behind,
         _lost_f,
     ):
@@ -301,6 +302,23 @@ def _inside_messages(tree: ast.Module, kinds: Mapping[str, str]) -> dict[int, Co
         if len(node.attr) > 1 and (heard.get(id(root)) == OF_MESSAGES or ast.unparse(root) in made):
             found[id(node.value)] = OF_MESSAGES
     return found
+
+
+def _whole_messages(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
+    """Yield `'I heard ' + msg` in a callback, for `'I heard ' + str(msg.data)`."""
+    tree, lines = tree_of(text), text.split("\n")
+    messages = _messages_of_callbacks(tree, known.fields(tree))
+    stored = {n.id for n in nodes_in(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    for node in (n for n in nodes_in(tree) if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Add)):
+        parts: list[ast.expr] = [node.left, node.right]
+        while isinstance(parts[0], ast.BinOp) and isinstance(parts[0].op, ast.Add):
+            parts[:1] = [parts[0].left, parts[0].right]
+        is_text = any(isinstance(p, ast.Constant) and isinstance(p.value, str) for p in parts)
+        for one in parts if is_text else ():
+            span = span_of(lines, one) if messages.get(id(one)) == MEMBERS["message"] else None
+            if span is not None and isinstance(one, ast.Name) and one.id not in stored:
+                why = f"`{one.id}` is the whole message, and no string can be added to it"
+                yield (span, f"str({one.id}.data)"), why
 
 
 def _misspelt_keywords(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
