@@ -14,7 +14,7 @@ from grader.checks.conditions import Condition, how_shown, true_spans
 from grader.checks.reacts import ORDER_S
 from grader.checks.registry import Refers, check
 from grader.checks.support.clocks import Lateness, excused, lateness
-from grader.checks.support.exit_causes import explain_early_end
+from grader.checks.support.exit_causes import explain_early_end, explain_error
 from grader.checks.support.fields import value_text
 from grader.checks.support.parameters import params_on_server, resolved_param, where_given
 from grader.checks.support.processes import (
@@ -363,6 +363,8 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
     kinds: tuple[SlipKind, ...] = ("spin-in-loop", "unregistered", *(() if others else ("loop-left",)))
     if slip := next(iter(_slips(run, package, params, *kinds)), None):
         return failed(f"{message}: {slip.message}", hint=slip.fix, citations=(slip.place,))
+    if end := explain_error(package, run):
+        return end.verdict(failed, f"{message}: an error comes first: {end.cause}")
     hint = f"publish in a loop `{LOOP}`, not a fixed number of times"
     if others:
         message += f" and goes on publishing on {others}"
@@ -559,13 +561,11 @@ def _rate_hint(ratio: float, nominal: str, *, even: bool) -> str:
 def _why_late(found: Rhythm, late: Lateness, params: RateParams) -> str:
     """Return what the machine was that may have made the rate wrong; "" where that is not why, or it is too far off."""
     # A machine that is late slows a loop down: it cannot double its rate.
-    if found.mean_hz >= 2 * params.rate_hz:
-        return ""
-    if found.tail_ns / 2e6 > max(late.max_ms, params.period_ns / 1e6):
+    doubled = found.mean_hz >= 2 * params.rate_hz
+    if doubled or found.tail_ns / 2e6 > max(late.max_ms, params.period_ns / 1e6):
         return ""
     if was_late(late, params) or sleeps_explain(found, late, params):
-        by = f"by up to {late.max_ms:.0f} ms, 95 % within {late.p95_ms:.0f} ms"
-        return f"late itself ({by}), so this proves nothing"
+        return f"late itself (by up to {late.max_ms:.0f} ms, 95 % within {late.p95_ms:.0f} ms), so this proves nothing"
     if stalls_explain(found, late, params):
         busy = f"{(late.busy or 0) * 100:.0f} % busy"
         return f"{busy}, and without the few long gaps the rate would be right, so this proves nothing"

@@ -400,10 +400,9 @@ def _local(message: str, _source: str, _marked: tuple[int, int] | None) -> Meani
     if hasattr(builtins, name[1]):
         cause = f"`{name[1]}` is a variable of this function, and hides Python's `{name[1]}`"
         return cause, f"give the variable `{name[1]}` another name"
-    cause = (
-        f"the function assigns to {name[1]} further down, so it is a variable of its own and has no value yet"
-    )
-    return cause, f"write `global {name[1]}` as the first line of the function"
+    cause = f"the function itself assigns to {name[1]}, so it is a variable of its own and has no value yet"
+    shared = f"write `global {name[1]}` as the first line of the function if the file has a {name[1]} outside of it"
+    return cause, f"{shared}, else give {name[1]} a value in the function, above that line"
 
 
 def _future(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
