@@ -20,7 +20,6 @@ NO_END = r"Premature end of data in tag (\S+) line (\d+)"
 _NO_NAME = "unparsable"
 """What libxml2 calls a tag without a name."""
 _MISMATCH = r"tag mismatch: (\S+) line (\d+) and ([^\s,]+)"
-_LINE_CHARS = 1_000
 _NO_QUOTE = (r"Unescaped '<' not allowed in attr", r"AttValue: ['\"] expected")
 NEVER_ENDED = "a comment is opened by `<!--` and never closed"
 # libxml2's message and what it means ({0}, {1}: the pattern's groups, {root}: the root tag)
@@ -162,9 +161,8 @@ def _fault(error: etree.XMLSyntaxError, parser: etree.XMLParser, data: bytes, fi
     known = 0 < column <= len(text) + 1
     # the error's own log holds what went wrong with other files before, too
     log = [str(entry.message)[:_MESSAGE_CHARS_MAX] for entry in islice(parser.error_log, _MESSAGES)]
-    known_by_text = _closed_early(message, data, root) or _never_begun(message, data, line)
-    known_by_text = known_by_text or _stands_for_another(message, text)
-    reason, opened = known_by_text or _explain(message, log, text, root=root)
+    by_text = _closed_early(message, data, root) or _never_begun(message, data, line)
+    reason, opened = by_text or _stands_for_another(message, text) or _explain(message, log, text, root=root)
     if reason.why == NEVER_ENDED:  # libxml2 says where the file ends
         opened = data[: data.rfind(b"<!--")].count(b"\n") + 1
     reason = _by_columns(reason, data, opened) if opened else reason
@@ -212,11 +210,10 @@ def _closed_early(message: str, data: bytes, root: str) -> tuple[Reason, int] | 
 
 
 def _never_begun(message: str, data: bytes, line: int) -> tuple[Reason, int] | None:
-    """Return what is to be said, with the line, of a tag that is closed in this line and begins nowhere above, or in a
-    comment."""
+    """Return what is to be said, with the line, of a tag that is closed in this line and begins nowhere above."""
     found = re.search(_MISMATCH, message)
-    text = data.decode("utf-8", "replace")
-    tag, above = found[3] if found is not None else "", "\n".join(_without_comments(text).split("\n")[:line])
+    plain = _without_comments(data.decode("utf-8", "replace")).split("\n")[:line]
+    tag, above = found[3] if found is not None else "", "\n".join(plain)
     begun = re.findall(rf"<{re.escape(tag)}\b[^<>]*(?<!/)>", above)
     if (
         found is None
@@ -224,13 +221,6 @@ def _never_begun(message: str, data: bytes, line: int) -> tuple[Reason, int] | N
         or get_close_matches(tag, [found[1]], cutoff=0.7)
     ):
         return None
-    hidden = rf"\s*<!--+\s*<{re.escape(tag)}\b[^<>]*(?<!/)>\s*--+>\s*"
-    commented = [
-        n for n, one in enumerate(text.split("\n")[:line], 1) if re.fullmatch(hidden, one[:_LINE_CHARS])
-    ]
-    if commented:
-        why = f"`<{tag}>` is in a comment, and `</{tag}>` on line {line} is not"
-        return Reason(why, "remove `<!--` and `-->` from it"), commented[-1]
     fix = f"write the `<{tag} …>` that is missing above it, or delete `</{tag}>`"
     return Reason(f"`</{tag}>` closes nothing: no `<{tag}>` is open there", fix), line
 
@@ -396,7 +386,8 @@ def _slips_near(at: int, message: str, text: str, root: str) -> Iterator[LineSli
     opened, closed = (mismatch[1], mismatch[3]) if mismatch else ("", "")
     begun = re.compile(rf"\s*[^\w\s<]?(?:{re.escape(closed)}\b[^<]*|/{re.escape(opened)}\s*)>")
     told = [at, *map(int, re.findall(r"line (\d+)", message))]
-    told += [n for n, line in enumerate(lines, 1) if mismatch and begun.match(line)]
+    hidden = re.compile(rf"\s*<!--+\s*<{re.escape(closed)}\b[^<>]*(?<!/)>\s*--+>")
+    told += [n for n, line in enumerate(lines, 1) if mismatch and (begun.match(line) or hidden.match(line))]
     if re.search("omment|hyphen|'--'", message):
         told += [n for n, line in enumerate(lines, 1) if "<!--" in line and "-->" not in line]
     named = [number for number in told if 0 < number <= len(lines)]

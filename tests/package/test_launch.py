@@ -82,7 +82,7 @@ def test_attributes_that_are_not_there_are_none():
         (
             '<launch>\n<group>\n<!-- <node name="a"> -->\n<remap from="a" to="b"/>\n</node>\n</group>\n</launch>',
             3,
-            "`<node>` is in a comment, and `</node>` on line 5 is not",
+            "only a part of an element is in a comment",
         ),
         ("<launch>\n<group>\n<!-- </group> -->\n</launch>", 3, "only a part of an element is in a comment"),
         ("<launch>\n<node/>\n", 1, "`<launch>` on line 1 is never closed"),

@@ -135,6 +135,11 @@ CASES = {
         {"src/hear.py": SCRIPT, LAUNCHED: LAUNCH.replace(NODE, f"{NODE}\n{NODE.replace('talker.py', 'hear.py')}")},
         ["launch-syntax"], 'line 3 of launch/lab.launch: name="talker" should be name="hear"',
     ),
+    "node-begun-in-a-comment": Case(
+        {LAUNCHED: LAUNCH.replace(NODE, '<!-- <node name="talker"> -->\n<!-- a -->\n<param name="a"/>\n</node>\n')},
+        ["launch-syntax"], "line 2 of launch/lab.launch: only a part of an element is in a comment",
+        after={LAUNCHED: 'name="talker">\n<!-- a -->'},
+    ),
     "launched-in-nearly-the-namespace": Case(
         {LAUNCHED: f'<launch>\n<group ns="Left">\n{NODE}</group>\n</launch>\n'},
         ["node-name"], 'line 2 of launch/lab.launch: ns="Left" should be ns="left"', after={LAUNCHED: 'ns="left"'},

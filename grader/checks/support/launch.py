@@ -107,6 +107,9 @@ _REFUSALS = (
      "the file {0} that <include> names does not exist", "push {0}, or start its nodes here, with a <node> for each"),
     (r"invalid bool value for (\w+): (\S+?)\.?(?:\s|$)", '{0}="{1}" is neither true nor false',
      'write {0}="true" or {0}="false"'),
+    (r"unused args \[([^\[\]\n]+)\] for include of \[([^\[\]\n]+)\]",
+     "<include> gives {1} a value for {0}, and no <arg> of {1} has that name",
+     'write <arg name="{0}"/> below <launch> in {1}, or delete that <arg> of the <include>'),
     (NO_VALUE, "a parameter has no value", "write a value behind each name, or names with values below it"),
     # Last, as the errors above may begin with these words.
     (NOT_WELL_FORMED, "it is not well-formed", "close every element"),
