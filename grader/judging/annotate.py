@@ -100,9 +100,10 @@ def _points(package: PackageFacts) -> Iterator[_Point]:
 def _nodes(package: PackageFacts, launch: LaunchFile) -> Iterator[_Point]:
     """Yield the nodes whose program is missing or not executable: roslaunch prints an error, and starts the others."""
     for node in launch.brings:
-        if node.pkg != package.name or node.uncertain:
-            continue
         script, slip = own_script(package, node), node_slip(package, node)
+        # a name that the manifest may be told to take is none to change here
+        if node.uncertain or (node.pkg != package.name and (slip is None or slip.of_manifest)):
+            continue
         if slip is not None:
             text = f"roslaunch leaves a <node> out: {slip.file}, line {slip.line}: {slip.why}; {slip.fix}"
             yield _Point(FileCitation(file=slip.file, line=slip.line), text, slip.lacks)

@@ -146,6 +146,16 @@ def test_what_does_not_start_is_told_where_nothing_is_lost(tmp_path) -> None:
     assert add_advice([lost], package, rubric(CMAKE_CHECK)) == (lost,)
 
 
+def test_a_node_of_nearly_the_packages_name_is_told(tmp_path) -> None:
+    nodes = [f'<node pkg="{name}" type="a.py" name="{name}"/>' for name in ("lab11", "rospy", "other")]
+    files = {
+        "src/a.py": "#!/usr/bin/env python3\n",
+        "launch/x.launch": "\n".join(["<launch>", *nodes, "</launch>"]),
+    }
+    (told,) = add_advice([criterion()], facts(tmp_path, **files), rubric(CMAKE_CHECK))
+    assert told.hint == f'{OUT} there is no a.py in a package lab11; write pkg="lab1"'
+
+
 CMAKE_CPP = CMAKE + "\nadd_executable(talker src/talker.cpp)\n"
 LAUNCH = (
     '<launch>\n<node pkg="lab1" type="talker" name="sender"/>\n'
