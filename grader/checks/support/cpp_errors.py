@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from grader.checks.support.scripts import CPP_SUFFIXES, cmake_calls, path_in_package
 from grader.checks.support.text import near_names, shown
+from grader.installable import noetic_messages
 from grader.model.package import CMAKE, PackageFacts
 from grader.model.verdict import FileCitation
 from grader.wording import ON_THE_MACHINE, on_lines, there_is
@@ -145,16 +146,134 @@ STANDARD = {
 """Names of C++'s standard library that are written without `std::`, with their headers."""
 
 
-def _no_semicolon(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+KEYWORDS = (
+    "return",
+    "while",
+    "for",
+    "if",
+    "else",
+    "int",
+    "void",
+    "bool",
+    "double",
+    "float",
+    "class",
+    "const",
+    "true",
+)
+OF_ROS = {
+    "init": 'ros::init(argc, argv, "name")',
+    "advertise": 'nh.advertise<std_msgs::String>("topic", 10)',
+    "subscribe": 'nh.subscribe("topic", 10, callback)',
+    "advertiseService": 'nh.advertiseService("service", callback)',
+    "serviceClient": 'nh.serviceClient<package::Type>("service")',
+    "publish": "pub.publish(msg)",
+    "Rate": "ros::Rate rate(10)",
+}
+"""Calls of roscpp, as they are written."""
+_OF_ROS_H = re.compile(
+    r"(?:init|ok|spin|spinOnce|shutdown|NodeHandle|Publisher|Subscriber|Rate|Time|Duration|Service(?:Server|Client))"
+    r"|ROS_(?:DEBUG|INFO|WARN|ERROR|FATAL)(?:_STREAM)?"
+)
+"""What `ros/ros.h` declares: unknown only where that is not included."""
+
+
+def _source(found: re.Match[str], lines: Sequence[str], number: str = "") -> str:
+    """Return the line of the source that the compiler shows below its error; "" for none."""
+    place = re.search(r":(\d+):", found.string)
+    shown_there = re.compile(rf"\s*{number or (place[1] if place else '0')} \|(.*)")
+    return next((match[1].strip() for line in lines if (match := shown_there.match(line))), "")
+
+
+def _no_semicolon(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
+    if _source(found, lines).startswith("for"):
+        why = f"{found.string}: a `;` is missing between the parts of the `for`"
+        return Explained(why, "write it as in `for (int i = 0; i < 3; i++)`")
+    if found[2] == ")":
+        why = f"{found.string}: there is a `)` that no `(` opens"
+        return Explained(why, "on that line, write the `(` that is missing, or delete a `)`")
     where = f"of the statement before `{found[2]}`" if found[1] else "of that line"
     return Explained(f"{found.string}: a `;` is missing", f"write a `;` at the end {where}")
+
+
+def _no_bracket(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    return Explained(
+        f"{found.string}: a `{found[1]}` is missing", f"write a `{found[1]}` before `{found[2]}`"
+    )
+
+
+def _no_end_of_macro(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
+    """The compiler looks for the bracket down to the file's end, and names the line of the call only then."""
+    called = re.compile(
+        rf"([^:\s]+):(\d+):\d+: (?:error: .{found[1]}. was not declared|warning: missing terminating (\"))"
+    )
+    place = next((match for line in lines if (match := called.match(line))), None)
+    path = path_in_package(package, place[1]) if place else None
+    at = FileCitation(file=path, line=int(place[2])) if path and place else None
+    where = f" on line {at.line} of {path}" if at else ""
+    if place and place[3]:
+        return Explained(
+            f'the text{where} has no `"` at its end', 'write a `"` where its text ends', place=at
+        )
+    return Explained(
+        f"the `(` of {found[1]}{where} is not closed", "write a `)` before the `;` of that call", place=at
+    )
+
+
+def _no_quote(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
+    source = _source(found, lines)
+    sign = found[1] or (">" if "<" in source else "<" if ">" in source else '"')
+    where = "at the end of" if sign != "<" else "before the file's name on"
+    hint = (
+        f"write a `{sign}` {where} that line"
+        if source.startswith("#")
+        else f"write a `{sign}` where its text ends"
+    )
+    return Explained(f"{found.string}: a `{sign}` is missing", hint)
+
+
+def _no_head(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    why = f"{found.string}: what is above this `{{` does not begin a function"
+    head = "`int main(int argc, char **argv)`"
+    return Explained(
+        why, f"above it, write the function's head with its brackets and without a `;`, as in {head}"
+    )
+
+
+def _twice(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
+    name = re.sub(r"\(.*", "", found[1]).split()[-1]
+    above = re.compile(r"\S+?:(\d+):\d+: note: .*previous")
+    first = next((f" on line {match[1]}" for line in lines if (match := above.match(line))), "")
+    why = f"{found.string}: {name} is declared{first} already"
+    return Explained(why, f"delete that line, or give what it declares another name than {name}")
+
+
+def _other_arguments(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
+    """Of a call of roscpp's with too few, too many or other arguments, or with them in another order."""
+    place, source = re.search(r":(\d+):", found.string), _source(found, lines)
+    if any(place and f":{place[1]}:" in line and "character constant" in line for line in lines):
+        why = f"{found.string}: single quotes are for a single character"
+        return Explained(why, "write the text of that line in double quotes")
+    if found[1] == "init" and "ros::init" not in source:
+        return Explained(found.string, FIRST_ERROR_HINT)
+    return Explained(f"{found.string}: these arguments do not fit", f"write it as in `{OF_ROS[found[1]]}`")
+
+
+def _no_call(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
+    """A function that is named without its brackets: called, or given to another function."""
+    method = re.split(r"::|\s", re.sub(r"\(.*", "", found[1] or ""))[-1] or r"\w+"
+    named = re.search(rf"(?:\.|->|^ros::){method}\b(?!\s*\()", _source(found, lines))
+    if named is None:
+        return _no_address(found, package, lines) if found[1] else Explained(found.string, FIRST_ERROR_HINT)
+    method = re.sub(r"\W*(?:ros::)?", "", named[0], count=1)
+    place = found.string.partition(" ")[0]
+    return Explained(f"{place} `{method}` is not called without brackets", f"write `{method}()` on that line")
 
 
 def _no_semicolon_above(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
     """Where what the compiler did not expect begins its line, the statement above has no end."""
     place = re.search(r":(\d+):", found.string)
-    source = re.compile(rf"\s*{place[1]} \|\s*{re.escape(found[1])}") if place else None
-    if source is None or not any(source.match(line) for line in lines):
+    if not _source(found, lines).startswith(found[1]):
         return Explained(found.string, FIRST_ERROR_HINT)
     hint = f"write a `;` at the end of the last line of code above line {place[1] if place else ''}"
     return Explained(f"{found.string}: a `;` is missing above it", hint)
@@ -162,15 +281,29 @@ def _no_semicolon_above(found: re.Match[str], _package: PackageFacts, lines: Seq
 
 def _explain_undeclared(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
     name, near = found[1], found[2]
+    source = _source(found, lines)
+    if re.search(rf"\b(?:ros|std|\w+_msgs):{name}\b", source):
+        return Explained(found.string, f"write `::` in place of the `:` before {name}")
     if re.fullmatch(r"_\d", name) and any("boost::bind" in line for line in lines):
         return _no_placeholder(name)
     is_bound = re.fullmatch(r"_\d", name) is not None and any("std::bind" in line for line in lines)
     if is_bound or name in STANDARD:
         whole, header = (f"placeholders::{name}", "functional") if is_bound else (name, STANDARD[name])
         return Explained(found.string, f"write std::{whole}, and #include <{header}> at the top")
+    if _OF_ROS_H.fullmatch(name) and name.startswith("ROS_"):
+        return _no_ros_h(found, _package, lines)
+    is_first = re.match(rf"(?:.*[{{}};]\s*)?{name}\s*[(\w]", source)
+    if not near and is_first and (keyword := near_names(name, KEYWORDS)):
+        return Explained(found.string, f"write `{keyword[0]}` in place of `{name}`")
     declare = f"declare {name} above that line, or include the header that does"
     meant = f"write {near} there, if that is what you mean; otherwise {declare}"
     return Explained(found.string, meant if near else declare)
+
+
+def _no_ros_h(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    if not _OF_ROS_H.fullmatch(found[1]):
+        return Explained(found.string, FIRST_ERROR_HINT)
+    return Explained(f"{found.string}: ros/ros.h is not included", "write `#include <ros/ros.h>` at the top")
 
 
 def other_namespace(found: re.Match[str], package: PackageFacts, _lines: Sequence[str] = ()) -> Explained:
@@ -213,7 +346,7 @@ def _explain_subscription(found: re.Match[str], _package: PackageFacts, _lines: 
     if method := re.search(r"\((\w+)::\*\)", given):
         fix = f"give the object behind the method: `this` in a method of {method[1]}, elsewhere the address of one"
         return Explained(f"{why}: a method of {method[1]} needs its object", fix)
-    return Explained(found.string, FIRST_ERROR_HINT)
+    return Explained(f"{found.string}: these arguments do not fit", f"write it as in `{OF_ROS['subscribe']}`")
 
 
 def _no_address(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -222,11 +355,22 @@ def _no_address(found: re.Match[str], _package: PackageFacts, _lines: Sequence[s
     return Explained(found.string, hint)
 
 
-def _no_type(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    """A service's type has two parts, and nothing else."""
-    near = near_names(found[2], ("Request", "Response"))
-    hint = f"write {found[1]}::{near[0]}" if near else f"look up the name of that part of {found[1]}"
-    return Explained(f"there is no {found[2]} in {found[1]}", hint)
+def _no_type(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    """A service's type has two parts, and nothing else; a message's package has its messages."""
+    scope, name = found["scope"], found["name"]
+    own = [posixpath.basename(one.path).partition(".")[0] for one in package.interfaces]
+    own += [
+        f"{one}{part}" for one in own for part in ("Request", "Response") if package.file(f"srv/{one}.srv")
+    ]
+    types = [*own] if scope == package.name else noetic_messages().get(scope, ())
+    if name in types:
+        why = f"{found.string}: its header is not included"
+        return Explained(why, f"write `#include <{scope}/{name}.h>` at the top")
+    near = near_names(name, types or ("Request", "Response"))
+    what = f"the names of {scope}'s messages" if types else f"the name of that part of {scope}"
+    return Explained(
+        f"there is no {name} in {scope}", f"write {scope}::{near[0]}" if near else f"look up {what}"
+    )
 
 
 def _without_main(package: PackageFacts, lines: Sequence[str]) -> Explained:
@@ -336,6 +480,16 @@ def _no_arrow(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]
 CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
     (r"Cannot determine link language for target \"([^\"]+)\"", _no_language),
     (r"expected (',' or )?';' before '([^']+)'", _no_semicolon),
+    (r"expected '([()])' before '([^']+)'", _no_bracket),
+    (r"unterminated argument list invoking macro \"(\w+)\"", _no_end_of_macro),
+    (r"missing terminating ([\">]) character|#include expects", _no_quote),
+    (r"invalid preprocessing directive #\w+; did you mean (#\w+)\?", told("{0}", "write `{1}` there")),
+    (r"expected unqualified-id before '{'", _no_head),
+    (r"re(?:declaration|definition) of '([^']+)'", _twice),
+    (r"no matching function for call to '(?:ros::)?NodeHandle::subscribe(.*)", _explain_subscription),
+    (rf"no matching function for call to '(?:ros::(?:\w+::)?)?({'|'.join(OF_ROS)})[<(]", _other_arguments),
+    (r"statement cannot resolve address of overloaded function()", _no_call),
+    (r"'(\w+)' is not a member of 'ros'(?!;)", _no_ros_h),
     (r"expected initializer before '([^']+)'", _no_semicolon_above),
     (
         r"a function-definition is not allowed here before '{'",
@@ -354,10 +508,21 @@ CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
         r"'([^']+)' (?:was not declared in this scope|does not name a (?:template )?type)(?:; did you mean '([^']+)')?",
         _explain_undeclared,
     ),
-    (r"no matching function for call to '(?:ros::)?NodeHandle::subscribe(.*)", _explain_subscription),
-    (r"invalid use of non-static member function '([^']+)'", _no_address),
-    (r"'([^']+)::(\w+)' has not been declared", _no_type),
+    (r"invalid use of (?:non-static )?member function '([^']+)'", _no_call),
+    (r"'(?P<scope>[^']+)::(?P<name>\w+)' has not been declared", _no_type),
+    (r"'(?P<name>\w+)' is not a member of '(?P<scope>\w+_msgs)'(?!;)", _no_type),
     (r"'__s_get\w+' is not a member of '([^']+)'", _no_message),
+    (
+        r"'__get\w+' in '\w+', which is of (non-class|pointer) type",
+        told(
+            "publish(…) is given what is no message, but of a {1} type",
+            "give it the message: `pub.publish(msg)`",
+        ),
+    ),
+    (
+        r"could not convert '.*operator=\(",
+        told("a single `=` sets a value, and compares nothing", "write `==` on that line"),
+    ),
     (r"'(\w+)' (?:has not been declared|is not a class, namespace, or enumeration)", other_namespace),
     (r"(?:ConstPtr|Ptr|shared_ptr).* has no member named '(\w+)'", _no_arrow),
     (
