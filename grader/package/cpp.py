@@ -29,9 +29,10 @@ _LAMBDA = re.compile(r"\[[^\[\];]*\]\s*\([^;{}]*?\)[^;{}()]*{")
 _ENDLESS = re.compile(
     r"\bwhile\s*\(\s*(?:(?:ros::|\w+(?:\.|->))ok\s*\(\s*\)|true|1)\s*\)|\bfor\s*\(\s*;\s*;\s*\)"
 )
+_REPEATS = re.compile(r"\bwhile\s*\([^;{}]{0,200}\)\s*{|\bfor\s*\([^{}]{0,200}\)\s*{")
 _LEAVES = re.compile(r"\b(?:break|return|throw|goto|spinOnce)\b")
 _SPIN = re.compile(r"\bros::spin\s*\(")
-_SPINS = re.compile(r"spin|Spinner|call(?:Available|One)\b")
+_SPINS = re.compile(r"spin(?!Once\s*;)|Spinner|call(?:Available|One)\b")
 _MAIN = re.compile(r"\bmain\s*\(")
 _DEFINES_MAIN = re.compile(r"\b(?:int|void)\s+main\s*\([^;{}()]*\)\s*{")
 _LOOP = re.compile(r"\bwhile\s*\([^;{}]*\bok\s*\(\s*\)")
@@ -332,8 +333,15 @@ def _waits_in(body: _Body, code: str, pauses_s: dict[str, float]) -> Iterator[tu
     for match in _SPIN.finditer(code, body.start, body.end):
         yield match.start(), "the callback {name} calls spin() on line {line}", "move line {line} out of it"
     for match in _SLEEP.finditer(code, body.start, body.end):
-        if _seconds(match, pauses_s) >= SHORT_S:
+        if _seconds(match, pauses_s) < SHORT_S:
+            continue
+        loops = _REPEATS.finditer(code, body.start, match.start())
+        loop = next((one for one in loops if match.start() < end_of_block(code, one.end())), None)
+        if loop is None:
             yield match.start(), "the callback {name} sleeps on line {line}", "delete line {line}"
+            continue
+        fix = "keep in it only what came, and go through the loop of line {line} in the main program"
+        yield loop.start(), "the loop in the callback {name}, line {line}, sleeps in each turn", fix
 
 
 def _seconds(match: re.Match[str], pauses_s: dict[str, float]) -> float:
