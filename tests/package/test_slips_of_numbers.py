@@ -527,7 +527,7 @@ def test_distances_without_a_root(text: str, lines: list[int], tmp_path: Path) -
         ("a = math.atan2(cos(e), sin(f))\n", []),
         ("def f(m):\n    self.x = m.x\n    self.y = m.x\n", ["mixed"]),
         ("def f(m):\n    self.x, self.y = m.y, m.x\n", []),
-        ("y = 0\ndef f(m):\n    global x, y\n    x = m.x\nprint(x, y)\n", ["mixed"]),
+        ("y = 0\ndef f(m):\n    global x, y\n    x = m.x\nprint(x, y)\n", ["", "mixed"]),
         ("y = read()\ndef f(m):\n    global x, y\n    x = m.x\nprint(x, y)\n", []),
         ("y = 0\ndef f(m):\n    global x\n    x = m.x\nprint(x)\n", []),
         ("if abs(e) > -0.1:\n    turn()\n", ["negative"]),

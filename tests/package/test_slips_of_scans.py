@@ -252,3 +252,47 @@ def test_files_that_are_open_elsewhere_too(lines: str, told: bool, tmp_path: Pat
     (tmp_path / "a.py").write_text(text, encoding="utf-8")
     [fix] = [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "emptied"]
     assert ("`flush()` of the file that line 4 opens" in fix) is told
+
+
+AIM = "give `self.aim` its value in the callback that has to"
+CALLBACKS = """\
+goal, near = None, 0
+far = 9.0
+def heard(msg):
+    global goal, far
+    %s
+class Driver:
+    def __init__(self):
+        self.goal, self.on = None, False
+        self.on = False
+        self.aim = None
+    def heard(self, msg):
+        %s
+    def step(self):
+        %s
+        pub.publish(goal, far)
+"""
+
+
+@pytest.mark.parametrize(
+    ("plain", "method", "test", "fixes"),
+    [
+        ("pass", "self.aim = msg", "", ["below line 4, write `far = msg`"]),
+        ("goal = msg", "self.aim = msg", "", ["below line 4, write `far = …`"]),
+        ("goal, far = msg.a, msg.b", "self.aim = msg", "", []),
+        ("print(goal, far)", "self.aim = msg", "", []),
+        ("far = msg", "self.x = 1", "if self.aim is None: return", [AIM]),
+        ("far = msg", "self.x = 1", "if not self.aim or self.x: return", [AIM]),
+        ("far = msg", "self.x = 1", "if self.aim and self.x: pub.publish(1)", [AIM]),
+        ("far = msg", "self.aim = msg", "if self.aim is None: return", []),
+        ("far = msg", "self.x = 1", "if self.aim is None: pub.publish(1)", []),
+        ("far = msg", "self.x = 1", "if self.aim: print(1)", []),
+        ("far = msg", "driver.aim = 1", "if not self.aim: return", []),
+    ],
+)  # fmt: skip
+def test_what_a_callback_never_gives_a_value(
+    plain: str, method: str, test: str, fixes: list[str], tmp_path: Path
+) -> None:
+    (tmp_path / "a.py").write_text(CALLBACKS % (plain, method, test), encoding="utf-8")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.fix for s in slips if s.kind == "wrong-value" and "value" in s.message] == fixes

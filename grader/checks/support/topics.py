@@ -437,7 +437,7 @@ SEEN_AS = {
 }  # fmt: skip
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so; others always show."""
 
-STEERING = ("swapped", "mixed", "rootless", "inf", "angle", "turned", "negative")
+STEERING = ("swapped", "mixed", "rootless", "inf", "angle", "turned", "negative", "ungiven")
 OF_STEERING = ("ends-at", "stays-within", "path", "reacts")
 """What leads a robot astray wherever its script computes so, and the checks of what a robot does."""
 

@@ -1,5 +1,6 @@
 """Finds what becomes of what a student's functions make and return, for `slips.py`: results that nothing keeps, lists
-in the place of a response, which fields of a message are filled in, and which errors a `try` catches.
+in the place of a response, which fields of a message are filled in, which errors a `try` catches, and names that keep
+their first value.
 
 These are facts, which checks compare with what the lab asks. Nothing is executed. Python 3.8, standard library only.
 """
@@ -8,13 +9,16 @@ import ast
 from collections import Counter
 
 from script_names import (
+    USES_LIMIT,
     all_of,
     argument,
     called_name,
+    calls_in,
     caught_by,
     dotted,
     functions_in,
     is_call_alone,
+    names_in,
     parents_of,
     slip,
     walk,
@@ -35,6 +39,7 @@ def results(tree):
     yield from filled_fields(tree)
     yield from narrow_handlers(tree)
     yield from unreached_returns(tree)
+    yield from never_given(tree)
 
 
 def dropped_results(tree):
@@ -176,3 +181,62 @@ def unreached_returns(tree):
 def is_plain_end(node):
     """Whether a statement ends its function without a value."""
     return isinstance(node, ast.Raise) or (isinstance(node, ast.Return) and node.value is None)
+
+
+def never_given(tree):
+    """`global goal` in a callback that does nothing with it, and `self.goal = None` with `if self.goal is None:
+    return`, where no line gives it another value."""
+    fixed = fixed_values(tree)
+    read = {dotted(n) for n in all_of(tree, ast.Name) if isinstance(n.ctx, ast.Load)}
+    for function in all_of(tree, ast.FunctionDef):
+        inside = [n for n in walk_own(function) if isinstance(n, ast.Name)]
+        used, stored = {n.id for n in inside}, {n.id for n in inside if isinstance(n.ctx, ast.Store)}
+        unread = [one.arg for one in function.args.args if one.arg not in {"self", *used}]
+        for node in (n for n in function.body if isinstance(n, ast.Global)):
+            names = [n for n in node.names if n in read & fixed.keys() - used and not n.isupper()]
+            for name in names if unread or stored.intersection(node.names) else ():
+                message = "`%s` has `global %s`, and never gives it a value" % (function.name, name)
+                fix = "below line %d, write `%s = %s`" % (node.lineno, name, (*unread, "…")[0])
+                yield slip(node.lineno, "wrong-value", message, fix, "ungiven" if unread else "")
+    acting = {"publish", *(n.name for n in all_of(tree, ast.FunctionDef) if calls_in(n, "publish"))}
+    for node in all_of(tree, ast.If)[:USES_LIMIT]:
+        leaves = isinstance(node.body[0], (ast.Return, ast.Continue))
+        for name in sorted(n for n in names_in(node.test) if n.startswith("self.")):
+            value = fixed.get(name[len("self.") :])
+            acts = any(calls_in(one, *acting) for one in node.body)
+            if value in ("None", "False") and truth(node.test, name, value) is leaves and (leaves or acts):
+                message = "`%s` is %s all the time: no line gives it another value" % (name, value)
+                fix = "give `%s` its value in the callback that has to" % name
+                yield slip(node.lineno, "wrong-value", message, fix, "ungiven")
+
+
+def fixed_values(tree):
+    """Return the names and attributes that are given one value only, written as a constant, with that."""
+    given = {}
+    for node in all_of(tree, ast.Assign):
+        for target in node.targets if isinstance(node.value, ast.Constant) else ():
+            given.setdefault(dotted(target).rpartition(".")[2], []).append(repr(node.value.value))
+    every = all_of(tree, ast.Name, ast.Attribute)
+    stored = Counter(dotted(n).rpartition(".")[2] for n in every if isinstance(n.ctx, ast.Store))
+    return {
+        name: values[0]
+        for name, values in given.items()
+        if stored[name] == len(values) and len(set(values)) == 1
+    }
+
+
+def truth(test, name, value):
+    """Return whether a condition is true where a name is None or False; None where that is not sure."""
+    if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
+        inner = truth(test.operand, name, value)
+        return None if inner is None else not inner
+    if isinstance(test, ast.BoolOp):
+        decides = isinstance(test.op, ast.Or)
+        return decides if decides in [truth(one, name, value) for one in test.values] else None
+    if isinstance(test, ast.Compare) and dotted(test.left) == name:
+        is_same = repr(getattr(test.comparators[0], "value", "")) == value
+        kind = type(test.ops[0])
+        return (
+            kind in (ast.Is, ast.Eq) if is_same and kind in (ast.Is, ast.Eq, ast.IsNot, ast.NotEq) else None
+        )
+    return False if dotted(test) == name else None
