@@ -23,6 +23,7 @@ UNDEFINED = {
     "module": ("x = math.sin(1)\n", "`math` is not imported: write `import math` at the top"),
     "module-of-messages": ("p = rospy.Publisher('a', std_msgs.msg.Int8)\n", "write `import std_msgs.msg` at the top"),
     "alias": ("x = np.zeros(3)\n", "`np` is not imported: write `import numpy as np` at the top"),
+    "constant": ("a = 1\ndef f():\n    return a * LIMIT\n", "above line 3, write `LIMIT = …`, with the value"),
     "class": ("x = Robot()\n", "nothing in the file gives `Robot` a value: above line 2, define Robot or import it"),
     "function": ("steer(1)\n", "above line 2, define it with `def steer(…):`, or import it"),
     "the function that nothing calls": ("def turn_server():\n    pass\ndef used(a):\n    pass\nused(1)\nadd_server()\n",

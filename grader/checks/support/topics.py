@@ -448,6 +448,15 @@ OF_TURNS = ("orientation", "rotation", "transform")
 def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a lost mark with the line of a script that runs on which the value goes wrong, or with its conditions that
     are always or never true."""
+    silent = not any("Twist" in c.type and c.messages for c in run.student_channels())
+    if (
+        silent
+        and not verdict.cause
+        and check.name in OF_STEERING[:3]
+        and (slip := why_unreached(package, run))
+    ):
+        why = f"line {slip.line} of {slip.file}: {slip.message}"
+        return verdict.explained(why, _reach_hint(slip), (slip.place,), cause=slip.message)
     files = _files_that_run(package, run)
     of_values = check.of_callbacks or check.name in OF_VALUES or (check.name == "prints" and verdict.silent)
     kinds = ["wrong-value", "compared"] if of_values and not verdict.cause else []

@@ -562,7 +562,8 @@ def what_to_write(node, used, tree):
     name, line = node.id, node.lineno
     inner = used.attr if isinstance(used, ast.Attribute) else ""
     around = parents_of(tree).get(node)
-    if name[:1].isupper():
+    is_constant = name.isupper() and len(name) > 1
+    if name[:1].isupper() and not is_constant:
         return line, "define %s or import it (a message: `from <package>.msg import %s`)" % (name, name)
     if isinstance(used, ast.Call):
         return line, "define it with `def %s(…):`, or import it" % name
@@ -575,6 +576,9 @@ def what_to_write(node, used, tree):
     if name in sent or (isinstance(used, ast.Attribute) and isinstance(used.ctx, ast.Store)):
         types = {published_type(n) for n in walk(tree) if called_name(n) == "Publisher"} - {""}
         return line, "create the message: `%s = %s()`" % (name, types.pop() if len(types) == 1 else "<Type>")
+    if is_constant:
+        starts = [n.lineno for n in tree.body if isinstance(n, (ast.ClassDef, ast.If, *FUNCTIONS))]
+        line = min([line, *starts])
     return line, "write `%s = …`, with the value that it should have" % name
 
 
