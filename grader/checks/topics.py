@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import AfterValidator
@@ -14,6 +15,7 @@ from grader.checks.support.processes import (
     OnTopic,
     TypeName,
     by_copies,
+    early_end,
     is_called,
     named_at,
     plain_type,
@@ -216,11 +218,14 @@ def latched(package: PackageFacts, run: Run, params: LatchedParams) -> Verdict:
     """
     channels = [c for c in run.student_channels(params.topic) if c.messages]
     plain = [c.callerid for c in channels if not c.latching]
+    what = f"it could not be seen whether {params.topic} is latched"
     if not channels:
         verdict = no_message(package, run, params.topic)
     elif plain and run.foreign:
         message = f"the recording does not say whether {params.topic} was latched"
         verdict = inconclusive(message, hint="let the grader run the package itself")
+    elif plain and _ended_at_once(run, channels) and (unseen := no_node(package, run, what)):
+        verdict = unseen
     elif plain:
         hint = publisher(params.topic, "…, latch=True, queue_size=1", "1, true")
         cited = named_at(package, run, "publisher", params.topic)
@@ -235,6 +240,15 @@ def latched(package: PackageFacts, run: Run, params: LatchedParams) -> Verdict:
     return verdict.about(expected=expected, measured=verdict.measured or kinds, citations=(cite(run, topic),))
 
 
+def _ended_at_once(run: Run, channels: Sequence[Channel]) -> bool:
+    """Return whether a process ended right after the first message, so that its publisher could not be asked."""
+    ended = early_end(run)
+    first_ns = min(one.times_ns[0] for one in channels)
+    return ended is not None and 0 <= (ended.end_ns or 0) - first_ns < ASKED_NS
+
+
+ASKED_NS = 1_000_000_000
+"""A publisher that lives for so long has been asked."""
 ENDS: tuple[End, End] = ("publishers", "subscribers")
 
 
