@@ -27,6 +27,7 @@ from grader.checks.support.processes import (
     slips_of,
 )
 from grader.checks.support.recorder_losses import whole_until_ns
+from grader.checks.support.scripts import slips_of_program
 from grader.checks.support.text import LOOP, SPIN, both, loop_rate
 from grader.checks.support.topics import (
     SYSTEM_TOPICS,
@@ -358,6 +359,10 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
     message = f"{params.topic} falls silent {lasted} after its first message, although its node keeps running"
     if slow := _asked_slow(found, run, package, params):
         return slow
+    if asleep := _asleep(found, run, package, params):
+        rate = f"a ros::Rate of {significant(params.rate_hz)} Hz"
+        hint = f"delete line {asleep.line} of {asleep.file}, and let {rate} wait"
+        return failed(f"{message}: {asleep.message}", hint=hint, citations=(asleep.place,))
     others = _goes_on(found, run, params)
     # A loop that still publishes on another topic was not left.
     kinds: tuple[SlipKind, ...] = ("spin-in-loop", "unregistered", *(() if others else ("loop-left",)))
@@ -370,6 +375,13 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
         message += f" and goes on publishing on {others}"
         hint = f"publish on {params.topic} in the loop that publishes on {others} too, and nowhere else"
     return failed(message, hint=hint).if_repeated()
+
+
+def _asleep(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> PythonSlip | None:
+    """Return the long pause of a program of C++, if the silence is no longer than that."""
+    lives = [life_of(run, c.callerid) for c in run.student_channels(params.topic)]
+    slips = [s for one in lives if one for s in slips_of_program(one.start.argv, package, "deaf")]
+    return next((s for s in slips if s.name and found.tail_ns < float(s.name) * 1e9), None)
 
 
 def _goes_on(found: Rhythm, run: Run, params: RateParams) -> str:
