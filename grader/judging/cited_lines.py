@@ -98,10 +98,10 @@ def _lines_to_blame(verdict: Verdict, criterion: Criterion, lines: list[SourceLi
             found = lines_that_say(lines, f"{verdict.measured} {verdict.said}")
             if not found and verdict.status is Status.PARTIAL:
                 found = [one for one in lines if re.search(SAYS[criterion.check], one.text)]
-        case "prints" | "topic-type":
-            found = _that_name(verdict.said, criterion.check, lines)
+        case "prints" | "topic-type" | "node-name":
+            found = _that_name(verdict.said, criterion, lines)
         case "message":
-            found = lines_that_say(lines, f"{verdict.measured} {verdict.said}")
+            found = lines_that_say(lines, verdict.said or verdict.measured)
             found = _published_of(found, lines, criterion)
         case "stamps":
             found = _published_of(lines_that_set(lines, "stamp"), lines, criterion)
@@ -112,12 +112,15 @@ def _lines_to_blame(verdict: Verdict, criterion: Criterion, lines: list[SourceLi
     return found
 
 
-def _that_name(said: str, check: str, lines: list[SourceLine]) -> list[SourceLine]:
-    """Return the lines that print a text, or the one of C++ that advertises a topic."""
-    made = re.compile(rf"""\badvertise\b[^"]*"/?{re.escape(said.strip("/"))}\"""")
-    return (
-        lines_that_say(lines, said) if check == "prints" else [one for one in lines if made.search(one.text)]
-    )
+def _that_name(said: str, criterion: Criterion, lines: list[SourceLine]) -> list[SourceLine]:
+    """Return the lines that print a text, or those of C++ that advertise a topic or name the node."""
+    if criterion.check == "prints":
+        return lines_that_say(lines, said)
+    if criterion.check == "node-name":
+        return [one for one in lines if "ros::init(" in one.text]
+    names = [one.strip("/") for one in (said, str(criterion.parameters["topic"]))]
+    calls = [re.compile(rf'''\badvertise\b[^"]*"/?{re.escape(name)}"''') for name in names if name]
+    return next((found for call in calls if (found := [one for one in lines if call.search(one.text)])), [])
 
 
 def _published_of(found: list[SourceLine], lines: list[SourceLine], criterion: Criterion) -> list[SourceLine]:

@@ -63,6 +63,7 @@ def test_other_words_are_shown_where_the_script_makes_them(line: str, said: str,
 SENT = {"check": "message", "with": {"topic": "/chatter", "template": "hello world {seconds}"}}
 CALLS = {"check": "calls", "with": {"service": "/add"}}
 ANSWERS = {"check": "service-answers", "with": {"service": "/add", "expect": [{"sum": 3}]}}
+CALLED = {"check": "node-name", "with": {"names": ["hello"], "process": "talker"}}
 PRINTS = {"check": "prints", "with": {"process": "talker", "text": "hello world {number}"}}
 NAMED = {"check": "topic-type", "with": {"topic": "/chatter", "type": "std_msgs/String"}}
 FRAMES = {"check": "transform", "with": {"parent": "base", "child": "laser"}}
@@ -76,6 +77,14 @@ FIELD = {"check": "field-equals", "with": {"topic": "/cmd_vel", "field": "linear
         (SENT, "text = 'bye'\npub.publish()", 2),
         (SENT, "text = 'hello world'\npub.publish('hello world')", 2),
         (SENT, "pub.publish(text)\nif x:\n    pub.publish()", None),
+        (SENT, "t = 'hello' + x('world')\nt = 'bye' + x('world')\npub.publish(t)\npub.publish(t)", 1),
+        (
+            NAMED,
+            'p = n.advertise<std_msgs::Int8>("chatter", 1);\nq = n.advertise<std_msgs::Int8>("other", 1);',
+            1,
+        ),
+        (CALLED, 'ros::init(argc, argv, "bye", ros::init_options::AnonymousName);', 1),
+        (CALLED, 'ros::init(argc, argv, "bye");\nros::init(argc, argv, "world");', None),
         (
             SENT,
             "a = rospy.Publisher('/chatter', String)\nb = rospy.Publisher('other', String)\nb.publish(1)\na.publish(2)",

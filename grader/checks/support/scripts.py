@@ -311,12 +311,12 @@ _WORD = re.compile(r"\w+")
 
 
 def lines_that_say(lines: Sequence[SourceLine], said: str) -> list[SourceLine]:
-    """Return the lines with a string of which most is in what was said; none where no string has its words alone."""
+    """Return the lines whose strings are most of what was said; of a string, all words have to be in it."""
     spoken = set(_WORD.findall(said))
 
     def alike(line: SourceLine) -> int:
         strings = [_WORD.findall(_FILLED_IN.sub(" ", found[2])) for found in _LITERAL.finditer(line.text)]
-        return max((sum(map(len, words)) for words in strings if spoken.issuperset(words)), default=0)
+        return sum(sum(map(len, words)) for words in strings if spoken.issuperset(words))
 
     most = max(map(alike, lines), default=0)
     return [line for line in lines if alike(line) == most > 0]
