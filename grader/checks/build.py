@@ -78,7 +78,8 @@ class BuildParams(Record):
     """What the build has to leave ready to run."""
 
     scripts: tuple[str, ...] = ()
-    """Scripts that have to be there after the build; paths as the handout gives them: `src/talker.py`."""
+    """What has to be there after the build: scripts with their paths as the handout gives them, `src/talker.py`, and
+    programs of C++ by name, `talker`."""
 
 
 @check("build", params=BuildParams, run_anyway=True)
@@ -252,7 +253,8 @@ def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> V
 def _lost_scripts(package: PackageFacts, scripts: Sequence[str]) -> Verdict | None:
     """Scripts that are nowhere in the package: their own criteria say so first."""
     there = paths_by_name(package)
-    lost = [s for s in scripts if PurePosixPath(s).name not in there]
+    made = {one.name for one in programs(package)}
+    lost = [s for s in scripts if PurePosixPath(s).name not in there and s not in made]
     if not lost:
         return None
     near = [there[n] for s in lost for n in near_names(PurePosixPath(s).name, there)]

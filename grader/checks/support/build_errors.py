@@ -414,8 +414,10 @@ def _missing_dependency(found: re.Match[str], package: PackageFacts, _lines: Seq
     why = f"add_dependencies({found[2]} {target}) names the target {target}, which does not exist"
     targets = "${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS}"
     calls = [call for call in cmake_calls(package, "add_dependencies") if target in call.args[1:]]
-    written = [f"add_dependencies({name} {targets})" for name in dict.fromkeys(c.args[0] for c in calls)]
-    hint = f"write {join_words(written or [f'add_dependencies({found[2]} {targets})'])}"
+    written = {c.line: f"add_dependencies({c.args[0]} {targets})" for c in calls}
+    hint = f"write add_dependencies({found[2]} {targets})"
+    if len(written) > 1:
+        hint = join_words(f"on line {line} write {one}" for line, one in written.items())
     if not any(PurePosixPath(file.path).suffix in OF_FILES.values() for file in package.files):
         return Explained(f"{why}: the package has no messages of its own", hint)
     hint = f"{hint}; messages of your own need generate_messages(…) above it"
