@@ -308,12 +308,14 @@ def _short(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     seen = f"only {plural(len(found.times_ns), 'message')} in {seconds(found.span_ns)} on {params.topic}"
     if end := explain_early_end(package, run):
         verdict = end.verdict(failed_or_blocked, f"{seen}: the node ended ({end.cause})")
-        # A loop that never waits can be over before a rate shows: then the pause is the second thing to write.
-        if not end.by_itself or run.foreign or _has_rate(package, run):
+        if not end.by_itself or run.foreign:
             return verdict
-        paced = f"rate = rospy.Rate({significant(params.rate_hz)}) above the loop, rate.sleep() in it"
         hint = f"publish in a loop `{LOOP}`" if SPIN in verdict.hint else verdict.hint
-        return verdict.model_copy(update={"hint": f"{hint}; then let it wait: {paced}"})
+        # A loop that never waits can be over before a rate shows: then the pause is the second thing to write.
+        if not _has_rate(package, run):
+            paced = f"rate = rospy.Rate({significant(params.rate_hz)}) above the loop, rate.sleep() in it"
+            hint = f"{hint}; then let it wait: {paced}"
+        return verdict.model_copy(update={"hint": hint})
     message = f"{seen}, a rate needs {params.min_window_s:g} s"
     return inconclusive(message, hint="record for longer" if run.foreign else "grade again")
 

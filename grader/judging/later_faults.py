@@ -540,7 +540,8 @@ class Later:
     def _message(self) -> Iterator[Fix]:
         template = str(self._wanted.get("template", ""))
         said = list({one.message: one for one in self._of("publishes")}.values())
-        code = in_language(code_of(template), "python")
+        of_cpp = bool(self._paths) and all(path.endswith(CPP_SUFFIXES) for path in self._paths)
+        code = in_words(template) if of_cpp else in_language(code_of(template), "python")
         if self._in_comment():
             return
         if len(said) != 1:
@@ -557,8 +558,7 @@ class Later:
             if not could_say(text, sample):
                 yield Fix(f"publish `{code}`", (f"`{code}`",))
         elif not could_say(text, sample):
-            words = in_words(template) if said[0].file.endswith(CPP_SUFFIXES) else code
-            yield Fix(f"publish `{words}` on {_line(said[0])}, not '{in_source(text)}'")
+            yield Fix(f"publish `{code}` on {_line(said[0])}, not '{in_source(text)}'")
         elif SECONDS in template and self._of("no-clock"):
             yield Fix(f"publish the time on {_line(said[0])}, `{code}`: the script only counts")
 

@@ -514,14 +514,14 @@ int main(int argc, char **argv) {
 """
 
 
-def cpp_runs(run: dict[str, Any]) -> dict[str, Any]:
+def cpp_runs(run: dict[str, Any], source: str = CPP) -> dict[str, Any]:
     package = {
         "files": [{"path": "src/talker.cpp"}],
         "cmake": {
             "calls": [["project", "lab1"], ["catkin_package"], ["add_executable", "talker", "src/talker.cpp"]]
         },
     }
-    runs = {"talker": run, "package": {"attachments": {"src/talker.cpp": CPP}}}
+    runs = {"talker": run, "package": {"attachments": {"src/talker.cpp": source}}}
     return build_runs({"runs": runs, "package": package})
 
 
@@ -543,6 +543,14 @@ def test_words_of_a_source_in_cpp_are_named_too() -> None:
     assert told["hears"].endswith(
         "; then print 'I heard <message>' on line 5 of src/talker.cpp, not 'got [<message>]'"
     )
+
+
+def test_a_source_in_cpp_without_the_words_is_not_told_pythons() -> None:
+    runs = cpp_runs(
+        {"processes": [{**STARTED, "script": "talker"}]}, "int main() {\n  pub.publish(msg);\n}\n"
+    )
+    told = {c.id: c.hint for c in judge(cpp_rubric(NODE | ROOT, CHATTER, MESSAGE), runs)}
+    assert told["chatter"].endswith("; then publish `hello world <seconds>`")
 
 
 def test_other_words_are_shown_where_the_program_in_cpp_makes_them() -> None:
