@@ -246,6 +246,8 @@ def test_a_line_is_counted_without_the_first_line_that_the_arena_writes(tmp_path
          "on line 5, write `float(input(…))` in place of `input(…)`"),
         ("total = self.n + self.text", "unsupported operand type(s) for +: 'int' and 'str'",
          "write `str(self.n)` instead of `self.n`"),
+        ("text = 'now ' - str(n)", "unsupported operand type(s) for -: 'str' and 'str'",
+         "write `+`, or make numbers of both"),
         ("n = side - 1", "unsupported operand type(s) for -: 'str' and 'int'",
          "turn the text into a number first: `float(…)`"),
     ],

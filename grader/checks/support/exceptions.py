@@ -378,6 +378,8 @@ def _operands(left: str, right: str, source: str) -> Meaning | None:
         return message_operand(message, left, source)
     if "^" in source and {left, right} <= {"int", "float"}:
         return "`^` is no power in Python", f"write `{shown(source.replace('^', '**'))}`"
+    if left == right == "str":
+        return "both sides are strings, which only `+` joins", "write `+`, or make numbers of both"
     if "str" in (left, right):
         return "one side is a string", "turn the text into a number first: `float(…)`"
     return None
@@ -394,8 +396,7 @@ def _none(source: str) -> Meaning:
 
 
 def _local(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
-    name = _LOCAL.search(message)
-    if name is None:
+    if (name := _LOCAL.search(message)) is None:
         return None
     if hasattr(builtins, name[1]):
         cause = f"`{name[1]}` is a variable of this function, and hides Python's `{name[1]}`"
