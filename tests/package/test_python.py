@@ -155,6 +155,8 @@ def assert_cases(report):
             "def f():\n    # to do\n\nif __name__ == '__main__':\n    f()\n",
             "in the block on line 1: below line 1, write",
         ),
+        ("if 1:\n#    f()\n", "there are only comments in the block on line 1: below line 1, write"),
+        ("if 1:\n# a word\nf()\n", "must be indented"),
         (
             "class A:\n    def f(self):\n    def g(self):\n        pass\n",
             "in the block on line 2: below line 2, write",

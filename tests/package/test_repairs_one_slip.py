@@ -262,6 +262,8 @@ SLIPS = {
         ("pass", "pas", "pas is not defined"),
     ],
     LISTENER: [
+        ("    rospy.loginfo", "#    rospy.loginfo", "delete the `#` before the code of that block"),
+        ("    rospy.loginfo", "    # rospy.loginfo", "there are only comments in the block that begins above it"),
         ("callback(msg)", "callbackmsg)", "its opening bracket is missing"),
         ("    rospy.loginfo", "rospy.loginfo", "the line after a `:` must be indented"),
         ("'I heard %s', msg.data", "msg.data, 'I heard %s'", "the string comes first, then its values"),

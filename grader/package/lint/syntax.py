@@ -328,12 +328,17 @@ def block_fault(lines, line, message):
     """Return the fault of a block whose first line or whole body is a comment, or which some of its lines are out of;
     None else."""
     indented = "unexpected indent" in message
-    above = [n for n in range(line - 1) if lines[n].strip()]
+    last = (
+        line if lines[line - 1 :] and not is_code(lines[line - 1]) else line - 1
+    )  # at the file's end, a comment
+    above = [n for n in range(last) if lines[n].strip()]
     head = next((n for n in reversed(above) if is_code(lines[n])), None)
     comments = (
         [n for n in above if head is not None and n > head] if "expected an indented" in message else []
     )
-    if any(len(blanks_of(lines[n])) > len(blanks_of(lines[head])) for n in comments):
+    # `#    x = 1`, too: an editor writes the sign before the line's own blanks
+    inside = [re.sub(r"^(?:#(?=    ))?(\s*).*", r"\1", lines[n]) for n in comments]
+    if any(len(blanks) > len(blanks_of(lines[head])) for blanks in inside):
         told = "only comments in the block on line %d" % (head + 1)
         return fault("IndentationError", line, 1, told, text=lines[line - 1])
     if head is not None and "expected an indented" in message:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import builtins
 import re
+import textwrap
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from itertools import takewhile
@@ -159,6 +160,7 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
     if not 0 <= at < len(lines):
         return
     yield "token", with_line(lines, at, ROSPY_COMMA.sub("rospy.", lines[at]))
+    yield from _with_body_uncommented(lines, error["message"])
     if error["message"].startswith("expected an indented block") and _is_in_comments(lines, at):
         return
     if "global declaration" in error["message"]:
@@ -214,6 +216,26 @@ def _without_braces(lines: list[str]) -> str:
         else:
             kept.append(line)
     return "\n".join(kept)
+
+
+def _with_body_uncommented(lines: list[str], message: str) -> Iterator[tuple[str, str]]:
+    """Yield the cause and the text with the comments below a block's first line as its body, where they are code."""
+    found = re.match(r"expected an indented block after .* on line (\d+)", message)
+    head = int(found[1]) if found else 0
+    body = list(takewhile(lambda line: line.lstrip().startswith("#"), lines[head:]))
+    after = next((line for line in lines[head + len(body) :] if without_texts(line).strip()), "")
+    # what follows as far in as the block's first line may be its body
+    is_other = re.match(r"\s*(@|(def|class|except|finally|else|elif)\b)", after) or OUTERMOST.match(after)
+    if not head or not (is_other or _width(after) < _width(lines[head - 1]) or not after):
+        return
+    code = textwrap.dedent("\n".join(re.sub(r"^(\s*)#", r"\1", line) for line in body))
+    try:
+        statements = ast.parse(code).body
+    except (SyntaxError, ValueError):
+        return
+    if any(not isinstance(one, ast.Expr) or isinstance(one.value, ast.Call) for one in statements):
+        inner = textwrap.indent(code, f"{_indentation(lines[head - 1])}    ").split("\n")
+        yield "emptied", "\n".join([*lines[:head], *inner, *lines[head + len(body) :]])
 
 
 def _is_in_comments(lines: list[str], at: int) -> bool:

@@ -38,7 +38,7 @@ Cause = Literal[
     "merged", "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
     "old-name", "module", "other-module", "import", "name", "quotes", "attribute", "value", "call", "quoted",
     "callback", "argument", "unbound", "kept", "guard", "inside", "start", "main", "init", "server", "spin", "line",
-    "twice", "turned", "empty",
+    "twice", "turned", "empty", "emptied",
 ]  # fmt: skip
 CALLS = (
     "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument", "unbound", "kept", "guard",
@@ -449,6 +449,8 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "guard": ("{place}: {word}", ""),
     "line": ("{place}: the line `{word}` is missing", ""),
     "empty": ("{place}: this block needs a line of its own", "write there what it should do, or `pass` if nothing"),
+    "emptied": ("{place}: there are only comments in the block that begins above it",
+     "delete the `#` before the code of that block"),
     "twice": ("{place}: this line repeats the one above", "delete line {line}"),
     "turned": ("lines {line} and {below} of {file} are the wrong way round", "write line {below} above line {line}"),
     "start": ("{place}: the lines from here on belong to {calls}, so nothing runs them", ""),
