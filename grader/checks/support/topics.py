@@ -9,7 +9,7 @@ from typing import Literal
 from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_end, explain_error
 from grader.checks.support.frames import unknown_frame
-from grader.checks.support.launch_slips import right_remap
+from grader.checks.support.launch_slips import own_script, right_remap
 from grader.checks.support.processes import (
     NO_SCRIPT_HINT,
     copied_topic,
@@ -263,11 +263,24 @@ def _judge_advertised(
         return _commented_out(message, slip, of_node)
     # A node that hears something may have good reason to publish on a condition only.
     kinds: tuple[SlipKind, ...] = ("never-published", *(() if _heard_topics(run) else ("published-in-part",)))
-    unused = [s for s in run_slips(package, run, *kinds) if is_written_as(s.name, topic)]
-    if told := next(iter(unused), None) or reads_keys(package, run):
+    if told := _unused_publisher(package, run, topic, kinds) or reads_keys(package, run):
         verdict = of_node(f"{message}: {told.message}", measured="no message", hint=told.fix)
         return verdict.about(citations=(told.place,))
     return _by_what_is_heard(run, message, of_node)
+
+
+def _unused_publisher(
+    package: PackageFacts, run: Run, topic: str, kinds: Collection[SlipKind]
+) -> PythonSlip | None:
+    """Return why a topic's publisher sends nothing; of one that is remapped, if its script has no other publisher."""
+    slips = [s for s in package.slips if s.kind in kinds]
+    scripts, nodes = run_scripts(run), nodes_on(run, topic, "publishers")
+    launched = (n for file in package.launch_files for n in file.brings if n.full_name in nodes)
+    scripts |= {script.path for n in launched if None in scripts and (script := own_script(package, n))}
+    own = [s for s in slips if s.file in scripts]
+    written = [s.file for s in package.slips if s.kind == "publisher"]
+    alone = [s for s in own if written.count(s.file) == 1 and len(own) == 1]
+    return next(iter([s for s in own if is_written_as(s.name, topic)] or alone), None)
 
 
 def _by_what_is_heard(run: Run, message: str, of_node: Callable[..., Verdict]) -> Verdict:
