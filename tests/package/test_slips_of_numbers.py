@@ -531,6 +531,8 @@ def test_distances_without_a_root(text: str, lines: list[int], tmp_path: Path) -
         ("y = read()\ndef f(m):\n    global x, y\n    x = m.x\nprint(x, y)\n", []),
         ("y = 0\ndef f(m):\n    global x\n    x = m.x\nprint(x)\n", []),
         ("if abs(e) > -0.1:\n    turn()\n", ["negative"]),
+        ("near = min(msg.ranges[:9])\nif near < 0 or far < 0:\n    turn()\n", [""]),
+        ("near = min(msg.ranges[:9])\nif near > 0 and far < 0:\n    turn()\n", []),
         ("if abs(e) > 0:\n    turn()\n", []),
         ("e = theta - atan2(dy, dx)\nv.angular.z = 2 * e\n", ["swapped"]),
         ("a = math.atan2(sin(e), cos(e))\n", []),

@@ -295,6 +295,11 @@ def exact_distances(tree):
     roots = NEVER_NEGATIVE[:3]
     made = {dotted(n.targets[0]) for n in all_of(tree, ast.Assign) if called_name(n.value) in roots}
     made |= {
+        dotted(t)
+        for t, value in pairs_of(tree)
+        if called_name(value) == "min" and "ranges" in ast.dump(value)
+    }
+    made |= {
         one.name
         for one in all_of(tree, ast.FunctionDef)
         if any(called_name(getattr(n, "value", None)) in roots for n in one.body if isinstance(n, ast.Return))
@@ -303,10 +308,13 @@ def exact_distances(tree):
         asked, number = called_name(node.left) or dotted(node.left), number_of(node.comparators[0])
         if number is None or len(node.ops) > 1 or asked not in {*made, *NEVER_NEGATIVE}:
             continue
-        if number < 0:
+        if number < 0 or (number == 0 and isinstance(node.ops[0], ast.Lt)):
             message = "`%s` is never below 0, and this compares it with %g" % (asked, number)
-            fix = "on line %d, write `%g` in place of `%g`" % (node.lineno, -number, number)
-            yield slip(node.lineno, "wrong-value", message, fix, "negative")
+            right = "`%g` in place of `%g`" % (-number, number)
+            fix, name = "on line %d, write %s" % (node.lineno, right), "negative"
+            if not number:
+                fix, name = "on line %d, write how near is near enough in place of 0" % node.lineno, ""
+            yield slip(node.lineno, "wrong-value", message, fix, name)
         elif number == 0 and isinstance(node.ops[0], (ast.Eq, ast.NotEq)) and asked not in NEVER_NEGATIVE[3:]:
             message = "a distance that is worked out is hardly ever exactly 0"
             sign = ">" if isinstance(node.ops[0], ast.NotEq) else "<"
