@@ -454,15 +454,11 @@ RIGHT = {
     "name of two words": "import logging\nlog = logging.getLogger()\nlog.info('a')\nrospy.loginfo('a')\n",
     "attribute of two words": "class A:\n    def f(self, pos):\n        self.posx = pos.x\n",
     "type as a text": "class A:\n    pub: 'rospy.Publisher'\n",
-    "names of a class": ("class Topics:\n    OUT = 'out'\n\n\nT = Topics\n\n\ndef f():\n"
-                         "    rospy.Subscriber(T.OUT, Int8, print)\n"),
+    "names of a class": "class T:\n    OUT = 'out'\n\n\nU = T\ndef f():\n    rospy.Subscriber(U.OUT, Int8, f)\n",
     "fields of a data class": ("class A:\n    speed: float = 1.0\n    limit: int = 1\n\n    def speeds(self):\n"
                                "        return self.speed * self.limit\n"),
     "a window": ("def f(root):\n    rospy.init_node('talker')\n    rospy.Subscriber('a', Int8, print)\n"
                  "    root.mainloop()\n"),
-    "fields of turtlesim": ("from turtlesim.msg import Pose\npose = Pose()\nprint(pose.linear_velocity)\n"),
-    "kept beside a message": ("from geometry_msgs.msg import Twist\n\n\nclass Robot:\n    def f(self):\n"
-                              "        self.twist = Twist()\n        self.liner = self.twist.linear\n"),
     "own timer": "class Timer:\n    pass\n\n\ndef tick():\n    pass\n\n\nTimer(0.1, tick)\n",
     "star import": "from math import *\n\n\nclass A:\n    def f(self, a):\n        self.degrees = degrees(a)\n",
     "global of another function": ("class A:\n    def f(self, pub):\n        self.pub = pub\n\n    def g(self):\n"

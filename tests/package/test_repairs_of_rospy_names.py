@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from grader.package.python_repairs.rospy_names import with_logger
-from tests.package.repairing import TALKER, Case, check, swapped
+from tests.package.repairing import SCRIPT, TALKER, Case, check, swapped
 
 PUBLISHER = "rospy.Publisher('numeric_chatter', Int8, queue_size=10)"
 LOOP = "        publisher.publish(1)"
@@ -114,3 +114,45 @@ def test_the_logger_of_ros_2_is_one_slip(of: str, tmp_path: Path) -> None:
 def test_another_logger_is_left_alone(swaps: list[tuple[str, str]], tmp_path: Path) -> None:
     text = swapped(TALKER, *swaps)[TALKER]
     assert "loginfo" not in "".join(one["text"] for one in with_logger(str(text)))
+
+
+LACKING = {
+    "fields-of-messages": Case(
+        swapped(TALKER,
+                ("import rospy\n", "import rospy\nfrom geometry_msgs.msg import PoseArray, Twist\n"),
+                ("def main", "def on_poses(got):\n    print(got.poses[0].positon.x, got.poses.count(1))\n\ndef main"),
+                ("    rate = ", "    twist = Twist()\n    twist.linaer.x = 1\n    twist.Angular = 2\n    rate = "),
+                ("\nmain()", "    rospy.Subscriber('poses', PoseArray, on_poses)\n\nmain()")),
+        ["missing-call"] * 3, "write `twist.linear.x = 1`",
+        after={TALKER: "twist.linear.x = 1\n    twist.angular = 2\n"},
+    ),
+    "statement-misspelt": Case(
+        {TALKER: SCRIPT.replace("        rate.sleep()\n", "        rate.sleep()\n        contineu\n        brek\n")},
+        ["missing-call", "missing-call"], after={TALKER: "        continue\n        break\n"},
+    ),
+    "init": Case(
+        {TALKER: SCRIPT.replace("    rospy.init_node('talker')\n", "")},
+        ["missing-call"], "below line 5 add `rospy.init_node('talker')`", after={TALKER: SCRIPT},
+    ),
+    "init-of-a-class": Case(
+        {TALKER: "#!/usr/bin/env python3\nimport rospy\nfrom std_msgs.msg import Int8\n\nclass Talker:\n"
+                 "    def __init__(self):\n        rospy.Subscriber('numeric_chatter', Int8, print)\n\n"
+                 "if __name__ == '__main__':\n    Talker()\n    rospy.spin()\n"},
+        ["missing-call"], after={TALKER: "'__main__':\n    rospy.init_node('talker')\n    Talker()\n"},
+    ),
+    "init-of-a-module": Case(
+        {"src/pubs.py": "import rospy\nfrom std_msgs.msg import Int8\n\n"
+                        "pub = rospy.Publisher('a', Int8, queue_size=1)\n",
+         TALKER: "#!/usr/bin/env python3\nimport rospy\nfrom pubs import pub\n\n"
+                 "rospy.init_node('talker')\npub.publish(1)\n"},
+        [],
+    ),
+    "init-without-topics": Case(
+        {TALKER: "#!/usr/bin/env python3\nimport rospy\n\nprint(rospy.get_param_names())\n"}, [],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", LACKING.values(), ids=LACKING)
+def test_what_a_script_of_rospy_lacks_is_added(case: Case, tmp_path: Path) -> None:
+    check(case, tmp_path)

@@ -444,12 +444,6 @@ def test_a_main_guard_without_underscores_is_told_with_its_whole_line(tmp_path):
     assert (slip.kind, slip.fix) == ("misspelt", "write `if __name__ == '__main__':`")
 
 
-def test_a_word_of_python_that_is_misspelt_is_no_variable(tmp_path):
-    (tmp_path / "a.py").write_text("def f(msg):\n    if msg.data:\n        retturn\n    print(msg.data)\n")
-    (slip,) = [one for one in check_syntax(tmp_path, ["a.py"]).slips if one.name == "retturn"]
-    assert (slip.kind, slip.line, slip.message) == ("misspelt", 3, "did you mean return?")
-
-
 def test_letters_in_another_order_are_a_slip(tmp_path):
     (tmp_path / "a.py").write_text("def f(msg):\n    print(mgs.data)\n")
     slip, _ = check_syntax(tmp_path, ["a.py"]).slips

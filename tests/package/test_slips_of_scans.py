@@ -296,3 +296,51 @@ def test_what_a_callback_never_gives_a_value(
     (tmp_path / "a.py").write_text(CALLBACKS % (plain, method, test), encoding="utf-8")
     slips = check_syntax(tmp_path, ["a.py"]).slips
     assert [s.fix for s in slips if s.kind == "wrong-value" and "value" in s.message] == fixes
+
+
+UNSET = """\
+from nav_msgs.msg import OccupancyGrid
+import nav_msgs.msg as nav
+class Mapper:
+    def __init__(self):
+        self.grid = OccupancyGrid()
+        self.grid.info.width = 4
+        self.grid.data = [0] * 12
+    def mark(self, point):
+        row = point.y / self.grid.info.resolution
+        self.grid.data[int(row)] = 100
+"""
+
+
+@pytest.mark.parametrize(
+    ("changed", "found"),
+    [
+        (("", ""), [("self.grid.info.resolution", 9, 6)]),
+        (("/ self.grid.info.resolution", "* 2 if point.x < self.grid.info.height else 0"),
+         [("self.grid.info.height", 9, 6)]),
+        (("= OccupancyGrid()", "= nav.OccupancyGrid()"), [("self.grid.info.resolution", 9, 6)]),
+        (("        self.grid.info.width = 4\n", ""), [("self.grid.info.resolution", 8, 5)]),
+        (("width = 4", "resolution = 4"), []),
+        (("info.width = 4", "info = info"), []),
+        (("        self.grid.info.width = 4\n", "        fill(self.grid.info)\n"), []),
+        (("        self.grid.info.width = 4\n", "        fill(self.grid)\n"), []),
+        (("self.grid.info.width = 4", "info = self.grid.info; info.resolution = 4"), []),
+        (("= OccupancyGrid()", "= OccupancyGrid(info=info)"), []),
+        (("= OccupancyGrid()", "= Own()"), []),
+        (("    def mark", "    def keep(self, grid):\n        self.grid = grid\n    def mark"), []),
+        (("row = point.y / ", "print("), []),
+    ],
+)  # fmt: skip
+def test_a_field_that_no_line_gives_a_value_is_known_where_it_is_calculated_with(tmp_path, changed, found):
+    (tmp_path / "a.py").write_text(
+        UNSET.replace(*changed).replace("print(self.grid.info.resolution", "print(1")
+    )
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "new-field"]
+    assert [(s.message.split("`")[1], s.line) for s in slips] == [(name, line) for name, line, _ in found]
+    assert [s.fix for s in slips] == [f"below line {line}, write `{name} = …`" for name, _, line in found]
+
+
+def test_a_word_of_python_that_is_misspelt_is_no_variable(tmp_path):
+    (tmp_path / "a.py").write_text("def f(msg):\n    if msg.data:\n        retturn\n    print(msg.data)\n")
+    (slip,) = [one for one in check_syntax(tmp_path, ["a.py"]).slips if one.name == "retturn"]
+    assert (slip.kind, slip.line, slip.message) == ("misspelt", 3, "did you mean return?")
