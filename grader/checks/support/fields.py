@@ -321,7 +321,10 @@ def made_of(found: Sequence[Reading], channels: Iterable[Channel], wanted: _Want
         if sizes == came:
             return f"each value is the one that came on {topic}", KEEP
         ends = found[-1].values
-        if math.isclose(came[-1], sum(sent)) and wanted.fits(found[-1]._replace(values=(sum(sizes),))):
+        if math.isclose(came[-1], abs(sum(sent))) and wanted.fits(found[-1]._replace(values=(sum(sizes),))):
+            if is_number(ends[-1]) and ends[-1] and math.isclose(ends[-1], -sum(sent)):
+                other = f"it is the sum of what came on {topic}, with the other sign"
+                return other, "add `abs(…)` of each value, and take none off"
             return (
                 f"it is the sum of what came on {topic}, less what is negative",
                 "add `abs(…)` of each value",
