@@ -24,7 +24,7 @@ from grader.checks.support.frames import (
 )
 from grader.checks.support.processes import GlobalName, observed_until_ns
 from grader.checks.support.text import RATE, near_names, shown
-from grader.checks.support.topics import cite, no_message, run_slip
+from grader.checks.support.topics import cite, no_message, no_node, run_slip
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -196,9 +196,10 @@ def _not_sent(
     near = [
         f"{wrong} for {name}" for name in wanted if name not in names for wrong in near_names(name, names)
     ]
+    ended = None if near else no_node(package, run, f"{params.name} is not sent")
     other = f" ({shown(join_words(near))})" if near else ""
     verdict = failed(f"{params.name} is not sent; there is {_edge_words(edges)}{other}", hint=hint)
-    return verdict.seeking("quoted", *_frames_instead(edges, wanted))
+    return ended or verdict.seeking("quoted", *_frames_instead(edges, wanted))
 
 
 def _frames_instead(edges: Sequence[tuple[str, str]], wanted: tuple[str, str]) -> list[str]:
