@@ -120,6 +120,24 @@ def test_a_refused_file_is_named_with_its_line() -> None:
     assert found.citations == (fault.place,)
 
 
+@pytest.mark.parametrize(
+    ("said", "hint"),
+    [
+        ("aro out", "write $(arg out)"),
+        ("rg out", "write $(arg out)"),
+        ("argout", "write $(arg out)"),
+        ("out", 'write $(arg out), with <arg name="out" default="…"/> above it'),
+        ("findlab", "write $(find "),
+        ("fnd lab", "write $(find "),
+    ],
+)
+def test_what_an_unknown_substitution_is_meant_for(said: str, hint: str) -> None:
+    line = f"RLException: Unknown substitution command [{said}]. Valid commands are"
+    found = refusal(printed(RED.format(line)), NO_PACKAGE)
+    assert found is not None
+    assert found.hint.startswith(hint)
+
+
 def test_no_refusal() -> None:
     run = printed("started roslaunch server http://127.0.0.1:43899/", "[fin-8] process has finished cleanly")
     assert refusal(run, NO_PACKAGE) is None

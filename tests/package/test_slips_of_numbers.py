@@ -272,3 +272,317 @@ def test_an_index_that_is_a_float(line: str, fixes: list[str], tmp_path: Path) -
     (tmp_path / "a.py").write_text(f"{line}\n", encoding="utf-8")
     slips = check_syntax(tmp_path, ["a.py"]).slips
     assert [s.fix for s in slips if s.kind == "float-index"] == fixes
+
+
+GRID = """\
+import rospy
+class Mapper:
+    def __init__(self):
+        self.w = rospy.get_param('~width')
+        self.h = rospy.get_param('~height')
+    def mark(self, p):
+        column = int(p.x / 0.5)
+        row = int(p.y / 0.5)
+        if CHECK:
+            self.data[INDEX] = 100
+"""
+
+
+@pytest.mark.parametrize(
+    ("check", "index", "fixes"),
+    [
+        ("column >= 0", "row * self.h + column", ["on line 10, write `self.w` in place of `self.h`"]),
+        ("p.x >= 0 and column > 0", "self.h * row + column", ["on line 10, write `self.w` in place of `self.h`"]),
+        ("0 <= p.x and 0 <= p.y and 0 <= column", "row * self.w + column", []),
+        ("column < 9", "row * self.w + column", []),
+        ("column < 9", "column * self.w + row", ["on line 10, write `row * self.w + column` for the index"]),
+        ("column < 9", "column * self.h + row", ["on line 10, write `row * self.w + column` for the index"]),
+        ("column < 9", "row + self.h * column", ["on line 10, write `row * self.w + column` for the index"]),
+    ],
+)  # fmt: skip
+def test_the_index_of_a_cell(check: str, index: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(GRID.replace("CHECK", check).replace("INDEX", index), encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.fix for s in slips if s.name == "step"] == fixes
+
+
+@pytest.mark.parametrize(
+    ("check", "fixes"),
+    [
+        ("not column > self.w", ["on line 9, write `>=` in place of `>` between `column` and `self.w`"]),
+        (
+            "column <= self.w and row <= self.h",
+            [
+                "on line 9, write `<` in place of `<=` between `column` and `self.w`, and between `row` and `self.h`"
+            ],
+        ),
+        ("0 <= row <= self.h", ["on line 9, write `<` in place of `<=` between `row` and `self.h`"]),
+        ("self.w >= column", ["on line 9, write `>` in place of `>=` between `self.w` and `column`"]),
+        ("column < self.w and row <= self.h - 1", []),
+        ("not (column >= self.w or row > self.h - 1)", []),
+    ],
+)
+def test_cells_at_the_edge(check: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(GRID.replace("CHECK", check).replace("INDEX", "0"), encoding="utf-8")
+    assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "edge"] == fixes
+
+
+def test_rows_that_are_worked_out_from_an_x(tmp_path: Path) -> None:
+    text = GRID.replace("CHECK", "row < 9").replace("INDEX", "row * self.w + column")
+    text = text.replace("p.x", "p.z").replace("p.y", "p.x").replace("p.z", "p.y")
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "step"]
+    assert [s.fix for s in slips] == ["on lines 7 and 8, write y for x, and x for y"]
+
+
+@pytest.mark.parametrize(
+    ("check", "fixes"),
+    [
+        ("column >= 0 and row >= 0", ["on lines 7 and 8, write `math.floor(…)` in place of `int(…)`"]),
+        ("not 0 > row", ["on line 8, write `math.floor(…)` in place of `int(…)`"]),
+        ("p.x >= 0 and column >= 0", []),
+        ("column < 9", []),
+    ],
+)
+def test_int_of_a_number_just_below_0(check: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(GRID.replace("CHECK", check).replace("INDEX", "0"), encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.fix for s in slips if s.name == "cut"] == fixes
+
+
+@pytest.mark.parametrize(
+    ("lines", "fixes"),
+    [
+        ("q.z = sin(yaw); q.w = cos(yaw)", ["on line 1, write `yaw / 2` in place of `yaw`"]),
+        ("q = Quaternion(0, 0, math.sin(a), math.cos(a))", ["on line 1, write `a / 2` in place of `a`"]),
+        ("q.z = sin(yaw / 2); q.w = cos(yaw / 2)", []),
+        ("half = yaw / 2; q.z = sin(half); q.w = cos(half)", []),
+        ("half = 0.5 * yaw; q.z = sin(half); q.w = cos(half)", []),
+        ("yaw = 2 * a; q.z = sin(yaw); q.w = cos(yaw)", ["on line 1, write `yaw / 2` in place of `yaw`"]),
+        ("p.z = sin(angle); p.x = cos(angle)", []),
+    ],
+)  # fmt: skip
+def test_a_quaternion_of_a_whole_angle(lines: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"{lines}\n", encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.fix for s in slips if s.name == "half"] == fixes
+
+
+@pytest.mark.parametrize(
+    ("last", "fixes"),
+    [
+        (
+            "elif req.a < 0:\n        return FitResponse(0)",
+            ["below line 6, and as far in as line 3, write `return FitResponse(…)`"],
+        ),
+        ("else:\n        return FitResponse(0)", []),
+        ("return FitResponse(0)", []),
+        ("raise ValueError", []),
+    ],
+)
+def test_a_service_that_answers_in_some_cases(last: str, fixes: list[str], tmp_path: Path) -> None:
+    text = f"def fit(req):\n    print(req)\n    if req.a > 9:\n        return FitResponse(9)\n    {last}\n"
+    (tmp_path / "a.py").write_text(f"{text}rospy.Service('fit', Fit, fit)\n", encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.fix for s in slips] == fixes
+
+
+KEPT = (
+    "cmd = Twist()\ndef f(scan):\n    if s:\n        cmd.angular.z = 1\n    else:\n        cmd.linear.x = 2\n"
+)
+SENT = "    pub.publish(cmd)\n"
+EACH = "def f(scan):\n    for i in range(90):\n        if scan.ranges[i] < 1:\n            v.x = 0\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "fixes"),
+    [
+        (KEPT + SENT, ["above line 4, write `cmd.angular.z = 0`", "above line 4, write `cmd.linear.x = 0`"]),
+        (KEPT.replace("linear.x", "angular.z") + SENT, []),
+        (KEPT.replace("2\n", "2\n        cmd.angular.z = 0\n") + SENT, ["above line 4, write `cmd.linear.x = 0`"]),
+        (KEPT.replace("    if", "    cmd = Twist()\n    if") + SENT, []),
+        (KEPT + "    cmd.angular.z = cmd.linear.x = 0\n" + SENT, []),
+        (KEPT, []),
+        (KEPT.replace("def f(scan)", "while ok()") + SENT,
+         ["above line 4, write `cmd.angular.z = 0`", "above line 4, write `cmd.linear.x = 0`"]),
+        (EACH + "        else:\n            v.x = 1\n        pub.publish(v)\n",
+         ["work out the smallest of the ranges first, and write the `if` of line 4 and the `publish(…)` of line 8"]),
+        (EACH + "        else:\n            v.x = 1\n    pub.publish(v)\n", []),
+        (EACH + "            break\n        else:\n            v.x = 1\n        pub.publish(v)\n", []),
+    ],
+)  # fmt: skip
+def test_velocities_of_another_turn(text: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text("import rospy\n" + text, encoding="utf-8")
+    found = [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name in {"added", "kept"}]
+    assert [one.partition(" below")[0] for one in found if "set `v.x`" not in one] == fixes
+
+
+@pytest.mark.parametrize(
+    ("text", "fixes"),
+    [
+        (
+            "t = rospy.Time(now().to_nsec())\n",
+            ["on line 1, write `rospy.Time(0, ` in place of `rospy.Time(`"],
+        ),
+        ("t = rospy.Time(0, now().to_nsec())\n", []),
+        ("t = rospy.Time(now().to_sec())\n", []),
+    ],
+)
+def test_nanoseconds_for_seconds(text: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "nanoseconds"] == fixes
+
+
+@pytest.mark.parametrize(
+    ("condition", "fixes"),
+    [
+        ("not rospy.has_param('~a')", ["on line 2, write the condition without its `not`"]),
+        ("rospy.has_param('~a')", []),
+        ("not rospy.has_param('~b')", []),
+    ],
+)
+def test_a_parameter_that_is_read_only_where_it_is_not_set(
+    condition: str, fixes: list[str], tmp_path: Path
+) -> None:
+    text = f"import rospy\nif {condition}:\n    a = rospy.get_param('~a')\nelse:\n    a = 1\n"
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.fix for s in slips] == fixes
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fixes"),
+    [
+        ("'white', '~color'", ["on line 1, write `get_param('~color', 'white')`"]),
+        ("5, '~rate'", ["on line 1, write `get_param('~rate', 5)`"]),
+        ("'~color', 'white'", []),
+        ("'topic', '/scan'", []),
+        ("'folder', '~/bags'", []),
+        ("'~topic', '~out'", []),
+        ("name, '~color'", []),
+        ("'~color'", []),
+    ],
+)
+def test_a_default_before_the_name_of_its_parameter(arguments: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"color = rospy.get_param({arguments})\n", encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.fix for s in slips] == fixes
+
+
+def test_a_parameter_may_be_read_where_it_has_just_been_set(tmp_path: Path) -> None:
+    text = "if not rospy.has_param('~a'):\n    rospy.set_param('~a', 2)\n    a = rospy.get_param('~a')\n"
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    assert not [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+
+
+def test_a_listener_that_each_turn_makes_again(tmp_path: Path) -> None:
+    text = (
+        "while not rospy.is_shutdown():\n    b = tf2_ros.Buffer()\n    ear = tf2_ros.TransformListener(b)\n"
+    )
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.fix for s in slips] == ["move lines 2 and 3 above line 1"]
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        ("distance = (a - b) ** 2 + (c - d) ** 2\n", [1]),
+        ("def dist(a, b):\n    return pow(a, 2) + pow(b, 2)\n", [2]),
+        ("distance = ((a - b) ** 2 + (c - d) ** 2) ** 0.5\n", []),
+        ("distance = sqrt((a - b) ** 2 + (c - d) ** 2)\n", []),
+        ("dist_sq = (a - b) ** 2 + (c - d) ** 2\n", []),
+        ("d2 = (a - b) ** 2 + (c - d) ** 2\n", []),
+        ("dist = (a - b) ** 2 + (c - d) ** 2\nif math.sqrt(dist) < 1:\n    stop()\n", []),
+        ("dist = (a - b) ** 2 + (c - d) ** 2\nif dist < near ** 2:\n    stop()\n", []),
+        ("dist = (a - b) ** 2 + (c - d) ** 2\nif dist < near * near:\n    stop()\n", []),
+        ("def dist(a, b):\n    return a ** 2 + b ** 2\nfar = self.dist(1, 2) ** 0.5\n", []),
+        ("dist = (a - b) ** 2 + (c - d) ** 2\nif dist < near:\n    stop()\n", [1]),
+        ("dist = (a - b) ** 2 + (c - d) ** 2\nif dist < least:\n    least = dist\n", []),
+        ("distance = a + b\n", []),
+    ],
+)
+def test_distances_without_a_root(text: str, lines: list[int], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    assert [s.line for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "rootless"] == lines
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("a = atan2(goal.x - p.x, goal.y - p.y)\n", ["swapped"]),
+        ("dx = goal.x - p.x\ndy = goal.y - p.y\na = math.atan2(dx, dy)\n", ["swapped"]),
+        ("a = atan2(goal.y - p.y, goal.x - p.x)\n", []),
+        ("a = math.atan2(p.y - goal.y, p.x - goal.x)\n", []),
+        ("a = math.atan2(goal.y - p.y, p.x - goal.x)\n", ["turned"]),
+        ("dx, dy = x - goal_x, goal_y - y\na = atan2(dy, dx)\n", ["turned"]),
+        ("bearing = atan2(goal.x - p.x, goal.y - p.y)\n", []),
+        ("a = math.pi / 2 - atan2(goal.x - p.x, goal.y - p.y)\n", []),
+        ("a = degrees(atan2(goal.x - p.x, goal.y - p.y))\nb = 90 - a\n", []),
+        ("dx = goal.x - p.y\n", ["mixed"]),
+        ("e = self.target_y - self.pose.x\n", ["mixed"]),
+        ("slope = p.x - p.y\n", []),
+        ("a = math.atan2(cos(e), sin(e))\n", ["swapped"]),
+        ("a = math.atan2(sin(e - 1), sin(e - 1))\n", ["swapped"]),
+        ("a = math.atan2(cos(e), sin(f))\n", []),
+        ("def f(m):\n    self.x = m.x\n    self.y = m.x\n", ["mixed"]),
+        ("def f(m):\n    self.x, self.y = m.y, m.x\n", []),
+        ("y = 0\ndef f(m):\n    global x, y\n    x = m.x\nprint(x, y)\n", ["", "mixed"]),
+        ("y = read()\ndef f(m):\n    global x, y\n    x = m.x\nprint(x, y)\n", []),
+        ("y = 0\ndef f(m):\n    global x\n    x = m.x\nprint(x)\n", []),
+        ("if abs(e) > -0.1:\n    turn()\n", ["negative"]),
+        ("near = min(msg.ranges[:9])\nif near < 0 or far < 0:\n    turn()\n", [""]),
+        ("near = min(msg.ranges[:9])\nif near > 0 and far < 0:\n    turn()\n", []),
+        ("if abs(e) > 0:\n    turn()\n", []),
+        ("e = theta - atan2(dy, dx)\nv.angular.z = 2 * e\n", ["swapped"]),
+        ("a = math.atan2(sin(e), cos(e))\n", []),
+        ("res = rospy.get_param('~resolution')\nc = int(p.x * resolution)\n", ["times"]),
+        ("c = math.floor((p.x - x0) * info.resolution)\n", ["times"]),
+        ("x = column * resolution\nc = int(p.x / resolution)\n", []),
+        ("e = p.theta - atan2(dy, dx)\nv.angular.z = 2 * e\n", ["swapped"]),
+        ("goal = atan2(dy, dx)\nv.angular.z = K * norm(p.theta - goal)\n", []),
+        ("goal = atan2(dy, dx)\ne = norm(p.theta - goal)\nv.angular.z = K * e\n", ["swapped"]),
+        ("e = p.theta - atan2(dy, dx)\nv.angular.z = -2 * e\n", []),
+        ("K = -2\ne = p.theta - atan2(dy, dx)\nv.angular.z = K * e\n", []),
+        ("e = p.theta - atan2(dy, dx)\nv.angular.z = 1 if e < 0 else 0\n", []),
+        ("e = abs(p.theta - atan2(dy, dx))\nif e > 1:\n    v.angular.z = 1\n", []),
+        ("e = degrees(atan2(dy, dx)) - self.pose.theta\n", ["mixed"]),
+        ("self.theta = degrees(yaw)\ne = degrees(atan2(dy, dx)) - self.theta\n", []),
+        ("e = p.theta - atan2(dy, dx)\nv.angular.z = pid(e)\n", []),
+        ("K = get_param('~k', -1)\ne = p.theta - atan2(dy, dx)\nv.angular.z = K * e\n", []),
+        ("pitch = atan2(a.x, sqrt(a.y ** 2 + a.z ** 2))\n", []),
+        ("resolution = 1 / info.resolution\nc = int(p.x * resolution)\n", []),
+        ("e = degrees(atan2(dy, dx)) - degrees(self.pose.theta)\n", []),
+        ("e = degrees(atan2(dy, dx) - self.pose.theta)\n", []),
+        ("def far(p):\n    return sqrt(p.x ** 2 + p.y ** 2)\nwhile self.far(p) != 0:\n    go()\n", ["exact"]),
+        ("d = math.hypot(dx, dy)\nif d == 0.0:\n    stop()\n", ["exact"]),
+        ("d = math.hypot(dx, dy)\nif d < 0.1 or count == 0:\n    stop()\n", []),
+    ],
+)
+def test_angles_and_distances(text: str, names: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.name for s in slips] == names
+
+
+def test_an_attribute_that_is_filled_from_outside(tmp_path: Path) -> None:
+    head = "class A:\n def __init__(self):\n  self.p = None\n  Subscriber('/p', Pose, self.f)\n def f(self, m):\n"
+    (tmp_path / "a.py").write_text(f"{head}  self.p.x = m.x\na = A()\na.p = Pose()\n", encoding="utf-8")
+    assert [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "object"] == []
+
+
+@pytest.mark.parametrize(
+    "tests",
+    [
+        ("m.on", "not m.on"),
+        ("m.on == True", "m.on == False"),
+        ("m.a < 3", "m.a >= 3"),
+        ("m.a > m.b", "m.a == m.b"),
+    ],
+)
+@pytest.mark.parametrize("word", ["if", "elif"])
+def test_a_service_that_answers_in_all_cases(tests: tuple[str, str], word: str, tmp_path: Path) -> None:
+    first, last = (f"{test}:\n        return FitResponse(1)\n" for test in tests)
+    text = f"def fit(m):\n    print(m)\n    if {first}    {word} {last}rospy.Service('fit', Fit, fit)\n"
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    assert [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"] == []
