@@ -65,6 +65,8 @@ UNDEFINED = {
                                    "`queue_size` is named here without its value: write `queue_size=10`"),
     "global": ("def a():\n    global total\n    total = 1\ndef b():\n    return total\n", ""),
     "enclosing": ("def a(x):\n    def b():\n        return x\n    return [b, lambda y: x + y, [z for z in x]]\n", ""),
+    "object-outside-of-its-class": ("class A:\n    def __init__(self):\n        self.rate = 1\na = A()\nrate.run()\n",
+                                    "nothing in the file gives `rate` a value: above line 6"),
     "class-level": ("class A:\n    n = 3\n    m = n + 1\n", ""),
     "caught": ("try:\n    text = unicode\nexcept NameError:\n    text = str\n", ""),
     # the import fails by itself
@@ -361,6 +363,9 @@ def test_an_exception_gets_the_name_that_is_used(caught: str, meant: str, tmp_pa
         ("twist = Twist()\n", []),
         ("from a import *\ncounter = 0\nprint(conter)\n", []),
         ("counter = 0\nprint(unlike)\n", []),
+        ("counter = Noone\n", ["write None instead of Noone"]),
+        ("counter = Node()\n", []),
+        ("if __naMe__ == '__main__':\n    pass\n", ["write `if __name__ == '__main__':`"]),
         ("try:\n    pass\nexcept Exception as error:\n    print(error, __file__)\n", []),
     ],
 )
@@ -438,3 +443,45 @@ def test_imports_that_are_not_used_or_not_there(tmp_path, text, found):
     slips = check_syntax(tmp_path, ["a.py"]).slips
     assert [s.kind for s in slips if s.kind in ("unused-import", "lacking-import")] == found
     assert all("line 1" in s.fix for s in slips if s.kind == "unused-import")
+
+
+GUARDS = {
+    "bin == '__main__'": "`bin` is never '__main__'",
+    "'__main__' == main": "`main` is never '__main__'",
+    "'__name__' == '__main__'": "`'__name__'` is never '__main__'",
+    "'main' == __name__": "`__name__` is never 'main'",
+    "__name__ != '__main__'": "`__name__` is '__main__' whenever the script is run",
+    "'__main__' == __name__": "",
+    "__name__ is '__main__'": "",
+    "__name__ >= '__main__'": "",
+    "'__main__' == '__main__'": "",
+    "role == '__main__'": "",
+}
+
+
+@pytest.mark.parametrize("test", GUARDS)
+def test_what_keeps_a_script_from_running(test: str, tmp_path: Path) -> None:
+    text = f"role = __name__\ndef main():\n    rospy.spin()\nif {test}:\n    main()\n"
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    found = [s.message for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "main-guard"]
+    assert found == [GUARDS[test]] * bool(GUARDS[test])
+
+
+@pytest.mark.parametrize(
+    ("body", "found"),
+    [
+        (
+            "    def __init__(self):\n        self.r == f(1)\n",
+            ["on line 3, write `self.r =` in place of `self.r ==`"],
+        ),
+        (
+            "    n = 0\n    def heard(msg, self):\n        self.n += 1\n",
+            ["on line 3, write `def heard(self, msg):`"],
+        ),
+        ("    n = 0\n    @staticmethod\n    def heard(msg, self):\n        self.n += 1\n", []),
+        ("    n = 0\n    def heard(self, msg):\n        self.n += 1\n", []),
+    ],
+)
+def test_attributes_of_self(body: str, found: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"class A:\n{body}", encoding="utf-8")
+    assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "object"] == found

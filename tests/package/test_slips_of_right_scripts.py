@@ -145,6 +145,16 @@ class A:
     def __init__(self):
         type(self).pub = rospy.Publisher('a', Int8)
 """),
+    "signals-as-always": ("deaf", "rospy.init_node('a', disable_signals=False)\n"),
+    "unregisters-below-spin": ("unregistered", "s = rospy.Subscriber('a', A, print)\nrospy.spin()\ns.unregister()\n"),
+    "unregisters-below-its-loop": ("unregistered", """\
+def main():
+    while not rospy.is_shutdown():
+        rate.sleep()
+    s.unregister()
+main()
+"""),
+    "unregisters-finally": ("unregistered", "try:\n    rospy.spin()\nfinally:\n    s.unregister()\n"),
     "unregisters-on-leaving": ("unregistered", """\
 class A:
     def __exit__(self, *why):

@@ -507,6 +507,12 @@ def test_a_publisher_that_nothing_uses_is_to_publish_where_the_script_works(
     assert found == [f"call `pub.publish(…)`{where}"]
 
 
+def test_a_timers_callback_that_no_timer_is_given(tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text("def send(event):\n    pub.publish(1)\nrospy.spin()\n", encoding="utf-8")
+    found = [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "never-called"]
+    assert found == ["pass it: `rospy.Timer(rospy.Duration(…), send)`"]
+
+
 @pytest.mark.parametrize(
     ("source", "asks"),
     [

@@ -508,7 +508,8 @@ def deaf_loops(tree):
         else:
             counted.append(deaf(loop, []))
     for node in () if calls_in(tree, "signal_shutdown") else walk(tree):
-        if is_call(node, "init_node") and any(k.arg == "disable_signals" for k in node.keywords):
+        off = [k for k in getattr(node, "keywords", ()) if k.arg == "disable_signals"]
+        if is_call(node, "init_node") and any(getattr(k.value, "value", True) for k in off):
             message = "`disable_signals=True` on line %d keeps Ctrl-C from rospy" % node.lineno
             yield slip(node.lineno, "deaf", message, "leave it out")
         if is_call(node, "signal") and node.args and dotted(node.args[0]).endswith("SIGINT"):

@@ -181,6 +181,7 @@ def misspelt(tree):
     odd = {*keys, *unbound, *outside}
     made = {dotted(n.targets[0]): dotted(getattr(n.value, "func", None)) for n in all_of(tree, ast.Assign)}
     unknown = [n for n in names if n.id not in known or id(n) in odd]
+    of_classes = {id(n) for one in tree.body if isinstance(one, ast.ClassDef) for n in ast.walk(one)}
     for node in unknown[:USES_LIMIT]:
         kind, line, message = "undefined", node.lineno, ""
         fitting = stored if id(node) in texts else own - functions if is_value(node, tree) else own
@@ -188,7 +189,11 @@ def misspelt(tree):
         fitting = fitting | FITTING.get(type(around), set())
         # what an object has is not meant by `name` in `self.name = name`
         others = attributes.difference(map(dotted, getattr(around, "targets", ())))
-        near = "" if node.id in known | OLD_NAMES else spelt_alike(node.id, fitting, others)
+        near = (
+            ""
+            if node.id in known | OLD_NAMES
+            else spelt_alike(node.id, fitting, others if id(node) in of_classes else ())
+        )
         near = "" if made.get(near) == node.id else near  # `twist = Twist()` lacks an import
         near = "__name__" if node.id == "name" and is_guard(node, tree) else near
         if id(node) in outside and (node.id == "self" or node.id not in known):
@@ -320,7 +325,7 @@ def spelt_alike(name, own, attributes):
     """Return the name that is meant, "" where none is alike."""
     if "self." + name in attributes:
         return "self." + name
-    if name.strip("_") == "name" != name:
+    if name.strip("_") == "name" != name or difflib.get_close_matches(name.lower(), ["__name__"], 1, 0.8):
         return "__name__"
     stem = name.rstrip(DIGITS)
     if name[0].islower() and any(one != stem != name and one.rstrip(DIGITS) == stem for one in own):
@@ -328,7 +333,7 @@ def spelt_alike(name, own, attributes):
     if name[:1].isupper():  # a class is not meant by a variable with a name like it
         own = {one for one in own if one[:1].isupper() or one.lower() == name.lower()}
     own = {one for one in own if not is_of_series(name, one)}
-    near = difflib.get_close_matches(name[:TEXT_LIMIT], sorted(own), 1, 0.8)
+    near = difflib.get_close_matches(name[:TEXT_LIMIT], sorted(own | {"None", "True", "False"}), 1, 0.8)
     near = near or [n for n in sorted(own) if sorted(n) == sorted(name) or n.lower() == name.lower()]
     return near[0] if near else ""
 

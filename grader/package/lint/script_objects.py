@@ -32,6 +32,7 @@ from script_names import (
     reads_names_in_texts,
     set_in,
     slip,
+    statements_of,
     targets_of,
     text_of,
     walk,
@@ -65,6 +66,8 @@ class Members:
         self.plain = {n.id: n.lineno for n in reversed(plain)}
         """Where each name of a method, which is no attribute, first gets a value."""
         self.called_on_self = called_methods(tree)
+        tests = [n for n, _ in inside if isinstance(n, ast.Compare) and isinstance(n.ops[0], ast.Eq)]
+        self.compared = {dotted(n.left): n.lineno for n in tests if isinstance(parents_of(tree)[n], ast.Expr)}
         self.stores, self.reads = {}, []
         for n in all_of(tree, ast.Attribute):
             method = owner.get(id(n))
@@ -172,11 +175,18 @@ OF_ROS_2 = (
 
 
 def methods_inside(tree):
-    """Yield where a method is read that is defined inside another one."""
+    """Yield where a method is read that is defined inside another one, or that has its `self` in another place."""
     read = [n for n in all_of(tree, ast.Attribute) if isinstance(n.ctx, ast.Load)]
     reads = {n.attr: n.lineno for n in reversed(read)}
     for owner in all_of(tree, ast.ClassDef):
         for method in (n for n in owner.body if isinstance(n, ast.FunctionDef)):
+            given = [arg.arg for arg in method.args.args]
+            fix = "on line %d, write `def %s(self, %s):`"
+            fix %= (method.lineno, method.name, ", ".join(n for n in given if n != "self"))
+            mixed = "self" in given[1:] and not method.decorator_list
+            for one in all_of(method, ast.Attribute) if mixed else ():
+                if dotted(one.value) == "self":
+                    yield slip(one.lineno, "object", "`self` has to be the first parameter", fix, one.attr)
             inner = [n for n in ast.walk(method) if isinstance(n, ast.FunctionDef) and n is not method]
             inner = [n for n in inner if not isinstance(parents_of(tree)[n], ast.ClassDef)]
             for one in inner:
@@ -201,6 +211,9 @@ def never_given(own, name, line):
     if name in own.called_on_self:
         return never_defined(own, name, line)
     why = "nothing in the file gives `self.%s` a value" % name
+    line = own.compared.get("self." + name)
+    if line:
+        return why, "on line %d, write `self.%s =` in place of `self.%s ==`" % (line, name, name)
     return why, "in `__init__`, write `self.%s = …`, with the value that it should have" % name
 
 
@@ -382,16 +395,27 @@ LOOKED_UP = 3
 
 
 def taken_off(tree):
-    """Yield where a `Publisher` or `Subscriber` is unregistered, but for what a function does at the node's end."""
+    """Yield where a `Publisher` or `Subscriber` is unregistered, but for what runs at the node's end."""
     at_end = {dotted(arg).rpartition(".")[2] for n in calls_in(tree, "on_shutdown") for arg in n.args}
     # `__exit__` and its like run at the end, too
     functions = [n for n in all_of(tree, ast.FunctionDef) if n.name in at_end or n.name.startswith("__")]
-    spared = {inner for function in functions for inner in ast.walk(function)}
+    after = [one for n in walk(tree) for one in below_the_last(statements_of(n))]
+    after += [one for n in all_of(tree, ast.Try) for one in n.finalbody]
+    spared = {inner for one in functions + after for inner in ast.walk(one)}
     for node in calls_in(tree, "unregister"):
         if not node.args and node not in spared:
-            line, message = node.lineno, "line %d unregisters `%s`, which then has no topic"
-            message %= (line, dotted(node.func.value))
+            line, name = node.lineno, dotted(node.func.value)
+            message = "line %d unregisters `%s`, which then has no topic" % (line, name)
             yield slip(line, "unregistered", message, "delete line %d" % line)
+
+
+def below_the_last(block):
+    """Return the statements below the first of a block that waits for the node's end."""
+    for at, one in enumerate(block):
+        is_run = not isinstance(one, (ast.FunctionDef, ast.ClassDef))
+        if is_run and calls_in(getattr(one, "test", one), "spin", "is_shutdown"):
+            return block[at + 1 :]
+    return []
 
 
 def unused_publishers(tree):

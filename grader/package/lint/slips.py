@@ -9,6 +9,7 @@ run it: Python 3.8, standard library only.
 """
 
 import ast
+import builtins
 import importlib.util
 import os
 import sys
@@ -181,7 +182,8 @@ def never_main(node, tree):
     at = 1 - words.index("__main__")
     given = {n.id for n in all_of(tree, ast.Name) if isinstance(n.ctx, ast.Store)}
     given |= {n.arg for n in all_of(tree, ast.arg)}
-    name = named[at] if named[at] not in given else ""
+    known = names.given_names(tree, []) | set(dir(builtins))
+    name = named[at] if named[at] in known - given else ""
     name = repr(words[at]) if isinstance(words[at], str) and words[at] != "__main__" else name
     return "`%s` is never '__main__'" % name if name else ""
 
@@ -200,6 +202,8 @@ def handed_over(function, tree, owner):
     if len(taken) != 1 or function.args.defaults or calls_in(function, "init_node"):
         return ""
     name = (owner and "self.") + function.name
+    if any(word in (function.name + taken[0]).lower() for word in ("timer", "event")):
+        return "pass it: `rospy.Timer(rospy.Duration(…), %s)`" % name
     if "feedback" in (function.name + taken[0]).lower() and calls_in(tree, "send_goal"):
         return "pass it: `send_goal(…, feedback_cb=%s)`" % name
     return "pass it to what calls it: `rospy.Subscriber(…, %s)`" % name
@@ -341,8 +345,6 @@ def without_effect(tree):
             if "..." not in name:
                 right = value.comparators[0]
                 right = repr(right.value) if isinstance(right, ast.Constant) else dotted(right)
-                message = "`%s ==` compares and gives no value" % name
-                fix = (
-                    "write `%s = %s`" % (name, right) if "..." not in right else "write `=` in place of `==`"
-                )
-                yield slip(node.lineno, "compared", message, fix)
+                fix = "write `%s = %s`" % (name, right)
+                fix = "write `%s =` in place of `%s ==`" % (name, name) if "..." in right else fix
+                yield slip(node.lineno, "compared", "`%s ==` compares and gives no value" % name, fix)
