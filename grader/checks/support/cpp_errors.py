@@ -240,6 +240,12 @@ def _no_head(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]
     )
 
 
+def _outside(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    """Of a statement, or a brace, that stands in no function."""
+    why = f"{found.string}: that line is outside of every function"
+    return Explained(why, "count the braces above it: a `{` is missing there, or a `}` is too many")
+
+
 def _twice(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
     name = re.sub(r"\(.*", "", found[1]).split()[-1]
     above = re.compile(r"\S+?:(\d+):\d+: note: .*previous")
@@ -282,6 +288,8 @@ def _no_semicolon_above(found: re.Match[str], _package: PackageFacts, lines: Seq
 def _explain_undeclared(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
     name, near = found[1], found[2]
     source = _source(found, lines)
+    if "not name a type" in found.string and re.match(rf"{name}\s*(?:\.|->|=|\()", source):
+        return _outside(found, _package, lines)
     if re.search(rf"\b(?:ros|std|\w+_msgs):{name}\b", source):
         return Explained(found.string, f"write `::` in place of the `:` before {name}")
     if re.fullmatch(r"_\d", name) and any("boost::bind" in line for line in lines):
@@ -290,8 +298,6 @@ def _explain_undeclared(found: re.Match[str], _package: PackageFacts, lines: Seq
     if is_bound or name in STANDARD:
         whole, header = (f"placeholders::{name}", "functional") if is_bound else (name, STANDARD[name])
         return Explained(found.string, f"write std::{whole}, and #include <{header}> at the top")
-    if _OF_ROS_H.fullmatch(name) and name.startswith("ROS_"):
-        return _no_ros_h(found, _package, lines)
     is_first = re.match(rf"(?:.*[{{}};]\s*)?{name}\s*[(\w]", source)
     if not near and is_first and (keyword := near_names(name, KEYWORDS)):
         return Explained(found.string, f"write `{keyword[0]}` in place of `{name}`")
@@ -485,6 +491,11 @@ CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
     (r"missing terminating ([\">]) character|#include expects", _no_quote),
     (r"invalid preprocessing directive #\w+; did you mean (#\w+)\?", told("{0}", "write `{1}` there")),
     (r"expected unqualified-id before '{'", _no_head),
+    (r"'(ROS_(?:DEBUG|INFO|WARN|ERROR|FATAL)(?:_STREAM)?)' was not declared", _no_ros_h),
+    (
+        r"expected (?:unqualified-id before '(?:return|while|for|if|else|do|switch|})|declaration before '})'",
+        _outside,
+    ),
     (r"re(?:declaration|definition) of '([^']+)'", _twice),
     (r"no matching function for call to '(?:ros::)?NodeHandle::subscribe(.*)", _explain_subscription),
     (rf"no matching function for call to '(?:ros::(?:\w+::)?)?({'|'.join(OF_ROS)})[<(]", _other_arguments),
