@@ -27,7 +27,6 @@ BLOCK = r"(?:if|elif|else|while|for|def|class|try|except|finally|with)\b"
 COMMENTED_OUT = "block commented out"
 """What the grader says of a comment that is the first line of the block below it."""
 OUT_OF_BLOCK = "ends its block too early"
-TOO_FAR_IN = "is further in than its block"
 """What the grader says of a line further out than the block that goes on below it."""
 MERGE_MARKER = re.compile(r"(<{7}|={7}|>{7}|\|{7})(\s|$)")
 MERGED = "git's merge markers (`<<<<<<<`) are still in the file"

@@ -26,7 +26,6 @@ from grader.syntax_fixes import (
     LFS_POINTER,
     MERGE_MARKER,
     OUT_OF_BLOCK,
-    TOO_FAR_IN,
     Reason,
     corrected,
     other_quotes,
@@ -66,6 +65,8 @@ _UNCLOSED = re.compile(r"'([(\[{])' was never closed")
 _ONE_WIDTH = "use four spaces everywhere"
 _TAB_SIZE = "let your editor turn the tabs into spaces, at a tab size of {}"
 _OUT_OF_BLOCK = "this line is indented less than the lines around it, which belong to one block"
+TOO_FAR_IN = "is further in than its block"
+"""What the grader says of a line further in than the block that it belongs to."""
 _COPIED = "copied from a PDF or a web page"
 
 _MESSAGES: tuple[tuple[str, ...], ...] = (
@@ -98,7 +99,7 @@ _MESSAGES: tuple[tuple[str, ...], ...] = (
     (r"'yield' outside", "`yield` is outside every function", "indent it like the lines of its function"),
     (r"f-string: expecting '}'", "a `{` in the f-string is never closed", "write `}` after its value"),
     (r"expected 'except' or 'finally'",
-     "a `try:` has no `except` below it", "write `except rospy.ROSInterruptException:` there, and `pass` below that"),
+     "a `try:` has no `except` below it", "write `except` there, with the error that it catches, and its block"),
     (r"future feature|__future__ imports must", "Python 3 needs nothing from `__future__`", DELETE_LINE),
     (r"non-default argument|parameter without a default",
      "a parameter without a default comes behind one with a default", "move it before that one"),
