@@ -331,6 +331,8 @@ def test_what_comes_behind_a_function_that_never_ends_is_never_reached(text, fou
         ("    if g.n < 0:\n        s.set_aborted(r)\n    s.set_succeeded(r)\n", ["below line 3, write `return`"]),
         ("    while n:\n        if s.is_preempt_requested():\n            s.set_preempted()\n        n -= 1\n",
          ["below line 4, write `return`"]),
+        (("    while ok:\n        g = s.accept_new_goal()\n        if g.n < 0:\n            s.set_aborted(r)\n"
+         "        s.set_succeeded(r)\n"), ["below line 5, write `continue`"]),
         ("    if g.n < 0:\n        s.set_aborted(r)\n        return\n    s.set_succeeded(r)\n", []),
         ("    if g.n < 0:\n        s.set_aborted(r)\n    else:\n        s.set_succeeded(r)\n", []),
         ("    if ok:\n        s.set_succeeded(r)\n    print('done')\n", []),
@@ -421,6 +423,22 @@ def test_objects_that_no_line_makes(text: str, fixes: list[str], tmp_path: Path)
     (tmp_path / "a.py").write_text(f"{head}import rospy\n{text}", encoding="utf-8")
     found = check_syntax(tmp_path, ["a.py"]).slips
     assert [s.fix for s in found if "gives `" in s.message] == fixes
+
+
+@pytest.mark.parametrize(
+    ("callback", "fix"),
+    [
+        ("publish", "write `def publish(self, …):` in the class A"),
+        ("hadle", "on line 3, write `self.handle` instead of `self.hadle`"),
+    ],
+)
+def test_a_callback_is_a_method_and_no_other_attribute(callback: str, fix: str, tmp_path: Path) -> None:
+    made = f"self.pub = rospy.Publisher('/a', Int8)\n  rospy.Timer(rospy.Duration(1), self.{callback})"
+    (tmp_path / "a.py").write_text(
+        f"class A:\n def __init__(self):\n  {made}\n def handle(self, e):\n  pass\n"
+    )
+    found = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.fix for s in found if s.kind == "object"] == [fix.replace("line 3", "line 4")]
 
 
 def test_fields_of_an_attribute_that_is_always_none(tmp_path: Path) -> None:

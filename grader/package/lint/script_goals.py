@@ -42,7 +42,8 @@ def finished_goals(tree):
         if more or (in_loop and not is_last_turn(around, node, call)):
             what = "loop" if in_loop else "callback"
             message = "the goal is over with `%s(…)`, and the %s goes on" % (called_name(call), what)
-            fix = "below line %d, write `return`" % node.body[-1].end_lineno
+            ends = "continue" if in_loop and calls_in(around, "accept_new_goal") else "return"
+            fix = "below line %d, write `%s`" % (node.body[-1].end_lineno, ends)
             yield slip(call.lineno, "goes-on", message, fix, called_name(call))
 
 

@@ -202,7 +202,8 @@ def never_given(own, name, line):
     if name in own.plain:
         why = "line %d gives a value to `%s`, and not to `self.%s`" % (own.plain[name], name, name)
         return why, "on line %d, write `self.%s` instead of `%s`" % (own.plain[name], name, name)
-    there = sorted(own.fixed | set(own.stores))
+    # what is called is a method
+    there = sorted(own.fixed | (set() if name in own.called_on_self else set(own.stores)))
     near = difflib.get_close_matches(name, there, 1, 0.75)
     near = near or [n for n in there if n.startswith(name) or name.startswith(n)]
     if near:
