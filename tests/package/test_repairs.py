@@ -454,7 +454,7 @@ RIGHT = {
     "name of two words": "import logging\nlog = logging.getLogger()\nlog.info('a')\nrospy.loginfo('a')\n",
     "attribute of two words": "class A:\n    def f(self, pos):\n        self.posx = pos.x\n",
     "type as a text": "class A:\n    pub: 'rospy.Publisher'\n",
-    "names of a class": "class T:\n    OUT = 'out'\n\n\nU = T\ndef f():\n    rospy.Subscriber(U.OUT, Int8, f)\n",
+    "names of a class": "class T:\n    OUT = 'out'\n\n\nU = T\ndef f():\n    rospy.Subscriber(U.OUT, Int8, print)\n",
     "fields of a data class": ("class A:\n    speed: float = 1.0\n    limit: int = 1\n\n    def speeds(self):\n"
                                "        return self.speed * self.limit\n"),
     "a window": ("def f(root):\n    rospy.init_node('talker')\n    rospy.Subscriber('a', Int8, print)\n"

@@ -168,10 +168,11 @@ def never_main(node, tree):
     words = [one.value if isinstance(one, ast.Constant) else None for one in sides]
     named = [getattr(one, "id", "") for one in sides]
     if isinstance(node.test.ops[0], NEVER):
+        if node.orelse or "__name__" not in named or "__main__" not in words:
+            return ""
         plain = [one for one in tree.body if not isinstance(one, (ast.FunctionDef, ast.ClassDef))]
         running = [one for one in plain if any(isinstance(n, ast.Call) for n in ast.walk(one))]
-        hides = running == [node] and not node.orelse and "__name__" in named and "__main__" in words
-        return "`__name__` is '__main__' whenever the script is run" if hides else ""
+        return "`__name__` is '__main__' whenever the script is run" if running == [node] else ""
     if not isinstance(node.test.ops[0], (ast.Eq, ast.Is)):
         return ""
     if "__name__" in named:

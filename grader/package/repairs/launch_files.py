@@ -19,7 +19,7 @@ from grader.package.repairs.yaml_files import namespace_wanted
 from grader.wording import the_same_on
 
 TAG_LINES_MAX = 20
-_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+_COMMENT = re.compile(r"<!--.*?(?:-->|\Z)", re.DOTALL)
 NO_SCRIPTS = (".launch", ".xml", ".txt", ".yaml", ".yml", ".md", ".test", *CPP)
 
 
