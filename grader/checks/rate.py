@@ -189,7 +189,8 @@ def _judge(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     citations = (cite(run, params.topic, found.times_ns[0], found.times_ns[-1]),)
     measured = found.described(*params.bounds_ns)
     if verdict.status is Status.INCONCLUSIVE or verdict.own_load:
-        measured += _lateness(found, run)
+        late = lateness(run, found.times_ns[0], found.until_ns, own=True) if found.gaps_ns else None
+        measured += f", {late.described}" if late else ""
     return verdict.about(measured=measured, citations=citations)
 
 
@@ -257,12 +258,6 @@ def _spans(run: Run, params: RateParams, cause: Condition) -> list[tuple[int, in
     settle_ns, order_ns = round(params.within_s * 1e9), round(ORDER_S * 1e9)
     later = [(begin_ns + settle_ns, min(end_ns - order_ns, until_ns or end_ns)) for begin_ns, end_ns in spans]
     return [(begin_ns, end_ns) for begin_ns, end_ns in later if begin_ns < end_ns]
-
-
-def _lateness(found: Rhythm, run: Run) -> str:
-    """Return how late the machine was during it, which is of use only where that decides."""
-    late = lateness(run, found.times_ns[0], found.until_ns, own=True) if found.gaps_ns else None
-    return "" if late is None else f", {late.described}"
 
 
 def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
@@ -344,7 +339,7 @@ def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) 
         or (_by_slip(wrong, "publish-twice", run, package, params) if mean_hz > params.high_hz else None)
         or _bursts(found, outside, even, params)
         or (_by_slip(wrong, "sleep-twice", run, package, params) if mean_hz < params.rate_hz else None)
-        or _by_number(wrong, found, run, package, params)
+        or ((slip := _asked_number(found, run, package, params)) and _with_line(wrong, slip, params))
         or _left_out(wrong, mean_hz, run, package, params)
         or _by_parameter(wrong, run, package, params, mean_hz)
     )
@@ -420,7 +415,10 @@ def _by_slip(
     verdict: Verdict, kind: SlipKind, run: Run, package: PackageFacts, params: RateParams
 ) -> Verdict | None:
     """Name the line on which a publisher's loop does twice in a turn what it should do once."""
-    slip = next(iter(_slips(run, package, params, kind)), None)
+    return _named(verdict, next(iter(_slips(run, package, params, kind)), None))
+
+
+def _named(verdict: Verdict, slip: PythonSlip | None) -> Verdict | None:
     if slip is None:
         return None
     return verdict.explained(f"{slip.file}: {slip.message}", f"in {slip.file}, {slip.fix}", (slip.place,))
@@ -432,14 +430,9 @@ def _left_out(
     """Name the `if` around the `publish(…)` of a loop that goes round as often as it should."""
     asked = [float(s.message) for s in _slips(run, package, params, "rate-number")]
     slips = _slips(run, package, params, "published-in-part")
-    slip = next((s for s in slips if is_written_as(s.name, params.topic)), None)
-    if (
-        slip is None
-        or mean_hz > params.rate_hz
-        or not any(params.low_hz <= hz <= params.high_hz for hz in asked)
-    ):
+    if mean_hz > params.rate_hz or not any(params.low_hz <= hz <= params.high_hz for hz in asked):
         return None
-    return verdict.explained(f"{slip.file}: {slip.message}", f"in {slip.file}, {slip.fix}", (slip.place,))
+    return _named(verdict, next((s for s in slips if is_written_as(s.name, params.topic)), None))
 
 
 def _bursts(found: Rhythm, outside: list[int], even: bool, params: RateParams) -> Verdict | None:
@@ -459,14 +452,6 @@ def _wrong_mean(found: Rhythm, params: RateParams) -> Verdict:
     ratio = found.mean_hz / params.rate_hz
     verdict = failed(message, hint=_rate_hint(ratio, nominal, even=found.is_even))
     return verdict.if_repeated() if abs(ratio - 1) < NEAR_SHARE else verdict
-
-
-def _by_number(
-    verdict: Verdict, found: Rhythm, run: Run, package: PackageFacts, params: RateParams
-) -> Verdict | None:
-    """Name the line where the node's script asks for the rate that was measured."""
-    slip = _asked_number(found, run, package, params)
-    return None if slip is None else _with_line(verdict, slip, params)
 
 
 def _with_line(verdict: Verdict, slip: PythonSlip, params: RateParams) -> Verdict:

@@ -49,6 +49,7 @@ from grader.checks.support.scripts import (
     SYNTAX,
     argument_not_given,
     copies_of,
+    in_comments,
     move_hint,
     old_encoding,
     path_in_package,
@@ -209,16 +210,6 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
     return Ending(f"it exited with code {code}{words}", hint)
 
 
-MAKES_NODES = {
-    "init_node": "node-name",
-    "Publisher": "publisher",
-    "Subscriber": "subscriber",
-    "publish": "publishes",
-    "spin": "",
-}
-"""Calls, and the kind of slip that there is where the script has one of them that is not in a comment."""
-
-
 def _ran_to_the_end(printed: Sequence[str], package: PackageFacts) -> Ending:
     """Explain it by what was printed last, where an `except` may have printed it."""
     last = printed[-1] if printed else ""
@@ -253,7 +244,7 @@ def _not_run(life: Life, run: Run, package: PackageFacts) -> Ending | None:
         return None
     slip = min(slips, key=lambda one: kinds.index(one.kind))
     of_script = [s for s in package.slips if s.file == life.start.script]
-    if slip.kind == "commented-out" and (all_of_them := _in_comments(of_script)):
+    if slip.kind == "commented-out" and (all_of_them := in_comments(of_script)):
         slip = slip.model_copy(update=all_of_them)
     called = f"call {slip.name}() at the end of the script, below {MAIN}" if slip.name else f"write {MAIN}"
     cause = f"its script ran to the end: {slip.message} ({slip.file}, line {slip.line})"
@@ -265,16 +256,6 @@ def _real_copy(script: SourceFile, package: PackageFacts) -> str:
     nodes = {s.file for s in package.slips if s.kind == "node-name"}
     others = [one.path for one in copies_of(package, script.path) if one.path != script.path]
     return others[0] if script.path not in nodes and len(others) == 1 and others[0] in nodes else ""
-
-
-def _in_comments(slips: Sequence[PythonSlip]) -> dict[str, str]:
-    """Return the message and the fix of several calls that make a script a node and are only there in comments."""
-    kinds = {one.kind for one in slips}
-    gone = (s for s in slips if s.kind == "commented-out" and "`#`" in s.fix)
-    lines = sorted({s.line for s in gone if MAKES_NODES.get(s.name.rpartition(" ")[2], s.kind) not in kinds})
-    where = on_lines(lines)
-    told = {"message": f"{where} are commented out", "fix": f"remove the `#` from {where}"}
-    return told if len(lines) > 1 else {}
 
 
 def explain_error(
@@ -458,7 +439,7 @@ def _late_init(place: FileCitation, package: PackageFacts) -> tuple[str, str] | 
         return astray.message, astray.fix
     gone = next((s for s in slips if (s.kind, s.name) == ("commented-out", "init_node")), None)
     if gone is not None and not any(s.kind == "node-name" for s in slips):
-        told = _in_comments(slips) or {"message": f"line {gone.line} is commented out", "fix": gone.fix}
+        told = in_comments(slips) or {"message": f"line {gone.line} is commented out", "fix": gone.fix}
         return told["message"], told["fix"]
     if never := next((s for s in slips if s.kind == "no-init"), None):
         return never.message, f"call `rospy.init_node(…)`, with the node's name, above line {place.line}"

@@ -13,7 +13,7 @@ from grader.model.git_ignores import IgnoreLine, hiding_line
 from grader.model.package import CMakeCall, Executable, PackageFacts, SourceFile
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.verdict import FileCitation
-from grader.wording import has_role_of, is_role
+from grader.wording import has_role_of, is_role, on_lines
 
 PYTHON = "catkin_install_python"
 CPP_SUFFIXES = (".c", ".cc", ".cpp", ".cxx")
@@ -468,3 +468,23 @@ def syntax_fault(file: SourceFile) -> Fault | None:
     old = file.shebang is not None and file.shebang.found and file.shebang.interpreter.startswith("python2")
     fault = file.python_fault
     return fault if fault is not None and fault.kind in UNPARSED and not old else None
+
+
+MAKES_NODES = {
+    "init_node": "node-name",
+    "Publisher": "publisher",
+    "Subscriber": "subscriber",
+    "publish": "publishes",
+    "spin": "",
+}
+"""Calls, and the kind of slip that there is where the script has one of them that is not in a comment."""
+
+
+def in_comments(slips: Sequence[PythonSlip]) -> dict[str, str]:
+    """Return the message and the fix of several calls that make a script a node and are only there in comments."""
+    kinds = {one.kind for one in slips}
+    gone = (s for s in slips if s.kind == "commented-out" and "`#`" in s.fix)
+    lines = sorted({s.line for s in gone if MAKES_NODES.get(s.name.rpartition(" ")[2], s.kind) not in kinds})
+    where = on_lines(lines)
+    told = {"message": f"{where} are commented out", "fix": f"remove the `#` from {where}"}
+    return told if len(lines) > 1 else {}

@@ -8,10 +8,12 @@ import re
 from collections import Counter
 
 from script_names import (
+    key_of,
+)
+from script_tree import (
     all_of,
     called_name,
     dotted,
-    key_of,
     listed,
     names_in,
     parents_of,

@@ -10,6 +10,9 @@ import itertools
 
 from script_loops import CALLED_BACK, is_endless, is_short, lines_said
 from script_names import (
+    given_names,
+)
+from script_tree import (
     all_of,
     argument,
     callback_of,
@@ -17,7 +20,6 @@ from script_names import (
     calls_in,
     dotted,
     functions_in,
-    given_names,
     gives_function,
     is_call,
     listed,

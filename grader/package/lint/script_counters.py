@@ -8,7 +8,7 @@ import ast
 import builtins
 
 from script_loops import turns
-from script_names import (
+from script_tree import (
     LOOPS,
     all_of,
     called_name,

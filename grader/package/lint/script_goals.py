@@ -7,6 +7,10 @@ import ast
 
 from script_callbacks import BELOW_LIMIT, excludes
 from script_names import (
+    set_in,
+)
+from script_objects import FINISHING
+from script_tree import (
     LOOPS,
     all_of,
     called_name,
@@ -15,11 +19,9 @@ from script_names import (
     is_call_alone,
     names_in,
     parents_of,
-    set_in,
     slip,
     statements_of,
 )
-from script_objects import FINISHING
 
 
 def finished_goals(tree):

@@ -8,13 +8,17 @@ import ast
 from collections import Counter
 
 from script_names import (
+    caught_by,
+    set_in,
+)
+from script_rates import constant
+from script_tree import (
     FUNCTIONS,
     LOOPS,
     all_of,
     argument,
     called_name,
     calls_in,
-    caught_by,
     dotted,
     functions_in,
     is_call,
@@ -24,12 +28,10 @@ from script_names import (
     names_in,
     parents_of,
     published_type,
-    set_in,
     slip,
     statements_of,
     walk,
 )
-from script_rates import constant
 
 CALLED_BACK = {"Subscriber": "callback", "Service": "handler"}
 """What calls a function of the script's, and the name of that argument."""

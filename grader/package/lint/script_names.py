@@ -1,14 +1,29 @@
 """Finds the names in a student's Python that are not there when they are read, for `slips.py`.
 
-What the others of `slips.py` use to look into a source is here too. Nothing is executed. Python 3.8, standard library
-only.
+Nothing is executed. Python 3.8, standard library only.
 """
 
 import ast
 import builtins
 import difflib
 
-TEXT_LIMIT = 300
+from script_tree import (
+    FUNCTIONS,
+    LOOPS,
+    TEXT_LIMIT,
+    all_of,
+    called_name,
+    calls_in,
+    dotted,
+    names_in,
+    parents_of,
+    published_type,
+    slip,
+    statements_of,
+    text_of,
+    walk,
+)
+
 NAMES_LIMIT = 500
 USES_LIMIT = 40
 """So many uses of unknown names are explained in a file: each takes a look at all of it."""
@@ -22,143 +37,7 @@ OF_VARIABLES = ("name", "topic")
 """So ends the name of a variable that has a name for its value."""
 FITTING = {ast.ExceptHandler: EXCEPTIONS, ast.Expr: {"pass", "break", "continue", "return"}}
 """What a name is meant for by where it stands, besides names."""
-FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
-LOOPS = (ast.While, ast.For)
 COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
-
-
-def walk(tree):
-    """Return all the nodes of a module, as `ast.walk` yields them: kept, since each finder asks for them."""
-    if not hasattr(tree, "all_nodes"):
-        tree.all_nodes = list(ast.walk(tree))
-    return tree.all_nodes
-
-
-def all_of(tree, *kinds):
-    """Return the nodes of a module that are of these kinds."""
-    return [n for n in walk(tree) if isinstance(n, kinds)]
-
-
-def reads_names_in_texts(tree):
-    """Return whether a text of the module may use a name of it, as in `eval('2 * pi')`."""
-    return any(called_name(n) in ("locals", "globals", "vars", "eval", "exec", "getattr") for n in walk(tree))
-
-
-def parents_of(tree):
-    """Return the node around each node of a module: kept, as above."""
-    if not hasattr(tree, "all_parents"):
-        tree.all_parents = {child: node for node in walk(tree) for child in ast.iter_child_nodes(node)}
-    return tree.all_parents
-
-
-def loop_around(node, tree):
-    """Return the innermost loop that a node is in, None outside of all."""
-    node = parents_of(tree).get(node)
-    while node is not None and not isinstance(node, LOOPS):
-        node = parents_of(tree).get(node)
-    return node
-
-
-def is_call(node, *names):
-    """Return whether it is a call `a.b()`, `b` being one of the names."""
-    return isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in names
-
-
-def calls_in(node, *names):
-    """Return all such calls in a node, itself included."""
-    return [n for n in getattr(node, "all_nodes", None) or ast.walk(node) if is_call(n, *names)]
-
-
-def functions_in(tree):
-    """Return the functions and methods of a module by their names."""
-    return {n.name: n for n in all_of(tree, ast.FunctionDef)}
-
-
-def gives_function(function):
-    """Whether it returns a function that it makes: one within it, a `lambda`, `partial(…)`."""
-    inside = list(ast.walk(function))
-    made = {n.name for n in inside if isinstance(n, (ast.FunctionDef, ast.ClassDef)) and n is not function}
-    given = [n.value for n in inside if isinstance(n, ast.Return)]
-    return any(isinstance(n, ast.Lambda) or called_name(n) == "partial" or dotted(n) in made for n in given)
-
-
-def callback_of(call, functions):
-    """Return the script's function that a `Subscriber(…)` is given; None of any other node."""
-    given = argument(call, 2, "callback") if called_name(call) == "Subscriber" else []
-    return functions.get(dotted(given[0]).rpartition(".")[2]) if given else None
-
-
-def targets_of(tree):
-    """Return the name that each value is given to, by the identity of the value."""
-    return {id(n.value): dotted(n.targets[0]) for n in all_of(tree, ast.Assign)}
-
-
-def argument(call, place, keyword):
-    """Return the argument of a call at that place or of that name, as a list of one; an empty one where it has none."""
-    return call.args[place : place + 1] or [k.value for k in call.keywords if k.arg == keyword]
-
-
-def text_of(node):
-    """Return a text as it is written in the source, "" of all else."""
-    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ""
-
-
-def is_call_alone(node):
-    """Whether a statement is a call whose answer nothing keeps."""
-    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Call)
-
-
-def called_name(node):
-    """Return `b` of the calls `a.b()` and `b()`, "" of all else."""
-    if not isinstance(node, ast.Call):
-        return ""
-    return node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
-
-
-def dotted(node):
-    """Return `a.b.c` as it is written; what stands before the dots and is not a name becomes an ellipsis."""
-    parts = []
-    while isinstance(node, ast.Attribute):
-        parts.append(node.attr)
-        node = node.value
-    parts.append(node.id if isinstance(node, ast.Name) else "...")
-    return ".".join(reversed(parts))[:TEXT_LIMIT]
-
-
-def statements_of(node, part="body"):
-    """Return the statements of a node's block; none where its body is an expression, as a lambda's is."""
-    block = getattr(node, part, None)
-    return block if isinstance(block, list) else []
-
-
-def names_in(node):
-    """Return the names in a node, as `dotted` writes them."""
-    return {dotted(n) for n in ast.walk(node) if isinstance(n, (ast.Name, ast.Attribute))}
-
-
-def listed(lines):
-    """Return `line 3`, `lines 3, 5 and 8`."""
-    *others, last = map(str, lines)
-    return "lines %s and %s" % (", ".join(others), last) if others else "line " + last
-
-
-def lines_from(first, last):
-    """Return `line 3`, `lines 3 to 5`."""
-    return "line %d" % first if first == last else "lines %d to %d" % (first, last)
-
-
-def slip(line, kind, message, fix="", name=""):
-    """Return what `PythonSlip` (grader/model/python_slip.py) says of a line of the script."""
-    texts = {"message": message, "fix": fix, "name": name}
-    return {"line": line, "kind": kind, **{key: text[:TEXT_LIMIT] for key, text in texts.items()}}
-
-
-def published_type(call):
-    """Return the name of the class that a `Publisher(…)` or `Subscriber(…)` is given, "" where it has none."""
-    types = argument(call, 1, "data_class")
-    if types and called_name(types[0]) == "numpy_msg":
-        types = types[0].args
-    return dotted(types[0]).rpartition(".")[2] if types else ""
 
 
 # ---- names that are not there
@@ -185,17 +64,9 @@ def misspelt(tree):
     for node in unknown[:USES_LIMIT]:
         kind, line, message = "undefined", node.lineno, ""
         fitting = stored if id(node) in texts else own - functions if is_value(node, tree) else own
-        around = parents_of(tree).get(node)
-        fitting = fitting | FITTING.get(type(around), set())
-        # what an object has is not meant by `name` in `self.name = name`
-        others = attributes.difference(map(dotted, getattr(around, "targets", ())))
-        near = (
-            ""
-            if node.id in known | OLD_NAMES
-            else spelt_alike(node.id, fitting, others if id(node) in of_classes else ())
-        )
+        others = attributes if id(node) in of_classes else set()
+        near = meant_for(node, tree, known, fitting, others)
         near = "" if made.get(near) == node.id else near  # `twist = Twist()` lacks an import
-        near = "__name__" if node.id == "name" and is_guard(node, tree) else near
         if id(node) in outside and (node.id == "self" or node.id not in known):
             message = "line %d is in the class, but in none of its methods, so it runs before them" % line
             fix = "indent line %d like the lines of the method above it, or delete it" % line
@@ -219,6 +90,18 @@ def misspelt(tree):
             message, fix = why_unbound(node, tree, known)
         if message:
             yield slip(line, kind, message, fix, node.id)
+
+
+def meant_for(node, tree, known, fitting, attributes):
+    """Return which of the fitting names, or of the attributes with `self.`, a name is spelt like; "" for none."""
+    if node.id == "name" and is_guard(node, tree):
+        return "__name__"
+    if node.id in known | OLD_NAMES:
+        return ""
+    around = parents_of(tree).get(node)
+    # what an object has is not meant by `name` in `self.name = name`
+    others = attributes.difference(map(dotted, getattr(around, "targets", ())))
+    return spelt_alike(node.id, fitting | FITTING.get(type(around), set()), others)
 
 
 def given_names(tree, names):

@@ -12,25 +12,28 @@ from collections import Counter
 
 from script_names import (
     CALL_BACK,
+    USES_LIMIT,
+    bound_names,
+    given_names,
+    set_in,
+)
+from script_texts import NAMED
+from script_tree import (
     LOOPS,
     TEXT_LIMIT,
-    USES_LIMIT,
     all_of,
     argument,
-    bound_names,
     callback_of,
     called_name,
     calls_in,
     dotted,
     functions_in,
-    given_names,
     is_call,
     listed,
     names_in,
     parents_of,
     published_type,
     reads_names_in_texts,
-    set_in,
     slip,
     statements_of,
     targets_of,
@@ -303,58 +306,6 @@ def names_of_objects(tree):
                 message = "`%s` has a value only in `%s(…)`" % (node.id, givers[node.id])
                 fix = "on %s, write `self.%s` instead of `%s`" % (lines, node.id, node.id)
                 yield slip(node.lineno, "undefined", message, fix, node.id)
-
-
-# ---- where ROS is told a name
-
-NAMED = {
-    "init_node": "node-name", "Publisher": "publisher", "Subscriber": "subscriber", "wait_for_message": "subscriber",
-    "set_param": "sets-parameter",
-}  # fmt: skip
-"""Calls whose first argument is a name, and the kind of slip that tells where."""
-
-
-def graph_names(tree):
-    """Where a script names its node, its topics and the parameters that it sets, as written; and the types that it
-    publishes."""
-    owners = targets_of(tree)
-    own = {n.name for n in all_of(tree, ast.ClassDef)}
-    for node in walk(tree):
-        kind = NAMED.get(called_name(node))
-        if not kind or dotted(node.func) in own:
-            continue
-        anonymous = [k for k in node.keywords if k.arg == "anonymous" and getattr(k.value, "value", True)]
-        owner = owners.get(id(node), "") or ("anonymous" if anonymous else "")
-        names, name = argument(node, 0, "name"), published_type(node)
-        if names and text_of(names[0]):
-            yield slip(names[0].lineno, kind, text_of(names[0]), name=owner)
-        elif names and kind == "node-name":
-            for text, written in text_behind(names[0], tree):
-                yield slip(text.lineno, kind, text_of(text), written, owner)
-        if names and name.isidentifier() and kind in ("publisher", "subscriber"):
-            yield slip(names[0].lineno, kind + "-type", name)
-
-
-def text_behind(node, tree):
-    """Yield the text that a variable is given once, or that an argument gets in the only call of its function, and how
-    it is written there, with `{}` in its place: `self.name = {}`, `name={}`."""
-    name = dotted(node)
-    assigned = [n.value for n in all_of(tree, ast.Assign) if name in map(dotted, n.targets)]
-    if len(assigned) == 1 and text_of(assigned[0]):
-        yield assigned[0], "%s = {}" % name
-    for function in () if assigned else functions_in(tree).values():
-        arguments = [one.arg for one in function.args.args]
-        if name in arguments and any(one is node for one in ast.walk(function)):
-            owners = [n.name for n in all_of(tree, ast.ClassDef) if function in n.body]
-            called = owners[0] if owners and function.name == "__init__" else function.name
-            calls = [n for n in all_of(tree, ast.Call) if dotted(n.func) in (called, "self." + called)]
-            place = arguments.index(name) - (arguments[0] == "self")
-            found = argument(calls[0], place, name) if len(calls) == 1 else []
-            if found and text_of(found[0]):
-                alone = len(calls[0].args) + len(calls[0].keywords) == 1
-                by_name = found[0] in [one.value for one in calls[0].keywords]
-                written = "%s={}" % name if by_name else "%s({})" % called if alone else "{}"
-                yield found[0], written
 
 
 # ---- what ROS is given

@@ -5,7 +5,17 @@ Nothing is executed. Python 3.8, standard library only.
 
 import ast
 
-from script_names import LOOPS, all_of, argument, calls_in, dotted, is_call, slip, text_of, walk
+from script_tree import (
+    LOOPS,
+    all_of,
+    argument,
+    calls_in,
+    dotted,
+    is_call,
+    slip,
+    text_of,
+    walk,
+)
 
 VALUES = {"Rate": "hz", "sleep": "duration", "Timer": "period"}
 """What says how often, by its name."""

@@ -10,11 +10,15 @@ from collections import Counter
 
 from script_names import (
     USES_LIMIT,
+    caught_by,
+    walk_own,
+)
+from script_texts import VALUE, Texts
+from script_tree import (
     all_of,
     argument,
     called_name,
     calls_in,
-    caught_by,
     dotted,
     functions_in,
     is_call_alone,
@@ -22,9 +26,7 @@ from script_names import (
     parents_of,
     slip,
     walk,
-    walk_own,
 )
-from script_texts import VALUE, Texts
 
 BROAD = {"", "Exception", "BaseException"}
 OTHER_VALUES = (ast.BoolOp, ast.Compare, ast.Dict, ast.DictComp, ast.Lambda, ast.List, ast.ListComp)

@@ -8,12 +8,14 @@ import ast
 from collections import Counter
 
 from script_names import (
-    FUNCTIONS,
     USES_LIMIT,
+    key_of,
+)
+from script_tree import (
+    FUNCTIONS,
     all_of,
     called_name,
     dotted,
-    key_of,
     names_in,
     parents_of,
     slip,

@@ -1,4 +1,4 @@
-"""Finds the texts that a student's Python publishes and prints, for `slips.py`.
+"""Finds the texts that a student's Python publishes, prints and gives ROS as names, for `slips.py`.
 
 As far as the source has them: values that only a run knows are `{}`. Nothing is executed. Python 3.8, standard library
 only.
@@ -7,17 +7,22 @@ only.
 import ast
 import re
 
-from script_names import (
+from script_tree import (
     FUNCTIONS,
     LOOPS,
     TEXT_LIMIT,
     all_of,
+    argument,
     called_name,
     calls_in,
     dotted,
+    functions_in,
     is_call,
+    published_type,
     slip,
     statements_of,
+    targets_of,
+    text_of,
     walk,
 )
 
@@ -150,3 +155,53 @@ class Texts:
         """Return the text with what stands in place of its `%s`, or of its `{}`."""
         value = DATA if values and all(self.of(one, 0) == DATA for one in values) else VALUE
         return places.sub(lambda found: "%" if found[0] == "%%" else value, text)
+
+
+NAMED = {
+    "init_node": "node-name", "Publisher": "publisher", "Subscriber": "subscriber", "wait_for_message": "subscriber",
+    "set_param": "sets-parameter",
+}  # fmt: skip
+"""Calls whose first argument is a name, and the kind of slip that tells where."""
+
+
+def graph_names(tree):
+    """Where a script names its node, its topics and the parameters that it sets, as written; and the types that it
+    publishes."""
+    owners = targets_of(tree)
+    own = {n.name for n in all_of(tree, ast.ClassDef)}
+    for node in walk(tree):
+        kind = NAMED.get(called_name(node))
+        if not kind or dotted(node.func) in own:
+            continue
+        anonymous = [k for k in node.keywords if k.arg == "anonymous" and getattr(k.value, "value", True)]
+        owner = owners.get(id(node), "") or ("anonymous" if anonymous else "")
+        names, name = argument(node, 0, "name"), published_type(node)
+        if names and text_of(names[0]):
+            yield slip(names[0].lineno, kind, text_of(names[0]), name=owner)
+        elif names and kind == "node-name":
+            for text, written in text_behind(names[0], tree):
+                yield slip(text.lineno, kind, text_of(text), written, owner)
+        if names and name.isidentifier() and kind in ("publisher", "subscriber"):
+            yield slip(names[0].lineno, kind + "-type", name)
+
+
+def text_behind(node, tree):
+    """Yield the text that a variable is given once, or that an argument gets in the only call of its function, and how
+    it is written there, with `{}` in its place: `self.name = {}`, `name={}`."""
+    name = dotted(node)
+    assigned = [n.value for n in all_of(tree, ast.Assign) if name in map(dotted, n.targets)]
+    if len(assigned) == 1 and text_of(assigned[0]):
+        yield assigned[0], "%s = {}" % name
+    for function in () if assigned else functions_in(tree).values():
+        arguments = [one.arg for one in function.args.args]
+        if name in arguments and any(one is node for one in ast.walk(function)):
+            owners = [n.name for n in all_of(tree, ast.ClassDef) if function in n.body]
+            called = owners[0] if owners and function.name == "__init__" else function.name
+            calls = [n for n in all_of(tree, ast.Call) if dotted(n.func) in (called, "self." + called)]
+            place = arguments.index(name) - (arguments[0] == "self")
+            found = argument(calls[0], place, name) if len(calls) == 1 else []
+            if found and text_of(found[0]):
+                alone = len(calls[0].args) + len(calls[0].keywords) == 1
+                by_name = found[0] in [one.value for one in calls[0].keywords]
+                written = "%s={}" % name if by_name else "%s({})" % called if alone else "{}"
+                yield found[0], written

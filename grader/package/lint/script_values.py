@@ -9,11 +9,15 @@ import re
 from collections import Counter
 
 from script_names import (
-    LOOPS,
     USES_LIMIT,
+    bound_names,
+    set_in,
+    walk_own,
+)
+from script_tree import (
+    LOOPS,
     all_of,
     argument,
-    bound_names,
     callback_of,
     called_name,
     calls_in,
@@ -23,11 +27,9 @@ from script_names import (
     is_call_alone,
     names_in,
     parents_of,
-    set_in,
     slip,
     text_of,
     walk,
-    walk_own,
 )
 
 IN_DEGREES = ("degrees", "rad2deg")

@@ -27,7 +27,8 @@ import script_rates as rates
 import script_results
 import script_scans as scans
 import script_values as values
-from script_names import (
+from script_texts import graph_names, said_texts
+from script_tree import (
     LOOPS,
     all_of,
     called_name,
@@ -42,7 +43,6 @@ from script_names import (
     targets_of,
     walk,
 )
-from script_texts import said_texts
 
 SLIPS_LIMIT = 100
 """Of a file."""
@@ -55,7 +55,7 @@ def slips(tree):
         counters.resets, never_run, loops.never_reached, loops.loops_that_never_go_round,
         loops.stopped_loops, loops.published_before,
         loops.sleepless_loops, loops.sleeps_twice, loops.publishes_twice, callbacks.callbacks,
-        callbacks.waiting_callbacks, objects.queue_sizes, objects.graph_names,
+        callbacks.waiting_callbacks, objects.queue_sizes, graph_names,
         objects.object_slips, said_texts, loops.deaf_loops, counters.clock_values, counters.counter_slips,
         counters.counter_starts, without_effect, values.assigned_late, objects.hidden_names, objects.subscribed_again,
         imports, objects.taken_off, objects.unstarted_servers, values.wrong_values, values.decided_conditions,

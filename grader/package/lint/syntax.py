@@ -20,7 +20,10 @@ import warnings
 
 # `-I` leaves this folder out, and a limited child does not begin in it.
 sys.path.append(os.path.dirname(os.path.abspath(__file__)))
-from script_names import TEXT_LIMIT, slip
+from script_tree import (
+    TEXT_LIMIT,
+    slip,
+)
 from slips import slips
 
 try:

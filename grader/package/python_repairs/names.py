@@ -245,8 +245,7 @@ def with_names(text: str) -> Iterator[Step]:
     blocks = (inner for one in parts for inner in (one.body if isinstance(one, ast.ClassDef) else [one]))
     for block in blocks:
         own = shared | (bound_in(ast.Module([block], [])) if isinstance(block, ast.FunctionDef) else set())
-        missing = [n for n in nodes_in(block) if isinstance(n, ast.Name) and n.id not in known]
-        missing += _read_for_themselves(block, shared)
+        missing = _missing_in(block, shared, known, kept if "self" in bound else ())
         stated = [
             n.value.id for n in nodes_in(block) if isinstance(n, ast.Expr) and isinstance(n.value, ast.Name)
         ]
@@ -254,13 +253,6 @@ def with_names(text: str) -> Iterator[Step]:
         member_of = {n.value.id: n.attr for n in parts_of if isinstance(n.value, ast.Name)}
         given = {one: kind for one, kind in made_by(nodes_in(tree)).items() if one in own}
         values, idle = _values_in(block), _meant_calls(unread, block)
-        # what the object has is meant with `self.` before it, but not in `self.name = name`
-        taken = {n.value.id for n in nodes_in(block) if is_kept_by_self(n)}  # type: ignore[attr-defined]
-        missing = (
-            [n for n in missing if n.id in taken or f"self.{n.id}" not in kept]
-            if "self" in bound
-            else missing
-        )
         alone = {one: word for one in stated for word in ALONE if is_one_edit(one.lower(), word)}
         called = {getattr(n.func, "id", "") for n in nodes_in(block) if isinstance(n, ast.Call) and n.args}
         for name in dict.fromkeys(n.id for n in missing):
@@ -285,6 +277,17 @@ def with_names(text: str) -> Iterator[Step]:
                     yield step
                     yield from with_names(step["text"])
                     return
+
+
+def _missing_in(
+    block: ast.stmt, shared: Collection[str], known: Collection[str], kept: Collection[str]
+) -> list[ast.Name]:
+    """Return the uses of names without a value; what the object has (`kept`) is meant with `self.` before it, but not
+    in `self.name = name`."""
+    missing = [n for n in nodes_in(block) if isinstance(n, ast.Name) and n.id not in known]
+    missing += _read_for_themselves(block, shared)
+    taken = {n.value.id for n in nodes_in(block) if is_kept_by_self(n)}  # type: ignore[attr-defined]
+    return [n for n in missing if n.id in taken or f"self.{n.id}" not in kept]
 
 
 def with_targets(text: str) -> Iterator[Step]:
