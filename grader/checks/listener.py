@@ -215,12 +215,31 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     elif verdict is None and (slip := run_slip(package, run, "never-reached")):
         message = f"the node never subscribes to {topic}: {slip.message}"
         verdict = failed(message, hint=f"in {slip.file}, {slip.fix}", citations=(slip.place,))
-    elif verdict is None and not subscribed and (slip := call_in_comment(package, run, "Subscriber")):
-        message = f"the node never subscribes to {topic}: in {slip.file}, line {slip.line}, {slip.message}"
-        verdict = failed(message, hint=slip.fix, citations=(slip.place,))
     elif verdict is None:
-        verdict = _never_subscribed(package, run, topic, subscribed)
+        verdict = _without_subscriber(package, run, topic, subscribed)
+        verdict = verdict or _never_subscribed(package, run, topic, subscribed)
     return verdict.about(measured=measured, citations=(cite(run, "/grader/graph"),))
+
+
+def _without_subscriber(
+    package: PackageFacts, run: Run, topic: str, subscribed: Sequence[str]
+) -> Verdict | None:
+    """The call that subscribes is in a comment, or it is missing, and a function that reads messages waits for it."""
+    spare = run_slip(package, run, "callback-missing")
+    used = bool(near_names(topic, subscribed)) or topic in topics_with(run, "publishers")
+    spare = None if used or spare is None or not spare.name else spare
+    gone = call_in_comment(package, run, "Subscriber") if spare or not subscribed else None
+    slip = gone or spare
+    if slip is None:
+        return None
+    message = f"the node never subscribes to {topic}: in {slip.file}, line {slip.line}, {slip.message}"
+    if slip is gone:
+        return failed(message, hint=slip.fix, citations=(slip.place,))
+    message = (
+        f"the node never subscribes to {topic}: {slip.message}, which line {slip.line} of {slip.file} defines"
+    )
+    fix = slip.fix.replace("(…, ", f"('{topic}', {TYPE_SLOT}, ")
+    return failed(message, hint=f"in {slip.file}, {fix}", citations=(slip.place,))
 
 
 def _never_subscribed(package: PackageFacts, run: Run, topic: str, subscribed: Sequence[str]) -> Verdict:
@@ -316,7 +335,9 @@ def _judge_error(package: PackageFacts, run: Run) -> Verdict | None:
         return failed(f"a callback never runs: {twice.message}", hint=twice.fix, citations=(twice.place,))
     if end := explain_error(package, run):
         return end.verdict(failed, f"an error stops the node from printing: {end.cause}")
-    if slip := run_slip(package, run, "callback-called", "callback-missing"):
+    slip = run_slip(package, run, "callback-called", "callback-missing")
+    # A function that no Subscriber is given may be for another topic than the one that was sent on.
+    if slip is not None and not (slip.name and slip.kind == "callback-missing"):
         message = f"ROS calls no function of the script for a message: {slip.message}"
         return failed(message, hint=slip.fix, citations=(slip.place,))
     return None

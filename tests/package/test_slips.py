@@ -53,7 +53,7 @@ def test_values_that_are_none(text: str, said: tuple[str, str] | None, tmp_path:
 @pytest.mark.parametrize(
     ("head", "fixes"),
     [
-        ("def heard(msg):", ["pass it: `rospy.Subscriber(…, heard)`"]),
+        ("r.init_node('a')\ndef heard(msg):", ["below line 1, write `r.Subscriber(…, heard)`"]),
         ("def heard(msg, /):", []),
         ("def heard(*, msg):", []),
     ],

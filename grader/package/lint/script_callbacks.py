@@ -163,8 +163,8 @@ def own_callbacks(tree, functions):
 
 
 def spare_callbacks(tree, functions):
-    """The only function that reads a message and that nothing names, where no Subscriber is made, or two of different
-    types are given one function."""
+    """The only function that reads a message and that nothing names, for which a Subscriber is missing; or two of
+    different types are given one function."""
     read = {getattr(n, "attr", getattr(n, "id", "")) for n in walk(tree)}
     data = {dotted(n.value) for n in all_of(tree, ast.Attribute) if n.attr == "data"}
     spare = [f for name, f in functions.items() if name not in read and takes(f, "self" in read) == (1, 1)]
@@ -173,9 +173,6 @@ def spare_callbacks(tree, functions):
         return
     name = ("self." if len(spare[0].args.args) > 1 else "") + spare[0].name
     calls = calls_in(tree, "Subscriber")
-    if not calls and {"object"}.issuperset(map(dotted, getattr(parents_of(tree)[spare[0]], "bases", ()))):
-        message, fix = "no Subscriber is given `%s`" % name, "pass it: `rospy.Subscriber(…, %s)`" % name
-        yield slip(spare[0].lineno, "callback-missing", message, fix, name)
     given = [ast.dump(one.args[2]) for one in calls if len(one.args) > 2]
     kinds = {dotted(one.args[1]) for one in calls if len(one.args) > 2}
     if len(calls) == len(given) == len(kinds) == 2 and len(set(given)) == 1:
@@ -183,6 +180,12 @@ def spare_callbacks(tree, functions):
         message = "%s give both Subscribers `%s`, and nothing calls `%s`" % (listed(lines), one, name)
         fix = "write `%s` in place of `%s` on the line of the topic that it is for" % (name, one)
         yield slip(spare[0].lineno, "defined-twice", message, fix, name)
+    elif {"object"}.issuperset(map(dotted, getattr(parents_of(tree)[spare[0]], "bases", ()))):
+        inits = calls_in(tree, "init_node")
+        module = dotted(inits[0].func)[: -len("init_node")] if inits else "rospy."
+        where = "below line %d" % inits[0].lineno if inits else "below `init_node(…)`"
+        fix = "%s, write `%sSubscriber(…, %s)`" % ("in `__init__`" if "." in name else where, module, name)
+        yield slip(spare[0].lineno, "callback-missing", "no Subscriber is given `%s`" % name, fix, name)
 
 
 def wrong_callback(own, call, tree, bound, values):
