@@ -306,12 +306,13 @@ def together_s(run: Run, topic: str) -> float:
 
 def _blame_scripts(
     package: PackageFacts, file: LaunchFile, verdict: Verdict, nodes: Sequence[LaunchNode], topic: str
-) -> Verdict:
-    """Name the lines of the scripts that have another topic, and what gives the right one another name then."""
+) -> Verdict | None:
+    """Name the lines of the scripts that have another topic, and what gives the right one another name then. None where
+    no script has another, and the launch file gives the right one no other name: it does not keep the nodes apart."""
     named = _names_in_scripts(package, nodes, topic)
-    if not named:
-        return verdict
     renaming = find_renaming(package, nodes, topic, in_scripts=False)
+    if not named:
+        return verdict if renaming is not None else None
     lines = join_words(f"line {one.line} of {one.file}" for one in named)
     others = join_words(dict.fromkeys(one.message for one in named))
     hint = f"write {topic.lstrip('/')} on {lines}, not {others}"
