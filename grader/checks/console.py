@@ -24,6 +24,7 @@ from grader.checks.support.console_output import (
     split_log_line,
     stream_lines,
     unprinted_result,
+    unreached_except,
 )
 from grader.checks.support.exit_causes import (
     explain_end,
@@ -207,6 +208,7 @@ def _not_printed(
         or unheard_of
         or _unseen(one, package, run, params, never)
         or unprinted_result(package, one, never, params.words, params.found_in)
+        or unreached_except(package, one, never, params.found_in, _of_client(asked, run))
     ):
         return why
     if not own:

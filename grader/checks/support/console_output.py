@@ -547,8 +547,7 @@ def unprinted_result(
     numbers = [s for s in own if s.message == "{}" and re.search(r"\d|<number>", words)]
     slip = next(iter(texts or numbers), None)
     if slip is None:
-        # a script that still waits for what it calls may yet catch something
-        return _unreached(package, script, never, found_in) if one.ended_early else None
+        return None
     call = f"`{slip.name}(…)` on line {slip.line}"
     why = f"line {slip.fix} of {slip.file} returns {'it' if texts else 'the number'}"
     hint = f"print what {call} returns" if texts else f"print {words} above line {slip.fix}"
@@ -556,11 +555,16 @@ def unprinted_result(
     return failed(message, hint=hint, citations=(slip.place,))
 
 
-def _unreached(
-    package: PackageFacts, script: str, never: str, found_in: Callable[[Line], Iterable[object]]
+def unreached_except(
+    package: PackageFacts,
+    one: Life,
+    never: str,
+    found_in: Callable[[Line], Iterable[object]],
+    lost: Callable[..., Verdict],
 ) -> Verdict | None:
-    """Return the loss where an `except` prints the words, and what is above it raised nothing."""
-    own = [s for s in package.slips if s.file == script]
+    """Return the loss where an `except` prints the words, and what is above it raised nothing; `lost` makes it."""
+    # a script that still waits for what it calls may yet catch something
+    own = [s for s in package.slips if s.file == one.start.script and one.ended_early]
     said = [s for s in own if s.kind == "prints" and any(found_in(Line(0, filled(s))))]
     caught = {s.line + 1: s for s in own if s.kind == "catches"}
     if len(said) != 1 or said[0].line not in caught:
@@ -570,4 +574,4 @@ def _unreached(
         f"{never}: line {slip.line} of {slip.file} would, and lines {lines} raise nothing that it catches"
     )
     hint = "look at what is called there: where the handout asks for a failure, a service's callback has to raise one"
-    return failed(message, hint=hint, citations=(slip.place,)).if_repeated()
+    return lost(message, hint=hint, citations=(slip.place,)).if_repeated()
