@@ -282,7 +282,7 @@ def test_a_handler_of_a_service_that_waits(tmp_path):
 
 
 def test_a_handler_that_waits_again_and_again(tmp_path):
-    code = "def add(request):\n    rate.sleep()\n    for i in range(3):\n        go()\n        rate.sleep()\n"
+    code = "def add(request):\n    rate.sleep()\n    if go():\n        stop()\n        rate.sleep()\n"
     (tmp_path / "a.py").write_text(code + "rospy.Service('/add', Add, add)\n")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "callback-waits"]
     assert [(s.message, s.fix) for s in slips] == [
@@ -303,6 +303,17 @@ def test_a_handler_that_waits_again_and_again(tmp_path):
             "the callback `add` calls `square` on line 2, which goes around a loop that sleeps",
             "keep in it only that it was called, and call `square` in the main program",
         ),
+        (
+            "for i in range(3): rate.sleep()",
+            "the loop in the callback `add`, line 2, sleeps in each turn",
+            "keep in it only what came, and go through the loop of line 2 in the main program",
+        ),
+        (
+            "turn()",
+            "the callback `add` calls `turn` on line 2, which goes around a loop that sleeps",
+            "keep in it only that it was called, and call `turn` in the main program",
+        ),
+        ("for i in range(3): time.sleep(0.01)", None, None),
         ("stop()", None, None),
         ("Thread(target=square).start()", None, None),
     ],
@@ -310,6 +321,7 @@ def test_a_handler_that_waits_again_and_again(tmp_path):
 def test_a_handler_that_loops(body, message, fix, tmp_path):
     code = f"def add(request):\n    {body}\n    return 1\nrospy.Service('/add', Add, add)\n"
     code += "def drive():\n    while far(): rate.sleep()\ndef square(): drive()\ndef stop(): rate.sleep()\n"
+    code += "def turn():\n    for i in range(3): rate.sleep()\n"
     (tmp_path / "a.py").write_text(code)
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "callback-waits"]
     assert [(s.message, s.fix) for s in slips] == ([(message, fix)] if fix else [])

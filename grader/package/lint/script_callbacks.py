@@ -13,6 +13,7 @@ from script_names import (
     given_names,
 )
 from script_tree import (
+    LOOPS,
     all_of,
     argument,
     callback_of,
@@ -568,7 +569,7 @@ def waits_in(callback, inside, slow):
         elif is_call(one, "spin"):
             message = "the callback `%s` calls spin() on line %d" % (callback.name, line)
             fix = "move line %d out of it" % line
-        elif isinstance(one, ast.While) and any(map(is_long_sleep, ast.walk(one))):
+        elif isinstance(one, LOOPS) and any(map(is_long_sleep, ast.walk(one))):
             message = "the loop in the callback `%s`, line %d, sleeps in each turn" % (callback.name, line)
             fix = "keep in it only what came, and go through the loop of line %d in the main program" % line
         elif called_name(one) in slow and called_name(one) != callback.name:
@@ -591,6 +592,6 @@ def is_long_sleep(node):
 def slow_functions(functions):
     """Return the names of the functions in which a loop sleeps, and of those that call them."""
     inside = {name: list(ast.walk(one)) for name, one in functions.items()}
-    loops = {name: [n for n in inside[name] if isinstance(n, ast.While)][:BELOW_LIMIT] for name in inside}
+    loops = {name: [n for n in inside[name] if isinstance(n, LOOPS)][:BELOW_LIMIT] for name in inside}
     slow = {name for name in loops if any(is_long_sleep(n) for one in loops[name] for n in ast.walk(one))}
     return slow | {name for name in inside if slow & {called_name(n) for n in inside[name]}}
