@@ -62,7 +62,8 @@ def cite_source(
     found = _lines_to_blame(verdict, criterion, lines)
     if len(found) != 1:
         return verdict
-    made = line_that_makes(lines, found[0]) if _field_of(verdict, criterion) else None
+    is_sent = criterion.check == "message" or _field_of(verdict, criterion)
+    made = line_that_makes(lines, found[0]) if is_sent else None
     places = (FileCitation(file=one.file, line=one.number) for one in (made, *found) if one is not None)
     return verdict.model_copy(update={"citations": (*places, *verdict.citations)})
 

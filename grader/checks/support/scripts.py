@@ -411,18 +411,25 @@ def lines_making(lines: Sequence[str], slip: PythonSlip, publishers: Iterable[Py
 
 def line_that_makes(lines: Sequence[SourceLine], setting: SourceLine) -> SourceLine | None:
     """Return the only line that gives a variable its value, where `setting` does no more than hand that variable on:
-    `speed = 2` of `msg.linear.x = speed`."""
-    handed = re.search(r"[^=!<>]=\s*([A-Za-z_]\w*)\s*;?\s*(?:(?:#|//).*)?$", setting.text)
+    `speed = 2` of `msg.linear.x = speed`, and of `pub.publish(speed)`."""
+    handed = _HANDED.search(setting.text)
     if handed is None:
         return None
-    name = handed[1]
+    name = rf"(?<![\w.]){re.escape(handed[1])}\b"
     # Whatever else may change it is reason enough to name no line.
     bound = re.compile(
-        rf"\b(?:def|for|global|nonlocal|lambda|with|import)\b.*\b{name}\b|(?<!\.)\b{name}\b[^=()]*=(?!=)|\b{name}\s*(?:\.|\[|\+\+|--)"
+        rf"\b(?:def|for|global|nonlocal|lambda|with|import)\b.*{name}|{name}[^=()]*=(?!=)|{name}\s*(?:\.|\[|\+\+|--|<<)"
     )
     found = [one for one in lines if one.file == setting.file and one != setting and bound.search(one.text)]
-    makes = re.compile(rf"\s*(?:[\w:<>]+\s+)?{name}\s*=(?!=)")
+    makes = re.compile(rf"\s*(?:[\w:<>]+\s+)*{name}\s*(?:=(?!=)|<<)")
     return found[0] if len(found) == 1 and makes.match(found[0].text) else None
+
+
+_HANDED = re.compile(
+    r"(?:[^=!<>]=\s*|(?:\.|->)publish\(\s*(?:[\w.]+\(\s*)?(?:data\s*=\s*)?)((?:self\.)?[A-Za-z_]\w*)(?:\.str\(\))?"
+    r"[\s)]*;?\s*(?:(?:#|//).*)?$"
+)
+"""What a line hands on: a variable, an object's attribute, or the text that a stream of C++ has taken."""
 
 
 OF_FILES = {"add_message_files": ".msg", "add_service_files": ".srv", "add_action_files": ".action"}
