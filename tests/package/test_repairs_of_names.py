@@ -120,3 +120,31 @@ def test_a_message_is_not_added_to_a_string(printed: str, right: str | None) -> 
     text += "rospy.init_node('listener')\nrospy.Subscriber('chatter', String, hear)\nrospy.spin()\n"
     (found,) = list(examine([["a.py", text.format(printed)]], [], {}, ""))
     assert [step["text"] for step in found["steps"]] == ([text.format(right)] if right else [])
+
+
+HEARS = "import rospy\nfrom std_msgs.msg import {}\n\n\ndef hear(msg):\n    print({})\n\n\nrospy.init_node('a')\n{}\n"
+SUBSCRIBES = "rospy.Subscriber('/a', %s, hear)\nrospy.spin()"
+SENDS = "pub = rospy.Publisher('/a', Int8, queue_size=1)\nmsg = Int8()\n{}\npub.publish(msg)"
+
+
+@pytest.mark.parametrize(
+    ("kind", "printed", "rest", "change"),
+    [
+        ("Int8", "1", SENDS.format("msg.counter = 3"), ("msg.counter", "msg.data")),
+        ("Int8", "1", SENDS.format("msg.counter += 3\nprint(msg.counter)"), ("msg.counter", "msg.data")),
+        ("String", "msg.text", SUBSCRIBES % "String", ("msg.text", "msg.data")),
+        ("Int8", "1", SENDS.format("msg.counter = 3\nmsg.data = 1"), None),
+        ("Int8", "1", SENDS.format("msg.counter = 3\nmsg.value = 1"), None),
+        ("Int8", "1", SENDS.format("msg = thing\nmsg.counter = 3"), None),
+        ("String", "msg.upper()", SUBSCRIBES % "String", None),
+        ("String", "msg._type", SUBSCRIBES % "String", None),
+        ("Header", "msg.counter", SUBSCRIBES % "Header", None),
+    ],
+)
+def test_data_is_the_only_field_of_most_messages_of_std_msgs(
+    kind: str, printed: str, rest: str, change: tuple[str, str] | None
+) -> None:
+    text = HEARS.format(kind, printed, rest)
+    (found,) = list(examine([["a.py", text]], [], {}, ""))
+    last = found["steps"][-1]["text"] if found["steps"] else text
+    assert last == (text.replace(*change) if change else text)

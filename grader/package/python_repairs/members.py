@@ -54,6 +54,11 @@ OF_MESSAGES = tuple(FIELD_NAMES.split())
 """What belongs to messages of `OF_ROS`, without names of three letters and less, and to their times."""
 OF_ROS = tuple(f"{one}_msgs.msg" for one in ("std", "geometry", "nav", "sensor"))
 
+NUMBERS = [f"{kind}{bits}" for kind in ("Int", "UInt", "Float") for bits in (8, 16, 32, 64)]
+OF_ONE_FIELD = frozenset(("Bool", "Byte", "Char", "String", *NUMBERS))
+"""The messages of std_msgs that have `data` alone."""
+DATA = frozenset({"data"})
+
 Edit = tuple[tuple[int, int, int], str]
 """Line (from 0), start and end of what is replaced, and what is written for it."""
 
@@ -190,7 +195,7 @@ def _misspelt_members(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
     inside = {id(n): name for one, name in named if name in own for n in nodes_in(one)}
     stored = {n.attr for n in nodes_in(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
     fields_of, lacking = known.fields(tree), _Lacking(tree)
-    of_ros = _inside_messages(tree, kinds)
+    of_ros, of_data = _inside_messages(tree, kinds), _instead_of_data(tree)
     messages = {**_messages_of_callbacks(tree, fields_of), **of_ros}
     for node in (n for n in nodes_in(tree) if isinstance(n, ast.Attribute)):
         members: Collection[str] = messages.get(id(node.value), ())
@@ -202,6 +207,7 @@ def _misspelt_members(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
         is_message = bool(fields) or id(node.value) in of_ros  # nothing else can be stored in one
         known_attr = node.attr in {*members, *(() if is_message else stored)}
         right = "" if known_attr else _near(node.attr, members)
+        right = of_data.get(id(node), right)
         if not known_attr and not right and kind in ("Publisher", "Rate") and kind not in own:
             right = next(iter(get_close_matches(node.attr, members, 1, 0.85)), "")  # `pub.publisher(…)`
         elif not known_attr and not right and owner == "self" and kind in own:
@@ -302,6 +308,35 @@ def _inside_messages(tree: ast.Module, kinds: Mapping[str, str]) -> dict[int, Co
         if len(node.attr) > 1 and (heard.get(id(root)) == OF_MESSAGES or ast.unparse(root) in made):
             found[id(node.value)] = OF_MESSAGES
     return found
+
+
+def _instead_of_data(tree: ast.Module) -> dict[int, str]:
+    """Return what is meant by the fields of messages that have `data` alone, by the identity of each use: `data` by
+    `msg.counter` too, where nothing sets (or reads) that one as well."""
+    nodes = nodes_in(tree)
+    imports = [n for n in nodes if isinstance(n, ast.ImportFrom) and n.module == "std_msgs.msg"]
+    classes = {a.asname or a.name for n in imports for a in n.names if a.name in OF_ONE_FIELD}
+    given = [(n.value, ast.unparse(t)) for n in nodes if isinstance(n, ast.Assign) for t in n.targets]
+    made, others = set[str](), set[str]()
+    for value, target in given:
+        is_made = isinstance(value, ast.Call) and last_name(value.func) in classes
+        (made if is_made else others).add(target)
+    heard = _messages_of_callbacks(tree, dict.fromkeys(classes, DATA))
+    inner = {id(getattr(n, "func", getattr(n, "value", None))) for n in nodes if isinstance(n, WITH_INNER)}
+    used: dict[tuple[str, bool], list[ast.Attribute]] = {}
+    for node in (n for n in nodes if isinstance(n, ast.Attribute)):
+        owner = ast.unparse(node.value)
+        if id(node) not in inner and (owner in made - others or heard.get(id(node.value)) == DATA):
+            used.setdefault((owner, isinstance(node.ctx, ast.Store)), []).append(node)
+    found = {}
+    for uses in used.values():
+        is_alone = len({n.attr for n in uses}) == 1 and uses[0].attr[0] != "_"
+        found.update({id(n): "data" if is_alone else _near(n.attr, DATA) for n in uses if n.attr != "data"})
+    return found
+
+
+WITH_INNER = (ast.Attribute, ast.Call, ast.Subscript)
+"""What takes something of the value before it: a text's method, and no field."""
 
 
 def _whole_messages(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
