@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.package.python_repairs.rospy_names import with_logger
+from grader.package.python_repairs.rospy_names import with_attributes, with_logger
 from tests.package.repairing import SCRIPT, TALKER, Case, check, swapped
 
 PUBLISHER = "rospy.Publisher('numeric_chatter', Int8, queue_size=10)"
@@ -156,3 +156,20 @@ LACKING = {
 @pytest.mark.parametrize("case", LACKING.values(), ids=LACKING)
 def test_what_a_script_of_rospy_lacks_is_added(case: Case, tmp_path: Path) -> None:
     check(case, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right"),
+    [
+        ("r.spiu()", "r.spin()"),
+        ("pub = r.create_publisher(Int8, '/a', 1)", "pub = r.Publisher('/a', Int8, queue_size=1)"),
+        ("while r.ok():\n    pass", "while not r.is_shutdown():\n    pass"),
+        ("self.r.spiu()", ""),
+        ("r.extra = 3", ""),
+        ("r = r.Rate(3)\nr.spiu()", ""),
+    ],
+)
+def test_rospy_may_be_imported_under_another_name(wrong: str, right: str) -> None:
+    head = "import rospy as r\n\nr.init_node('a')\n"
+    steps = list(with_attributes(f"{head}{wrong}\n"))
+    assert [one["text"] for one in steps] == ([f"{head}{right}\n"] if right else [])

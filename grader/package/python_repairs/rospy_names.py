@@ -93,15 +93,21 @@ def with_rospy(text: str) -> Iterator[Step]:
 
 
 def with_attributes(text: str) -> Iterator[Step]:
-    """`rospy.subscriber(…)` and `rospy.create_subscription(…)`, for `rospy.Subscriber(…)`."""
+    """`rospy.subscriber(…)` and `rospy.create_subscription(…)`, for `rospy.Subscriber(…)`; rospy may have another
+    name in the script."""
     tree, lines = tree_of(text), text.split("\n")
     calls = {id(n.func): n for n in nodes_in(tree) if isinstance(n, ast.Call)}
     alone = {id(n.value) for n in nodes_in(tree) if isinstance(n, ast.Expr)}
+    imported = [a for n in nodes_in(tree) if isinstance(n, ast.Import) for a in n.names]
+    rospy = next((a.asname for a in imported if a.name == "rospy" and a.asname), "rospy")
+    if rospy in {n.id for n in nodes_in(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}:
+        return
     for node in nodes_in(tree):
         is_lacking = (
             isinstance(node, ast.Attribute)
             and isinstance(node.ctx, ast.Load)  # a value may be given to it: `rospy.rate = 10`
-            and last_name(node.value) == "rospy"
+            and isinstance(node.value, ast.Name)
+            and node.value.id == rospy
             and node.attr not in ROSPY
             and not node.attr.startswith("_")
         )
@@ -116,7 +122,8 @@ def with_attributes(text: str) -> Iterator[Step]:
             edit = (line, end - len(node.attr), end, meant)
         if edit is None:
             continue
-        for step in step_to("attribute", node.lineno, text, edited(text, [edit]), f"rospy.{node.attr}"):
+        edit = (*edit[:3], edit[3].replace("rospy.", f"{rospy}."))
+        for step in step_to("attribute", node.lineno, text, edited(text, [edit]), f"{rospy}.{node.attr}"):
             yield step
             yield from with_attributes(step["text"])
             return
