@@ -148,3 +148,19 @@ def test_data_is_the_only_field_of_most_messages_of_std_msgs(
     (found,) = list(examine([["a.py", text]], [], {}, ""))
     last = found["steps"][-1]["text"] if found["steps"] else text
     assert last == (text.replace(*change) if change else text)
+
+
+@pytest.mark.parametrize(
+    ("module", "wrong", "right"),
+    [
+        ("rospy", "spni()", "spin()"),
+        ("rospy", "Publsher", "Publisher"),
+        ("rospy", "mxg", "mxg"),
+        ("lab", "spni()", ""),
+    ],
+)
+def test_all_names_of_rospy_may_be_imported(module: str, wrong: str, right: str) -> None:
+    text = f"from {module} import *\n\ninit_node('a')\n{wrong}\n"
+    (found,) = list(examine([["a.py", text]], [], {}, ""))
+    last = found["steps"][-1]["text"] if found["steps"] else text
+    assert last == text.replace(wrong, right or wrong)

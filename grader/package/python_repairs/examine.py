@@ -43,8 +43,9 @@ from grader.package.python_repairs.names import (
     with_self,
     with_targets,
 )
-from grader.package.python_repairs.rospy_names import ROSPY, with_attributes, with_logger, with_rospy
+from grader.package.python_repairs.rospy_names import with_attributes, with_logger, with_rospy
 from grader.package.python_repairs.syntax import (
+    ROSPY,
     Step,
     as_python3,
     edited,

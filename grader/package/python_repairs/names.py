@@ -14,6 +14,8 @@ from difflib import get_close_matches
 from string import digits
 
 from grader.package.python_repairs.syntax import (
+    MODULES_OF_ROSPY,
+    ROSPY,
     Step,
     edited,
     last_name,
@@ -61,7 +63,9 @@ def bound_in(tree: ast.Module) -> set[str]:
         elif isinstance(node, ast.arg):
             found.add(node.arg)
         elif isinstance(node, ast.Import | ast.ImportFrom):
-            found.update((a.asname or a.name).partition(".")[0] for a in node.names)
+            every = {"*"} if getattr(node, "module", "") == "rospy" else set()
+            found.update({(a.asname or a.name).partition(".")[0] for a in node.names} - every)
+            found.update(ROSPY - MODULES_OF_ROSPY if every & {a.name for a in node.names} else ())
         elif isinstance(node, ast.ExceptHandler | ast.MatchAs | ast.MatchStar):
             found.add(node.name or "")
     return found

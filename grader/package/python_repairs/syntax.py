@@ -52,6 +52,35 @@ CONTINUES = re.compile(r"(elif|else|except|finally)\b")
 Step = dict[str, Any]
 """`cause`, `line`, the `text` that comes out, and for what does not parse the `error`."""
 Error = dict[str, Any]
+NAMES_OF_ROSPY = (
+    "AnyMsg DEBUG Duration ERROR FATAL Header INFO MasterProxy Message Publisher ROSException ROSInitException "
+    "ROSInternalException ROSInterruptException ROSSerializationException ROSTimeMovedBackwardsException Rate Service "
+    "ServiceException ServiceProxy SubscribeListener Subscriber Time Timer TransportException TransportInitError "
+    "TransportTerminated WARN client core delete_param exceptions get_caller_id get_master get_name get_namespace "
+    "get_node_uri get_param get_param_cached get_param_names get_published_topics get_ros_root get_rostime get_time "
+    "get_topic_class has_param impl init_node is_shutdown logdebug logdebug_once logdebug_throttle logerr logerr_once "
+    "logerr_throttle logfatal logfatal_once logfatal_throttle loginfo loginfo_once loginfo_throttle logout logwarn "
+    "logwarn_once logwarn_throttle msg msproxy myargv names numpy_msg on_shutdown parse_rosrpc_uri remap_name "
+    "resolve_name rostime search_param service set_param signal_shutdown sleep spin timer topics wait_for_message "
+    "wait_for_service"
+)
+ROSPY = frozenset(NAMES_OF_ROSPY.split())
+MODULES_OF_ROSPY = frozenset(
+    [
+        "client",
+        "core",
+        "exceptions",
+        "impl",
+        "msg",
+        "msproxy",
+        "names",
+        "numpy_msg",
+        "rostime",
+        "service",
+        "timer",
+        "topics",
+    ]
+)
 
 
 def syntax_error(text: str) -> Error | None:
