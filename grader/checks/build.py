@@ -160,7 +160,8 @@ def explain_by_build(
     ):
         one = _name_missing(package, build, failed_or_blocked("there is no script to run"), beside)
         if one.unbuilt:
-            message = f"{verdict.message}; {one.message}, which runs beside it"
+            which = "" if set(beside) & set(asked) else ", which runs beside it"
+            message = f"{verdict.message}; {one.message}{which}"
             verdict = one.model_copy(update={"message": message}).about(expected=verdict.expected)
     if not (verdict.unbuilt and verdict.status.is_lost) or package is None or build is None:
         return verdict

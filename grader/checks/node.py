@@ -14,6 +14,7 @@ from grader.checks.support.exit_causes import (
     process_tracebacks,
 )
 from grader.checks.support.processes import (
+    NO_SCRIPT_HINT,
     Anonymous,
     Life,
     are_noted,
@@ -147,6 +148,9 @@ def _nameless(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdic
     """No node was registered: why, where its process ended by itself."""
     message, hint = "no node was registered, so there is no name", f"call {INIT}"
     one = life(run, params.process)
+    if one is None and not run.foreign and not lives(run):
+        why = "no node was registered: there is no script to run"
+        return failed_or_blocked(why, measured="no node", hint=NO_SCRIPT_HINT)
     if one is None or not one.ended_early:
         slip = run_slip(package, run, "never-reached")
         if slip is not None and "init_node" in slip.message:

@@ -319,7 +319,7 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
             own = facts.rubric.starts_of(criterion)
             started = {event.name for _, event in run.processes} if isinstance(run, Run) else set()
             all_of_run = facts.rubric.starts_of(criterion.model_copy(update={"parameters": {}}))
-            beside = [s.script for s in all_of_run if s.script and s not in own and s.name not in started]
+            beside = [s.script for s in all_of_run if s.script and s.name not in started]
             asked_for = [s.script for s in own if s.script]
             found = explain_by_build(package, facts.runs.get(PACKAGE_RUN), found, asked_for, beside)
         found = fill_slots(choose_hint_language(found, criterion, facts), criterion, facts.rubric)

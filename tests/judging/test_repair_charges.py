@@ -585,10 +585,18 @@ def test_what_runs_beside_a_program_that_was_not_built_is_left_open() -> None:
         "with": {"process": "talker", "text": "done"},
         "scenario": "talker",
     }
+    apart = {
+        "id": "apart",
+        "check": "connected",
+        "with": {"topic": "/numeric_chatter", "subscriber": "mean"},
+        "scenario": "talker",
+    }
+    asked = rubric(done, apart, scenarios={"talker": scenario})
     said = [{"process": "talker", "line": "waiting"}]
     runs = build_runs({"runs": {"talker": {**GOOD_RUN, "console": said}}, "package": package})
     for exit_code, status in ((1, "inconclusive"), (0, "fail")):
         runs |= built(package, exit_code=exit_code, said=[tf] if exit_code else [])
-        (found,) = judge(rubric(done, scenarios={"talker": scenario}), runs)
-        assert found.status.value == status
+        found, connected = judge(asked, runs)
+        assert (found.status.value, connected.status.value) == (status, status)
         assert ("did not make the program mean, which runs beside it" in found.message) == bool(exit_code)
+        assert ("did not make the program mean;" in connected.message) == bool(exit_code)
