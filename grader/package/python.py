@@ -75,6 +75,8 @@ _MESSAGES: tuple[tuple[str, ...], ...] = (
      "this line's indentation matches none of the lines above it", "start it exactly below a line of the same block"),
     (r"unexpected indent",
      "this line is indented further than the one above for no reason", "start it exactly below that one"),
+    (r"block without its first line",
+     "the line that begins this block (`if …:`) is missing above this line", "write it there, with what it asks"),
     (r"the same line twice", "this line repeats the one above", DELETE_LINE),
     (r"expected an indented block",
      "the line after a `:` must be indented", "start it four spaces further to the right than the one above"),

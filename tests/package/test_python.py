@@ -166,6 +166,10 @@ def assert_cases(report):
             "nothing in the block on line 3: below",
         ),
         ("def f(x):\n    if x:\n    if x:\n        return 1\n", "repeats the one above: delete this line"),
+        ("while f():\n    if x:\n    rate.sleep()\n", "nothing in the block on line 2: below line 2, write"),
+        ("if x:\nrospy.spin()\n", "nothing in the block on line 1: below line 1, write"),
+        ("while f():\nrate.sleep()\n", "must be indented"),
+        ("if x:\nx = 0\n", "must be indented"),
         ("class A:\ndef f(self):\n    pass\n", "must be indented"),
         ("def f():\nx = 1\n", "must be indented"),
     ],
@@ -174,6 +178,29 @@ def test_a_block_without_a_line_is_told_from_one_that_is_not_indented(tmp_path, 
     (tmp_path / "x.py").write_text(text)
     fault = check_syntax(tmp_path, ["x.py"]).faults["x.py"]
     assert cause in fault.explanation
+
+
+@pytest.mark.parametrize(
+    ("text", "is_lost"),
+    [
+        ("def f(x):\n    y = 1\n        return\n    print(y)\n", True),
+        ("def f(x):\n    print(x)\n        print(1)\n        return\n\n    print(2)\n", True),
+        ("while f():\n    n += 1\n        n = -128\n    rate.sleep()\n", True),
+        ("def f(x):\n    y = 1\n        y = 2\n    else:\n        y = 3\n", True),
+        ("def f(x):\n    y = 1\n        return y\n", False),
+        ("def f(x):\n    y = 1\n        y = y + 2\n    print(y)\n", False),
+        ("def f(x):\n    y = 1\n        print(y)\n    return y\n", False),
+        ("def f(x):\n    y = 1\n     return\n    print(y)\n", False),
+        ("def f(x):\n    return 1\n        return 2\n    print(y)\n", False),
+        ("if a:\n    b()\nc()\n    return\nd()\n", False),
+    ],
+)
+def test_a_block_without_its_first_line_is_told_where_that_is_sure(
+    tmp_path: Path, text: str, is_lost: bool
+) -> None:
+    (tmp_path / "x.py").write_text(text)
+    told = check_syntax(tmp_path, ["x.py"]).faults["x.py"].explanation
+    assert ("the line that begins this block (`if …:`) is missing above this line" in told) is is_lost
 
 
 def test_faults_have_line_and_plain_cause(tmp_path):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from grader.package.python_repairs.syntax import make_readable
 from tests.package.repairing import SCRIPT, TALKER, Case, check, swapped
 
 pytestmark = pytest.mark.usefixtures("without_processes")
@@ -42,6 +43,10 @@ CASES = {
     "import-further-in": Case(
         {TALKER: FROM_ROSPY}, ["python-syntax"], "line 2 of src/talker.py: this line is indented further",
         after={TALKER: "\nfrom rospy import init_node, spin"}),
+    "what-an-if-does-is-missing": Case(
+        swapped(TALKER, ("        rate.sleep()", "        if a:\n        rate.sleep()")), ["python-syntax"],
+        "line 12 of src/talker.py: this block needs a line of its own",
+        after={TALKER: "        if a:\n            pass\n        rate.sleep()"}),
     "statement-that-is-misspelt": Case(
         swapped(TALKER, ("        rate.sleep()", "        if a:\n            contniue\n        rate.sleep()")),
         ["missing-call"], "line 12 of src/talker.py: contniue is not defined", after={TALKER: " continue\n"}),
@@ -51,3 +56,10 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_a_mistake_in_a_block_is_found_and_repaired(name: str, tmp_path: Path) -> None:
     check(CASES[name], tmp_path)
+
+
+@pytest.mark.parametrize("alone", ["break", "return 1", "raise a"])
+def test_what_an_if_that_is_missing_asked_is_not_known(alone: str) -> None:
+    wrong = SCRIPT.replace("        rate.sleep()", f"            {alone}\n        rate.sleep()")
+    assert not list(make_readable(wrong))
+    assert list(make_readable(wrong.replace(alone, "print(1)")))

@@ -20,6 +20,7 @@ import warnings
 
 # `-I` leaves this folder out, and a limited child does not begin in it.
 sys.path.append(os.path.dirname(os.path.abspath(__file__)))
+from blocks import is_code, lacks_body, lacks_head
 from script_tree import (
     TEXT_LIMIT,
     slip,
@@ -345,16 +346,19 @@ def block_fault(lines, line, message):
         told = "only comments in the block on line %d" % (head + 1)
         return fault("IndentationError", line, 1, told, text=lines[line - 1])
     if head is not None and "expected an indented" in message:
-        if lines[line - 1].strip() == lines[head].strip():
-            return fault("IndentationError", line, 1, "the same line twice", text=lines[line - 1])
-        if len(blanks_of(lines[line - 1])) < len(blanks_of(lines[head])):
+        is_out = len(blanks_of(lines[line - 1])) < len(blanks_of(lines[head]))
+        told = "the same line twice" if lines[line - 1].strip() == lines[head].strip() else ""
+        if not told and (is_out or lacks_body(lines[head], lines[line - 1])):
             told = "nothing in the block on line %d" % (head + 1)
+        if told:
             return fault("IndentationError", line, 1, told, text=lines[line - 1])
     head = commented_head(lines, line) if indented else None
     if head is not None:
         at, text = lines[head].index("#") + 1, lines[head]
         return fault("IndentationError", head + 1, at, "block commented out" + moved(lines, head), text=text)
     odd = out_of_block(lines, line) if indented else None
+    if indented and odd is None and lacks_head(lines, line - 1):
+        return fault("IndentationError", line, 1, "block without its first line", text=lines[line - 1])
     inner = blanks_of(lines[line - 1]) if odd is not None else block_cut(lines, line)
     if inner is None:
         return None
@@ -415,10 +419,6 @@ def commented_head(lines, line):
         if is_code(text):
             return None
     return None
-
-
-def is_code(text):
-    return bool(text.strip()) and not text.lstrip().startswith("#")
 
 
 def moved(lines, head):

@@ -35,6 +35,7 @@ from grader.package.python_repairs.imports import (
 )
 from grader.package.python_repairs.members import Known, with_members
 from grader.package.python_repairs.names import (
+    ROSPY,
     bound_in,
     meant_by,
     with_methods,
@@ -45,7 +46,6 @@ from grader.package.python_repairs.names import (
 )
 from grader.package.python_repairs.rospy_names import with_attributes, with_logger, with_rospy
 from grader.package.python_repairs.syntax import (
-    ROSPY,
     Step,
     as_python3,
     edited,

@@ -14,8 +14,6 @@ from difflib import get_close_matches
 from string import digits
 
 from grader.package.python_repairs.syntax import (
-    MODULES_OF_ROSPY,
-    ROSPY,
     Step,
     edited,
     last_name,
@@ -37,6 +35,35 @@ OBVIOUS_NAMES = {
     **dict.fromkeys(("null", "NULL", "none", "nil", "nullptr"), "None"),
     **dict.fromkeys(("_name_", "__name", "_name", "name__"), "__name__"),
 }
+NAMES_OF_ROSPY = (
+    "AnyMsg DEBUG Duration ERROR FATAL Header INFO MasterProxy Message Publisher ROSException ROSInitException "
+    "ROSInternalException ROSInterruptException ROSSerializationException ROSTimeMovedBackwardsException Rate Service "
+    "ServiceException ServiceProxy SubscribeListener Subscriber Time Timer TransportException TransportInitError "
+    "TransportTerminated WARN client core delete_param exceptions get_caller_id get_master get_name get_namespace "
+    "get_node_uri get_param get_param_cached get_param_names get_published_topics get_ros_root get_rostime get_time "
+    "get_topic_class has_param impl init_node is_shutdown logdebug logdebug_once logdebug_throttle logerr logerr_once "
+    "logerr_throttle logfatal logfatal_once logfatal_throttle loginfo loginfo_once loginfo_throttle logout logwarn "
+    "logwarn_once logwarn_throttle msg msproxy myargv names numpy_msg on_shutdown parse_rosrpc_uri remap_name "
+    "resolve_name rostime search_param service set_param signal_shutdown sleep spin timer topics wait_for_message "
+    "wait_for_service"
+)
+ROSPY = frozenset(NAMES_OF_ROSPY.split())
+MODULES_OF_ROSPY = frozenset(
+    [
+        "client",
+        "core",
+        "exceptions",
+        "impl",
+        "msg",
+        "msproxy",
+        "names",
+        "numpy_msg",
+        "rostime",
+        "service",
+        "timer",
+        "topics",
+    ]
+)
 MEMBERS = {
     "Publisher": ("publish", "unregister", "get_num_connections"),
     "Rate": ("sleep", "remaining"),

@@ -10,9 +10,8 @@ import ast
 from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
 
-from grader.package.python_repairs.names import bound_in
+from grader.package.python_repairs.names import ROSPY, bound_in
 from grader.package.python_repairs.syntax import (
-    ROSPY,
     Step,
     edited,
     last_name,

@@ -17,6 +17,7 @@ from itertools import takewhile
 from typing import Any
 
 from grader.package.line_corrections import first_version
+from grader.package.lint.blocks import lacks_body, lacks_head
 from grader.syntax_fixes import (
     DELETE_LINE,
     PLAIN,
@@ -52,35 +53,6 @@ CONTINUES = re.compile(r"(elif|else|except|finally)\b")
 Step = dict[str, Any]
 """`cause`, `line`, the `text` that comes out, and for what does not parse the `error`."""
 Error = dict[str, Any]
-NAMES_OF_ROSPY = (
-    "AnyMsg DEBUG Duration ERROR FATAL Header INFO MasterProxy Message Publisher ROSException ROSInitException "
-    "ROSInternalException ROSInterruptException ROSSerializationException ROSTimeMovedBackwardsException Rate Service "
-    "ServiceException ServiceProxy SubscribeListener Subscriber Time Timer TransportException TransportInitError "
-    "TransportTerminated WARN client core delete_param exceptions get_caller_id get_master get_name get_namespace "
-    "get_node_uri get_param get_param_cached get_param_names get_published_topics get_ros_root get_rostime get_time "
-    "get_topic_class has_param impl init_node is_shutdown logdebug logdebug_once logdebug_throttle logerr logerr_once "
-    "logerr_throttle logfatal logfatal_once logfatal_throttle loginfo loginfo_once loginfo_throttle logout logwarn "
-    "logwarn_once logwarn_throttle msg msproxy myargv names numpy_msg on_shutdown parse_rosrpc_uri remap_name "
-    "resolve_name rostime search_param service set_param signal_shutdown sleep spin timer topics wait_for_message "
-    "wait_for_service"
-)
-ROSPY = frozenset(NAMES_OF_ROSPY.split())
-MODULES_OF_ROSPY = frozenset(
-    [
-        "client",
-        "core",
-        "exceptions",
-        "impl",
-        "msg",
-        "msproxy",
-        "names",
-        "numpy_msg",
-        "rostime",
-        "service",
-        "timer",
-        "topics",
-    ]
-)
 
 
 def syntax_error(text: str) -> Error | None:
@@ -203,7 +175,8 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
         for changed in corrections(lines[line], *told):
             cause = "characters" if changed == lines[line].translate(PLAIN) else "token"
             yield cause, with_line(lines, line, changed)
-    if error["kind"] == "IndentationError" or OF_BLOCK.match(lines[at].strip()):
+    is_headless = error["message"] == "unexpected indent" and lacks_head(lines, at)
+    if (error["kind"] == "IndentationError" and not is_headless) or OF_BLOCK.match(lines[at].strip()):
         moved = [("level", candidate) for candidate in _with_line_moved(lines, at)]
         moved += [("turned", candidate) for candidate in _with_lines_turned(lines, at)]
         yield from (one for one in moved if syntax_error(one[1]) is None)
@@ -283,15 +256,19 @@ def _with_body_indented(lines: list[str], at: int) -> Iterator[str]:
     ends = len(_indentation(after)) < len(own) or not after or CONTINUES.match(after.strip())
     is_head = without_texts(head).rstrip().endswith(":")
     does_nothing = lines[at].partition("#")[0].strip() == "pass" and around.startswith(own) and is_head
+    if lacks_body(head, lines[at]):
+        return
     if does_nothing or (lines[at].strip() and own == around and ends):
         yield with_line(lines, at, f"{around}    {lines[at].lstrip()}")
 
 
 def _with_a_body(lines: list[str], at: int) -> Iterator[str]:
-    """Yield the text with a `pass` in the block above the line, which begins further out than that block's head."""
+    """Yield the text with a `pass` in the block above the line, which begins further out than that block's head, or
+    belongs to the loop around it."""
     above = next((n for n in range(at - 1, -1, -1) if without_texts(lines[n]).strip()), at)
     head = lines[above]
-    if _width(lines[at]) < _width(head) and not head.lstrip().startswith("while"):
+    is_out = _width(lines[at]) < _width(head) or lacks_body(head, lines[at])
+    if is_out and not head.lstrip().startswith("while"):
         candidate = "\n".join([*lines[: above + 1], f"{_indentation(head)}    pass", *lines[above + 1 :]])
         if syntax_error(candidate) is None:
             yield candidate
@@ -420,6 +397,8 @@ def _with_block_moved(lines: list[str], at: int) -> Iterator[str]:
         is_inner = not any(OUTERMOST.match(one) or DEFINES.match(one) for one in map(str.strip, moved_in))
         if is_shorter and is_inner and not ENDS_BLOCK.match(behind):
             yield "\n".join([*lines[:first], *moved_in, *lines[at:]])
+    if own > above[-1] and lacks_head(lines, at):
+        return  # what is asked there is not known
     if OUTERMOST.match(lines[at].strip()):
         level = 0
     elif own > above[-1]:
