@@ -89,6 +89,8 @@ def _points(package: PackageFacts) -> Iterator[_Point]:
         if slip.kind == "misspelt" and not is_right and not is_product(slip.file):
             text = f"{slip.file}, line {slip.line}: `{slip.name}` is not defined anywhere: {slip.message}"
             yield _Point(slip.place, text)
+        elif slip.kind == "no-effect" and slip.fix.startswith("write ") and not is_product(slip.file):
+            yield _Point(slip.place, f"{slip.file}, line {slip.line}: {slip.message}: {slip.fix}")
     for launch in package.launch_files:
         if launch.fault is not None:
             why = launch.fault.explanation

@@ -24,7 +24,7 @@ from grader.judging.facts import Facts
 from grader.judging.judge import judge_files
 from grader.model.package import PackageFacts
 from grader.model.result import CriterionResult
-from grader.model.verdict import Status, failed
+from grader.model.verdict import FileCitation, Status, failed
 from grader.package.facts import read_package
 from grader.rubric.load import load_rubric, read_beside_rubric
 from tests.package.trees import CMAKE, MANIFEST, NODE, make_package
@@ -144,6 +144,18 @@ def test_what_does_not_start_is_told_where_nothing_is_lost(tmp_path) -> None:
     assert add_advice([told], package, rubric(CMAKE_CHECK)) == (told,)
     lost = criterion(status=Status.FAIL)
     assert add_advice([lost], package, rubric(CMAKE_CHECK)) == (lost,)
+
+
+def test_a_value_that_is_given_to_a_misspelt_name_is_told_unless_a_loss_names_its_line(tmp_path) -> None:
+    package = facts(
+        tmp_path, **{"src/a.py": "up = False\nuo = up\nif changed: f()\nchnaged = True\nchanged = False\n"}
+    )
+    (told,) = add_advice([criterion()], package, rubric(CMAKE_CHECK))
+    why = "src/a.py, line 4: nothing reads `chnaged`, to which a value is given here: `changed` is meant"
+    assert told.hint == f"{why}: write `changed` in place of `chnaged`"
+    cited = FileCitation(file="src/a.py", line=4)
+    lost = criterion(status=Status.FAIL).model_copy(update={"citations": (cited,)})
+    assert add_advice([criterion(), lost], package, rubric(CMAKE_CHECK)) == (criterion(), lost)
 
 
 def test_a_node_of_nearly_the_packages_name_is_told(tmp_path) -> None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from grader.package.python import check_syntax
 from grader.package.python_repairs.examine import examine
 
 NAMED = """\
@@ -164,3 +167,34 @@ def test_all_names_of_rospy_may_be_imported(module: str, wrong: str, right: str)
     (found,) = list(examine([["a.py", text]], [], {}, ""))
     last = found["steps"][-1]["text"] if found["steps"] else text
     assert last == text.replace(wrong, right or wrong)
+
+
+TARGETS = {
+    "a flag": (
+        "up = 1\ndef f(m):\n  global changed\n  chnaged = True\nchanged = False\nif changed: g()",
+        "changed",
+    ),
+    "capitals": (
+        "class A:\n  count = 0\n  def f(self, e):\n    self.coUnt += 1\n    g(self.count)",
+        "self.count",
+    ),
+    "below nothing": ("counter = 0\ng(counter)\ncouner = -128", "counter"),
+    "worked out": ("counter = 0\ng(counter)\ncouner = counter + 1", "counter"),
+    "of a class": ("class A:\n  topic = 'a'\n  def f(self):\n    g(self.topic)\nTopic = 'b'\ng(Topic)", ""),
+    "another kind": ("counter = 0\ng(counter)\ncouner = 'a'", ""),
+    "a series": ("speed_x = 0\ng(speed_x)\nspeed_y = 1", ""),
+    "plural": ("speed = 0\ng(speed)\nspeeds = 1", ""),
+    "read by its name": ("counter = 0\ng(counter)\ncouner = 3\ng(vars()['couner'])", ""),
+    "read": ("counter = 0\ng(counter)\ncouner = 3\ng(couner)", ""),
+}
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_a_misspelt_name_that_gets_a_value_is_told_without_a_repair_too(name: str, tmp_path: Path) -> None:
+    text, meant = TARGETS[name]
+    (tmp_path / "a.py").write_text(f"{text}\n")
+    slips = [one for one in check_syntax(tmp_path, ["a.py"]).slips if "is meant" in one.message]
+    assert [one.fix.split("`")[1] for one in slips] == ([meant] if meant else [])
+    (found,) = list(examine([["a.py", f"import rospy\n{text}\n"]], [], {}, ""))
+    told = [one["word"] for one in found["steps"] if "is meant" in one["word"]]
+    assert told == [one.message for one in slips] or name == "read by its name"

@@ -22,8 +22,10 @@ from script_tree import (
     dotted,
     functions_in,
     is_call_alone,
+    is_of_series,
     names_in,
     parents_of,
+    reads_names_in_texts,
     slip,
     walk,
 )
@@ -41,7 +43,11 @@ def results(tree):
     yield from filled_fields(tree)
     yield from narrow_handlers(tree)
     yield from unreached_returns(tree)
-    yield from never_given(tree)
+    meant = misnamed_targets(tree)
+    for node, (name, other) in meant.items():
+        message = "nothing reads `%s`, to which a value is given here: `%s` is meant" % (name, other)
+        yield slip(node.lineno, "no-effect", message, "write `%s` in place of `%s`" % (other, name), name)
+    yield from never_given(tree, {other.rpartition(".")[2] for _, other in meant.values()})
 
 
 def dropped_results(tree):
@@ -185,10 +191,62 @@ def is_plain_end(node):
     return isinstance(node, ast.Raise) or (isinstance(node, ast.Return) and node.value is None)
 
 
-def never_given(tree):
+def misnamed_targets(tree):
+    """Return the assignments to a name that nothing reads, with that name and the only one that is read and nearly the
+    same: `chnaged = True`. What is assigned in a class is read with `self.`."""
+    # `python_repairs/names.py` has the same for its side of the grader
+    every = all_of(tree, ast.Name, ast.Attribute) if not reads_names_in_texts(tree) else []
+    read = {dotted(n) for n in every if isinstance(n.ctx, ast.Load)}
+    stored = Counter(dotted(n) for n in every if isinstance(n.ctx, ast.Store))
+    given, unread, found = {}, [], {}
+    for node in all_of(tree, ast.Assign, ast.AugAssign):
+        name = dotted(node.targets[0] if isinstance(node, ast.Assign) else node.target)
+        if isinstance(parents_of(tree).get(node), ast.ClassDef):
+            name = "self." + name
+        elif name not in read and stored[name] == 1 and "..." not in name:
+            unread.append((node, name))
+        given.setdefault(name, []).append(node.value)
+    for node, name in unread[:USES_LIMIT]:
+        near = [other for other in given if other in read and is_alike(name, other)]
+        values = [node.value, *given[near[0]]] if len(near) == 1 else []
+        kinds = {kind_of_constant(one) for one in values}
+        is_same = isinstance(node, ast.AugAssign) or (len(kinds) == 1 and None not in kinds)
+        if values and (is_same or near[0] in map(dotted, ast.walk(node.value))):
+            found[node] = (name, near[0])
+    return found
+
+
+def kind_of_constant(node):
+    """Return the type of a text, a number, -1 too, True, False or None; None for what has to be worked out."""
+    is_less = isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub)
+    node = node.operand if is_less else node
+    return type(node.value) if isinstance(node, ast.Constant) else None
+
+
+def is_alike(name, other):
+    """Return whether two names of one object, or of none, differ by capitals, or by a letter that is no plural."""
+    (owner, _, last), (other_owner, _, other_last) = name.rpartition("."), other.rpartition(".")
+    is_other = is_of_series(last, other_last) or last[-1:].isdigit() or last.isupper() or last == other_last
+    if owner != other_owner or is_other or last + "s" == other_last or other_last + "s" == last:
+        return False
+    return last.lower() == other_last.lower() or (
+        min(len(last), len(other_last)) > 3 and is_one_edit(last, other_last)
+    )
+
+
+def is_one_edit(one, other):
+    """Return whether one letter added, left out, changed or swapped with its neighbour makes one the other."""
+    least = min(len(one), len(other))
+    at = next((i for i in range(least) if one[i] != other[i]), least)
+    one, other = one[at:], other[at:]
+    swapped = one[:2] == other[1::-1] and one[2:] == other[2:]
+    return swapped or one[1:] == other[1:] or one[1:] == other or one == other[1:]
+
+
+def never_given(tree, misspelt):
     """`global goal` in a callback that does nothing with it, and `self.goal = None` with `if self.goal is None:
-    return`, where no line gives it another value."""
-    fixed = fixed_values(tree)
+    return`, where no line gives it another value, under a `misspelt` name either."""
+    fixed = {name: value for name, value in fixed_values(tree).items() if name not in misspelt}
     read = {dotted(n) for n in all_of(tree, ast.Name) if isinstance(n.ctx, ast.Load)}
     for function in all_of(tree, ast.FunctionDef):
         inside = [n for n in walk_own(function) if isinstance(n, ast.Name)]

@@ -330,14 +330,16 @@ def with_targets(text: str) -> Iterator[Step]:
     stored = [ast.unparse(n) for n in nodes if isinstance(n.ctx, ast.Store)]
     assigned = [n for n in nodes_in(tree) if isinstance(n, ast.Assign | ast.AugAssign)]
     given: dict[str, list[ast.expr]] = {}
+    of_classes = {n for one in nodes_in(tree) if isinstance(one, ast.ClassDef) for n in one.body}
     for one in assigned:
         target = one.targets[0] if isinstance(one, ast.Assign) else one.target
-        given.setdefault(ast.unparse(target), []).append(one.value)
+        name = f"self.{ast.unparse(target)}" if one in of_classes else ast.unparse(target)
+        given.setdefault(name, []).append(one.value)
     local = {*_only_in_init(tree)}
     for one in assigned:
         target = one.targets[0] if isinstance(one, ast.Assign) else one.target
         name, span = ast.unparse(target), span_of(lines, target)
-        if name in read or stored.count(name) != 1 or span is None:
+        if name in read or stored.count(name) != 1 or span is None or one in of_classes:
             continue
         near = [f"self.{name}"] if target in local and f"self.{name}" in read else []
         near = near or [other for other in given if other in read and _is_alike(name, other)]
@@ -373,7 +375,12 @@ def _is_alike(name: str, other: str) -> bool:
 
 def _are_constants(values: Iterable[ast.expr]) -> bool:
     """Return whether only numbers, texts and truth values of one kind are given."""
-    kinds = {type(value.value) if isinstance(value, ast.Constant) else None for value in values}
+    # -1 too
+    plain = [
+        one.operand if isinstance(one, ast.UnaryOp) and isinstance(one.op, ast.USub) else one
+        for one in values
+    ]
+    kinds = {type(value.value) if isinstance(value, ast.Constant) else None for value in plain}
     return len(kinds) == 1 and None not in kinds
 
 
