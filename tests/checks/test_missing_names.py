@@ -115,16 +115,28 @@ def test_a_package_without_any_definition_is_told_what_to_write(tmp_path, source
     assert explained(tmp_path, files, ("node.py", 1, source), error=NO_LAB).hint.startswith(hint)
 
 
-def test_the_message_is_that_of_the_package_that_is_named(tmp_path):
+@pytest.mark.parametrize(
+    ("asked", "cmake", "hint"),
+    [
+        ("lab_msgs", "", "first get the build to pass: catkin_make"),
+        ("lab", "catkin_package()\n", "write `from lab_msgs.msg import Reading`"),  # its own is a copy
+        (
+            "lab",
+            "add_message_files(FILES Reading.msg)\n",
+            "call generate_messages(…) above catkin_package(…)",
+        ),
+    ],
+)
+def test_the_message_is_that_of_the_package_that_makes_it(tmp_path, asked, cmake, hint):
     made = "add_message_files(FILES Reading.msg)\ngenerate_messages()\n"
-    line = "from lab_msgs.msg import Reading"
+    line = f"from {asked}.msg import Reading"
     lab, messages = (
-        package_of(tmp_path / name, {"msg/Reading.msg": "int8 a\n", "CMakeLists.txt": cmake, **more}, name)
-        for name, cmake, more in (("lab", "", {"node.py": f"{line}\n"}), ("lab_msgs", made, {}))
+        package_of(tmp_path / name, {"msg/Reading.msg": "int8 a\n", "CMakeLists.txt": text, **more}, name)
+        for name, text, more in (("lab", cmake, {"node.py": f"{line}\n"}), ("lab_msgs", made, {}))
     )
     package = lab.model_copy(update={"also": (messages,)})
-    found = raised(package, ("node.py", 1, line), error="ModuleNotFoundError: No module named 'lab_msgs'")
-    assert explain_traceback(found, package).hint == "first get the build to pass: catkin_make"
+    found = raised(package, ("node.py", 1, line), error=f"ModuleNotFoundError: No module named '{asked}'")
+    assert explain_traceback(found, package).hint == hint
 
 
 @pytest.mark.parametrize(

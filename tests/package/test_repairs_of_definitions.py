@@ -99,6 +99,8 @@ CASES = {
         {**RUN_OWN, CMAKELISTS: CMAKE}, ["build-line"] * 3, "write message_generation after COMPONENTS",
         after={CMAKELISTS: OWN_CMAKE.replace("\ncatkin_p", "\ngenerate_messages()\ncatkin_p")},
     ),
+    "own-message-that-is-a-copy-of-another-package-s": Case(
+        {**RUN_OWN, CMAKELISTS: CMAKE}, [], wanted=asking(types=("lab_msgs/Level",))),
     "own-message-that-nothing-uses": Case({**SERVICE, CMAKELISTS: SERVICE_CMAKE}, [], ""),
     "own-message-in-a-service": Case(
         {**SERVICE, "srv/Two.srv": "Level[] a\n---\n", CMAKELISTS: SERVICE_CMAKE}, ["build-line"],

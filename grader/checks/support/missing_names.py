@@ -195,8 +195,9 @@ def unmade(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """Return the cause and the hint of an import of what the build makes, and has not made; None of any other."""
     makers = (one for one in (package, *package.also) if _makes(one, found.message))
     maker = None if own_message(found, package) else next(makers, None)
-    if maker is None:
-        return _undefined(found, package) or _unlisted(found, package)
+    undefined = _undefined(found, package)
+    if maker is None or (maker is package and undefined):
+        return undefined or _unlisted(found, package)
     wanted = re.match(r"cannot import name '(\w+)'", found.message)
     if wanted is not None and "__init__.py" in found.message:  # the build made others
         own = next((one for one in maker.interfaces if wanted[1] in one.classes), None)
@@ -225,16 +226,19 @@ def unmade(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
 
 
 def _undefined(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
-    """Return the cause and the hint of an import of definitions from a package that has none at all."""
+    """Return the cause and the hint of an import of definitions from a package that has none, or lists none."""
     module, names = (found.kind in IMPORT_ERRORS and _imported_names(found.innermost.source)) or ("", ())
     kind = {f"{package.name}.msg": "message", f"{package.name}.srv": "service"}.get(module)
-    if kind is None or package.interfaces or f"'{package.name}" not in found.message:
+    listed = package.interfaces and cmake_calls(package, *OF_FILES)
+    if kind is None or listed or f"'{package.name}" not in found.message:
         return None
     folder = module.rpartition(".")[2]
     for other in package.also:  # the one of the submission's packages that it comes from
         if any(set(names) & {*one.classes} for one in other.interfaces if one.module == folder):
             line = found.innermost.source.replace(str(package.name), str(other.name), 1)
             return f"{other.name} makes this {kind}", f"write `{shown(line)}`"
+    if package.interfaces:
+        return None
     name = re.sub(r"(Request|Response)$", "", names[0]) if folder == "srv" else names[0]
     file = f"{folder}/{name}.{folder}" if name != "*" else f"the definition in {folder}/"
     hint = f"write {file}, list it in add_{kind}_files(…), and call generate_messages(…) in {CMAKE}"

@@ -69,6 +69,9 @@ def make_interfaces(
     made = {
         c: _definitions(files, package, folder) for c, folder in INTERFACE_FOLDERS.items() if folder in used
     }
+    if not any(calls_of(files, call) for call in made):  # of a copy, the package is meant that the lab names
+        others = {one.rpartition("/")[2] for one in wanted.types if one.partition("/")[0] != name}
+        made = {c: [one for one in own if PurePosixPath(one).stem not in others] for c, own in made.items()}
     if not any(made.values()):
         _delete_generation(files, package)
         return
