@@ -20,7 +20,7 @@ import warnings
 
 # `-I` leaves this folder out, and a limited child does not begin in it.
 sys.path.append(os.path.dirname(os.path.abspath(__file__)))
-from blocks import is_code, lacks_body, lacks_head
+from script_blocks import is_code, lacks_body, lacks_head
 from script_tree import (
     TEXT_LIMIT,
     slip,

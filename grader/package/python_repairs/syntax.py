@@ -17,7 +17,7 @@ from itertools import takewhile
 from typing import Any
 
 from grader.package.line_corrections import first_version
-from grader.package.lint.blocks import lacks_body, lacks_head
+from grader.package.lint.script_blocks import lacks_body, lacks_head
 from grader.syntax_fixes import (
     DELETE_LINE,
     PLAIN,
