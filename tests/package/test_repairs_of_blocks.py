@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from grader.package.python_repairs.syntax import make_readable
-from tests.package.repairing import SCRIPT, TALKER, Case, check, swapped
+from tests.package.repairing import SCRIPT, TALKER, Case, check, package, repair_all, swapped
 
 pytestmark = pytest.mark.usefixtures("without_processes")
 
@@ -23,6 +23,42 @@ except rospy.ServiceException as e:
 FROM_ROSPY = (
     SCRIPT.replace("rospy.", "").replace("import rospy\n", "    from rospy import init_node, spin\n")
     + "spin()\n"
+)
+TICKER = """\
+#!/usr/bin/env python3
+import rospy
+from std_msgs.msg import Int8
+
+
+class Ticker(object):
+    \'\'\'Counts.\'\'\'
+
+    def __init__(self, first):
+        self.count = first
+        self.pub = rospy.Publisher('numeric_chatter', Int8, queue_size=10)
+        rospy.Timer(rospy.Duration(0.1), self.tick)
+
+    def tick(self, event):
+        self.pub.publish(self.count)
+        self.count = (self.count + 1) % 128
+
+    def run(self):
+        rospy.spin()
+
+
+def main():
+    rospy.init_node('talker')
+    Ticker(0)
+    ticker = Ticker(0)
+    ticker.run()
+
+
+main()
+"""
+DOCSTRING = "    '''Counts.'''\n\n"
+LOST = [line for line in TICKER.split("\n") if line.strip().startswith(("def", "class"))]
+FORGOTTEN = TICKER.replace(
+    "    def tick(self, event):\n", "    def run_on(self):\n        rate = rospy.Rate(10)\n\n"
 )
 
 CASES = {
@@ -51,6 +87,31 @@ CASES = {
         swapped(TALKER, ("        rate.sleep()", "        if a:\n            contniue\n        rate.sleep()")),
         ["missing-call"], "line 12 of src/talker.py: contniue is not defined", after={TALKER: " continue\n"}),
 }  # fmt: skip
+
+
+@pytest.mark.parametrize("head", LOST)
+@pytest.mark.parametrize("docstring", [DOCSTRING, ""])
+def test_the_first_line_of_a_class_or_function_that_is_lost(
+    head: str, docstring: str, tmp_path: Path
+) -> None:
+    text = TICKER.replace(DOCSTRING, docstring)
+    own = head.replace("(object)", "")
+    missing = {TALKER: text.replace(f"{head}\n", "")}
+    said = f"the line `{own.strip()}` is missing"
+    check(
+        Case(missing, ["python-syntax"], said, after={TALKER: text.replace(head, own)}), tmp_path / "missing"
+    )
+    indentation = head[: len(head) - len(head.lstrip())]
+    commented = {TALKER: text.replace(head, f"{indentation}# {head.strip()}")}
+    said = "this line begins the block below it, and is commented out"
+    check(Case(commented, ["python-syntax"], said, after={TALKER: text}), tmp_path / "commented")
+
+
+def test_a_method_that_is_not_there_has_no_lost_first_line(tmp_path: Path) -> None:
+    folder = package(
+        tmp_path, {TALKER: FORGOTTEN.replace("self.count = (", "rate.sleep()\n        self.count = (")}
+    )
+    assert repair_all(folder) == ()
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -11,6 +11,7 @@ from collections import Counter
 from script_names import (
     USES_LIMIT,
     caught_by,
+    is_of_series,
     walk_own,
 )
 from script_texts import VALUE, Texts
@@ -22,7 +23,6 @@ from script_tree import (
     dotted,
     functions_in,
     is_call_alone,
-    is_of_series,
     names_in,
     parents_of,
     reads_names_in_texts,

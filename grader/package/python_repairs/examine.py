@@ -14,7 +14,7 @@ import re
 import sys
 import warnings
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -33,6 +33,7 @@ from grader.package.python_repairs.imports import (
     with_message_classes,
     without_suffixes,
 )
+from grader.package.python_repairs.lost_heads import lost_head, lost_method
 from grader.package.python_repairs.members import Known, with_members
 from grader.package.python_repairs.names import (
     ROSPY,
@@ -50,7 +51,6 @@ from grader.package.python_repairs.syntax import (
     as_python3,
     edited,
     last_name,
-    lost_head,
     make_readable,
     nodes_in,
     span_of,
@@ -256,11 +256,17 @@ def _with_start(text: str) -> Iterator[Step]:
     that begins the script's own part."""
     tree, lines = tree_of(text), text.split("\n")
     used = {n.id for n in nodes_in(tree) if isinstance(n, ast.Name)} - bound_in(tree)
+    methods = {n.name for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)}
+    used |= {"__init__", *(n.attr for n in nodes_in(tree) if isinstance(n, ast.Attribute))} - methods
     for number, found in enumerate(map(COMMENTED_HEAD.match, lines)):
-        changed = "\n".join([*lines[:number], *([found[1]] if found else []), *lines[number + 1 :]])
-        if found and found[2] in used and syntax_error(changed) is None:
-            yield from step_to("commented", number + 1, text, changed, found[2])
+        changed = "\n".join(
+            [*lines[:number], *([found[1] + found[2]] if found else []), *lines[number + 1 :]]
+        )
+        is_method = found and re.search(r"\(\s*self\b", found[2])
+        if found and found[3] in used and bool(is_method) == bool(found[1]) and syntax_error(changed) is None:
+            yield from step_to("commented", number + 1, text, changed, found[3])
             return
+    yield from islice(_with_method(text, tree, lines), 1)
     functions = [n for n in tree.body if isinstance(n, ast.FunctionDef)]
     started = any(isinstance(n, ast.Call) for one in _runs(tree) for n in nodes_in(one))
     for function in functions:
@@ -279,7 +285,31 @@ def _with_start(text: str) -> Iterator[Step]:
                 return
 
 
-COMMENTED_HEAD = re.compile(r"#[#\s]*((?:def|class)\s+(\w+).*:)\s*$")
+def _with_method(text: str, tree: ast.Module, lines: list[str]) -> Iterator[Step]:
+    """A method without its first line, which the method above it goes on with, or a function below a class."""
+    owners = [n for n in tree.body if isinstance(n, ast.ClassDef)]
+    methods = [n for one in owners for n in one.body if isinstance(n, ast.FunctionDef)]
+    blocks: list[ast.ClassDef | ast.FunctionDef] = [*owners, *methods]
+    for block in blocks:
+        kept = {n.id for n in nodes_in(block) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+        for before, after in pairwise(block.body):
+            first = after.lineno - 1
+            apart = sum(not line.strip() for line in lines[before.end_lineno or 0 : first])
+            body = "\n".join(lines[first : block.end_lineno])
+            head = ""
+            if block in owners and apart >= BLANK_LINES:
+                head = lost_head(text, body)
+            elif block in methods and apart and DOES_WORK.search(body) and not SETS_UP.search(body):
+                head = lost_method(text, "\n".join(lines[:first]), body)
+                head = f"{' ' * block.col_offset}{head}" if head else ""
+            changed = "\n".join([*lines[:first], head, *lines[first:]])
+            if head and kept.isdisjoint(re.findall(r"\w+", head)) and syntax_error(changed) is None:
+                yield from step_to("line", first + 1, text, changed, head.strip())
+
+
+DOES_WORK = re.compile(r"\.data\b|\bpublish\(|\blog\w+\(|\bprint\(|\bspin\(|\bsleep\(|\breturn\b")
+SETS_UP = re.compile(r"\b(?:Publisher|Subscriber|Timer|Rate|Service|ServiceProxy|init_node)\(")
+COMMENTED_HEAD = re.compile(r"(\s*)#[#\s]*((?:def|class)\s+(\w+).*:)\s*$")
 
 
 def _runs(tree: ast.Module) -> Iterator[ast.stmt]:

@@ -8,7 +8,6 @@ and nothing is executed.
 from __future__ import annotations
 
 import ast
-import builtins
 import re
 import textwrap
 from collections.abc import Iterable, Iterator
@@ -18,6 +17,7 @@ from typing import Any
 
 from grader.package.line_corrections import first_version
 from grader.package.lint.script_blocks import lacks_body, lacks_head
+from grader.package.python_repairs.lost_heads import lost_head, lost_method
 from grader.syntax_fixes import (
     DELETE_LINE,
     PLAIN,
@@ -110,7 +110,7 @@ def _step(cause: str, text: str, candidate: str, error: Error) -> Step:
         "line": line,
         "error": error,
         "text": candidate,
-        "word": word[1] if word else added,
+        "word": added or (word[1] if word else ""),
     }
 
 
@@ -165,6 +165,7 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
     if error["message"].startswith("expected an indented block") and _is_in_comments(lines, at):
         return
     if "global declaration" in error["message"]:
+        yield from _with_head_of_global(lines, at)
         yield from _with_global_first(text, error["line"])
     yield from _in_their_blocks(lines, at, error["message"])
     yield from (("python2", candidate) for candidate in as_python3(lines, at))
@@ -199,9 +200,10 @@ def _in_their_blocks(lines: list[str], at: int, message: str) -> Iterator[tuple[
         yield from (("empty", candidate) for candidate in _with_a_body(lines, at))
     if message.startswith("expected 'except' or 'finally'"):
         yield from (("level", candidate) for candidate in _with_lines_in_try(lines, at))
-    yield from (("line", candidate) for candidate in _with_line_back(lines, at, message))
     if message.startswith(("unexpected indent", "unindent does not match")):
         yield from (("commented", candidate) for candidate in _with_head_uncommented(lines, at))
+    yield from (("line", candidate) for candidate in _with_line_back(lines, at, message))
+    if message.startswith(("unexpected indent", "unindent does not match")):
         yield from (("turned", candidate) for candidate in _with_head_first(lines, at))
         yield from (("level", candidate) for candidate in _with_block_moved(lines, at))
 
@@ -276,10 +278,11 @@ def _with_a_body(lines: list[str], at: int) -> Iterator[str]:
 
 def _with_head_uncommented(lines: list[str], at: int) -> Iterator[str]:
     """Yield the text with the comment right above the line that is the first line of its block."""
-    for number in range(at - 1, -1, -1):
+    first, level = _body_in_class(lines, at)
+    for number in range(first - 1, -1, -1):
         if head := without_comment_sign(lines[number]):
             before = next((line for line in reversed(lines[:number]) if without_texts(line).strip()), "")
-            yield with_line(lines, number, _indentation(before) + head.lstrip())
+            yield with_line(lines, number, (level or _indentation(before)) + head.lstrip())
         if without_texts(lines[number]).strip():
             return
 
@@ -306,6 +309,7 @@ def _with_line_back(lines: list[str], at: int, message: str) -> Iterator[str]:
     elif message.startswith(("unexpected indent", "unindent does not match")):
         yield from _with_try(lines, at)
         yield from _with_def(lines, at)
+        yield from _with_method(lines, at)
 
 
 def _error_to_catch(text: str) -> str:
@@ -345,35 +349,40 @@ def _with_try(lines: list[str], at: int) -> Iterator[str]:
 def _with_def(lines: list[str], at: int) -> Iterator[str]:
     """Yield the text with the first line of a function above lines that stand further in for no reason."""
     before = next((line for line in reversed(lines[:at]) if without_texts(line).strip()), "")
-    if _indentation(before) or not _indentation(lines[at]):
+    stands_apart = "".join(lines[max(0, at - 2) : at]).strip() == ""
+    if (_indentation(before) and not stands_apart) or not _indentation(lines[at]):
         return
     body = "\n".join(takewhile(lambda line: not line.strip() or _indentation(line), lines[at:]))
     if head := lost_head("\n".join(lines), body):
         yield "\n".join([*lines[:at], head, *lines[at:]])
 
 
-def lost_head(text: str, body: str) -> str:
-    """Return the first line of the one function that the file names as a callback, or calls, and does not have, or of
-    the one class; "" where there is not just one. `body` are the lines that belong below it."""
-    code = re.sub(r"#[^\n]*", "", text)
-    named = dict.fromkeys(re.findall(r"\b(?:Subscriber|Service|Timer)\s*\(.*,\s*(\w+)\s*[,)]", code), "msg")
-    named |= dict.fromkeys(re.findall(r"^\s*(\w+)\(\)\s*$", code, re.MULTILINE), "")
-    of_class = re.match(r"\s*def\s+\w+\s*\(\s*self\b", body)
-    if of_class:
-        named = dict.fromkeys(re.findall(r"(?<![\w.])([A-Z]\w*)\(", code), "")
-    imported = re.findall(r"^\s*(?:from\s.*)?import\s+(.*)", code, re.MULTILINE)
-    given = set(re.findall(r"\w+", " ".join(imported)))
-    given |= {
-        *re.findall(r"\b(?:def|class)\s+(\w+)", text),
-        *re.findall(r"^\s*(\w+)\s*=", text, re.MULTILINE),
-    }
-    lost = [name for name in named if name not in given]
-    if len(lost) != 1 or lost[0] in dir(builtins):
-        return ""
-    if of_class:
-        return f"class {lost[0]}:"
-    value = re.search(r"\b(\w+)\.data\b", body) if named[lost[0]] else None
-    return f"def {lost[0]}({value[1] if value else named[lost[0]]}):"
+def _with_head_of_global(lines: list[str], at: int) -> Iterator[tuple[str, str]]:
+    """Yield the cause and the text with the first line of a function above its `global`, where it is lost."""
+    if at and (head := without_comment_sign(lines[at - 1])):
+        yield "commented", with_line(lines, at - 1, _indentation(lines[at - 1]) + head.lstrip())
+    yield from (("line", candidate) for candidate in _with_def(lines, at))
+
+
+def _with_method(lines: list[str], at: int) -> Iterator[str]:
+    """Yield the text with the first line of a method above its body, which stands right in its class."""
+    first, level = _body_in_class(lines, at)
+    body = "\n".join(takewhile(lambda line: not line.strip() or _width(line) > len(level), lines[first:]))
+    if level and (head := lost_method("\n".join(lines), "\n".join(lines[:first]), body)):
+        yield "\n".join([*lines[:first], level + head, *lines[first:]])
+
+
+def _body_in_class(lines: list[str], at: int) -> tuple[int, str]:
+    """Return where lines begin that stand right in a class and further in than its methods, of which the line is one or
+    which it is the first of, and what its methods begin with: "" where there are none."""
+    first, above = at, next((n for n in range(at - 1, -1, -1) if without_texts(lines[n]).strip()), at)
+    level = _width(lines[at if DEFINES.match(lines[at].strip()) else above])
+    while first > 0 and (not without_texts(lines[first - 1]).strip() or _width(lines[first - 1]) > level):
+        first -= 1
+    first = next((n for n in range(first, at) if without_texts(lines[n]).strip()), at)
+    around = next((line for line in reversed(lines[:first]) if line.strip() and _width(line) < level), "")
+    is_inside = around.startswith("class ") and _width(lines[first]) > level
+    return (first, " " * level) if is_inside else (at, "")
 
 
 def _with_block_moved(lines: list[str], at: int) -> Iterator[str]:
