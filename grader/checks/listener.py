@@ -55,6 +55,8 @@ from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, failed_or_blocked, grade_again, passed
 from grader.wording import join_words, plural, significant
 
+UNCALLED: tuple[SlipKind, ...] = ("never-reached", "never-called")
+"""Why a line of a script is never run; a function that nothing calls may also be a spare one."""
 CALLBACK_HINT = (
     "print the message's .data in the callback, without a condition and with nothing slow beside it; "
     f"end with {SPIN}"
@@ -212,7 +214,9 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     elif verdict is None and topic in subscribed:
         message = f"the node subscribed to {topic}, but the grader sent nothing"
         verdict = grade_again(message)
-    elif verdict is None and (slip := run_slip(package, run, "never-reached")):
+    elif verdict is None and (
+        slip := run_slip(package, run, *(UNCALLED if not subscribed else UNCALLED[:1]))
+    ):
         message = f"the node never subscribes to {topic}: {slip.message}"
         verdict = failed(message, hint=f"in {slip.file}, {slip.fix}", citations=(slip.place,))
     elif verdict is None:

@@ -525,6 +525,28 @@ def test_a_publisher_that_nothing_uses_is_to_publish_where_the_script_works(
     assert found == [f"call `pub.publish(…)`{where}"]
 
 
+HEARS = (
+    "class Hear:\n    def __init__(self):\n        rospy.Subscriber('a', A, print)\nrospy.init_node('a')\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("below", "fixes"),
+    [
+        ("rospy.spin()\n", ["below line 4, write `hear = Hear()`"]),
+        ("# hear = Hear()\nrospy.spin()\n", ["remove the `#` from line 5"]),
+        ("Hear()\nrospy.spin()\n", []),
+        ("rospy.Subscriber('b', A, print)\nrospy.spin()\n", []),
+    ],
+)
+def test_a_class_that_nothing_makes(below: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(HEARS + below, encoding="utf-8")
+    found = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.fix for s in found if s.kind == "never-called"] == fixes
+    (tmp_path / "a.py").write_text(HEARS.partition("rospy.init")[0], encoding="utf-8")
+    assert not [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "never-called"]
+
+
 def test_a_timers_callback_that_no_timer_is_given(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text("def send(event):\n    pub.publish(1)\nrospy.spin()\n", encoding="utf-8")
     found = [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "never-called"]

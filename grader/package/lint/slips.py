@@ -145,6 +145,9 @@ def never_run(tree):
         if {dotted(base) for base in one.bases} - plain:
             plain.discard(one.name)
             named |= {f.name for f in one.body if isinstance(f, ast.FunctionDef)}
+    # of a module that only defines names, others may make all but what makes the node
+    if not is_module or calls_in(tree, "init_node"):
+        yield from never_made(tree, [c for c in classes if c.name in plain], named)
     for node in walk(tree):
         # A decorator may hand the function on to what calls it
         if isinstance(node, ast.FunctionDef) and node.name not in named and not node.decorator_list:
@@ -160,6 +163,26 @@ def never_run(tree):
             message = never_main(node, tree)
             if message:
                 yield slip(node.lineno, "main-guard", message)
+
+
+SETS_UP = ("init_node", "Publisher", "Subscriber", "Service", "Timer", "SimpleActionServer")
+
+
+def never_made(tree, classes, named):
+    """The class that sets up all that a script has of ROS, where nothing calls it."""
+    made = [f for c in classes for f in c.body if isinstance(f, ast.FunctionDef) and f.name == "__init__"]
+    made = [f for f in made if calls_in(f, *SETS_UP)]
+    whole, inner = calls_in(tree, *SETS_UP[1:]), [n for f in made for n in calls_in(f, *SETS_UP[1:])]
+    owner = parents_of(tree)[made[0]] if len(made) == 1 and len(whole) == len(inner) else None
+    if owner is None or owner.name in named or owner.decorator_list:
+        return
+    inits = [n.lineno for n in calls_in(tree, "init_node") if n not in set(ast.walk(owner))]
+    mains = [n.lineno for n in tree.body if isinstance(n, ast.If) and "__name__" in names_in(n.test)]
+    where = "below line %d" % (inits + mains)[0] if inits or mains else "at the end of the script"
+    asked = [a.arg for a in made[0].args.args[1 : len(made[0].args.args) - len(made[0].args.defaults)]]
+    fix = "%s, write `%s = %s(%s)`" % (where, owner.name.lower(), owner.name, ", ".join(asked))
+    message = "nothing calls `%s()`, so its `__init__` never runs" % owner.name
+    yield slip(owner.lineno, "never-called", message, fix, owner.name)
 
 
 def never_main(node, tree):

@@ -132,7 +132,11 @@ def check(root, name, with_slips=True):
             return report
         text = data.decode("utf-8", "replace")
         if with_slips:
-            report["slips"] = [*slips(tree), *argument_texts(text), *commented_calls(text)]
+            report["slips"] = [
+                *with_comments(slips(tree), text),
+                *argument_texts(text),
+                *commented_calls(text),
+            ]
     return report
 
 
@@ -223,6 +227,22 @@ COMMENTED_CALL = re.compile(
     r"log\w+(?=\(.*\w\.data\b)|print(?=\(.*\w\.data\b))\(.*\))"
     r"(?(quotes)(?P=quotes))\s*(?:#.*)?"
 )
+
+
+COMMENTED_NAME = re.compile(r"\s*#[#\s]*(?:\w+\s*=\s*)?(\w+)\(.*\)\s*")
+
+
+def with_comments(found, text):
+    """Return the slips; what nothing calls is said to be called in a comment, where there is one such call."""
+    lines = enumerate(text.splitlines(), 1)
+    called = [
+        (m[1], n) for n, m in ((n, COMMENTED_NAME.fullmatch(line[:TEXT_LIMIT])) for n, line in lines) if m
+    ]
+    names, where = [name for name, _ in called], dict(called)
+    for one in found:
+        name = one.get("name", "")
+        again = one["kind"] == "never-called" and names.count(name) == 1
+        yield {**one, "fix": "remove the `#` from line %d" % where[name]} if again else one
 
 
 def commented_calls(text):
