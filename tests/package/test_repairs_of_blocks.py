@@ -60,6 +60,7 @@ LOST = [line for line in TICKER.split("\n") if line.strip().startswith(("def", "
 FORGOTTEN = TICKER.replace(
     "    def tick(self, event):\n", "    def run_on(self):\n        rate = rospy.Rate(10)\n\n"
 )
+OTHERS = "get_param, is_shutdown, Publisher, Rate"
 
 CASES = {
     "further-in-than-what-nothing-reaches": Case(
@@ -83,6 +84,14 @@ CASES = {
         swapped(TALKER, ("        rate.sleep()", "        if a:\n        rate.sleep()")), ["python-syntax"],
         "line 12 of src/talker.py: this block needs a line of its own",
         after={TALKER: "        if a:\n            pass\n        rate.sleep()"}),
+    "import-of-rospys-names-that-is-missing": Case(
+        {TALKER: FROM_ROSPY.replace("    from rospy import init_node, spin\n", "")}, ["missing-import"],
+        "Publisher, Rate, get_param, init_node, is_shutdown and spin are not imported from rospy",
+        after={TALKER: "\nfrom rospy import Publisher, Rate, get_param, init_node, is_shutdown, spin\n"}),
+    "import-of-rospys-names-in-a-comment": Case(
+        {TALKER: FROM_ROSPY.replace("    from rospy import", f"# from rospy import {OTHERS},")},
+        ["missing-import"], "line 2 of src/talker.py: this line, which imports from rospy, is commented out",
+        after={TALKER: "\nfrom rospy import get_param, is_shutdown, Publisher, Rate, init_node, spin\n"}),
     "statement-that-is-misspelt": Case(
         swapped(TALKER, ("        rate.sleep()", "        if a:\n            contniue\n        rate.sleep()")),
         ["missing-call"], "line 12 of src/talker.py: contniue is not defined", after={TALKER: " continue\n"}),

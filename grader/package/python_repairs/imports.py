@@ -25,7 +25,7 @@ from grader.package.python_repairs.syntax import (
     tree_of,
     with_line,
 )
-from grader.wording import is_one_edit
+from grader.wording import is_one_edit, join_words
 
 MESSAGES = {
     "std_msgs": "Bool Byte Char ColorRGBA Empty Float32 Float32MultiArray Float64 Float64MultiArray Int16 "
@@ -51,6 +51,14 @@ MODULES_OF_MESSAGES = ("point_cloud2",)
 """Modules beside the `msg` of a package of messages, called nearly like a class."""
 NO_MESSAGES = "messages are not imported from {}"
 SUFFIX = "the module of {} is called {}"
+OF_ROSPY = frozenset({
+    "Duration", "Publisher", "ROSException", "ROSInterruptException", "Rate", "Service", "ServiceException",
+    "ServiceProxy", "Subscriber", "Time", "Timer", "get_caller_id", "get_name", "get_param", "get_rostime",
+    "get_time", "init_node",
+    "is_shutdown", "logdebug", "logerr", "loginfo", "logwarn", "on_shutdown", "set_param", "signal_shutdown", "sleep",
+    "spin", "wait_for_message", "wait_for_service",
+})  # fmt: skip
+"""What scripts import from rospy."""
 MODULES = frozenset({"math", "os", "random", "rospy", "sys", "time"})
 
 
@@ -178,6 +186,14 @@ def _with_inner_module(text: str, node: ast.Import) -> Iterator[Step]:
 
 
 def with_imports(text: str, types: list[str]) -> Iterator[Step]:
+    """The import of what a script uses: the names of rospy, then classes of messages and modules."""
+    for step in _with_names_of_rospy(text):
+        text = step["text"]
+        yield step
+    yield from _with_each_import(text, types)
+
+
+def _with_each_import(text: str, types: list[str]) -> Iterator[Step]:
     tree = tree_of(text)
     bound = bound_in(tree)
     if "*" in bound:
@@ -210,6 +226,30 @@ def with_imports(text: str, types: list[str]) -> Iterator[Step]:
         for step in step_to("import", missing[name], text, after, name):
             text = step["text"]
             yield step
+
+
+def _with_names_of_rospy(text: str) -> Iterator[Step]:
+    """`from rospy import …`, with all that a script without rospy takes from it: the line is missing, or a comment."""
+    tree, lines = tree_of(text), text.split("\n")
+    modules, bound = (
+        {one.name for n in nodes_in(tree) if isinstance(n, ast.Import) for one in n.names},
+        bound_in(tree),
+    )
+    named = {
+        n.id: n.lineno for n in nodes_in(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)
+    }
+    lost = sorted(named.keys() & OF_ROSPY - bound)
+    if "init_node" not in lost or "rospy" in modules or "*" in bound:
+        return
+    in_comments = (re.match(r"#[#\s]*(from\s+rospy\s+import\s.*\binit_node\b.*)", line) for line in lines)
+    number, found = next(((n, one) for n, one in enumerate(in_comments) if one), (0, None))
+    if found is not None:
+        why = "this line, which imports from rospy, is commented out: delete its `#`"
+        yield from step_to("module", number + 1, text, with_line(lines, number, found[1]), why)
+    else:
+        why = f"{join_words(lost)} {'are' if lost[1:] else 'is'} not imported from rospy"
+        after = _add_import(text, f"from rospy import {', '.join(lost)}", "", "")
+        yield from step_to("module", named["init_node"], text, after, why)
 
 
 def _imported_instead(tree: ast.Module, name: str, package: str, types: list[str]) -> str:
