@@ -121,6 +121,11 @@ def test_a_method_that_is_not_there_has_no_lost_first_line(tmp_path: Path) -> No
         tmp_path, {TALKER: FORGOTTEN.replace("self.count = (", "rate.sleep()\n        self.count = (")}
     )
     assert repair_all(folder) == ()
+    begins = "    def run(self):\n        self.rate = rospy.Rate(1)\n\n        self.n = 0\n        self.rate.sleep()\n"
+    whole = (
+        TICKER[: TICKER.index("    def __init__")].replace(DOCSTRING, "") + begins + "\n\nTicker().run()\n"
+    )
+    assert repair_all(package(tmp_path, {TALKER: whole})) == ()
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -35,9 +35,10 @@ def lost_head(text: str, body: str) -> str:
     return f"def {lost[0]}({value[1] if value else named[lost[0]]}):"
 
 
-def lost_method(text: str, above: str, body: str) -> str:
+def lost_method(text: str, above: str, body: str, *, at_first: bool = False) -> str:
     """Return the first line of the one method that the script calls, or names as a callback, and that the class does
-    not have, or of its `__init__`; "" where there is no such class or method. `above` is the text down to the body."""
+    not have; "" where there is none. `above` is the text down to the body: where that stands right in
+    the class, `at_first`, it may be that of `__init__`."""
     code = re.sub(r"#[^\n]*", "", text)
     top = next((one for one in reversed(above.split("\n")) if one[:1].strip(" \t#")), "")
     owner = re.match(r"class\s+(\w+)\s*(?:\(\s*(?:object)?\s*\))?\s*:", top)
@@ -51,7 +52,7 @@ def lost_method(text: str, above: str, body: str) -> str:
         *re.findall(r"\bself\.(\w+)(?=\s*(?:[,:].{0,200})?=(?!=))", code),
     }
     lost = [name for name in dict.fromkeys(used) if name not in has]
-    if not lost and "__init__" not in has and re.search(r"\bself\.\w+\s*=(?!=)", body):
+    if at_first and not lost and "__init__" not in has and re.search(r"\bself\b", body):
         lost = ["__init__"]
     taken = _unknown(code, body)
     if len(lost) != 1 or taken is None or any(is_one_edit(lost[0], name) for name in has):

@@ -368,7 +368,8 @@ def _with_method(lines: list[str], at: int) -> Iterator[str]:
     """Yield the text with the first line of a method above its body, which stands right in its class."""
     first, level = _body_in_class(lines, at)
     body = "\n".join(takewhile(lambda line: not line.strip() or _width(line) > len(level), lines[first:]))
-    if level and (head := lost_method("\n".join(lines), "\n".join(lines[:first]), body)):
+    above = "\n".join(lines[:first])
+    if level and (head := lost_method("\n".join(lines), above, body, at_first=True)):
         yield "\n".join([*lines[:first], level + head, *lines[first:]])
 
 
