@@ -506,8 +506,9 @@ def test_what_becomes_of_results(
 @pytest.mark.parametrize(
     ("around", "where"),
     [
-        ("rospy.Subscriber('a', Int8, heard)\n", " in the callback"),
-        ("rospy.Timer(rospy.Duration(1), heard)\n", " in the callback"),
+        ("rospy.Subscriber('a', Int8, heard)\n", " in the callback `heard`, line 1"),
+        ("rospy.Timer(rospy.Duration(1), heard)\n", " in the callback `heard`, line 1"),
+        ("rospy.Timer(1, heard)\nrospy.Timer(1, other)\n", " in the callback"),
         ("while not rospy.is_shutdown():\n    rate.sleep()\n", " inside the loop"),
         (
             "rospy.Subscriber('a', Int8, heard)\nwhile not rospy.is_shutdown():\n    rate.sleep()\n",

@@ -40,7 +40,7 @@ from script_tree import (
     text_of,
     walk,
 )
-from script_values import stored_in
+from script_values import in_callback, stored_in
 
 
 def object_slips(tree):
@@ -377,7 +377,7 @@ def unused_publishers(tree):
     if reads_names_in_texts(tree):
         return
     answers = calls_in(tree, "Subscriber", "Timer") and not all_of(tree, ast.While)
-    where = " in the callback" if answers else " inside the loop" if all_of(tree, *LOOPS) else ""
+    where = in_callback(tree) if answers else " inside the loop" if all_of(tree, *LOOPS) else ""
     for node in all_of(tree, ast.Assign):
         name = dotted(node.targets[0])
         topics = argument(node.value, 0, "name") if is_call(node.value, "Publisher") else []

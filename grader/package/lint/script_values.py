@@ -552,3 +552,12 @@ def held_open(tree):
         if mode and text_of(mode[0]).startswith("w") and spins:
             held.setdefault(ast.dump(node.args[0]), []).append(node)
     return held
+
+
+def in_callback(tree):
+    """Return where a script that waits for messages, or for a timer, does its work."""
+    calls = calls_in(tree, "Subscriber", "Timer")
+    given = [one for n in calls for one in argument(n, 1 if called_name(n) == "Timer" else 2, "callback")]
+    own = {functions_in(tree).get(dotted(one).rpartition(".")[2]) for one in given}
+    one = own.pop() if len(own) == 1 else None
+    return " in the callback" + (" `%s`, line %d" % (one.name, one.lineno) if one else "")
