@@ -176,7 +176,8 @@ def never_made(tree, classes, named):
     owner = parents_of(tree)[made[0]] if len(made) == 1 and len(whole) == len(inner) else None
     if owner is None or owner.name in named or owner.decorator_list:
         return
-    inits = [n.lineno for n in calls_in(tree, "init_node") if n not in set(ast.walk(owner))]
+    inside = set(ast.walk(owner))
+    inits = [n.lineno for n in calls_in(tree, "init_node") if n not in inside]
     mains = [n.lineno for n in tree.body if isinstance(n, ast.If) and "__name__" in names_in(n.test)]
     where = "below line %d" % (inits + mains)[0] if inits or mains else "at the end of the script"
     asked = [a.arg for a in made[0].args.args[1 : len(made[0].args.args) - len(made[0].args.defaults)]]

@@ -290,9 +290,9 @@ def _with_method(text: str, tree: ast.Module, lines: list[str]) -> Iterator[Step
     owners = [n for n in tree.body if isinstance(n, ast.ClassDef)]
     methods = [n for one in owners for n in one.body if isinstance(n, ast.FunctionDef)]
     blocks: list[ast.ClassDef | ast.FunctionDef] = [*owners, *methods]
-    for block in blocks:
+    for block in blocks[:BLOCKS_MAX]:
         kept = {n.id for n in nodes_in(block) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
-        for before, after in pairwise(block.body):
+        for before, after in pairwise(block.body[:BLOCKS_MAX]):
             first = after.lineno - 1
             apart = sum(not line.strip() for line in lines[before.end_lineno or 0 : first])
             body = "\n".join(lines[first : block.end_lineno])
@@ -318,8 +318,8 @@ def _runs(tree: ast.Module) -> Iterator[ast.stmt]:
     return (one for one in tree.body if not isinstance(one, plain))
 
 
-BLANK_LINES = 2
-"""So many stand between a function and what comes after it (PEP 8)."""
+BLOCKS_MAX, BLANK_LINES = 40, 2
+"""So many blocks are searched; so many blank lines stand between a function and what comes after it (PEP 8)."""
 
 
 def _with_lines_inside(text: str) -> Iterator[Step]:
