@@ -24,7 +24,6 @@ from grader.checks.support.processes import (
     lives,
     named_at,
     not_started,
-    run_slips,
 )
 from grader.checks.support.text import (
     IN_OWN_WORDS,
@@ -43,6 +42,7 @@ from grader.checks.support.text import (
 from grader.checks.support.topics import (
     call_in_comment,
     cite,
+    files_that_run,
     misfit,
     refused_type,
     run_slip,
@@ -383,10 +383,10 @@ def _by_callback(
     package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe], params: HearsParams
 ) -> Verdict | None:
     """What the source of the topic's callback says of it: it prints nothing of a message, or not each of them."""
-    told = run_slips(package, run, "not-printed", "printed-in-part")
-    found = [
-        s for s in told if not s.name or is_written_as(s.name, params.topic)
-    ]  # a name in a variable is not known
+    kinds, files = ("not-printed", "printed-in-part"), files_that_run(package, run)
+    told = [s for s in package.slips if s.kind in kinds and s.file in files]
+    # a name in a variable is not known
+    found = [s for s in told if not s.name or is_written_as(s.name, params.topic)]
     few = 2 * len(missing) < len(probes)  # another number may happen to be one that was sent
     if len(found) != 1 or (found[0].kind == "not-printed" and few):
         return None

@@ -82,6 +82,17 @@ _DECLARES = re.compile(r"\b(?:int|char|void|bool)\s*$")
 _TURNED = re.compile(r"180|rad|PI\b", re.IGNORECASE)
 """So an angle in degrees is made one in radians."""
 _BRACE, _BRACKET = re.compile(r"[{}]"), re.compile(r"[][(){},]")
+_PARAMETER = re.compile(
+    r"\bstd_msgs::\w+(?P<arrow>[^(){};,]*Ptr\b)?[^(){};,]*\b(?P<name>\w+)\s*\)\s*(?:const\s*)?\{$"
+)
+_PRINTS = re.compile(
+    r"\b(?:ROS_(?:INFO|WARN|ERROR|FATAL)\w*\s*\(|c(?:out|err)\s*<<|f?printf\s*\(|f?puts\s*\()(?P<what>[^;{}]*)"
+)
+_VARIABLE = re.compile(r"(?<![\w.>:])[A-Za-z_]\w*(?!\w|\s*::|\s*\()")
+_IN_PLACE = r"(?:\w*sort|reverse|\w*shuffle|transform|rotate|swap|unique|fill)"
+_NO_VALUES = frozenset({"endl", "stdout", "stderr", "cout", "flush"})
+PRINTS_MAX = 5
+"""A callback with more calls that print, or a call with more names, is not looked at."""
 _WHOLE_TURN = 7
 """Of a number of radians, no one writes more."""
 
@@ -112,6 +123,7 @@ def slips_of(path: str, text: str) -> Iterator[PythonSlip]:
     yield from _waiting(path, code)
     yield from _unspun(path, code)
     yield from _made_again(path, code)
+    yield from _prints_another(path, code)
     yield from _without_main(path, text, code)
     yield from _degrees(path, code)
     if _MAIN.search(code):
@@ -252,6 +264,48 @@ def _made_again(path: str, code: str) -> Iterator[PythonSlip]:
             message = f"the loop on line {_line(code, loop.start())} {what}"
             fix = f"move line {line} above the loop"
             yield PythonSlip(file=path, line=line, kind="callback-waits", message=message, fix=fix)
+
+
+def _prints_another(path: str, code: str) -> Iterator[PythonSlip]:
+    """Yield what a callback prints in place of what it hears: another variable, or one that it has changed."""
+    for body in dict.fromkeys(_callbacks(code)):
+        prints = [*_PRINTS.finditer(code, body.start, body.end)]
+        head = _PARAMETER.search(code[max(0, body.start - BEFORE_CHARS) : body.start])
+        if not 0 < len(prints) <= PRINTS_MAX or head is None:
+            continue
+        value = f"{head['name']}{'->' if head['arrow'] else '.'}data"
+        is_whole = re.search(rf"\b{head['name']}\b(?!\s*(?:->|\.))", code[body.start : body.end])
+        if is_whole or any(head["name"] in one["what"] for one in prints):
+            continue  # it prints it, or another function does
+        told = {_printed_instead(one, code[body.start : one.start()], head["name"]) for one in prints}
+        if len(told) == 1 and (what := told.pop()):
+            line = _line(code, prints[0].start())
+            fix = f"on line {line}, print `{value}` itself"
+            yield PythonSlip(
+                file=path, line=line, kind="not-printed", message=f"line {line} prints {what}", fix=fix
+            )
+
+
+def _printed_instead(call: re.Match[str], before: str, own: str) -> str:
+    """Return what a call prints that is not the value of the message `own`, "" where it may be that value."""
+    names = [name for name in dict.fromkeys(_VARIABLE.findall(call["what"])) if name not in _NO_VALUES]
+    for name in names[:PRINTS_MAX]:
+        words = [re.compile(rf"\b{word}\b") for word in (name, own)]
+        given = [one for one in before.split(";") if all(word.search(one) for word in words)]
+        if any(len(one) > BEFORE_CHARS for one in given):
+            return ""
+        whole = rf"{own}\s*(?:->|\.)\s*data\b(?:\s*\.\s*c_str\(\))?"
+        made = rf"\b{name}\s*[=({{]\s*{whole}\s*(?P<more>[^)}}\s].*)?[)}}]?\s*$"
+        found = [re.search(made, one) for one in given]
+        changes = rf"\b{name}\s*(?:\[[^];]{{0,80}}\]\s*)?[-+*/%]=|\b{_IN_PLACE}\s*\([^;]{{0,80}}\b{name}\b"
+        is_other = any(one and one["more"] for one in found) or re.search(changes, before)
+        if given and (not is_other or not all(found)):
+            return ""
+        if given:
+            return f"`{name}`, which is made of the message's value, and not the value itself"
+    if not names:
+        return "nothing of the message"
+    return f"`{names[0]}`, and not the message's value" if len(names) == 1 else ""
 
 
 def _made_in(body: _Body, code: str) -> re.Match[str] | None:

@@ -110,7 +110,7 @@ def test_a_lambda_that_waits() -> None:
         "while (true) { if (done) break; }",
         "ros::Duration(0.01).sleep();",
         "usleep(1000);",
-        'ROS_INFO("sleep(5)");',
+        'ROS_INFO("sleep(5) %d", distance->data);',
         "while (i < 3) i++;",
         "message.data = std::sin(angle * M_PI / 180);",
         "message.data = cos(yaw);",
@@ -319,3 +319,29 @@ def test_a_subscription_by_a_variable_is_kept(tmp_path: Path) -> None:
     node = "int main() {\n  ros::NodeHandle nh;\n  nh.subscribe(topic, 1, hear);\n  ros::spin();\n}\n"
     folder = package(tmp_path, {"src/a.cpp": node})
     assert [one.line for one in find_repairs(folder, facts_of(folder), WANTED)] == [3]
+
+
+CHANGED = "which is made of the message's value, and not the value itself"
+
+
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [
+        ("auto s = msg->data; std::sort(s.begin(), s.end()); cout << s << std::endl;", f"`s`, {CHANGED}"),
+        ('int x = msg->data * 2; ROS_INFO("%d", x);', f"`x`, {CHANGED}"),
+        ("int x(msg->data); x += 2; ROS_INFO_STREAM(x);", f"`x`, {CHANGED}"),
+        ('ROS_INFO("I heard %d", count);', "`count`, and not the message's value"),
+        ('ROS_INFO("I heard it");', "nothing of the message"),
+        ('auto s = msg->data; ROS_INFO("%s", s.c_str());', ""),
+        ("std::string s(msg->data.c_str()); std::cout << s << std::endl;", ""),
+        ("std::stringstream ss; ss << msg->data; std::cout << ss.str();", ""),
+        ('sprintf(b, "%s", msg->data.c_str()); puts(b);', ""),
+        ("total += msg->data; std::cout << total;", ""),
+        ("show(msg); std::cout << count;", ""),
+        ('ROS_INFO("I heard"); ROS_INFO("%s", msg->data.c_str());', ""),
+    ],
+)
+def test_what_a_callback_prints_in_place_of_its_message(body: str, told: str) -> None:
+    code = f"void hear(const std_msgs::String::ConstPtr& msg)\n{{\n{body}\n}}\nint main() {{ {HEARS} ros::spin(); }}"
+    found = [(one.message, one.fix) for one in slips_of("src/node.cpp", code) if one.kind == "not-printed"]
+    assert found == [(f"line 3 prints {told}", "on line 3, print `msg->data` itself")] * bool(told)

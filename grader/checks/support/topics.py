@@ -470,7 +470,7 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
     ):
         why = f"line {slip.line} of {slip.file}: {slip.message}"
         return verdict.explained(why, _reach_hint(slip), (slip.place,), cause=slip.message)
-    files = _files_that_run(package, run)
+    files = files_that_run(package, run)
     of_values = check.of_callbacks or check.name in OF_VALUES or (check.name == "prints" and verdict.silent)
     kinds = ["wrong-value", "compared"] if of_values and not verdict.cause else []
     if check.name == "action-result" and verdict.wrong != "nothing" and ends_twice(run):
@@ -502,7 +502,7 @@ OF_RESULTS = ("prints", "rostest")
 """Checks of what comes of callbacks in the end."""
 
 
-def _files_that_run(package: PackageFacts, run: Run) -> set[str | None]:
+def files_that_run(package: PackageFacts, run: Run) -> set[str | None]:
     """Return the scripts that run, those that a launch file started, and the sources of programs of C++."""
     scripts = run_scripts(run)
     nodes = [node for file in package.launch_files for node in file.brings]
@@ -514,14 +514,14 @@ def _files_that_run(package: PackageFacts, run: Run) -> set[str | None]:
 
 def reads_keys(package: PackageFacts, run: Run) -> PythonSlip | None:
     """Return where a program of C++ reads what is typed: without any input it goes on, and may do nothing."""
-    files = _files_that_run(package, run) - run_scripts(run)
+    files = files_that_run(package, run) - run_scripts(run)
     return next((s for s in package.slips if s.kind == "input" and s.file in files), None)
 
 
 def explain_by_waiting_callback(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a lost mark with the callback that sleeps or never ends: until it returns, its script receives nothing."""
     of_callbacks = check.of_callbacks or check.name in OF_RESULTS
-    files = _files_that_run(package, run) if of_callbacks and not verdict.cause else ()
+    files = files_that_run(package, run) if of_callbacks and not verdict.cause else ()
     slip = next((s for s in package.slips if s.kind == "callback-waits" and s.file in files), None)
     # What should come before any callback does not wait for one.
     if slip is None or verdict.callbacks == "before":
