@@ -134,7 +134,7 @@ def test_where_a_counter_begins_is_known(tmp_path, code, found):
         ("n += 1\nif n > 127:\n n = 0\npub.publish(n)", "move line 3 below line 6"),
         # moved, it would let the reset keep the last number from being published
         ("n = n + 1\npub.publish(n)\nif n >= 127:\n n = 0",
-         "delete line 3, and below line 6 write `else:` with `n += 1` in it"),
+         "below line 6 write `else:`, and move line 3 into it"),
         ("n += 1\npub.publish(n)\nif n == 127:\n n = -1", "set `n` to -1 before the loop, as line 5 does"),
         ("n += 1\npub.publish(n)\nif n == 127:\n say(n)", "move line 3 below line 4"),
     ],

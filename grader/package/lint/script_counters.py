@@ -204,7 +204,7 @@ def added_later(one, name, publishes, after):
         return "move %s below line %d" % (lines, publishes.end_lineno)
     if to[0] < 0:
         return "set `%s` to %d before the loop, as line %d does" % (name, to[0], reset.lineno)
-    return "delete %s, and below line %d write `else:` with `%s += 1` in it" % (lines, reset.end_lineno, name)
+    return "below line %d write `else:`, and move %s into it" % (reset.end_lineno, lines)
 
 
 def put_in_messages(node):
