@@ -86,6 +86,8 @@ def without_place(text: str, place: str) -> str:
     beginnings = [f"{file}{comma} line {number}: " for comma in ("", ",", ":")]
     text = next((text.removeprefix(one) for one in beginnings if text.startswith(one)), text)
     text = text.replace(f" ({file}, line {number})", "").replace(f"line {number} of {file}", f"line {number}")
+    text = text.replace(f"; in {file}, line {number} ", f"; line {number} ")
+    text = text.replace(f"in {file}, line {number}", f"on line {number}")
     return text.replace(f"{file}, line {number}", f"line {number}")
 
 

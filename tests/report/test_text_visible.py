@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from fixtures.make import labs, rubric_of
 from grader.model.verdict import FileCitation
 from grader.report.text import code_parts, markdown, markdown_block
-from grader.report.view import caret, commands_in, headline, hint_beside, steps, where_to_type
+from grader.report.view import caret, commands_in, headline, hint_beside, steps, where_to_type, without_place
 from grader.untrusted_text import (
     HIDDEN_CATEGORIES,
     clip,
@@ -158,6 +158,19 @@ def test_a_fix_says_in_which_line(hint, shown) -> None:
         .model_copy(update={"hint": hint, "citations": (FileCitation(file="src/a.py", line=3),)})
     )
     assert hint_beside(criterion, "src/a.py:3") == shown
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("not printed; in src/a.py, line 3 prints `n`", "not printed; line 3 prints `n`"),
+        ("the loop in src/a.py, line 3, never ends", "the loop on line 3, never ends"),
+        ("`n` (src/a.py, line 3) is new", "`n` is new"),
+        ("in src/b.py, line 3 prints `n`", "in src/b.py, line 3 prints `n`"),
+    ],
+)
+def test_a_file_that_stands_beside_is_not_named_again(text, shown) -> None:
+    assert without_place(text, "src/a.py:3") == shown
 
 
 @pytest.mark.parametrize(
