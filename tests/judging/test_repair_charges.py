@@ -579,18 +579,9 @@ def test_what_runs_beside_a_program_that_was_not_built_is_left_open() -> None:
         "cmake": {"calls": [["add_executable", "mean", "src/mean.cpp"]]},
     }
     scenario = {**SCENARIO, "start": [*SCENARIO["start"], {"name": "mean", "script": "mean"}]}
-    done = {
-        "id": "done",
-        "check": "prints",
-        "with": {"process": "talker", "text": "done"},
-        "scenario": "talker",
-    }
-    apart = {
-        "id": "apart",
-        "check": "connected",
-        "with": {"topic": "/numeric_chatter", "subscriber": "mean"},
-        "scenario": "talker",
-    }
+    text, ends = {"process": "talker", "text": "done"}, {"topic": "/numeric_chatter", "subscriber": "mean"}
+    done = {"id": "done", "check": "prints", "with": text, "scenario": "talker"}
+    apart = {"id": "apart", "check": "connected", "with": ends, "scenario": "talker"}
     asked = rubric(done, apart, scenarios={"talker": scenario})
     said = [{"process": "talker", "line": "waiting"}]
     runs = build_runs({"runs": {"talker": {**GOOD_RUN, "console": said}}, "package": package})
