@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from itertools import islice, takewhile
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
 from cmake_parser import CMakeError, Token, parse_raw, parse_tree, resolve_args, tokenize
@@ -18,7 +18,7 @@ from cmake_parser import ast as nodes
 from cmake_parser.interpreter import Context
 
 from grader.model.file_fault import Fault
-from grader.model.package import CMAKE, CMakeCall, CMakeFacts
+from grader.model.package import CMAKE, INTERFACE_FOLDERS, CMakeCall, CMakeFacts
 from grader.package.cmake_corrections import find_slip, is_open
 from grader.package.reading import printable, read_markup
 from grader.syntax_fixes import MERGE_MARKER, MERGED
@@ -340,6 +340,22 @@ def _explain_fault(text: str, end: int, file: str, message: str) -> Fault:
     return _fault(file, line, message, cause, fix=fix, unclosed=unclosed)
 
 
+_HEADS = {
+    **dict.fromkeys(("CATKIN_DEPENDS", "INCLUDE_DIRS", "LIBRARIES", "DEPENDS"), "catkin_package"),
+    "DEPENDENCIES": "generate_messages",
+    "PROGRAMS": "catkin_install_python",
+    "TARGETS": "install",
+}
+"""The calls of which these words are the first ones."""
+_OF_FILES = {f".{folder}": f"{command}(FILES" for command, folder in INTERFACE_FOLDERS.items()}
+_OF_FILES[".py"] = "catkin_install_python(PROGRAMS"
+_OF_WORDS = {
+    "DESTINATION": "catkin_install_python(PROGRAMS",
+    "${catkin_INCLUDE_DIRS}": "include_directories(",
+}
+"""How the calls begin in which such files or words are."""
+
+
 def missing_head(tokens: list[Token], text: str) -> str:
     """Return how the call begins whose words and `)` are there alone, from the first of the tokens on; "" where that
     is not known."""
@@ -350,13 +366,12 @@ def missing_head(tokens: list[Token], text: str) -> str:
     below_comment = text[: behind[0].span.start].rstrip().rpartition("\n")[2].lstrip().startswith("#")
     called = set(re.findall(r"^\s*(\w+)\s*\(", text, re.MULTILINE))
     catkin = re.search(r"^\s*find_package\s*\(\s*catkin\b", text, re.MULTILINE)
-    if "DESTINATION" in inside or any(word.endswith(".py") for word in inside):
-        return "catkin_install_python(PROGRAMS"
-    if any("INCLUDE_DIRS" in word for word in inside):
-        return "include_directories("
-    for ending, command in ((".msg", "add_message_files"), (".srv", "add_service_files")):
-        if inside and inside[-1].endswith(ending):
-            return f"{command}(FILES"
+    if inside and inside[0] in _HEADS:
+        return f"{_HEADS[inside[0]]}("
+    words = ((PurePosixPath(word).suffix, word) for word in inside)
+    heads = (_OF_WORDS.get(word) or _OF_FILES.get(suffix) for suffix, word in words)
+    if head := next(filter(None, heads), None):
+        return head.removesuffix("FILES") if inside[0] == "FILES" else head
     if inside and not catkin and all(re.fullmatch(r"[a-z]\w+", word) for word in inside):
         return "find_package(catkin REQUIRED COMPONENTS"
     return "catkin_package(" if not inside and "catkin_package" not in called and below_comment else ""

@@ -517,6 +517,14 @@ RIGHT_BUILDS = {
         "src/b.cpp": "#include <lab/Own.h>\n",
     },
     "another-library-s-program": {CMAKELISTS: CMAKE + "cuda_add_executable(a src/a.cpp)\n"},
+    "roscpp-by-another-package": {
+        CMAKELISTS: CPP_CMAKE.replace(" roscpp", " tf") + LINKED, "src/a.cpp": "#include <ros/ros.h>\nint main() {}\n",
+    },
+    "folder-first": {
+        CMAKELISTS: CMAKE.replace("rospy", "rospy message_generation").replace(
+            "catkin_p", "add_message_files(DIRECTORY msg FILES Own.msg)\ngenerate_messages()\ncatkin_p"),
+        "msg/Own.msg": "int8 a\n",
+    },
     "found-by-another-package": {
         CMAKELISTS: CMAKE.replace("rospy", "rospy message_generation").replace(
             "catkin_p", "add_message_files(FILES Own.msg)\ngenerate_messages(DEPENDENCIES nav_msgs)\ncatkin_p"),

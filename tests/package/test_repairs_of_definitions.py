@@ -68,6 +68,21 @@ CASES = {
         ["build-line"], "add_message_files(…) needs the folder msg/, which is not there",
         after={CMAKELISTS: "message_generation rospy)\n\ncatkin_package"},
     ),
+    "no-keyword-before-the-files": Case(
+        {**RUN_OWN, CMAKELISTS: GENERATED.replace("FILES L", "L")}, ["build-line"], "write FILES before Level.msg",
+        after={CMAKELISTS: GENERATED},
+    ),
+    "no-keyword-before-the-packages": Case(
+        {**RUN_OWN, CMAKELISTS: GENERATED.replace("messages()", "messages(std_msgs)")}, ["build-line"],
+        "write DEPENDENCIES before std_msgs", after={CMAKELISTS: "generate_messages(DEPENDENCIES std_msgs)\n"},
+    ),
+    **{f"first-line-missing-above-{rest[:5]}": Case(
+        {**RUN_OWN, CMAKELISTS: GENERATED.replace(f"{head}({inside})", f"\n  {rest})")}, ["build-line"], f"`{head}(",
+        after={CMAKELISTS: f"{head}(\n  {rest})"},
+    ) for head, inside, rest in (
+        ("add_message_files", "FILES Level.msg", "FILES\n Level.msg\n"),
+        ("generate_messages", "", "DEPENDENCIES std_msgs\n"),
+    )},
     "own-name": Case({XML: MANIFEST.replace(">lab<", ">mine<"), CMAKELISTS: CMAKE.replace("lab", "mine")},
                  ["package-name"], "the package is called mine, not lab"),
     "own-package-misspelt": Case(

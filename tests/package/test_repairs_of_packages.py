@@ -47,6 +47,8 @@ int main(int argc, char** argv) {
   return 0;
 }
 """
+MEAN_CMAKE, LINKED = CMAKE.replace("rospy", "roscpp rospy"), "target_link_libraries(mean x)\n"
+MEAN = {"src/mean.cpp": "#include <ros/ros.h>\nint main() {}\n"}
 STARTED = asking(launch_files=("activity1.launch",), started=(("activity1.launch", "talker.py"),))
 CONSTRUCTOR = """\
 Node::Node() : n_(1)
@@ -339,6 +341,46 @@ CASES = {
         {CMAKELISTS: CMAKE + "add_executable(mean src/mean.cpp)\n", "src/mean.cpp": "int main() {}\n"}, ["build-line"],
         "below line 5 add `target_link_libraries(mean ${catkin_LIBRARIES})`",
     ),
+    "source-with-a-slip-in-its-ending": Case(
+        {CMAKELISTS: f"{MEAN_CMAKE}add_executable(mean src/mean.cppp)\n{LINKED}", **MEAN}, ["build-line"],
+        "write src/mean.cpp instead of src/mean.cppp", after={CMAKELISTS: "add_executable(mean src/mean.cpp)"},
+    ),
+    "program-and-source-turned": Case(
+        {CMAKELISTS: f"{MEAN_CMAKE}add_executable(src/mean.cpp mean)\n{LINKED}", **MEAN}, ["build-line"],
+        "write add_executable(mean src/mean.cpp)", after={CMAKELISTS: "add_executable(mean src/mean.cpp)"},
+    ),
+    "program-that-nothing-makes": Case(
+        {CMAKELISTS: f"{MEAN_CMAKE}add_dependencies(mean x)\n{LINKED}", **MEAN}, ["build-line"],
+        "above line 5, write add_executable(mean src/mean.cpp)",
+        after={CMAKELISTS: "catkin_package()\nadd_executable(mean src/mean.cpp)\nadd_dependencies(mean x)\n"},
+    ),
+    "program-in-a-comment": Case(
+        {CMAKELISTS: f"{MEAN_CMAKE}# add_executable(mean src/mean.cpp)\n{LINKED}", **MEAN}, ["build-line"],
+        "remove the `#` on line 5", after={CMAKELISTS: "\nadd_executable(mean src/mean.cpp)\n"},
+    ),
+    "program-without-roscpp": Case(
+        {CMAKELISTS: f"{CMAKE}add_executable(mean src/mean.cpp)\n{LINKED}", **MEAN}, ["build-line"],
+        "write roscpp after COMPONENTS", after={CMAKELISTS: "COMPONENTS roscpp rospy)"},
+    ),
+    "component-with-a-slip": Case(
+        swapped(CMAKELISTS, ("rospy", "ropsy")), ["build-line"], "write rospy instead of ropsy",
+        after={CMAKELISTS: CMAKE},
+    ),
+    "place-in-small-letters": Case(
+        {CMAKELISTS: CMAKE + INSTALL.replace("KAGE", "KaGE").replace("scripts/other.py", TALKER)},
+        ["build-line"], "there is no variable CATKIN_PACKaGE_BIN_DESTINATION",
+        after={CMAKELISTS: "DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})"},
+    ),
+    "scripts-without-a-place": Case(
+        {CMAKELISTS: f"{CMAKE}catkin_install_python(PROGRAMS {TALKER})\n"}, ["build-line"], "has no DESTINATION",
+        after={CMAKELISTS: "DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})"},
+    ),
+    **{f"first-line-of-{head}": Case(
+        {CMAKELISTS: CMAKE.replace("catkin_package()", rest)}, ["build-line"], f"`{head}(`",
+        after={CMAKELISTS: f"\n{head}(\n"},
+    ) for head, rest in {
+        "catkin_package": "\n  CATKIN_DEPENDS rospy\n)", "install": "catkin_package()\n\n  TARGETS x DESTINATION y\n)"
+    }.items()},
     "run-dependency": Case(
         {CMAKELISTS: CMAKE.replace("package()", "package(CATKIN_DEPENDS rospy message_runtime)")}, ["manifest-line"],
         "names message_runtime", after={XML: "  <exec_depend>message_runtime</exec_depend>"},

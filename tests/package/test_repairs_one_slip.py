@@ -166,7 +166,7 @@ SLIPS = {
         ("src/listener.py", "srclistener.py", "write src/listener.py instead of srclistener.py"),
         ("DESTINATION $", "DSTINATION $", "it is DESTINATION"),
         ("DESTINATION $", "$", "has no DESTINATION"),
-        ("${CATKIN_PACKAGE_BIN_DESTINATION}", "${catkin_package_bin_destination}", "is not where rosrun looks"),
+        ("${CATKIN_PACKAGE_BIN_DESTINATION}", "${catkin_package_bin_destination}", "there is no variable"),
     ],
     TALKER: [
         ("import rospy", "import ropy", "uses rospy, which is not imported"),

@@ -433,9 +433,16 @@ def _run_dependency(found: re.Match[str], package: PackageFacts, _lines: Sequenc
 
 
 def _unused_argument(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    why = f"catkin_package(…) does not know what to do with {shown(found[1].replace(';', ' '))}"
-    kept = "write it after INCLUDE_DIRS, LIBRARIES, CATKIN_DEPENDS or DEPENDS, spelt like this"
-    return Explained(why, "remove each `...` from its brackets" if "..." in found[1].split(";") else kept)
+    why = f"{found[1]}(…) does not know what to do with {shown(found[2].replace(';', ' '))}"
+    kept = f"write it after {_KEYWORDS.get(found[1], 'its keyword')}, spelt like this"
+    return Explained(why, "remove each `...` from its brackets" if "..." in found[2].split(";") else kept)
+
+
+_KEYWORDS = dict.fromkeys(OF_INTERFACES, "FILES") | {
+    "catkin_package": "INCLUDE_DIRS, LIBRARIES, CATKIN_DEPENDS or DEPENDS",
+    "generate_messages": "DEPENDENCIES",
+}
+_PLACE = "end it with `DESTINATION ${{CATKIN_PACKAGE_BIN_DESTINATION}}`, spelt like this"
 
 
 PLACEHOLDER = "it is only a placeholder in the help text of catkin_create_pkg"
@@ -528,10 +535,7 @@ def _not_catkin(found: re.Match[str], package: PackageFacts, _lines: Sequence[st
 
 
 _EXPLAINED: tuple[tuple[str, Explain], ...] = (
-    (
-        r'Could not find a package configuration file provided by "([\w-]+(?:[,;.:][\w,;.:-]*)?)"',
-        _missing_package,
-    ),
+    (r'Could not find a package \w+ file provided by "([\w-]+(?:[,;.:][\w,;.:-]*)?)"', _missing_package),
     (r'By not providing "Find([\w-]+)\.cmake"', _missing_library),
     (r"Could NOT find ([\w-]+) \(missing:", _missing_library),
     (r"(add_\w+_files)\(\) directory not found: (\S+)", _missing_folder),
@@ -576,7 +580,8 @@ _EXPLAINED: tuple[tuple[str, Explain], ...] = (
             "add <build_depend>{1}</build_depend> to package.xml",
         ),
     ),
-    (r"catkin_package\(\) called with unused arguments: (\S+)", _unused_argument),
+    (r"(\w+)\(\) called with unused arguments: (\S+)", _unused_argument),
+    (r"(\w+)\(\) called without required DESTINATION", told("{1}(…) does not say where to install", _PLACE)),
     (r"catkin_package\(\) DEPENDS on the catkin package '([^']+)' which must", _run_dependency),
     (
         r"catkin_package\(\) DEPENDS on (?:the catkin package )?'([^']+)'",

@@ -404,6 +404,10 @@ def _explain_unlinked(found: re.Match[str], package: PackageFacts, lines: Sequen
     program = alone[0] if alone else "<program>"
     own = "" if alone else "; a function of your own needs its .cpp file in add_executable(…)"
     why = f"{name} is used, but nothing that is linked defines it"
+    catkin = [call for call in cmake_calls(package, "find_package") if call.args[:1] == ("catkin",)]
+    if name.startswith("ros::") and catkin and not alone and not any("roscpp" in c.args for c in catkin):
+        words = "roscpp" if "COMPONENTS" in catkin[0].args else "COMPONENTS roscpp"
+        return Explained(why, f"in the find_package(…) on line {catkin[0].line}, add {words}")
     return Explained(why, f"write {call_below(program, 'target_link_libraries', '${catkin_LIBRARIES}')}{own}")
 
 

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import takewhile
 from pathlib import PurePosixPath
 
-from cmake_parser.ast import Token
+from cmake_parser.ast import Command, Token
 
 from grader.installable import is_no_package, known_packages, noetic_messages
-from grader.model.package import CMAKE, MAKES_PACKAGE, MANIFEST, SIMPLE, PackageFacts, meant_command
+from grader.model.package import (
+    CMAKE,
+    INTERFACE_FOLDERS,
+    MAKES_PACKAGE,
+    MANIFEST,
+    SIMPLE,
+    PackageFacts,
+    meant_command,
+)
 from grader.model.repair import RepairKind
 from grader.package.cmake_corrections import find_slip, is_open
 from grader.package.cmake_parse import commands_of, join_half_comment, parse_tree_of
@@ -34,6 +42,7 @@ from grader.package.repairs.interfaces import (
     define_as_asked,
     depend_on_exported,
     make_interfaces,
+    name_roscpp,
     needs_interfaces,
     wait_for_headers,
 )
@@ -45,11 +54,12 @@ from grader.package.repairs.programs import (
     install_scripts,
     leave_out_missing,
     link_programs,
+    make_programs,
     name_programs,
     name_targets,
     spell_variables,
 )
-from grader.wording import is_one_edit, join_words, numbers_text
+from grader.wording import join_words, numbers_text
 
 OF_WORKSPACE = "catkin_workspace"
 DEPENDS_MAX = 50
@@ -113,13 +123,16 @@ def repair_cmake(
     _move_project(files)
     _spell_catkin(files)
     _leave_out_modules(files)
+    _spell_packages(files, {"find_package": "COMPONENTS", GENERATE: "DEPENDENCIES"})
     if not _calls_catkin(files, package):
         line = f"find_package(catkin REQUIRED COMPONENTS {needs})"
         add_call(files, "find_package(catkin …)", line, ("project",))
     if not any(has_call(files, package, name) for name in MAKES_PACKAGE):
         below = (GENERATE, "find_package", "project")
         add_call(files, "catkin_package()", "catkin_package()", below)
+    name_roscpp(files, package)
     name_targets(files)
+    make_programs(files, package)
     spell_variables(files)
     wait_for_headers(files, package, name)
     if needs_interfaces(files, package, name, scripts):
@@ -195,7 +208,12 @@ KEYWORDS = {
     "install": ("TARGETS", "PROGRAMS", "DIRECTORY", "ARCHIVE", "LIBRARY", "RUNTIME", "DESTINATION"),
 }
 """Words of these calls that have to be in capitals and spelt so."""
-FIRST = {"cmake_minimum_required": "VERSION", INSTALL: "PROGRAMS"}
+FIRST = {
+    "cmake_minimum_required": "VERSION",
+    INSTALL: "PROGRAMS",
+    GENERATE: "DEPENDENCIES",
+    **dict.fromkeys(INTERFACE_FOLDERS, "FILES"),
+}
 """The words without which these calls mean nothing, and that come first."""
 
 
@@ -221,6 +239,8 @@ def _put_first(files: Files, name: str, words: Sequence[Token]) -> None:
     values = [word.value for word in words]
     if not right or not words or values[0] == right or "$" in values[0] or values[0].upper() == right:
         return
+    if values[0].isupper() and right in ("DEPENDENCIES", "FILES"):
+        return  # DIRECTORY and LANGS may come first
     text = cmake_text(files)
     behind = words[values.index(right)] if right in values else None
     text = replace_token(text, behind, "") if behind is not None else text
@@ -344,17 +364,35 @@ def _correct_include(files: Files) -> None:
 
 def _declare_exported(files: Files) -> None:
     """Declare in `package.xml` what `catkin_package(CATKIN_DEPENDS …)` names, as catkin asks for."""
+    _spell_packages(files, {"catkin_package": "CATKIN_DEPENDS"})
     for call in calls_of(files, "catkin_package"):
         for name in values_behind(call, "CATKIN_DEPENDS")[:DEPENDS_MAX]:
-            meant = [one for one in _declared(files) if is_one_edit(name, one) or name.lower() == one]
-            token = next(t for t in words_of(call) if t.value == name)
-            known = {*_declared(files), *known_packages(), *noetic_messages(), *OF_ROS}
-            if name not in known and len(meant) == 1:
-                why = f"catkin_package(…) names {name}, which is called {meant[0]}"
-                change_word(files, token, meant[0], why, f"write {meant[0]} instead of {name}", call=call)
-            elif re.fullmatch(r"\w+", name):
+            if re.fullmatch(r"\w+", name):
                 why = f"catkin_package(…) names {name}, and {MANIFEST} does not"
                 declare_for_running(files, name, f"line {call.line} of {CMAKE}: {why}")
+
+
+def _spell_packages(files: Files, keywords: Mapping[str, str]) -> None:
+    """Spell the packages that calls name behind these keywords as `package.xml` does, where there are none of those
+    names."""
+    declared = _declared(files)
+    known = {*declared, *known_packages(), *noetic_messages(), *OF_ROS}
+    listed = [(c, t) for name, k in keywords.items() for c in calls_of(files, name) for t in _listed(c, k)]
+    meant = [
+        (c, t, [one for one in declared if is_near(t.value, one)]) for c, t in listed if t.value not in known
+    ]
+    slips = [(call, token, right[0]) for call, token, right in meant if len(right) == 1]
+    for call, token, right in sorted(
+        slips[:CALLS_MAX], key=lambda one: -one[1].span.start
+    ):  # places above stay
+        why = f"{call.identifier}(…) names {token.value}, which is called {right}"
+        change_word(files, token, right, why, f"write {right} instead of {token.value}", call=call)
+
+
+def _listed(call: Command, keyword: str) -> list[Token]:
+    """Return the words behind a keyword."""
+    names = values_behind(call, keyword)[:DEPENDS_MAX]
+    return [token for token in words_of(call) if token.value in names]
 
 
 def _declared(files: Files) -> set[str]:

@@ -227,6 +227,19 @@ def _name_components(files: Files, names: Sequence[str]) -> None:
     change_word(files, token, f"{token.value} {new}", why, fix, call=of_catkin[0])
 
 
+def name_roscpp(files: Files, package: PackageFacts) -> None:
+    """Name roscpp in find_package(catkin …) where the source of a program includes ROS, and nothing named brings it."""
+    named = [name for name in _components(files)[1] if not name.isupper()]
+    sources = [f.path for f in package.files if is_own(f.path) and f.path.endswith(CPP)]
+    includes = re.compile(r"^\s*#\s*include\s*[<\"]ros/ros\.h", re.MULTILINE)
+    needed = calls_of(files, "add_executable") and any(includes.search(files.text(p) or "") for p in sources)
+    if needed and all(name.endswith("_msgs") or name in _WITHOUT_ROSCPP for name in named):
+        _name_components(files, ["roscpp"])
+
+
+_WITHOUT_ROSCPP = {"catkin", "rospy", "std_srvs", GENERATION, "message_runtime"}
+
+
 def define_as_asked(files: Files, package: PackageFacts, wanted: Wanted) -> None:
     """Put the parts of a service or an action into the order of the handout where whole parts have changed places, and
     between them the `---` that are missing; give fields the handout's types where others cannot stand for them."""

@@ -35,6 +35,42 @@ _IS_BIN = re.compile(
 """How the place where rosrun looks can be written with catkin's variables."""
 
 
+def _turn_programs(files: Files) -> None:
+    """Write the program's name in front of its source, where the two have changed places."""
+    for call in reversed(calls_of(files, "add_executable")[:CALLS_MAX]):  # places above stay
+        first, second, *_ = [*words_of(call), None, None]
+        if first is None or second is None or not first.value.endswith(CPP) or "." in second.value:
+            continue
+        if (files.folder / first.value).is_file() and not (files.folder / second.value).exists():
+            text = replace_token(replace_token(cmake_text(files), second, first.value), first, second.value)
+            fix = f"write add_executable({second.value} {first.value})"
+            why = "the program's name comes first in add_executable(…), and its source behind it"
+            change_line(files, call, text, why, fix)
+
+
+def make_programs(files: Files, package: PackageFacts) -> None:
+    """Make the program that a call is about, and none makes, of the only program's source that no call names."""
+    if calls_of(files, "foreach", "function", "macro", "include", "add_subdirectory"):
+        return
+    made = {target.value for call in calls_of(files, *MAKING) for target in words_of(call)[:1]}
+    named = {_plain(word.value) for call in calls_of(files, *MAKING) for word in words_of(call)[1:]}
+    sources = [f.path for f in package.files if is_own(f.path) and f.path.endswith(CPP)]
+    left = [path for path in sources if path not in named and _MAIN.search(files.text(path) or "")]
+    for call in calls_of(files, *OF_TARGETS[1:]):
+        target = _target_of(call)
+        if target is None or target.value in made or "$" in target.value or len(left) != 1:
+            continue
+        text, line = cmake_text(files), f"add_executable({target.value} {left[0]})"
+        at, commented = find_commented(text, rf"add_executable\s*\(\s*{re.escape(target.value)}\s") or (0, [])
+        fix = f"remove the `#` on line {at + 1}" if commented else f"above line {call.line}, write {line}"
+        changed = f"{text[: call.span.start]}{line}\n{text[call.span.start :]}"
+        change_line(files, call, changed, f"no add_executable(…) makes the program {target.value}", fix)
+        return
+
+
+_MAIN = re.compile(r"\bint\s+main\s*\(")
+
+
 def link_programs(files: Files, package: PackageFacts) -> None:
     """Link ROS to programs that nothing is linked to. A program without ROS is none the worse for it."""
     linked = {words[0].value for c in calls_of(files, "target_link_libraries") if (words := words_of(c))}
@@ -52,6 +88,7 @@ def link_programs(files: Files, package: PackageFacts) -> None:
 
 def name_targets(files: Files) -> None:
     """Call what waits for a target, links to it or installs it by the target's name, below the call that makes it."""
+    _turn_programs(files)
     # Where a file makes targets in such ways, which there are is for CMake to say.
     if calls_of(files, "foreach", "function", "macro", "include", "add_subdirectory"):
         return
@@ -66,15 +103,16 @@ def name_targets(files: Files) -> None:
             return
 
 
-OF_CATKIN = ("catkin_LIBRARIES", "catkin_INCLUDE_DIRS", "catkin_EXPORTED_TARGETS")
-"""Variables that find_package(catkin …) sets."""
+OF_CATKIN = ("catkin_LIBRARIES", "catkin_INCLUDE_DIRS", "catkin_EXPORTED_TARGETS", BIN[2:-1])
+"""Variables that find_package(catkin …) and catkin_package(…) set."""
 _VARIABLE = re.compile(r"\$\{(\w+)\}")
 
 
 def spell_variables(files: Files) -> None:
     """Write catkin's variables for slips of them, which CMake takes for empty."""
     plain = {token.value for token in all_words(files)}
-    for call in reversed(calls_of(files, "target_link_libraries", "include_directories", "add_dependencies")):
+    using = ("target_link_libraries", "include_directories", "add_dependencies", "install", INSTALL)
+    for call in reversed(calls_of(files, *using)):
         for token in reversed(words_of(call)):  # places in front stay
             name = found[1] if (found := _VARIABLE.fullmatch(token.value)) else ""
             singular = name.replace("LIBRARY", "LIBRARIES")
@@ -202,10 +240,11 @@ def _meant_file(files: Files, word: str, own: Sequence[str], written: Collection
     """Return where the only file lies that a word means which names none; "" where it is not plain. What `written`
     names is meant there."""
     path = PurePosixPath(_plain(word))
-    if path.suffix not in (".py", *CPP) or not _is_missing(files, word, ()):
+    if not path.suffix or not _is_missing(files, word, ()):
         return ""
     same = [one for one in own if PurePosixPath(one).name == path.name]
-    near = [one for one in own if one not in written and _is_slip_of(path, PurePosixPath(one))]
+    sources = (one for one in own if one not in written and one.endswith((".py", *CPP)))
+    near = [one for one in sources if _is_slip_of(path, PurePosixPath(one))]
     found = same or near
     return found[0] if len(found) == 1 else ""
 
@@ -335,14 +374,15 @@ def _is_about(given: str, name: str) -> bool:
 
 
 def _correct_destination(files: Files, scripts: Collection[str]) -> None:
-    """Of a call that names one of the scripts: another of catkin's places, or a slip in this one's name."""
+    """Write the place of a call that has none, and, of one that names one of the scripts, catkin's place for these in
+    place of another, or of a slip of its name."""
     for call in calls_of(files, INSTALL):
         words = words_of(call)
         at = next((i for i, t in enumerate(words) if t.value == "DESTINATION"), len(words))
         given = words[at + 1] if at + 1 < len(words) else None
         names_one = any(_plain(t.value) in scripts for t in words)
         place = next((w for w in words if "CATKIN_PACKAGE_BIN_DESTINATION" in w.value.upper()), None)
-        if names_one and at in (len(words), len(words) - 1) and "PROGRAMS" in [t.value for t in words]:
+        if at in (len(words), len(words) - 1) and "PROGRAMS" in [t.value for t in words]:
             text, last = cmake_text(files), words[-1].span.stop
             lacks = "DESTINATION" if at == len(words) else "place behind DESTINATION"
             if place is not None:
