@@ -13,6 +13,7 @@ from grader.wording import join_words, the_same_on
 
 _CHARS_MAX = 12_000
 _CALL_LINES_MAX = 12
+_NESTED_MAX = 3
 _COMMANDS = "|".join(sorted(CMAKE_COMMANDS, key=len, reverse=True))
 _BEGIN = "the command's `(` is missing"
 _VARIABLE = "a variable is written `${{{1}}}`"
@@ -158,4 +159,6 @@ def is_good(text: str) -> bool:
 
 def is_open(word: str) -> bool:
     """Return whether a variable in the word is begun and not closed, or closed and not begun."""
-    return bool(re.search(r"[{}]|\$\w", re.sub(r"\$\w*\{[^\s{}]*\}|\$<.*>", "", word)))
+    for _ in range(_NESTED_MAX):  # of `${${PROJECT_NAME}_EXPORTED_TARGETS}`, the inner one first
+        word = re.sub(r"\$\w*\{[^\s{}]*\}|\$<.*>", "_", word)
+    return bool(re.search(r"[{}]|\$\w", word))

@@ -366,6 +366,11 @@ CASES = {
         swapped(CMAKELISTS, ("rospy", "ropsy")), ["build-line"], "write rospy instead of ropsy",
         after={CMAKELISTS: CMAKE},
     ),
+    "bracket-beside-a-variable-in-a-variable": Case(
+        {CMAKELISTS: f"{MEAN_CMAKE}add_executable(mean src/mean.cpp)\n{LINKED.replace('s(', 's')}"
+         "add_dependencies(mean ${${PROJECT_NAME}_EXPORTED_TARGETS})\n", **MEAN}, ["build-line"],
+        "write `target_link_libraries(mean x)`", after={CMAKELISTS: LINKED},
+    ),
     "place-in-small-letters": Case(
         {CMAKELISTS: CMAKE + INSTALL.replace("KAGE", "KaGE").replace("scripts/other.py", TALKER)},
         ["build-line"], "there is no variable CATKIN_PACKaGE_BIN_DESTINATION",
