@@ -285,6 +285,11 @@ def _no_semicolon_above(found: re.Match[str], _package: PackageFacts, lines: Seq
     return Explained(f"{found.string}: a `;` is missing above it", hint)
 
 
+_OUTSIDE = re.compile(
+    r"([^/\s:]+):(\d+):\d+: error: expected (?:unqualified-id before .(?:return|while|for|if)|declaration before .\})"
+)
+
+
 def _explain_undeclared(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
     name, near = found[1], found[2]
     source = _source(found, lines)
@@ -303,7 +308,12 @@ def _explain_undeclared(found: re.Match[str], _package: PackageFacts, lines: Seq
         return Explained(found.string, f"write `{keyword[0]}` in place of `{name}`")
     declare = f"declare {name} above that line, or include the header that does"
     meant = f"write {near} there, if that is what you mean; otherwise {declare}"
-    return Explained(found.string, meant if near else declare)
+    outside = next((match for line in lines if (match := _OUTSIDE.search(line))), None)
+    why, hint = found.string, meant if near else declare
+    if outside is not None and outside[1] == why.partition(":")[0]:
+        why = f"{why}, and line {outside[2]} is outside of every function"
+        hint = "count the braces above these lines: a `{` is missing there, or a `}` is too many"
+    return Explained(why, hint)
 
 
 def _no_ros_h(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
