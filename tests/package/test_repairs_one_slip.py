@@ -525,6 +525,7 @@ LEFT_ALONE = {
     "method-of-a-text": "from os.path import join\nformat = 3\nprint(join('a', '{}'.format(format)), ','.join('ab'))\n",
     "commented-callback": "def f():\n    a = 1\n    # rospy.Subscriber('a', A, g)\n\n\n    print(a)\nf()\n",
     "made-of-a-class-that-is-not-there": "battery = Battery()\nprint(battery)\n",
+    "rate-beside-a-lost-text": f"{NODE}def f(p):\n    rate = rospy.Rate(1)\n    p.publish(text)\nf(P())\n",
     "commented": "while a:\n    if b:\n        # c()\n    d()\n",
     "window": f"{NODE}rospy.Subscriber('a', A, print)\ngtk.main()\n",
     "test": f"{NODE}rospy.Subscriber('a', A, print)\nrostest.rosrun('a', 'b', T)\n",

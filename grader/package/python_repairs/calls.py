@@ -332,21 +332,22 @@ def _published_nothing(tree: ast.Module) -> Iterator[Argument]:
     """Yield `publish()`, or a `publish(x)` of a name that is given no value anywhere, where its function gives a value
     to one name and does nothing with it, or its block to one that nothing else publishes."""
     known = {name for one in tree.body for name in bound_in(ast.Module([one], []))} | set(dir(builtins))
-    made = [n for n in nodes_in(tree) if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)]
-    of_others = {ast.unparse(t) for n in made if _called(n.value) != "Publisher" for t in n.targets}
-    of_others |= {"", "self"}  # `self.publish()` is a method of the class
+    assigned = (n for n in nodes_in(tree) if isinstance(n, ast.Assign))
+    made = [(ast.unparse(t), _called(n.value)) for n in assigned for t in n.targets]
+    of_others = {"", "self", *(name for name, call in made if call not in ("", "Publisher"))}
+    tools = {name for name, call in made if call in ("Rate", "Publisher", "Subscriber", "Timer")}
     for function in (n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)):
-        unread = _names_in(function, ast.Store) - _names_in(function, ast.Load)
+        unread = _names_in(function, ast.Store) - _names_in(function, ast.Load) - tools
         published = [n for n in nodes_in(function) if isinstance(n, ast.Call) and _called(n) == "publish"]
         published = [n for n in published if ast.unparse(n.func).rpartition(".")[0] not in of_others]
         calls = [n for n in published if not n.keywords and _gives_nothing(n, known)]
         others = {ast.unparse(given) for n in published if n not in calls for given in n.args}
-        beside = _names_beside(function, calls[0]) - others if len(calls) == 1 else set()
+        beside = _names_beside(function, calls[0]) - others - tools if len(calls) == 1 else set()
         meant = unread if len(unread) == 1 else beside
         if len(meant) == len(calls) == 1:
-            name, given = meant.pop(), calls[0].args
+            given = calls[0].args
             why = f"nothing gives `{ast.unparse(given[0])}` a value" if given else NOTHING_PUBLISHED
-            yield Argument([(calls[0], f"{ast.unparse(calls[0].func)}({name})")], why)
+            yield Argument([(calls[0], f"{ast.unparse(calls[0].func)}({meant.pop()})")], why)
 
 
 NOTHING_PUBLISHED = "there is nothing to publish in the brackets"
