@@ -62,7 +62,46 @@ FORGOTTEN = TICKER.replace(
 )
 OTHERS = "get_param, is_shutdown, Publisher, Rate"
 
+LISTENER_CLASS = """\
+#!/usr/bin/env python3
+import rospy
+from std_msgs.msg import Int8
+
+
+class Echo:
+    def __init__(self):
+        self.last = 0
+        rospy.Subscriber('numeric_chatter', Int8, self.heard)
+
+    def heard(self, message):
+        self.last = message.data
+        rospy.loginfo(self.last)
+
+
+if __name__ == '__main__':
+    rospy.init_node('talker')
+    Echo()
+    rospy.spin()
+"""
+
+TWICE = ["python-syntax", "python-syntax"]
+
 CASES = {
+    "def-further-in-and-a-later-line": Case(
+        {TALKER: LISTENER_CLASS.replace("    def __init__", "        def __init__").replace("    Echo", "      Echo")},
+        ["python-syntax"], "line 7 of src/talker.py", after={TALKER: "\n    Echo()\n"}),
+    "def-further-in-and-a-bracket": Case(
+        {TALKER: LISTENER_CLASS.replace("    def heard", "       def heard").replace("spin()", "spin(")},
+        TWICE, "line 11 of src/talker.py", after={TALKER: "\n    def heard(self, message):\n        self.last"}),
+    "two-lines-of-a-block": Case(
+        swapped(TALKER, ("    publisher = ", "  publisher = "), ("        rate.sleep", "      rate.sleep")),
+        ["python-syntax"], "line 7 of src/talker.py", after={TALKER: "\n        rate.sleep()\n"}),
+    "a-quote-below-a-line-further-out": Case(
+        {TALKER: LISTENER_CLASS.replace("    self.last = m", "self.last = m").replace("== '", "== ")},
+        TWICE, "line 12 of src/talker.py", after={TALKER: "if __name__ == '__main__':"}),
+    "comment-sign-before-the-head-and-a-bracket": Case(
+        swapped(TALKER, ("def main", "# def main"), ("size=10)", "size=10")), TWICE, "line 7 of src/talker.py",
+        after={TALKER: "\ndef main():\n    rospy.init_node('talker')\n"}),
     "further-in-than-what-nothing-reaches": Case(
         swapped(TALKER, ("    rate = rospy", f"{USAGE}    a = 1\n        rate = rospy")), ["python-syntax"],
         "line 12 of src/talker.py: this line is indented further than the one above for no reason",

@@ -45,10 +45,10 @@ from grader.package.python_repairs.names import (
     with_self,
     with_targets,
 )
+from grader.package.python_repairs.python2 import as_python3
 from grader.package.python_repairs.rospy_names import with_attributes, with_logger, with_rospy
 from grader.package.python_repairs.syntax import (
     Step,
-    as_python3,
     edited,
     last_name,
     make_readable,

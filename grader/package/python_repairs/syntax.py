@@ -10,7 +10,7 @@ from __future__ import annotations
 import ast
 import re
 import textwrap
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from itertools import takewhile
 from typing import Any
@@ -18,6 +18,7 @@ from typing import Any
 from grader.package.line_corrections import first_version
 from grader.package.lint.script_blocks import lacks_body, lacks_head
 from grader.package.python_repairs.lost_heads import lost_head, lost_method
+from grader.package.python_repairs.python2 import as_python3
 from grader.syntax_fixes import (
     DELETE_LINE,
     PLAIN,
@@ -29,10 +30,7 @@ from grader.syntax_fixes import (
 )
 
 STEPS_MAX = 60
-STATEMENT_LINES_MAX = 12
 ODD_LINES_MAX = 3
-FIXERS = ("print", "except", "exec", "raise", "repr", "ne", "numliterals", "long", "unicode")
-OLD_PRINT = re.compile(r"\bprint\b(?!\s*\()")
 ALL_OVER = ("merged", "tabs", "python2", "braces", "characters")
 OF_SIGNS = re.compile("does not match opening|unmatched|unterminated")
 OF_WHOLE = re.compile(
@@ -48,6 +46,7 @@ DEFINES = re.compile(r"(def|class)\s")
 ENDS_BLOCK = re.compile(r"(return|raise|break|continue)\b|(sys\.)?exit\(")
 TELLS_ERROR = re.compile(r"[%{(,+]\s*(e|ex|exc|err|error|exception)(?=\s*(?:[]}).,:!]|$))")
 """A line that prints the error that an `except … as e:` above it caught."""
+BEGINS_PART = re.compile(r"\s*(?:def|class)\b|\s*@|(?!elif\b|else\b|except\b|finally\b)[^\s#)\]}]")
 CONTINUES = re.compile(r"(elif|else|except|finally)\b")
 
 Step = dict[str, Any]
@@ -84,20 +83,52 @@ def make_readable(text: str) -> list[Step]:
 
 
 def _one_step(text: str, error: Error) -> Step | None:
-    """Return the first step after which the text parses, else the first after which it is read further: that one at
-    once, where such mistakes are all over a file."""
-    further = None
+    """Return the first step after which the text parses, else the first after which its part does, else the first
+    after which it is read further: that one at once, where such mistakes are all over a file."""
+    found: dict[int, Step] = {}
     for cause, candidate in _candidates(text, error):
         if candidate == text:
             continue
         left = syntax_error(candidate)
         if left is None or (left["line"] > error["line"] and _only_tabs(candidate, left)):
             return _step(cause, text, candidate, error)
-        if further is None and (left["line"] > error["line"] or _is_next(error, left)):
-            further = _step(cause, text, candidate, error)
-            if cause in ALL_OVER:
-                return further
-    return further
+        is_above = OF_SIGNS.search(error["message"]) and left["line"] < _first_changed(text, candidate)
+        if _is_right(text.split("\n"), error["line"] - 1, candidate, left):
+            rank = 0
+        elif left["line"] > error["line"]:
+            rank = 1
+        elif is_above or _is_next(error, left):
+            rank = 2
+        else:
+            continue
+        if cause in ALL_OVER and not found:
+            return _step(cause, text, candidate, error)
+        found.setdefault(rank, _step(cause, text, candidate, error))
+    return found[min(found)] if found else None
+
+
+def _is_right(lines: Sequence[str], at: int, candidate: str, left: Error | None = None) -> bool:
+    """Return whether the candidate for these lines parses, or would without one mistake of its own that is `left`: of
+    the signs in a line, or beyond the part with the line, which ends at the next function or unindented line."""
+    left = left or syntax_error(candidate)
+    if left is None:
+        return True
+    changed, number = candidate.split("\n"), left["line"] - 1
+    end = next((n for n in range(at + 1, len(lines)) if BEGINS_PART.match(lines[n])), len(lines))
+    part = changed[: len(changed) - len(lines) + end]
+    if end < len(lines) and len(part) <= number:
+        return _parses([*part, f"{_indentation(lines[end])}pass"])
+    is_plain = left["kind"] == "SyntaxError" and at <= number < len(changed)
+    is_same = is_plain and changed[number].strip() in map(str.strip, lines)
+    if not is_same or CONTINUES.match(changed[number].strip()):
+        return False
+    below = next((line for line in changed[number + 1 :] if line.strip()), "")
+    instead = "if 1:" if _width(below) > _width(changed[number]) else "pass"
+    return _parses([*changed[:number], _indentation(changed[number]) + instead, *changed[number + 1 :]])
+
+
+def _parses(lines: Sequence[str]) -> bool:
+    return syntax_error("\n".join(lines)) is None
 
 
 def _step(cause: str, text: str, candidate: str, error: Error) -> Step:
@@ -180,7 +211,8 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
     if (error["kind"] == "IndentationError" and not is_headless) or OF_BLOCK.match(lines[at].strip()):
         moved = [("level", candidate) for candidate in _with_line_moved(lines, at)]
         moved += [("turned", candidate) for candidate in _with_lines_turned(lines, at)]
-        yield from (one for one in moved if syntax_error(one[1]) is None)
+        right = [one for one in moved if _is_right(lines, at, one[1])]
+        yield from right or [("level", candidate) for candidate in _read_furthest(lines, at)]
     is_future = "future" in error["message"] and FUTURE.fullmatch(lines[at])
     if is_future or reason_of_line(lines[at]).fix == DELETE_LINE:
         first = lines[1] if not at and lines[1:] and lines[1].startswith("#!") else ""
@@ -272,7 +304,7 @@ def _with_a_body(lines: list[str], at: int) -> Iterator[str]:
     is_out = _width(lines[at]) < _width(head) or lacks_body(head, lines[at])
     if is_out and not head.lstrip().startswith("while"):
         candidate = "\n".join([*lines[: above + 1], f"{_indentation(head)}    pass", *lines[above + 1 :]])
-        if syntax_error(candidate) is None:
+        if _is_right(lines, at, candidate):
             yield candidate
 
 
@@ -414,6 +446,9 @@ def _with_block_moved(lines: list[str], at: int) -> Iterator[str]:
     elif own > above[-1]:
         level = above[-1]
     else:
+        body = next((_width(line) for line in lines[at + 1 :] if line.strip()), 0)
+        if DEFINES.match(lines[at].strip()) and own % 4 and body % 4 == 0:
+            return  # the line alone is moved
         distance, level = min((abs(width - own), width) for width in above)
         if {own - distance, own + distance} <= set(above):
             return  # as near to one as to the other
@@ -436,10 +471,25 @@ def _with_line_moved(lines: list[str], at: int) -> Iterator[str]:
     """Yield the text with the line, or the one above it, as far in as another line of the file, the nearest first."""
     above = next((n for n in range(at - 1, -1, -1) if without_texts(lines[n]).strip()), at)
     widths = {_width(line) for line in lines if line.strip()} | {_width(lines[above]) + 4}
+    by_four = {width for width in widths if width % 4 == 0}
+    if sum(_width(line) not in by_four for line in lines if line.strip()) <= ODD_LINES_MAX:
+        widths = by_four  # another line may be odd, too
     for number in dict.fromkeys((at, above)):
         own = _width(lines[number])
         for width in sorted(widths - {own}, key=lambda width: abs(width - own)):
             yield with_line(lines, number, " " * width + lines[number].lstrip())
+
+
+def _read_furthest(lines: list[str], at: int) -> Iterator[str]:
+    """Yield the text with the line moved that is read furthest, well beyond the line: others are moved, too."""
+    read: dict[int, list[str]] = {}
+    for candidate in _with_line_moved(lines, at):
+        left = syntax_error(candidate)
+        if left is not None and left["kind"] == "IndentationError":
+            read.setdefault(left["line"], []).append(candidate)
+    furthest = max(read, default=0)
+    if furthest > at + 2 and len(read[furthest]) == 1:
+        yield from read[furthest]
 
 
 def _with_lines_turned(lines: list[str], at: int) -> Iterator[str]:
@@ -493,54 +543,6 @@ def _expand_tabs(line: str, width: int) -> str:
 def with_line(lines: list[str], at: int, line: str) -> str:
     """Return the text with another line at index `at`."""
     return "\n".join([*lines[:at], line, *lines[at + 1 :]])
-
-
-def as_python3(lines: list[str], at: int) -> Iterator[str]:
-    """Yield the text with the statement at the line read as Python 2."""
-    for start in range(at, max(-1, at - STATEMENT_LINES_MAX), -1):
-        for end in range(at + 1, min(len(lines), start + STATEMENT_LINES_MAX) + 1):
-            fixed = _fixed_statement(lines[start:end])
-            if fixed is not None:
-                yield "\n".join([*lines[:start], *fixed, *lines[end:]])
-                return
-
-
-def _fixed_statement(lines: list[str]) -> list[str] | None:
-    """The same as Python 3; None where it is not a statement by itself, or nothing of it is Python 2."""
-    indentation = lines[0][: len(lines[0]) - len(lines[0].lstrip())]
-    first = lines[0].strip()
-    keyword = re.match(r"\w*", first)
-    head = {"elif": "if x:\n    pass\n", "else": "if x:\n    pass\n", "except": "try:\n    pass\n"}
-    before = head.get(keyword[0] if keyword else "", "")
-    after = "    pass\n" if without_texts(lines[-1]).rstrip().endswith(":") else ""
-    source = before + "\n".join([first, *lines[1:]]) + "\n" + after
-    tools = _tools()[::-1] if OLD_PRINT.search(source) else _tools()
-    fixed = next((f for tool in tools if (f := _refactor(tool, source)) not in (None, source)), None)
-    if fixed is None:
-        return None
-    body = fixed.removeprefix(before).removesuffix("\n" + after if after else "\n").split("\n")
-    return [indentation + body[0], *body[1:]]
-
-
-_TOOLS: list[Any] = []
-
-
-def _tools() -> list[Any]:
-    """First for a file whose `print` is Python 3 already."""
-    if not _TOOLS:
-        from fissix.refactor import RefactoringTool  # noqa: PLC0415 - found once `site` is in the path
-
-        names = [f"fissix.fixes.fix_{name}" for name in FIXERS]
-        _TOOLS.append(RefactoringTool([n for n in names if "print" not in n], {"print_function": True}))
-        _TOOLS.append(RefactoringTool(names))
-    return _TOOLS
-
-
-def _refactor(tool: Any, source: str) -> str | None:  # noqa: ANN401 - a library without types
-    try:
-        return str(tool.refactor_string(source, "script"))
-    except Exception:  # noqa: BLE001 - the library raises whatever its parser and tokenizer do
-        return None
 
 
 def is_docstring(statement: ast.stmt) -> bool:
