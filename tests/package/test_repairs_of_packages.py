@@ -131,6 +131,11 @@ CASES = {
     ),
     "tag-open": Case(swapped(LAUNCHED, ("/>", ">")), ["launch-syntax"], "is still open where"),
     "no-quotes": Case(swapped(LAUNCHED, ('"talker.py"', "talker.py")), ["launch-syntax"], "has no quotes around it"),
+    "script-of-a-launch-file-that-cannot-be-read": Case(
+        {"launch/lab.launch": '<launch>\n  <node pkg="lab" type="extra.py" name="extra"/>\n',
+         "src/extra.py": "#!/usr/bin/env python3\nprint(1\n"},
+        ["python-syntax", "launch-syntax"], "line 2 of src/extra.py", after={"src/extra.py": "print(1)"},
+        wanted=asking(launch_files=("lab.launch",))),
     "tag-open-and-type": Case(swapped(LAUNCHED, ("/>", ">"), ("talker.py", "talker")),
                           ["launch-syntax", "launch-type"], 'type="talker" should be'),
     "second-node-of-a-name": Case(

@@ -74,6 +74,7 @@ __all__ = [
 
 SCRIPTS_MAX = 40
 IMPORTED = re.compile(r"^\s*(?:from|import)\s+([\w.]+)", re.MULTILINE)
+TYPES = re.compile(r"\btype\s*=\s*[\"']?([\w.-]{1,100})")
 UNREAD = ("PythonCrash", "NotChecked")
 
 
@@ -85,7 +86,7 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     """
     files = Files(folder=folder.resolve())
     renames = find_renames(package, wanted)
-    started = _started(package, wanted, renames)
+    started = _started(files, package, wanted, renames)
     imported = _imported(files, package, started)
     scripts = [*started, *imported][:SCRIPTS_MAX]
     repair_files(files, scripts, {file.path for file in started})
@@ -197,13 +198,17 @@ def _readable(package: PackageFacts) -> list[SourceFile]:
     return [f for f in own if f.python_fault is None or f.python_fault.kind not in UNREAD]
 
 
-def _started(package: PackageFacts, wanted: Wanted, renames: dict[str, str]) -> list[SourceFile]:
+def _started(
+    files: Files, package: PackageFacts, wanted: Wanted, renames: dict[str, str]
+) -> list[SourceFile]:
     """Return the files that are run: those of the lab in its order, then those of its launch files."""
     python = _readable(package)
     named = [PurePosixPath(path).name for path in (*wanted.scripts, *wanted.installed)]
     asked = {PurePosixPath(path).name for path in wanted.launch_files}
     launches = [f for f in package.launch_files if PurePosixPath(renames.get(f.path, f.path)).name in asked]
     named += [node.type for launch in launches for node in (*launch.nodes, *launch.brings) if node.type]
+    unread = (files.text(launch.path) or "" for launch in launches if launch.fault is not None)
+    named += [name for text in unread for name in TYPES.findall(text)]
     built = {one.name for one in package.cmake.executables} if package.cmake else set[str]()
     named += [f"{name}.py" for name in named if not PurePosixPath(name).suffix and name not in built]
     names = dict.fromkeys(PurePosixPath(file.path).name for file in python)
