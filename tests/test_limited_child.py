@@ -24,7 +24,12 @@ OF_REPAIRS = {
     *("errors", "installable", "package", "package.line_corrections", "syntax_fixes", "wording"),
     *("package.python_repairs", "package.python_repairs.calls", "package.python_repairs.examine"),
     *("package.python_repairs.imports", "package.python_repairs.members", "package.python_repairs.names"),
-    *("package.python_repairs.rospy_names", "package.python_repairs.syntax"),
+    *(
+        "package.python_repairs.lost_heads",
+        "package.python_repairs.python2",
+        "package.python_repairs.rospy_names",
+    ),
+    *("package.python_repairs.syntax", "package.lint", "package.lint.script_blocks"),
 }
 MAY_IMPORT = {
     "grader.intake.archive:unpack_here": {
@@ -37,7 +42,7 @@ MAY_IMPORT = {
 }
 """The grader's functions that run in such a child, and the modules that they are made of: a module that comes to import
 a library, which is not there, takes with it all that its function finds, without an error."""
-LIBRARIES = {("syntax.py", "fissix"), ("installable.py", "packaging")}
+LIBRARIES = {("python2.py", "fissix"), ("installable.py", "packaging")}
 """The folder of the one is handed to the function that needs it; the other is for a function that no child calls."""
 LOADED = """
 import importlib, json, sys

@@ -575,9 +575,8 @@ class Later:
 def _later_in_file(criterion: Criterion, package: PackageFacts) -> Iterator[str]:
     """Yield what a launch file would be lost by once the scripts that it lacks are written."""
     file = find_launch(package, str(criterion.parameters.get("launch", "")))
-    if file is not None:
-        for script in texts_in(criterion.parameters.get("scripts")):
-            yield from later_fixes(file, script)
+    scripts = texts_in(criterion.parameters.get("scripts"))
+    yield from (fix for script in scripts if file is not None for fix in later_fixes(file, script))
 
 
 def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) -> Iterator[str]:
@@ -591,11 +590,10 @@ def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) 
     if refused is not None and refused.refused != NOT_STARTED and not any(refusals(package, file)):
         yield f"{refused.hint}: {refused.why}"
     given = [word for start in facts.rubric.starts_of(criterion) for word in start.args]
-    yield from unset_arg_fixes(file, refused.hint if refused is not None else "", given)
+    yield from unset_arg_fixes(file, refused.hint if refused else "", given)
     nodes = [one for one in file.brings if {one.type, f"{one.type}.py"} & names]
-    if topic := wanted.get("topic"):
-        renaming = find_renaming(package, nodes, str(topic))
-        yield from [f"in {file.path} {renaming.fix}"] if renaming else []
+    if (topic := wanted.get("topic")) and (renaming := find_renaming(package, nodes, str(topic))):
+        yield f"in {file.path} {renaming.fix}"
 
 
 def _line(slip: PythonSlip) -> str:

@@ -8,6 +8,9 @@ import pytest
 
 from grader.package.python import check_syntax
 from grader.package.python_repairs.examine import examine
+from grader.package.repairs import find_repairs
+from tests.package.repairing import TALKER, asking, package
+from tests.package.trees import facts_of
 
 NAMED = """\
 import rospy
@@ -198,3 +201,37 @@ def test_a_misspelt_name_that_gets_a_value_is_told_without_a_repair_too(name: st
     (found,) = list(examine([["a.py", f"import rospy\n{text}\n"]], [], {}, ""))
     told = [one["word"] for one in found["steps"] if "is meant" in one["word"]]
     assert told == [one.message for one in slips] or name == "read by its name"
+
+
+RIGHT = {
+    "flag of its own": ("class A:\n    def __init__(self):\n        self.is_shutdown = False\n\n    def f(self):\n"
+                        "        while not self.is_shutdown:\n            pass\n"),
+    "property of its own": ("class A:\n    @property\n    def is_shutdown(self):\n        return 1\n\n"
+                            "    def f(self):\n        while not self.is_shutdown:\n            pass\n"),
+    "name of two words": "import logging\nlog = logging.getLogger()\nlog.info('a')\nrospy.loginfo('a')\n",
+    "attribute of two words": "class A:\n    def f(self, pos):\n        self.posx = pos.x\n",
+    "type as a text": "class A:\n    pub: 'rospy.Publisher'\n",
+    "names of a class": "class T:\n    OUT = 'out'\n\n\nU = T\ndef f():\n    rospy.Subscriber(U.OUT, Int8, print)\n",
+    "fields of a data class": ("class A:\n    speed: float = 1.0\n    limit: int = 1\n\n    def speeds(self):\n"
+                               "        return self.speed * self.limit\n"),
+    "a window": ("def f(root):\n    rospy.init_node('talker')\n    rospy.Subscriber('a', Int8, print)\n"
+                 "    root.mainloop()\n"),
+    "own timer": "class Timer:\n    pass\n\n\ndef tick():\n    pass\n\n\nTimer(0.1, tick)\n",
+    "star import": "from math import *\n\n\nclass A:\n    def f(self, a):\n        self.degrees = degrees(a)\n",
+    "global of another function": ("class A:\n    def f(self, pub):\n        self.pub = pub\n\n    def g(self):\n"
+                                   "        pub.publish(1)\n\n\ndef h():\n    global pub\n    pub = A()\n"),
+    "read later": "def f():\n    rospy.on_shutdown(lambda: pub.publish(0))\n    pub = make()\n    pub.publish(1)\n",
+    "both Pythons": "try:\n    input = raw_input\nexcept NameError:\n    pass\n",
+    "both Pythons by version": "import sys\ntext = str if sys.version_info >= (3,) else unicode\n",
+    "argument as a key": "def f(name):\n    all = rospy.get_param('all')\n    name = all[name]\n    return name\n",
+    "lines of comments": ("def g():\n    pass\n\n\ndef f():\n    a = 1\n    # one\n    # two\n    # three\n    g()\n"
+                          "    print(a)\n"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_what_few_students_write_and_is_right_is_left_alone(name: str, tmp_path: Path) -> None:
+    head = "#!/usr/bin/env python3\nimport rospy\nfrom std_msgs.msg import Int8\n\n\n"
+    folder = package(tmp_path, {TALKER: head + RIGHT[name]})
+    found = find_repairs(folder, facts_of(folder), asking(topics=()))
+    assert [one.message for one in found if one.file == TALKER] == []
