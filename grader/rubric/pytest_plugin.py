@@ -236,7 +236,7 @@ class _Notes:
             lacks = "" if change.get("returns", True) else ", which has no `return` with a value"
             place = f"`{function}`, {lines_text(first - 1, last - 1)} of {file}{lacks}"
             return {"file": file, "line": first, "place": place}
-        writes = [f"write `{one['after']}`{_indent(one)} in line {one['line']}" for one in passing]
+        writes = [f"write `{one['after']}`{_indent(one)} on line {one['line']}" for one in passing]
         hint = f"in {file}, {' or '.join(writes)}: with that, each test of `{function}` passes"
         return {"file": file, "line": passing[0]["line"], "hint": hint}
 

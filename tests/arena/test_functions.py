@@ -249,12 +249,12 @@ def test_a_small_change_with_which_all_tests_of_a_function_pass_is_named(tmp_pat
     )
     verdict = _judge(tmp_path, _record(tmp_path, AREA_TESTS, wrong))
     assert (
-        f"in {FILE}, write `whole = width * height` in line 7: with that, each test of `area`" in verdict.hint
+        f"in {FILE}, write `whole = width * height` on line 7: with that, each test of `area`" in verdict.hint
     )
     assert (
-        "write `return distance / (2 * step)` in line 12: with that, each test of `steps` passes"
+        "write `return distance / (2 * step)` on line 12: with that, each test of `steps` passes"
         in verdict.hint
     )
-    assert "write `return total / len(values)` with 4 spaces before it in line 19" in verdict.hint
-    assert "write `HALF = 0.5` in line 2: with that, each test of `turned` passes" in verdict.hint
+    assert "write `return total / len(values)` with 4 spaces before it on line 19" in verdict.hint
+    assert "write `HALF = 0.5` on line 2: with that, each test of `turned` passes" in verdict.hint
     assert FileCitation(file=FILE, line=7) in verdict.citations
