@@ -204,6 +204,15 @@ def test_a_misspelt_name_that_gets_a_value_is_told_without_a_repair_too(name: st
 
 
 RIGHT = {
+    "two names of settings": ("class A:\n    def __init__(self):\n        self.pub_topic = '/a'\n"
+                              "        self.sub_topic = '/b'\n        rospy.Publisher(self.pub_topic, Int8)\n"),
+    "a copy that is not used": "def f(cv_image):\n    cp_image = cv_image.copy()\n    return cv_image\n",
+    "a class of another module": ('from lab.errors import *\n\n\nclass A:\n    """One."""\n\n\n    def f(self):\n'
+                                  "        raise LabError('a')\n"),
+    "a list of its own": ("class A:\n    def f(self):\n        self.a = []\n\n        self.a.append(1)\n"
+                          "        return self.a\n\n\na = A()\n"),
+    "a module of publishers": ("import sys\nsys.path.append('..')\n\n\nclass A:\n    def f(self):\n"
+                               "        return rospy.Publisher('a', Int8)\n"),
     "flag of its own": ("class A:\n    def __init__(self):\n        self.is_shutdown = False\n\n    def f(self):\n"
                         "        while not self.is_shutdown:\n            pass\n"),
     "property of its own": ("class A:\n    @property\n    def is_shutdown(self):\n        return 1\n\n"

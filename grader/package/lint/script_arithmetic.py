@@ -56,6 +56,7 @@ def unset_fields(tree):
     imports = [n for n in all_of(tree, ast.ImportFrom, ast.Import) if "msg" in ast.dump(n)]
     messages = {a.asname or a.name for n in imports for a in n.names}
     made, filled = {}, {n.attr for n in all_of(tree, ast.Attribute) if isinstance(n.ctx, ast.Store)}
+    several = {dotted(n) for one in all_of(tree, ast.Tuple, ast.List) for n in one.elts if is_stored(n)}
     for node in all_of(tree, ast.Assign):
         for target in node.targets:
             made.setdefault(dotted(target), []).append(node)
@@ -63,7 +64,7 @@ def unset_fields(tree):
     given = [
         v for n in calls if called_name(n) != "publish" for v in [*n.args, *(k.value for k in n.keywords)]
     ]
-    other = {dotted(one) for one in given} | {n.arg for n in all_of(tree, ast.arg)}
+    other = {dotted(one) for one in given} | {n.arg for n in all_of(tree, ast.arg)} | several
     new = {}
     for name, nodes in made.items():
         call = nodes[0].value
@@ -84,6 +85,10 @@ def unset_fields(tree):
                 message = "no line gives `%s` a value, so it is that of a new message, 0 or empty" % field
                 fix = "below line %d, write `%s = …`" % (line, field)
                 yield slip(node.lineno, "wrong-value", message, fix, "new-field")
+
+
+def is_stored(node):
+    return isinstance(getattr(node, "ctx", None), ast.Store)
 
 
 def is_quotient(node):

@@ -6,6 +6,7 @@ These are facts, which checks compare with what the lab asks. Nothing is execute
 """
 
 import ast
+import itertools
 from collections import Counter
 
 from script_names import (
@@ -27,6 +28,7 @@ from script_tree import (
     parents_of,
     reads_names_in_texts,
     slip,
+    statements_of,
     walk,
 )
 
@@ -211,9 +213,25 @@ def misnamed_targets(tree):
         values = [node.value, *given[near[0]]] if len(near) == 1 else []
         kinds = {kind_of_constant(one) for one in values}
         is_same = isinstance(node, ast.AugAssign) or (len(kinds) == 1 and None not in kinds)
-        if values and (is_same or near[0] in map(dotted, ast.walk(node.value))):
+        used = map(dotted, ast.walk(node.value)) if isinstance(node.value, ast.BinOp) else ()
+        if values and (is_same or near[0] in used) and not stands_beside(node, near[0], tree):
             found[node] = (name, near[0])
     return found
+
+
+def stands_beside(node, name, tree):
+    """Return whether that name gets its value in the same run of assignments: then both are meant."""
+    around = parents_of(tree).get(node)
+    block = next((b for b in (statements_of(around, part) for part in BLOCKS) if node in b), [node])
+    at = block.index(node)
+    for part in (reversed(block[:at]), block[at + 1 :]):
+        for one in itertools.takewhile(lambda s: isinstance(s, ast.Assign), part):
+            if name in map(dotted, one.targets):
+                return True
+    return False
+
+
+BLOCKS = ("body", "orelse", "finalbody")
 
 
 def kind_of_constant(node):

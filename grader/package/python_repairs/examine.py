@@ -46,7 +46,13 @@ from grader.package.python_repairs.names import (
     with_targets,
 )
 from grader.package.python_repairs.python2 import as_python3
-from grader.package.python_repairs.rospy_names import with_attributes, with_logger, with_rospy
+from grader.package.python_repairs.rospy_names import (
+    runs_of,
+    with_attributes,
+    with_init,
+    with_logger,
+    with_rospy,
+)
 from grader.package.python_repairs.syntax import (
     Step,
     edited,
@@ -137,11 +143,7 @@ def _steps(text: str, types: list[str], known: Known, name: str, *, is_run: bool
             with_lines_turned,
             _with_lines_inside,
             _with_start,
-            *(
-                (_with_main, lambda t: _with_init(t, name), _with_server_started, _with_spin)
-                if is_run
-                else ()
-            ),
+            *((_with_main, lambda t: with_init(t, name), _with_server_started, _with_spin) if is_run else ()),
         ):
             for step in repair(text):
                 if step["text"] in seen:  # two repairs that undo each other would do so for ever
@@ -268,7 +270,7 @@ def _with_start(text: str) -> Iterator[Step]:
             return
     yield from islice(_with_method(text, tree, lines), 1)
     functions = [n for n in tree.body if isinstance(n, ast.FunctionDef)]
-    started = any(isinstance(n, ast.Call) for one in _runs(tree) for n in nodes_in(one))
+    started = any(isinstance(n, ast.Call) for one in runs_of(tree) for n in nodes_in(one))
     for function in functions:
         for before, after in pairwise(function.body):
             between = lines[before.end_lineno or after.lineno : after.lineno - 1]
@@ -312,12 +314,6 @@ SETS_UP = re.compile(r"\b(?:Publisher|Subscriber|Timer|Rate|Service|ServiceProxy
 COMMENTED_HEAD = re.compile(r"(\s*)#[#\s]*((?:def|class)\s+(\w+).*:)\s*$")
 
 
-def _runs(tree: ast.Module) -> Iterator[ast.stmt]:
-    """Yield the statements of a script that do more than to define or import names."""
-    plain = ast.FunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom
-    return (one for one in tree.body if not isinstance(one, plain))
-
-
 BLOCKS_MAX, BLANK_LINES = 40, 2
 """So many blocks are searched; so many blank lines stand between a function and what comes after it (PEP 8)."""
 
@@ -357,7 +353,7 @@ def _with_main(text: str) -> Iterator[Step]:
                 yield from step_to("guard", node.lineno, text, right, why)
             if why or "__name__" in ast.unparse(node.test):
                 return
-    if any(isinstance(n, ast.Call) for one in _runs(tree) for n in nodes_in(one)):
+    if any(isinstance(n, ast.Call) for one in runs_of(tree) for n in nodes_in(one)):
         return
     functions = [f for f in tree.body if isinstance(f, ast.FunctionDef)]
     functions = [f for f in functions if len(f.args.args) == len(f.args.defaults)]
@@ -377,7 +373,7 @@ def _never_main(guard: ast.If, test: ast.Compare, tree: ast.Module) -> str:
     words = [one.value for one in sides if isinstance(one, ast.Constant) and isinstance(one.value, str)]
     if "__name__" in names and len(words) == 1:
         if isinstance(test.ops[0], ast.NotEq | ast.Lt | ast.Gt):
-            running = [one for one in _runs(tree) if any(isinstance(n, ast.Call) for n in nodes_in(one))]
+            running = [one for one in runs_of(tree) if any(isinstance(n, ast.Call) for n in nodes_in(one))]
             hides = running == [guard] and not guard.orelse and words[0] == "__main__"
             return "`__name__` is '__main__' whenever the script is run" if hides else ""
         word = words[0]
@@ -389,37 +385,6 @@ def _never_main(guard: ast.If, test: ast.Compare, tree: ast.Module) -> str:
     given = {n.id for n in nodes_in(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
     given |= {n.arg for n in nodes_in(tree) if isinstance(n, ast.arg)}
     return f"`{other[0]}` is never '__main__'" if other and other[0] not in given else ""
-
-
-def _with_init(text: str, name: str) -> Iterator[Step]:
-    """A script that publishes or subscribes, and never makes its node: it gets the script's name."""
-    tree, lines = tree_of(text), text.split("\n")
-    of_rospy = [n.func.value for n in nodes_in(tree) if isinstance(n, ast.Call)
-                and isinstance(n.func, ast.Attribute) and n.func.attr in {"Publisher", "Subscriber"}]  # fmt: skip
-    rospy = next((a.asname or a.name for n in nodes_in(tree) if isinstance(n, ast.Import)
-                  for a in n.names if a.name == "rospy"), "")  # fmt: skip
-    runs = [one for one in _runs(tree) if any(isinstance(n, ast.Call) for n in nodes_in(one))]
-    if "init_node" in text or not runs or rospy not in map(ast.unparse, of_rospy) or not name.isidentifier():
-        return
-    first: ast.stmt = runs[0]
-    while isinstance(first, ast.If | ast.Try):
-        first = first.body[0]
-    called = first.value.func if isinstance(first, ast.Expr) and isinstance(first.value, ast.Call) else None
-    own = [
-        n for n in tree.body if isinstance(n, ast.FunctionDef) and called and n.name == ast.unparse(called)
-    ]
-    first = next((one for function in own for one in function.body if not _is_head(one)), first)
-    at, line = first.lineno - 1, f"{rospy}.init_node('{name}')"
-    before = lines[at][: first.col_offset]
-    if not before.strip():
-        after = "\n".join([*lines[:at], before + line, *lines[at:]])
-        yield from step_to("init", at + 1, text, after, line)
-
-
-def _is_head(statement: ast.stmt) -> bool:
-    """Return whether it is a docstring or a `global`, which come first."""
-    constant = isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
-    return constant or isinstance(statement, ast.Global)
 
 
 def _with_server_started(text: str) -> Iterator[Step]:
@@ -450,7 +415,7 @@ def _with_spin(text: str) -> Iterator[Step]:
     loops = any(isinstance(n, ast.While) for n in nodes_in(tree))
     makes_node = any(last_name(c.func) == "init_node" for c in calls)
     own = {n.name for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)}
-    runs = any(isinstance(n, ast.Call) for one in _runs(tree) for n in nodes_in(one))
+    runs = any(isinstance(n, ast.Call) for one in runs_of(tree) for n in nodes_in(one))
     if not waits or loops or not rospy or not makes_node or not runs:
         return
     if (LOOPED | (HOLDING - own)) & {last_name(c.func) for c in calls}:

@@ -14,6 +14,9 @@ from grader.wording import is_one_edit
 
 METHOD = re.compile(r"\s*def\s+\w+\s*\(\s*self\b")
 DEFINED = re.compile(r"\b(?:def|class)\s+(\w+)")
+ALL_NAMES = re.compile(r"\bimport\s*\*")
+"""What a script has from elsewhere by `from … import *` is not known."""
+OF_LISTS = frozenset(dir(list) + dir(dict) + dir(str))
 DOCSTRING = re.compile(r"\s*(\"{3}[^\"]*\"{3}|'{3}[^']*'{3})\n")
 
 
@@ -25,7 +28,9 @@ def lost_head(text: str, body: str) -> str:
     named |= dict.fromkeys(re.findall(r"^\s*(\w+)\(\)\s*$", code, re.MULTILINE), "")
     of_class = METHOD.match(DOCSTRING.sub("", body, count=1).lstrip("\n"))
     if of_class:
-        named = dict.fromkeys(re.findall(r"(?<![\w.])([A-Z]\w*)\(", code), "")
+        named = dict.fromkeys(re.findall(r"(?<![\w.])(?<!raise )([A-Z]\w*)\(", code), "")
+    if ALL_NAMES.search(code):
+        return ""
     lost = [name for name in named if name not in _given(code) | set(DEFINED.findall(text))]
     if len(lost) != 1 or lost[0] in dir(builtins):
         return ""
@@ -45,7 +50,7 @@ def lost_method(text: str, above: str, body: str, *, at_first: bool = False) -> 
     if owner is None:
         return ""
     objects = "|".join(["self", *re.findall(rf"^\s*(\w+)\s*=\s*{owner[1]}\(", code, re.MULTILINE)])
-    used = re.findall(rf"\b(?:{objects})\.(\w+)\(", code)
+    used = [one for one in re.findall(rf"(?<![\w.])(?:{objects})\.(\w+)\(", code) if one not in OF_LISTS]
     used += re.findall(r"\b(?:Subscriber|Service|Timer)\s*\(.*,\s*(?:\w+\s*=\s*)?self\.(\w+)\s*[,)]", code)
     has = {
         *re.findall(r"\bdef\s+(\w+)", text),

@@ -11,6 +11,7 @@ import builtins
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
+from itertools import takewhile
 from string import digits
 
 from grader.package.python_repairs.syntax import (
@@ -343,15 +344,25 @@ def with_targets(text: str) -> Iterator[Step]:
             continue
         near = [f"self.{name}"] if target in local and f"self.{name}" in read else []
         near = near or [other for other in given if other in read and _is_alike(name, other)]
-        used = {ast.unparse(n) for n in nodes_in(one.value)} if near else set()
+        used = {ast.unparse(n) for n in nodes_in(one.value)} if isinstance(one.value, ast.BinOp) else set()
         same = isinstance(one, ast.AugAssign) or (near and (near[0] in used or near[0].endswith(f".{name}")))
         same = same or (near and _are_constants([one.value, *given[near[0]]]))
-        if len(near) == 1 and same:
+        if len(near) == 1 and same and not _stands_beside(one, near[0], tree):
             why = f"nothing reads `{name}`, to which a value is given here: `{near[0]}` is meant"
             for step in step_to("argument", span[0] + 1, text, edited(text, [(*span, near[0])]), why):
                 yield step
                 yield from with_targets(step["text"])
                 return
+
+
+def _stands_beside(one: ast.stmt, name: str, tree: ast.Module) -> bool:
+    """Return whether that name gets its value in the same run of assignments: then both are meant."""
+    blocks = (getattr(n, part, None) for n in nodes_in(tree) for part in ("body", "orelse", "finalbody"))
+    block = next((body for body in [tree.body, *blocks] if isinstance(body, list) and one in body), [one])
+    at = block.index(one)
+    above = takewhile(lambda s: isinstance(s, ast.Assign), reversed(block[:at]))
+    below = takewhile(lambda s: isinstance(s, ast.Assign), block[at + 1 :])
+    return any(name in map(ast.unparse, s.targets) for s in (*above, *below))
 
 
 def _only_in_init(tree: ast.Module) -> Iterator[ast.Name]:

@@ -1,4 +1,5 @@
-"""Repairs of names that rospy lacks: its own in other letters, and those of ROS 2 and roscpp.
+"""Repairs of names that rospy lacks: its own in other letters, and those of ROS 2 and roscpp; and of a script that
+never makes its node.
 
 The text of a script that parses comes in, and the steps go out that repair it, as in `examine.py`. It runs in a
 child process: the standard library only, and nothing is executed.
@@ -191,3 +192,49 @@ def _of_call(
     if new in ("Publisher", "Subscriber", "Service", "ServiceProxy") and (not is_text or len(given) < 2):
         return None  # `rospy.publish(msg)` is a method's
     return (of_name[0], of_name[2] - len(name), of_name[2], new)
+
+
+def with_init(text: str, name: str) -> Iterator[Step]:
+    """A script that publishes or subscribes, and never makes its node: it gets the script's name."""
+    tree, lines = tree_of(text), text.split("\n")
+    makes = {"Publisher", "Subscriber"}
+    of_rospy = [n.func.value for n in nodes_in(tree) if isinstance(n, ast.Call)
+                and isinstance(n.func, ast.Attribute) and n.func.attr in makes]  # fmt: skip
+    rospy = next((a.asname or a.name for n in nodes_in(tree) if isinstance(n, ast.Import)
+                  for a in n.names if a.name == "rospy"), "")  # fmt: skip
+    # a module that others import makes no node
+    makes |= {n.name for n in tree.body if isinstance(n, ast.FunctionDef | ast.ClassDef)}
+    runs = [
+        s
+        for s in runs_of(tree)
+        if any(isinstance(n, ast.Call) and last_name(n.func) in makes for n in nodes_in(s))
+    ]
+    if "init_node" in text or not runs or rospy not in map(ast.unparse, of_rospy) or not name.isidentifier():
+        return
+    first: ast.stmt = runs[0]
+    while isinstance(first, ast.If | ast.Try):
+        first = first.body[0]
+    called = (
+        ast.unparse(first.value.func)
+        if isinstance(first, ast.Expr) and isinstance(first.value, ast.Call)
+        else ""
+    )
+    own = [n for n in tree.body if isinstance(n, ast.FunctionDef) and n.name == called]
+    first = next((one for function in own for one in function.body if not _is_head(one)), first)
+    at, line = first.lineno - 1, f"{rospy}.init_node('{name}')"
+    before = lines[at][: first.col_offset]
+    if not before.strip():
+        after = "\n".join([*lines[:at], before + line, *lines[at:]])
+        yield from step_to("init", at + 1, text, after, line)
+
+
+def _is_head(statement: ast.stmt) -> bool:
+    """Return whether it is a docstring or a `global`, which come first."""
+    constant = isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
+    return constant or isinstance(statement, ast.Global)
+
+
+def runs_of(tree: ast.Module) -> Iterator[ast.stmt]:
+    """Yield the statements of a script that do more than to define or import names."""
+    plain = ast.FunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom
+    return (one for one in tree.body if not isinstance(one, plain))
