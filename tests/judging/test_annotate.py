@@ -148,7 +148,7 @@ def test_what_does_not_start_is_told_where_nothing_is_lost(tmp_path) -> None:
 
 def test_a_value_that_is_given_to_a_misspelt_name_is_told_unless_a_loss_names_its_line(tmp_path) -> None:
     package = facts(
-        tmp_path, **{"src/a.py": "up = False\nuo = up\nif changed: f()\nchnaged = True\nchanged = False\n"}
+        tmp_path, **{"src/a.py": "changed = False\nuo = up = 1\nif changed: f()\nchnaged = True\n"}
     )
     (told,) = add_advice([criterion()], package, rubric(CMAKE_CHECK))
     why = "src/a.py, line 4: nothing reads `chnaged`, to which a value is given here: `changed` is meant"
