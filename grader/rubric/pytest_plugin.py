@@ -190,7 +190,9 @@ class _Notes:
         if unreached is not None:
             message = f"{message}; line {unreached.line} of {unreached.file}: {unreached.message}"
             hint = f"in {unreached.file}, {unreached.fix}"
-        changed = {} if hint or outcome != "failed" else self._found_changes(item)
+        # a function that gives back no value needs more than another sign
+        told = hint or isinstance(error, StudentError)
+        changed = {} if told or outcome != "failed" else self._found_changes(item)
         hint = changed.get("hint", hint)
         at: Answer = {"file": own.file, "line": own.line or None} if own.file and not hint else changed
         noted = self._tests.get(item.nodeid)
