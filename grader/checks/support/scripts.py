@@ -429,7 +429,7 @@ _HANDED = re.compile(
     r"(?:[^=!<>]=\s*|(?:\.|->)publish\(\s*(?:[\w.]+\(\s*)?(?:data\s*=\s*)?)((?:self\.)?[A-Za-z_]\w*)(?:\.str\(\))?"
     r"[\s)]*;?\s*(?:(?:#|//).*)?$"
 )
-"""What a line hands on: a variable, an object's attribute, or the text that a stream of C++ has taken."""
+"""What a line publishes: a variable, an attribute, or the text that was written to a stream in C++."""
 
 
 OF_FILES = {"add_message_files": ".msg", "add_service_files": ".srv", "add_action_files": ".action"}

@@ -24,13 +24,13 @@ def lost_head(text: str, body: str) -> str:
     """Return the first line of the one function that the file names as a callback, or calls, and does not have, or of
     the one class; "" where there is not just one. `body` are the lines that belong below it."""
     code = re.sub(r"#[^\n]*", "", text)
+    if ALL_NAMES.search(code):
+        return ""
     named = dict.fromkeys(re.findall(r"\b(?:Subscriber|Service|Timer)\s*\(.*,\s*(\w+)\s*[,)]", code), "msg")
     named |= dict.fromkeys(re.findall(r"^\s*(\w+)\(\)\s*$", code, re.MULTILINE), "")
     of_class = METHOD.match(DOCSTRING.sub("", body, count=1).lstrip("\n"))
     if of_class:
         named = dict.fromkeys(re.findall(r"(?<![\w.])(?<!raise )([A-Z]\w*)\(", code), "")
-    if ALL_NAMES.search(code):
-        return ""
     lost = [name for name in named if name not in _given(code) | set(DEFINED.findall(text))]
     if len(lost) != 1 or lost[0] in dir(builtins):
         return ""
@@ -42,8 +42,8 @@ def lost_head(text: str, body: str) -> str:
 
 def lost_method(text: str, above: str, body: str, *, at_first: bool = False) -> str:
     """Return the first line of the one method that the script calls, or names as a callback, and that the class does
-    not have; "" where there is none. `above` is the text down to the body: where that stands right in
-    the class, `at_first`, it may be that of `__init__`."""
+    not have; "" where there is none. `above` is the text down to the body, which may be that of `__init__` where it
+    comes first in the class (`at_first`)."""
     code = re.sub(r"#[^\n]*", "", text)
     top = next((one for one in reversed(above.split("\n")) if one[:1].strip(" \t#")), "")
     owner = re.match(r"class\s+(\w+)\s*(?:\(\s*(?:object)?\s*\))?\s*:", top)
