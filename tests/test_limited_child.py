@@ -29,7 +29,13 @@ OF_REPAIRS = {
         "package.python_repairs.python2",
         "package.python_repairs.rospy_names",
     ),
-    *("package.python_repairs.syntax", "package.lint", "package.lint.script_blocks"),
+    *(
+        "package.python_repairs.syntax",
+        "package.lint",
+        "package.lint.script_blocks",
+        "package.lint.script_names",
+    ),
+    "package.lint.script_results",
 }
 MAY_IMPORT = {
     "grader.intake.archive:unpack_here": {
@@ -127,7 +133,7 @@ def test_what_a_function_in_a_child_imports_is_there(function: str) -> None:
     assert set(json.loads(done.stdout)) == MAY_IMPORT[function]
     paths = [GRADER.joinpath(*name.split(".")) for name in MAY_IMPORT[function]]
     files = [path / "__init__.py" if path.is_dir() else path.with_suffix(".py") for path in paths]
-    files += GRADER.glob("package/lint/*.py") if ".lint." in function else []
+    files += GRADER.glob("package/lint/*.py")
     # a folder without __init__.py is a package, too
     found = {
         (file.name, root)
@@ -135,7 +141,7 @@ def test_what_a_function_in_a_child_imports_is_there(function: str) -> None:
         if file.exists()
         for root in _imported(ast.parse(file.read_text()))
     }
-    known = {*sys.stdlib_module_names, "grader", *(LINT if ".lint." in function else ())}
+    known = {*sys.stdlib_module_names, "grader", *LINT}
     assert {one for one in found - LIBRARIES if one[1] not in known} == set()
 
 

@@ -192,7 +192,6 @@ SERIES = (set("xyz"), set("XYZ"), set("lr"), set("LR"), set(DIGITS))
 
 def is_of_series(name, other):
     """Return whether two names differ only by a digit, or by the letter of an axis or a side at the end of a word."""
-    # `python_repairs/names.py` has the same for its side of the grader
     if len(name) != len(other):
         return False
     at = [i for i in range(len(name)) if name[i] != other[i]]
@@ -233,6 +232,34 @@ def is_guard(node, tree):
     """Whether it is compared where the script's own part begins."""
     tests = [n.test for n in tree.body if isinstance(n, ast.If)]
     return any(isinstance(test, ast.Compare) and test.left is node for test in tests)
+
+
+def never_main(node, tree):
+    """Return why `if __name__ == '__main__':`, or what stands in its place, never holds, behind what stands there for
+    the one or the other; two empty texts where it may hold."""
+    sides = [node.test.left, node.test.comparators[0]]
+    words = [one.value if isinstance(one, ast.Constant) else None for one in sides]
+    named = [getattr(one, "id", "") for one in sides]
+    if isinstance(node.test.ops[0], NEVER):
+        plain = [one for one in tree.body if not isinstance(one, (ast.FunctionDef, ast.ClassDef))]
+        running = [one for one in plain if any(isinstance(n, ast.Call) for n in ast.walk(one))]
+        hides = "__name__" in named and "__main__" in words and running == [node] and not node.orelse
+        return "", "`__name__` is '__main__' whenever the script is run" if hides else ""
+    if not isinstance(node.test.ops[0], (ast.Eq, ast.Is)):
+        return "", ""
+    if "__name__" in named:
+        word = words[1 - named.index("__name__")]
+        return ("", "") if word in ("__main__", None) else (repr(word), "`__name__` is never %r" % (word,))
+    at = 1 - words.index("__main__") if "__main__" in words else 0
+    given = {n.id for n in all_of(tree, ast.Name) if isinstance(n.ctx, ast.Store)}
+    given |= {n.arg for n in all_of(tree, ast.arg)}
+    name = repr(words[at]) if isinstance(words[at], str) and words[at] != "__main__" else named[at]
+    is_odd = "__main__" in words and name and name not in given
+    return (name, "`%s` is never '__main__'" % name) if is_odd else ("", "")
+
+
+NEVER = (ast.NotEq, ast.Lt, ast.Gt)
+"""Comparisons that do not hold between equal values."""
 
 
 def unread_argument(node, tree):

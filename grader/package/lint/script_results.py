@@ -196,7 +196,6 @@ def is_plain_end(node):
 def misnamed_targets(tree):
     """Return the assignments to a name that nothing reads, with that name and the only one that is read and nearly the
     same: `chnaged = True`. What is assigned in a class is read with `self.`."""
-    # `python_repairs/names.py` has the same for its side of the grader
     every = all_of(tree, ast.Name, ast.Attribute) if not reads_names_in_texts(tree) else []
     read = {dotted(n) for n in every if isinstance(n.ctx, ast.Load)}
     stored = Counter(dotted(n) for n in every if isinstance(n.ctx, ast.Store))

@@ -11,11 +11,7 @@ run it: Python 3.8, standard library only.
 import ast
 import builtins
 import importlib.util
-import os
-import sys
 
-# `-I` leaves this folder out
-sys.path.append(os.path.dirname(os.path.abspath(__file__)))
 import script_arithmetic as arithmetic
 import script_callbacks as callbacks
 import script_counters as counters
@@ -145,6 +141,7 @@ def never_run(tree):
         if {dotted(base) for base in one.bases} - plain:
             plain.discard(one.name)
             named |= {f.name for f in one.body if isinstance(f, ast.FunctionDef)}
+    known = names.given_names(tree, []) | set(dir(builtins))
     # of a module that only defines names, others may make all but what makes the node
     if not is_module or calls_in(tree, "init_node"):
         yield from never_made(tree, [c for c in classes if c.name in plain], named)
@@ -160,8 +157,9 @@ def never_run(tree):
                 fix = handed_over(node, tree, owner)
                 yield slip(node.lineno, "never-called", message, fix, owner + node.name)
         elif isinstance(node, ast.If) and isinstance(node.test, ast.Compare):
-            message = never_main(node, tree)
-            if message:
+            odd, message = names.never_main(node, tree)
+            # a name that is not there is told by `names.misspelt`
+            if message and (not odd.isidentifier() or odd in known):
                 yield slip(node.lineno, "main-guard", message)
 
 
@@ -184,37 +182,6 @@ def never_made(tree, classes, named):
     fix = "%s, write `%s = %s(%s)`" % (where, owner.name.lower(), owner.name, ", ".join(asked))
     message = "nothing calls `%s()`, so its `__init__` never runs" % owner.name
     yield slip(owner.lineno, "never-called", message, fix, owner.name)
-
-
-def never_main(node, tree):
-    """Return why `if __name__ == '__main__':`, or what stands in its place, never holds; "" where it may hold."""
-    sides = [node.test.left, node.test.comparators[0]]
-    words = [one.value if isinstance(one, ast.Constant) else None for one in sides]
-    named = [getattr(one, "id", "") for one in sides]
-    if isinstance(node.test.ops[0], NEVER):
-        if node.orelse or "__name__" not in named or "__main__" not in words:
-            return ""
-        plain = [one for one in tree.body if not isinstance(one, (ast.FunctionDef, ast.ClassDef))]
-        running = [one for one in plain if any(isinstance(n, ast.Call) for n in ast.walk(one))]
-        return "`__name__` is '__main__' whenever the script is run" if running == [node] else ""
-    if not isinstance(node.test.ops[0], (ast.Eq, ast.Is)):
-        return ""
-    if "__name__" in named:
-        word = words[1 - named.index("__name__")]
-        return "" if word in ("__main__", None) else "`__name__` is never %r" % (word,)
-    if "__main__" not in words:
-        return ""
-    at = 1 - words.index("__main__")
-    given = {n.id for n in all_of(tree, ast.Name) if isinstance(n.ctx, ast.Store)}
-    given |= {n.arg for n in all_of(tree, ast.arg)}
-    known = names.given_names(tree, []) | set(dir(builtins))
-    name = named[at] if named[at] in known - given else ""
-    name = repr(words[at]) if isinstance(words[at], str) and words[at] != "__main__" else name
-    return "`%s` is never '__main__'" % name if name else ""
-
-
-NEVER = (ast.NotEq, ast.Lt, ast.Gt)
-"""Comparisons that do not hold between equal values."""
 
 
 def handed_over(function, tree, owner):

@@ -18,6 +18,7 @@ from itertools import islice, pairwise
 from pathlib import PurePosixPath
 from typing import Any
 
+from grader.package.lint.script_names import never_main
 from grader.package.python_repairs.calls import (
     with_arguments,
     with_callbacks,
@@ -347,7 +348,7 @@ def _with_main(text: str) -> Iterator[Step]:
     tree, lines = tree_of(text), text.split("\n")
     for node in nodes_in(tree):
         if isinstance(node, ast.If) and isinstance(node.test, ast.Compare):
-            why, span = _never_main(node, node.test, tree), span_of(lines, node.test)
+            why, span = _never_main(node, tree), span_of(lines, node.test)
             if why and span:
                 right = edited(text, [(*span, "__name__ == '__main__'")])
                 yield from step_to("guard", node.lineno, text, right, why)
@@ -366,25 +367,13 @@ def _with_main(text: str) -> Iterator[Step]:
         yield from step_to("main", makers[0].lineno, text, after, makers[0].name)
 
 
-def _never_main(guard: ast.If, test: ast.Compare, tree: ast.Module) -> str:
-    """Return why the comparison of an `if` for `__name__ == '__main__'` never holds; "" where it may hold."""
-    sides = (test.left, test.comparators[0])
-    names = [one.id for one in sides if isinstance(one, ast.Name)]
-    words = [one.value for one in sides if isinstance(one, ast.Constant) and isinstance(one.value, str)]
-    if "__name__" in names and len(words) == 1:
-        if isinstance(test.ops[0], ast.NotEq | ast.Lt | ast.Gt):
-            running = [one for one in runs_of(tree) if any(isinstance(n, ast.Call) for n in nodes_in(one))]
-            hides = running == [guard] and not guard.orelse and words[0] == "__main__"
-            return "`__name__` is '__main__' whenever the script is run" if hides else ""
-        word = words[0]
-        near = word != "__main__" and (word.strip("_ ").lower() == "main" or is_one_edit(word, "__main__"))
-        return f"`__name__` is never {word!r}" if near else ""
-    if "__main__" not in words or not isinstance(test.ops[0], ast.Eq | ast.Is):
-        return ""
-    other = [*(repr(w) for w in words if w != "__main__"), *names]
-    given = {n.id for n in nodes_in(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
-    given |= {n.arg for n in nodes_in(tree) if isinstance(n, ast.arg)}
-    return f"`{other[0]}` is never '__main__'" if other and other[0] not in given else ""
+def _never_main(guard: ast.If, tree: ast.Module) -> str:
+    """Return why the comparison of an `if` for `__name__ == '__main__'` never holds; "" where it may hold, or where
+    another word than that one may be meant."""
+    odd, why = never_main(guard, tree)
+    word = odd.strip("'\"")
+    is_near = word.strip("_ ").lower() == "main" or is_one_edit(word, "__main__")
+    return why if is_near or not why.startswith("`__name__` is never") else ""
 
 
 def _with_server_started(text: str) -> Iterator[Step]:

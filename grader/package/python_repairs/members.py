@@ -18,7 +18,8 @@ from difflib import get_close_matches
 from itertools import chain
 from typing import NamedTuple
 
-from grader.package.python_repairs.names import MEMBERS, bound_in, is_of_series, made_by, meant_by_use
+from grader.package.lint.script_names import is_of_series
+from grader.package.python_repairs.names import MEMBERS, bound_in, made_by, meant_by_use
 from grader.package.python_repairs.syntax import Step, edited, last_name, nodes_in, span_of, step_to, tree_of
 from grader.wording import is_one_edit
 

@@ -9,11 +9,13 @@ from __future__ import annotations
 import ast
 import builtins
 import re
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
-from itertools import takewhile
 from string import digits
 
+from grader.package.lint.script_names import is_of_series
+from grader.package.lint.script_results import misnamed_targets
 from grader.package.python_repairs.syntax import (
     Step,
     edited,
@@ -326,73 +328,32 @@ def with_targets(text: str) -> Iterator[Step]:
     """`self.cout = self.count + 1` and `couner = 0`: a value is given to a name that nothing reads, and is meant for
     one that is nearly the same; and `count = 0` in `__init__`, which is meant for `self.count`."""
     tree, lines = tree_of(text), text.split("\n")
-    nodes = [n for n in nodes_in(tree) if isinstance(n, ast.Name | ast.Attribute)]
-    read = {ast.unparse(n) for n in nodes if isinstance(n.ctx, ast.Load)}
-    stored = [ast.unparse(n) for n in nodes if isinstance(n.ctx, ast.Store)]
-    assigned = [n for n in nodes_in(tree) if isinstance(n, ast.Assign | ast.AugAssign)]
-    given: dict[str, list[ast.expr]] = {}
-    of_classes = {n for one in nodes_in(tree) if isinstance(one, ast.ClassDef) for n in one.body}
-    for one in assigned:
-        target = one.targets[0] if isinstance(one, ast.Assign) else one.target
-        name = f"self.{ast.unparse(target)}" if one in of_classes else ast.unparse(target)
-        given.setdefault(name, []).append(one.value)
-    local = {*_only_in_init(tree)}
-    for one in assigned:
-        target = one.targets[0] if isinstance(one, ast.Assign) else one.target
-        name, span = ast.unparse(target), span_of(lines, target)
-        if name in read or stored.count(name) != 1 or span is None or one in of_classes:
-            continue
-        near = [f"self.{name}"] if target in local and f"self.{name}" in read else []
-        near = near or [other for other in given if other in read and _is_alike(name, other)]
-        used = {ast.unparse(n) for n in nodes_in(one.value)} if isinstance(one.value, ast.BinOp) else set()
-        same = isinstance(one, ast.AugAssign) or (near and (near[0] in used or near[0].endswith(f".{name}")))
-        same = same or (near and _are_constants([one.value, *given[near[0]]]))
-        if len(near) == 1 and same and not _stands_beside(one, near[0], tree):
-            why = f"nothing reads `{name}`, to which a value is given here: `{near[0]}` is meant"
-            for step in step_to("argument", span[0] + 1, text, edited(text, [(*span, near[0])]), why):
+    for one, (name, meant) in {**misnamed_targets(tree), **_meant_for_self(tree)}.items():
+        span = span_of(lines, one.targets[0] if isinstance(one, ast.Assign) else one.target)
+        if span is not None:
+            why = f"nothing reads `{name}`, to which a value is given here: `{meant}` is meant"
+            for step in step_to("argument", span[0] + 1, text, edited(text, [(*span, meant)]), why):
                 yield step
                 yield from with_targets(step["text"])
                 return
 
 
-def _stands_beside(one: ast.stmt, name: str, tree: ast.Module) -> bool:
-    """Return whether that name gets its value in the same run of assignments: then both are meant."""
-    blocks = (getattr(n, part, None) for n in nodes_in(tree) for part in ("body", "orelse", "finalbody"))
-    block = next((body for body in [tree.body, *blocks] if isinstance(body, list) and one in body), [one])
-    at = block.index(one)
-    above = takewhile(lambda s: isinstance(s, ast.Assign), reversed(block[:at]))
-    below = takewhile(lambda s: isinstance(s, ast.Assign), block[at + 1 :])
-    return any(name in map(ast.unparse, s.targets) for s in (*above, *below))
-
-
-def _only_in_init(tree: ast.Module) -> Iterator[ast.Name]:
-    """Yield the variables that get a value in an `__init__` which gives none to the object's attribute of that name."""
+def _meant_for_self(tree: ast.Module) -> dict[ast.Assign | ast.AugAssign, tuple[str, str]]:
+    """Return the assignments in an `__init__` to a variable that nothing reads, where the object's attribute of that
+    name is read and gets no value there, with both."""
+    nodes = [n for n in nodes_in(tree) if isinstance(n, ast.Name | ast.Attribute)]
+    read = {ast.unparse(n) for n in nodes if isinstance(n.ctx, ast.Load)}
+    stored = Counter(ast.unparse(n) for n in nodes if isinstance(n.ctx, ast.Store))
+    found = {}
     for init in (n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef) and n.name == "__init__"):
-        stored = [n for n in nodes_in(init) if isinstance(getattr(n, "ctx", None), ast.Store)]
-        own = {n.attr for n in stored if isinstance(n, ast.Attribute)}
-        yield from (n for n in stored if isinstance(n, ast.Name) and n.id not in own)
-
-
-def _is_alike(name: str, other: str) -> bool:
-    """Return whether two names of one object, or of none, differ by one edit or by capitals alone."""
-    (owner, _, last), (other_owner, _, other_last) = name.rpartition("."), other.rpartition(".")
-    is_other = is_of_series(last, other_last) or last[-1].isdigit() or last.isupper()
-    plural_of_it = f"{last}s" == other_last or f"{other_last}s" == last
-    if owner != other_owner or last == other_last or is_other or plural_of_it:
-        return False
-    long = min(len(last), len(other_last)) >= NAME_CHARS_MIN
-    return last.lower() == other_last.lower() or (long and is_one_edit(last, other_last))
-
-
-def _are_constants(values: Iterable[ast.expr]) -> bool:
-    """Return whether only numbers, texts and truth values of one kind are given."""
-    # -1 too
-    plain = [
-        one.operand if isinstance(one, ast.UnaryOp) and isinstance(one.op, ast.USub) else one
-        for one in values
-    ]
-    kinds = {type(value.value) if isinstance(value, ast.Constant) else None for value in plain}
-    return len(kinds) == 1 and None not in kinds
+        inside = nodes_in(init)
+        own = {n.attr for n in inside if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
+        for one in (n for n in inside if isinstance(n, ast.Assign | ast.AugAssign)):
+            target = one.targets[0] if isinstance(one, ast.Assign) else one.target
+            name = target.id if isinstance(target, ast.Name) else ""
+            if name not in read | own and f"self.{name}" in read and stored[name] == 1:
+                found[one] = (name, f"self.{name}")
+    return found
 
 
 def is_kept_by_self(node: ast.AST) -> bool:
@@ -532,20 +493,6 @@ def is_letter_changed(name: str, other: str) -> bool:
     pairs = [(a, b) for a, b in zip(name, other, strict=False) if a != b]
     same_ends = len(name) == len(other) >= NAME_CHARS_MIN and (name[0], name[-1]) == (other[0], other[-1])
     return same_ends and len(pairs) == 1 and "".join(pairs[0]).isalpha()
-
-
-def is_of_series(name: str, other: str) -> bool:
-    """Return whether two names differ only by a digit, or by the letter of an axis or a side with which a word begins
-    or ends: `max_x` and `max_y`."""
-    places = [i for i, (a, b) in enumerate(zip(name, other, strict=False)) if a != b]
-    if len(name) != len(other) or len(places) != 1:
-        return False
-    at = places[0]
-    at_end = name[at - 1 : at] in ("", "_") or name[at + 1 : at + 2] in ("", "_") or name[at].isdigit()
-    return at_end and any({name[at], other[at]} <= one for one in SERIES)
-
-
-SERIES = (set("xyz"), set("XYZ"), set("lr"), set("LR"), set(digits))
 
 
 def is_slip(name: str, other: str) -> bool:
