@@ -11,15 +11,13 @@ from pydantic import Field, model_validator
 
 from grader.checks.registry import check
 from grader.checks.support.clocks import excused, lateness, no_clock, run_seconds
-from grader.checks.support.exit_causes import explain_early_end
+from grader.checks.support.driving import STOPS_S, metres, never_moves, spot, tell_end, unreadable
 from grader.checks.support.geometry import (
     RESTS_M,
     TURNING_RAD,
-    Band,
     Course,
     Point,
     Pose,
-    Region,
     Spot,
     Track,
     arc,
@@ -27,14 +25,10 @@ from grader.checks.support.geometry import (
     driven,
     first_turn,
     followed,
-    has_no_numbers,
     length_m,
     off_m,
-    other_axis,
     relative,
-    rests_along,
     set_off_s,
-    share_inside,
     stands,
     top_speeds,
     track,
@@ -42,27 +36,24 @@ from grader.checks.support.geometry import (
     winds,
 )
 from grader.checks.support.processes import GlobalName
-from grader.checks.support.topics import Sender, cite, nothing_sent, topics_with
+from grader.checks.support.topics import Sender, cite, nothing_sent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Status, Verdict, failed, failed_or_blocked, passed
+from grader.model.verdict import Verdict, failed, passed
 from grader.wording import join_words, significant
 
 LATE_MS = 25.0
 LATE_P95_MS = 5.0
+
+
 LATE_TURNS = 4
 """Each turn may be late: at 1.6 rad/s, 25 ms in each of four are 0.16 rad, and 0.3 m beside a line of 2 m."""
 ORIGIN = (0.0, 0.0)
-DRIVE = "publish a velocity that is not 0, again and again for as long as it should drive"
 DEGREES_FROM = 20.0
 """Radians a second that no robot of a lab turns with, and that small angles in degrees come to."""
-
 AWAY = 0.3
 """How far from a corner, as a share of what follows it, the robot is when its direction is looked at."""
-STOPS_S = 0.3
-TURNS_S = 3.0
-"""A robot that turns for so long, and does not drive, finds no way."""
 STOPS_AFTER_S = 1.0
 """The last velocity of a node that ends holds for so long."""
 SAME_TURN_DEG, OTHER_TURN_DEG, HALF_TURN_DEG = 2.0, 20.0, 170.0
@@ -140,34 +131,6 @@ def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
     return verdict.about(expected=expected, measured=measured, citations=(cite(run, params.topic),))
 
 
-def tell_end(verdict: Verdict, package: PackageFacts, run: Run) -> Verdict:
-    """Return a loss with the reason why the node ended, where it did so early and not by its script's own end."""
-    end = explain_early_end(package, run) if verdict.status is Status.FAIL else None
-    for channel in run.student_channels() if verdict.status is Status.FAIL else ():
-        if axis := other_axis(channel):
-            why = f"velocities on {channel.topic} set {axis}, and their angular.z is always 0"
-            hint = f"set angular.z in place of {axis}: a robot on wheels turns by that alone"
-            verdict = verdict.explained(why, hint)
-    if end is None or end.by_itself or end.cause in verdict.message:
-        return verdict
-    kind = failed_or_blocked if verdict.unjudged else failed
-    if "keeps moving" in verdict.message:  # it was there before that
-        verdict = verdict.model_copy(update={"citations": (*verdict.citations, *end.citations)})
-        return verdict.explained(f"the node ended: {end.cause}", f"{verdict.hint}; {end.hint}")
-    return end.verdict(kind, f"{verdict.message}; the node ended: {end.cause}", verdict.measured)
-
-
-def unreadable(found: Track, topic: str) -> Verdict | None:
-    """Return the verdict where the messages tell of no path."""
-    if found.misfit:
-        hint = f"rostopic info {topic} shows their type"
-        return failed_or_blocked(f"the messages on {topic} {found.misfit}", measured=found.misfit, hint=hint)
-    if found.fault:
-        hint = "print what you publish: a division by zero, or a square root of a negative number?"
-        return failed(f"the messages on {topic} {found.fault}", measured=found.fault, hint=hint)
-    return None
-
-
 def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
     taken = relative(found.path) if params.relative else list(found.path)
     course = course_of(taken, params)
@@ -199,76 +162,6 @@ def course_of(taken: Sequence[Pose], params: PathParams) -> Course:
     if params.may_go_on and course.reached == len(params.way.points):
         return course._replace(done=True, strayed=None)
     return course
-
-
-def never_moves(path: Sequence[Pose], figures: str, run: Run) -> Verdict:
-    """Return the loss of a robot that stays where it is, and turns there at most."""
-    if turned_rad(path) > TURNING_RAD:
-        hint = f"{DRIVE}: linear.x, and not only angular.z; where the script does so, its condition is never true"
-        if any(one.forward for channel in run.student_channels() for _, one in commands_of(channel)):
-            hint = "look at the condition under which it drives: it is hardly ever true"
-        return failed_or_blocked("it turns, and never leaves its place", measured=figures, hint=hint)
-    return why_still(failed_or_blocked("it never moves", measured=figures, hint=DRIVE), run)
-
-
-def drives_too_little(path: Sequence[Pose], region: Region, least_m: float) -> Verdict:
-    """Return the loss of a robot whose path is too short: it is slow, stands, or turns on the spot in the end."""
-    long_m, rests = length_m(path), rests_along(path)
-    message = f"its path is {metres(long_m)} long; {significant(least_m)} m are asked for"
-    hint, stood = "keep driving while the way is clear", 1 - share_inside(path, rests)
-    recent = [pose for pose in path if pose.time_s >= path[-1].time_s - TURNS_S]
-    turns = stands(recent) and turned_rad(recent) > TURNING_RAD
-    if turns:
-        message += f", and it turns on the spot at {spot(path[-1].point)} in the end"
-        hint = AHEAD
-        steps = (math.remainder(b.heading - a.heading, math.tau) for a, b in pairwise(recent))
-        if abs(sum(steps)) < turned_rad(recent) / 2:
-            message += ", now to the left and now to the right"
-            hint = "once it turns, let it turn to the same side until the way in front is clear"
-    elif stood < RARELY:
-        mean_m_s = long_m / max(path[-1].time_s - path[0].time_s, STOPS_S)
-        message, hint = f"{message}, and it drives all the time, at {mean_m_s:.2f} m/s", "drive faster"
-    if turns and isinstance(region, Band) and region.max_m is not None:
-        message += f", {metres(region.nearest_m(path[-1].point))} from the nearest wall; why is not known"
-        hint = "print in each branch which one it is, and look at the condition that stays true there"
-    elif stood > MOSTLY and (isinstance(region, Band) or not turns):
-        message += f", and it stands, or turns on the spot, for {stood:.0%} of the time"
-        if isinstance(region, Band):
-            free_m = min(region.nearest_m(a.point) for a, still in zip(path, rests, strict=True) if still)
-            message += f", at least {metres(free_m)} from any wall"
-        why = "look at the condition under which it drives: it does not hold there"
-        hint = f"{hint}; {why}" if turns else why
-    verdict = failed(message, hint=hint)
-    return verdict.stuck() if stands(recent) and not turns else verdict
-
-
-AHEAD = "drive on where the way is clear: look at the ranges in front alone, by their angles in radians"
-RARELY, MOSTLY = 0.05, 0.5
-"""Shares of the time for which it stands."""
-
-
-def why_still(verdict: Verdict, run: Run) -> Verdict:
-    """Return the loss with its cause where the student's velocities have a linear.y, and never a linear.x, are no
-    numbers, or go where the robot does not listen."""
-    types = {topic: kind for _, event in run.graph for topic, kind in event.topic_types.items()}
-    simulated = topics_with(run, "subscribers", lambda node: node in run.grader_nodes)
-    hears = sorted(topic for topic in simulated if "Twist" in types.get(topic, ""))
-    heard, own = topics_with(run, "subscribers", lambda _: True), topics_with(run, "subscribers")
-    for channel in run.student_channels():
-        commands = [command for _, command in commands_of(channel)]
-        if has_no_numbers(channel):
-            why = f"velocities on {channel.topic} are no numbers (nan or inf), which a robot does not obey"
-            hint = "print what they are calculated from, to see where the first nan or inf comes from"
-            if any("LaserScan" in types.get(topic, "") for topic in own):
-                hint = "a range is inf where nothing is in reach: calculate with no such range"
-            return verdict.explained(why, hint)
-        if hears and channel.topic not in heard and any(one.speed for one in commands):
-            why = f"its velocities are on {channel.topic}, which no node hears"
-            return verdict.explained(why, f"publish them on {join_words(hears, last='or')}")
-        if any(one.left for one in commands) and not any(one.forward for one in commands):
-            why = f"linear.x of {channel.topic} is always 0, and linear.y does not move a robot on wheels"
-            return verdict.explained(why, "set linear.x in place of linear.y")
-    return verdict
 
 
 def _drift_m(run: Run, path: Sequence[Pose], way: Way) -> float:
@@ -358,14 +251,6 @@ class Way(NamedTuple):
         if index == 0 and self.added:
             return "its start"
         return f"point {index + (0 if self.added else 1)} {spot(self.points[index])}"
-
-
-def spot(point: Point) -> str:
-    return f"({significant(round(point[0], 2))}, {significant(round(point[1], 2))})"
-
-
-def metres(distance_m: float) -> str:
-    return f"{distance_m:.2f} m"
 
 
 def what_is_wrong(path: Sequence[Pose], way: Way, course: Course, *, mirror: bool) -> Words:

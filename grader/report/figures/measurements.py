@@ -12,17 +12,11 @@ from functools import partial
 from itertools import chain
 
 from grader.checks.counter import StartParams, StepParams, judge_start
+from grader.checks.ends_at import EndsAtParams, path_to_judge, stretch_to_judge
 from grader.checks.listener import HearsParams
 from grader.checks.rate import RateParams, rhythms_to_judge, sleeps_explain, was_late
-from grader.checks.robot_path import PathParams, course_of, spot
-from grader.checks.robot_places import (
-    EndsAtParams,
-    Place,
-    StaysWithinParams,
-    path_to_judge,
-    placed,
-    stretch_to_judge,
-)
+from grader.checks.robot_path import PathParams, course_of
+from grader.checks.stays_within import StaysWithinParams, placed
 from grader.checks.support import counters
 from grader.checks.support.clocks import lateness, run_seconds
 from grader.checks.support.console_output import (
@@ -36,6 +30,7 @@ from grader.checks.support.console_output import (
     text_places,
 )
 from grader.checks.support.counters import Count, Step, WrapParams
+from grader.checks.support.driving import Place, spot
 from grader.checks.support.exit_causes import process_tracebacks
 from grader.checks.support.geometry import Polyline, Pose, out_along, relative, shown_walls, track
 from grader.checks.support.processes import how_it_ended, life_of
