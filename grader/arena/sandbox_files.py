@@ -70,7 +70,7 @@ def prepare(place: Path, ros: RosInstallation) -> None:
     for name in ("python", "python3"):
         (shims / name).symlink_to(ros.python)
     shutil.copyfile(LINT / "syntax.py", shims / "grader-syntax.py")
-    for module in (LINT / "slips.py", *LINT.glob("script_*.py")):
+    for module in (LINT / "slips.py", *LINT.glob("script_*.py"), ROS_SIDE / "small_changes.py"):
         shutil.copyfile(module, shims / module.name)
     shutil.copyfile(ROS_SIDE / "functions.py", shims / FUNCTIONS)
     shutil.copyfile(ROS_SIDE / "rostests.py", shims / ROSTESTS)
