@@ -39,8 +39,7 @@ ALLOWED = {
     "untrusted_text": set[str](),
     "wording": set[str](),
     "installable": {"errors", "wording"},
-    "syntax_fixes": {"wording"},
-    "yaml_fixes": {"wording"},
+    "line_slips": {"model", "wording"},
     "portable": {"errors"},
     "ros_env": {"errors", "host_programs", "installable", "model", "portable", "wording"},
     "host_programs": set[str](),
@@ -54,11 +53,10 @@ ALLOWED = {
     "faults": BASE | {"files", "intake", "judging", "report", "results", "rubric"},
     "evidence": BASE | {"files", "installable"},
     "package": BASE | {
-        "files", "host_programs", "installable", "limited_child", "rubric.model", "rubric.scenario", "syntax_fixes",
-        "yaml_fixes"
+        "files", "host_programs", "installable", "limited_child", "rubric.model", "rubric.scenario", "line_slips"
     },
     "intake": BASE | {"files", "host_programs", "limited_child"},
-    "checks": BASE | {"evidence", "installable", "syntax_fixes", "yaml_fixes"},
+    "checks": BASE | {"evidence", "installable", "line_slips"},
     "rubric": BASE | {"checks", "evidence", "files", "installable", "ros_env"},
     "judging": BASE | {"checks", "evidence", "installable", "rubric"},
     "report": BASE | {"checks", "evidence", "files", "judging", "rubric"},
@@ -142,7 +140,7 @@ def test_checks_and_records_do_no_io() -> None:
 
 def test_checks_parse_python_where_threads_can() -> None:
     wrong = [str(path) for path in _sources(GRADER / "checks") if "ast.parse(" in path.read_text("utf-8")]
-    assert wrong == [], "grader.syntax_fixes.parsed is for threads that parse at the same time"
+    assert wrong == [], "grader.line_slips.python.parsed is for threads that parse at the same time"
 
 
 def test_checks_see_evidence_as_records_only() -> None:

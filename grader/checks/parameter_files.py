@@ -28,12 +28,12 @@ from grader.checks.support.scripts import add_hint, can_be_moved, find_script, m
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
+from grader.line_slips.python import LFS_BEGINS, LFS_POINTER
+from grader.line_slips.yaml import levels_of
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Citation, FileCitation, Verdict, failed, grade_again, passed
-from grader.syntax_fixes import LFS_BEGINS, LFS_POINTER
 from grader.wording import join_words, plural, there_is
-from grader.yaml_fixes import levels_of
 
 
 class ParamsLoadedParams(Record):

@@ -17,11 +17,11 @@ from cmake_parser import CMakeError, Token, parse_raw, parse_tree, resolve_args,
 from cmake_parser import ast as nodes
 from cmake_parser.interpreter import Context
 
+from grader.line_slips.cmake import find_slip, is_open
+from grader.line_slips.python import MERGE_MARKER, MERGED
 from grader.model.file_fault import Fault
 from grader.model.package import CMAKE, INTERFACE_FOLDERS, CMakeCall, CMakeFacts
-from grader.package.cmake_corrections import find_slip, is_open
 from grader.package.reading import printable, read_markup
-from grader.syntax_fixes import MERGE_MARKER, MERGED
 from grader.wording import lines_text
 
 _CALLS_MAX = 5_000

@@ -16,6 +16,7 @@ from lxml import etree
 from pydantic import Field
 
 from grader.installable import TUTORIALS, known_packages
+from grader.line_slips.xml import ATTRIBUTES
 from grader.model.file_fault import Fault
 from grader.model.launch_file import (
     SUBSTITUTION,
@@ -28,7 +29,6 @@ from grader.model.launch_file import (
 )
 from grader.model.record import Record
 from grader.package.xml import line_of
-from grader.package.xml_corrections import ATTRIBUTES
 from grader.wording import PAIR, is_one_edit
 
 INCLUDES_MAX = 50

@@ -16,12 +16,12 @@ from catkin_pkg.condition import evaluate_condition
 from catkin_pkg.package import InvalidPackage, Package, parse_package_string
 from lxml import etree
 
+from grader.line_slips.python import Reason
+from grader.line_slips.xml import TAGS
 from grader.model.file_fault import Fault
 from grader.model.package import MANIFEST, Dependency, Manifest, Person
 from grader.package.reading import read_markup
 from grader.package.xml import find_strange, line_of, parse_xml
-from grader.package.xml_corrections import TAGS
-from grader.syntax_fixes import Reason
 
 _TEXT_CHARS_MAX = 4_000
 _TAGS = 600

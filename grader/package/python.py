@@ -14,12 +14,7 @@ from typing import Literal, TypeVar
 from pydantic import Field
 
 from grader.limited_child import ChildLimits, run_limited
-from grader.model.file_fault import Fault
-from grader.model.python_slip import PythonSlip
-from grader.model.record import Record
-from grader.model.repair import as_code
-from grader.package.reading import printable
-from grader.syntax_fixes import (
+from grader.line_slips.python import (
     BLOCK,
     COMMENTED_OUT,
     DELETE_LINE,
@@ -33,6 +28,11 @@ from grader.syntax_fixes import (
     reason_of_line,
     without_texts,
 )
+from grader.model.file_fault import Fault
+from grader.model.python_slip import PythonSlip
+from grader.model.record import Record
+from grader.model.repair import as_code
+from grader.package.reading import printable
 from grader.wording import plural
 
 CHECK = "grader.package.lint.syntax:check_all"

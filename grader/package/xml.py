@@ -9,10 +9,10 @@ from itertools import islice
 
 from lxml import etree
 
+from grader.line_slips.python import LFS_BEGINS, LFS_POINTER, MERGED, Reason
+from grader.line_slips.text import LineSlip, changed_line, doubled_and_turned
+from grader.line_slips.xml import ATTRIBUTES, DECLARATION, TAGS, slips_of
 from grader.model.file_fault import Fault
-from grader.package.line_corrections import LineSlip, changed_line, doubled_and_turned
-from grader.package.xml_corrections import ATTRIBUTES, DECLARATION, TAGS, slips_of
-from grader.syntax_fixes import LFS_BEGINS, LFS_POINTER, MERGED, Reason
 
 TYPOGRAPHIC = re.compile("[\u2018\u2019\u201a\u201b\u201c\u201d\u201e\u2033\u00ab\u00bb]")
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from grader.line_slips.cmake import find_slip
 from grader.model.package import meant_command
 from grader.package.cmake import (
     FILES_BYTES_MAX,
@@ -18,7 +19,6 @@ from grader.package.cmake import (
     split_lists,
     written_calls,
 )
-from grader.package.cmake_corrections import find_slip
 from grader.package.cmake_parse import parse_tree_of
 
 

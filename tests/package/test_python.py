@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from grader.checks.support.exit_causes import syntax_hint
-from grader.package.line_corrections import first_version
+from grader.line_slips.python import corrected, other_quotes, parsed
+from grader.line_slips.text import first_version
 from grader.package.lint import syntax
 from grader.package.python import check_syntax, read_syntax_report, reason_of
-from grader.syntax_fixes import corrected, other_quotes, parsed
 
 pytestmark = pytest.mark.usefixtures("without_processes")
 """What the child may take, and what ends it, is looked at in test_hostile.py."""

@@ -23,9 +23,9 @@ from grader.checks.support.rospy_calls import (
 )
 from grader.checks.support.text import shown
 from grader.installable import noetic_messages
+from grader.line_slips.python import parsed
 from grader.model.package import PackageFacts
 from grader.model.verdict import FileCitation
-from grader.syntax_fixes import parsed
 from grader.wording import join_words, plural
 
 _CANNOT_ADD = r"can only concatenate str \(not \"(\w+)\"\) to str"

@@ -68,11 +68,11 @@ from grader.checks.support.text import (
 from grader.evidence.events import STOPPED
 from grader.evidence.run import Run
 from grader.installable import install_hint
+from grader.line_slips.python import COMMENTED_OUT, corrected, without_brace
 from grader.model.file_fault import Fault
 from grader.model.package import PackageFacts, SourceFile
 from grader.model.python_slip import PythonSlip
 from grader.model.verdict import Citations, FileCitation, Span, Verdict, machine_lacks
-from grader.syntax_fixes import COMMENTED_OUT, corrected, without_brace
 from grader.wording import NOTHING_TO_DO, ON_THE_MACHINE, join_words, on_lines
 
 OTHER_NAMES_SHOWN = 3

@@ -34,10 +34,10 @@ from grader.installable import (
     nearest_module,
     noetic_messages,
 )
+from grader.line_slips.python import parsed
 from grader.model.package import CMAKE, Interface, PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.verdict import FileCitation
-from grader.syntax_fixes import parsed
 from grader.wording import closest, join_words
 
 SETUP_PAGE = "http://docs.ros.org/en/noetic/api/catkin/html/howto/format2/installing_python.html"

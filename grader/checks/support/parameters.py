@@ -21,11 +21,11 @@ from grader.checks.support.text import both, get_param, init, near_names, shown
 from grader.checks.support.topics import cite, nodes_on, published_topics
 from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
+from grader.line_slips.yaml import YAML_LINES_MAX, slip_of_yaml
 from grader.model.launch_file import LaunchNode, LaunchParam
 from grader.model.package import PackageFacts
 from grader.model.verdict import EvidenceCitation, Verdict
 from grader.wording import join_words, plural, there_is
-from grader.yaml_fixes import YAML_LINES_MAX, slip_of_yaml
 
 UNNAMED = "/unnamed"
 """What rospy calls a node before `init_node`."""

@@ -11,8 +11,8 @@ from pathlib import PurePosixPath
 from grader.checks.support.console_output import Traceback
 from grader.checks.support.text import shown
 from grader.installable import noetic_messages
+from grader.line_slips.python import parsed
 from grader.model.package import PackageFacts
-from grader.syntax_fixes import parsed
 from grader.wording import join_words, on_lines
 
 Meaning = tuple[str, str]

@@ -195,7 +195,7 @@ def slips_of_the_rest(text):
 
 def first_version(lines):
     """Return the lines with git's merge markers blank, and all versions between them but the first."""
-    # `line_corrections.py` has the same for texts, and this side of the grader imports nothing of the other.
+    # `line_slips/text.py` has the same for texts, and this side of the grader imports nothing of the other.
     kept, part = [], ""
     for line in lines:
         marker = MARKER.match(line)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from grader.syntax_fixes import without_texts
+from grader.line_slips.python import without_texts
 
 STATEMENT_LINES_MAX = 12
 FIXERS = ("print", "except", "exec", "raise", "repr", "ne", "numliterals", "long", "unicode")

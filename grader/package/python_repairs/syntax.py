@@ -1,7 +1,7 @@
 """Repairs of Python sources that do not parse, step by step: tabs, Python 2, braces, a token that is missing.
 
 A text comes in, and the steps go out after which it parses; what one line could mean is known to
-`grader/syntax_fixes.py`. It runs in a child process as `examine.py` does: the standard library and fissix only,
+`grader/line_slips/python.py`. It runs in a child process as `examine.py` does: the standard library and fissix only,
 and nothing is executed.
 """
 
@@ -15,11 +15,7 @@ from functools import lru_cache
 from itertools import takewhile
 from typing import Any
 
-from grader.package.line_corrections import first_version
-from grader.package.lint.script_blocks import lacks_body, lacks_head
-from grader.package.python_repairs.lost_heads import lost_head, lost_method
-from grader.package.python_repairs.python2 import as_python3
-from grader.syntax_fixes import (
+from grader.line_slips.python import (
     DELETE_LINE,
     PLAIN,
     corrections,
@@ -28,6 +24,10 @@ from grader.syntax_fixes import (
     without_comment_sign,
     without_texts,
 )
+from grader.line_slips.text import first_version
+from grader.package.lint.script_blocks import lacks_body, lacks_head
+from grader.package.python_repairs.lost_heads import lost_head, lost_method
+from grader.package.python_repairs.python2 import as_python3
 
 STEPS_MAX = 60
 ODD_LINES_MAX = 3

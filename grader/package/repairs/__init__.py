@@ -10,7 +10,7 @@ A new kind needs
 3. its name in the sets of `judging/repair_charges.py` that fit, which decide to which criterion it is charged;
 4. its name in `FIXED` of `cli/fixing.py` if `grader check --fix` may do it: never what decides what a program does.
 
-One more line of Python for a kind that is there is a correction in `syntax_fixes.py`, or a step in
+One more line of Python for a kind that is there is a correction in `line_slips/python.py`, or a step in
 `package/python_repairs/examine.py`.
 """
 

@@ -10,6 +10,7 @@ from pathlib import PurePosixPath
 from cmake_parser.ast import Command, Token
 
 from grader.installable import is_no_package, known_packages, noetic_messages
+from grader.line_slips.cmake import find_slip, is_open
 from grader.model.package import (
     CMAKE,
     INTERFACE_FOLDERS,
@@ -20,7 +21,6 @@ from grader.model.package import (
     meant_command,
 )
 from grader.model.repair import RepairKind
-from grader.package.cmake_corrections import find_slip, is_open
 from grader.package.cmake_parse import commands_of, join_half_comment, parse_tree_of
 from grader.package.manifest import parse_manifest
 from grader.package.repairs.cmake_calls import (

@@ -17,17 +17,17 @@ from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
 from grader.files import atomic_write, open_untrusted
+from grader.line_slips.python import MERGED
+from grader.line_slips.text import first_version
 from grader.model.package import CMAKE, MANIFEST
 from grader.model.repair import Repair, RepairKind, added_lines, messages_of
-from grader.package.line_corrections import first_version
 from grader.package.reading import LEFT_OUT
-from grader.package.repairs.xml_edits import well_formed
+from grader.package.repairs.well_formed import well_formed
 from grader.package.xml import (
     find_strange,
     parse_xml,
 )
 from grader.portable import BINARY, CLOEXEC, DIRECTORY, NOFOLLOW, READ
-from grader.syntax_fixes import MERGED
 from grader.wording import numbers_text
 
 TEXT_BYTES_MAX = 64_000

@@ -17,12 +17,12 @@ from typing import Literal
 
 from grader.installable import exists_somewhere, known_packages, noetic_messages
 from grader.limited_child import ChildLimits, run_limited
+from grader.line_slips.python import COMMENTED_OUT, DELETE_LINE, MERGED, OUT_OF_BLOCK, Reason
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.repair import Repair, RepairKind, as_code
 from grader.package.python import TOO_FAR_IN, reason_of
 from grader.package.repairs.editing import KEEP_ONE, Files, emptied_lines
-from grader.syntax_fixes import COMMENTED_OUT, DELETE_LINE, MERGED, OUT_OF_BLOCK, Reason
 from grader.wording import is_one_edit, join_words, numbers_text, plural
 
 EXAMINE = "grader.package.python_repairs.examine:examine"

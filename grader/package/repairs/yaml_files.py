@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import yaml
 
+from grader.line_slips.yaml import YAML_LINES_MAX, levels_of, slip_of_yaml
 from grader.model.package import PackageFacts
 from grader.model.repair import indent_of
 from grader.package.repairs.editing import Files, keep_first_version
 from grader.package.repairs.names import Wanted
 from grader.wording import on_lines, plural
-from grader.yaml_fixes import YAML_LINES_MAX, levels_of, slip_of_yaml
 
 SUFFIXES = (".yaml", ".yml")
 LINES_MAX = 4

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from grader.syntax_fixes import MERGE_MARKER
+from grader.line_slips.python import MERGE_MARKER
 
 
 class LineSlip(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from grader.package.launch import parse_launch
-from grader.package.repairs.xml_edits import well_formed
+from grader.package.repairs.well_formed import well_formed
 
 TALKER = '<node pkg="lab" type="talker.py" name="talker" output="screen"/>'
 RIGHT = f"""\

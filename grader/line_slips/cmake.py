@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 from cmake_parser import CMakeError, parse_raw
 
+from grader.line_slips.text import LineSlip, changed_line, doubled_and_turned
 from grader.model.package import CMAKE_COMMANDS
-from grader.package.line_corrections import LineSlip, changed_line, doubled_and_turned
 from grader.wording import join_words, the_same_on
 
 _CHARS_MAX = 12_000
