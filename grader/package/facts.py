@@ -21,12 +21,12 @@ from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
 
 from grader.model.file_fault import Fault
+from grader.model.git_ignores import IgnoreLine
 from grader.model.message_definitions import PARTS, parse_interface
 from grader.model.package import Interface, PackageFacts, Shebang, ShebangFault, SourceFile
 from grader.model.python_slip import PythonSlip
 from grader.model.submission import SourcePackage, Submission
 from grader.package.cpp import SUFFIXES, cpp_slips
-from grader.package.git_ignores import read_git_ignores
 from grader.package.own_modules import drop_slips_of_modules
 from grader.package.python import check_syntax
 from grader.package.reading import (
@@ -42,6 +42,8 @@ from grader.portable import system
 
 _CHUNK_BYTES = 1 << 20
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
+_GIT_IGNORE = ".gitignore"
+_IGNORE_LINES_MAX = _IGNORE_CHARS_MAX = 100
 _SCRIPTS = frozenset({".py", ".sh", ".bash"})
 
 SYSTEM_PATH = "/usr/local/bin:/usr/bin:/bin"
@@ -313,7 +315,7 @@ def read_package(
         interfaces=_interfaces(package.folder, _readable(entries)),
         asked=package.asked,
         beside=others,
-        git_ignores=read_git_ignores(package, (file.path for file in files)),
+        git_ignores=_read_git_ignores(package, (file.path for file in files)),
     )
 
 
@@ -395,3 +397,33 @@ def _readable(entries: Iterable[Entry]) -> Iterable[Entry]:
 
 def _with_faults(files: tuple[SourceFile, ...], faults: Mapping[str, Fault]) -> tuple[SourceFile, ...]:
     return tuple(file.model_copy(update={"python_fault": faults.get(file.path)}) for file in files)
+
+
+def _read_git_ignores(package: SourcePackage, paths: Iterable[str]) -> tuple[IgnoreLine, ...]:
+    """Return the lines that count for the package, those of outer folders first; `paths` are the package's files."""
+    if package.mode_source != "git":
+        return ()
+    above = PurePosixPath(package.path_in_git or package.path).parts
+    found: list[IgnoreLine] = []
+    for depth in range(len(above), 0, -1):
+        folder = package.folder.parents[depth - 1] if depth <= len(package.folder.parents) else None
+        below = "/".join(above[len(above) - depth :])
+        found += (
+            _ignore_lines(folder, _GIT_IGNORE, "../" * depth + _GIT_IGNORE, below)
+            if folder is not None
+            else []
+        )
+    for path in sorted(
+        (p for p in paths if posixpath.basename(p) == _GIT_IGNORE), key=lambda p: p.count("/")
+    ):
+        found += _ignore_lines(package.folder, path, path, posixpath.dirname(path))
+    return tuple(found[:_IGNORE_LINES_MAX])
+
+
+def _ignore_lines(folder: Path, path: str, shown: str, below: str) -> Iterator[IgnoreLine]:
+    text = (read_data(folder, path) or b"").decode("utf-8", "replace")
+    for number, line in enumerate(text.removeprefix("\ufeff").split("\n")[:_IGNORE_LINES_MAX], start=1):
+        # a space at the end counts behind a backslash alone
+        pattern = re.sub(r"(?<!\\) +$", "", line.removesuffix("\r"))
+        if pattern and not pattern.startswith("#") and len(pattern) <= _IGNORE_CHARS_MAX:
+            yield IgnoreLine(file=shown, line=number, pattern=pattern, below=below)

@@ -88,7 +88,7 @@ def test_what_git_ignores_is_read_up_to_the_top_of_the_repository(tmp_path):
     repo = repository(tmp_path / "r", files)
     for root in (repo, repo / "ws", repo / "ws/src/lab1"):
         (line,) = read_package(opened(root, tmp_path).package).git_ignores
-        assert (line.file, line.line, line.hides("launch/a.launch")) == ("../../../.gitignore", 2, True)
+        assert (line.file, line.line, line.hides("launch/a.launch", 1)) == ("../../../.gitignore", 2, True)
     write(tmp_path / "untracked", lab() | {"lab1/.gitignore": "launch/\n"})
     assert not read_package(opened(tmp_path / "untracked/lab1", tmp_path).package).git_ignores
 
