@@ -10,6 +10,7 @@ import re
 import threading
 import warnings
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from pathlib import Path
 
 from catkin_pkg.condition import evaluate_condition
@@ -107,8 +108,9 @@ def _missing(folder: Path, fault: Fault) -> Fault:
     return fault.model_copy(update={"cause": cause})
 
 
+@lru_cache(maxsize=8)
 def parse_manifest(data: bytes) -> tuple[Manifest | None, Fault | None]:
-    """Return the manifest from its bytes. Never raises."""
+    """Return the manifest from its bytes. Never raises. Each repair asks for that of the same file."""
     if not data.strip():
         return None, _fault(1, "XMLSyntaxError", "no element found", "`package.xml` is empty")
     try:

@@ -235,7 +235,7 @@ def _wrong_arguments(tree: ast.Module, kinds: list[str]) -> Iterator[Argument]:
             yield from _without_quotes(call, name, functions)
 
 
-def _in_quotes(call: ast.Call, name: str, known: set[str]) -> Iterator[Argument]:
+def _in_quotes(call: ast.Call, name: str, known: AbstractSet[str]) -> Iterator[Argument]:
     """Of `Publisher('x, String')`, which has its other arguments within the quotes of the first."""
     first = call.args[0] if call.args and name in {"Publisher", "Subscriber", "init_node"} else None
     begin, comma, rest = first.value.partition(",") if _is_text(first) else ("", "", "")
@@ -331,7 +331,7 @@ def _names_beside(function: ast.FunctionDef, call: ast.Call) -> set[str]:
 def _published_nothing(tree: ast.Module) -> Iterator[Argument]:
     """Yield `publish()`, or a `publish(x)` of a name that is given no value anywhere, where its function gives a value
     to one name and does nothing with it, or its block to one that nothing else publishes."""
-    known = {name for one in tree.body for name in bound_in(ast.Module([one], []))} | set(dir(builtins))
+    known = bound_in(tree) | set(dir(builtins))
     assigned = (n for n in nodes_in(tree) if isinstance(n, ast.Assign))
     made = [(ast.unparse(t), _called(n.value)) for n in assigned for t in n.targets]
     of_others = {"", "self", *(name for name, call in made if call not in ("", "Publisher"))}

@@ -322,12 +322,12 @@ BLOCKS_MAX, BLANK_LINES = 40, 2
 def _with_lines_inside(text: str) -> Iterator[Step]:
     """`rospy.spin()`, or a loop, right below the function that makes the node, and outside of it."""
     tree, lines = tree_of(text), text.split("\n")
-    shared = {name for one in tree.body for name in bound_in(ast.Module([one], [])) if _is_plain(one)}
+    shared = {name for one in tree.body for name in bound_in(one) if _is_plain(one)}
     for function, below in pairwise(tree.body):
         if not isinstance(function, ast.FunctionDef) or below.lineno != (function.end_lineno or 0) + 1:
             continue
         calls = {last_name(n.func) for n in nodes_in(function) if isinstance(n, ast.Call)}
-        own = bound_in(ast.Module([function], [])) - shared
+        own = bound_in(function) - shared
         used = {n.id for n in nodes_in(below) if isinstance(n, ast.Name)}
         spins = isinstance(below, ast.Expr) and ast.unparse(below.value) == "rospy.spin()"
         loops = isinstance(below, ast.While) and bool(own & used)

@@ -11,7 +11,9 @@ import builtins
 import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from difflib import get_close_matches
+from functools import lru_cache
 from string import digits
 
 from grader.package.lint.script_names import is_of_series
@@ -83,22 +85,29 @@ SHORT_NAME_CHARS_MIN = 2
 """Names of one letter are different names."""
 
 
-def bound_in(tree: ast.Module) -> set[str]:
+@lru_cache(maxsize=256)
+def bound_in(tree: ast.AST) -> frozenset[str]:
+    """Return the names that anything in a tree that nobody changes, or in a part of one, gives a value."""
     found: set[str] = set()
     for node in nodes_in(tree):
-        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
-            found.add(node.id)
-        elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-            found.add(node.name)
+        if not isinstance(node, _BINDING):
+            continue
+        if isinstance(node, ast.Name):
+            found.update(() if isinstance(node.ctx, ast.Load) else (node.id,))
         elif isinstance(node, ast.arg):
             found.add(node.arg)
         elif isinstance(node, ast.Import | ast.ImportFrom):
             every = {"*"} if getattr(node, "module", "") == "rospy" else set()
             found.update({(a.asname or a.name).partition(".")[0] for a in node.names} - every)
             found.update(ROSPY - MODULES_OF_ROSPY if every & {a.name for a in node.names} else ())
-        elif isinstance(node, ast.ExceptHandler | ast.MatchAs | ast.MatchStar):
+        else:
             found.add(node.name or "")
-    return found
+    return frozenset(found)
+
+
+_NAMED = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.ExceptHandler, ast.MatchAs, ast.MatchStar)
+_BINDING = (ast.Name, ast.arg, ast.Import, ast.ImportFrom, *_NAMED)
+"""Made once: of `A | B`, Python would make a new type for each node."""
 
 
 def meant_by_use(name: str, member: str, given: Mapping[str, str], read: Collection[str]) -> str:
@@ -278,7 +287,7 @@ def with_names(text: str) -> Iterator[Step]:
     parts = (one for one in tree.body if not isinstance(one, ast.Import | ast.ImportFrom))
     blocks = (inner for one in parts for inner in (one.body if isinstance(one, ast.ClassDef) else [one]))
     for block in blocks:
-        own = shared | (bound_in(ast.Module([block], [])) if isinstance(block, ast.FunctionDef) else set())
+        own = shared | (bound_in(block) if isinstance(block, ast.FunctionDef) else set())
         missing = _missing_in(block, shared, known, kept if "self" in bound else ())
         stated = [
             n.value.id for n in nodes_in(block) if isinstance(n, ast.Expr) and isinstance(n.value, ast.Name)
@@ -459,7 +468,7 @@ def _is_guard(node: ast.stmt) -> bool:
     return isinstance(word, ast.Constant) and str(word.value).strip("_ ").lower() == "main"
 
 
-def meant_by(name: str, own: set[str], unused: Collection[str] = ()) -> str:
+def meant_by(name: str, own: AbstractSet[str], unused: Collection[str] = ()) -> str:
     """Return the one name of the script's own that is meant by one that has no value; "" where there is not one. Of the
     `unused`, one that is nearly the same is meant before all others."""
     stem = name.rstrip(digits)
@@ -502,11 +511,11 @@ def is_slip(name: str, other: str) -> bool:
     return one == two or (is_one_edit(one, two) and (len(one) != len(two) or sorted(one) == sorted(two)))
 
 
-def _bound_by(statement: ast.stmt) -> set[str]:
+def _bound_by(statement: ast.stmt) -> frozenset[str]:
     """Return the names that a statement of the script gives a value to, none of those within functions and classes."""
     if isinstance(statement, ast.FunctionDef | ast.ClassDef):
-        return {statement.name}
-    return bound_in(ast.Module([statement], []))
+        return frozenset({statement.name})
+    return bound_in(statement)
 
 
 def _catches_names(block: ast.Try) -> bool:

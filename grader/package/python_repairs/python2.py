@@ -11,6 +11,10 @@ from grader.line_slips.python import without_texts
 STATEMENT_LINES_MAX = 12
 FIXERS = ("print", "except", "exec", "raise", "repr", "ne", "numliterals", "long", "unicode")
 OLD_PRINT = re.compile(r"\bprint\b(?!\s*\()")
+OF_FIXERS = re.compile(
+    r"print|except|exec|raise|`|<>|long|unicode|unichr|\b0\d|[0-9a-f]l\b|\bur?['\"]", re.IGNORECASE
+)
+"""What there is in all that the fixers change."""
 
 
 def as_python3(lines: list[str], at: int) -> Iterator[str]:
@@ -25,6 +29,8 @@ def as_python3(lines: list[str], at: int) -> Iterator[str]:
 
 def _fixed_statement(lines: list[str]) -> list[str] | None:
     """The same as Python 3; None where it is not a statement by itself, or nothing of it is Python 2."""
+    if not OF_FIXERS.search("\n".join(lines)):
+        return None
     indentation = lines[0][: len(lines[0]) - len(lines[0].lstrip())]
     first = lines[0].strip()
     keyword = re.match(r"\w*", first)
