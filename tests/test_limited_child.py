@@ -21,7 +21,7 @@ GRADER = Path(limited_child.__file__).parent
 FUNCTION = re.compile(r'"(grader\.[\w.]+:\w+)"')
 LINT = {path.stem for path in GRADER.glob("package/lint/[a-z]*.py")}
 OF_REPAIRS = {
-    *("errors", "installable", "package", "line_slips", "line_slips.python", "line_slips.text", "wording"),
+    *("errors", "installable", "package", "line_slips", "line_slips.python", "wording"),
     *("package.python_repairs", "package.python_repairs.calls", "package.python_repairs.examine"),
     *("package.python_repairs.imports", "package.python_repairs.members", "package.python_repairs.names"),
     *(

@@ -246,7 +246,6 @@ class _RunBuilder:
         self._attachments: dict[str, bytes] = {}
         # The grader writes it before all messages: as long as there is none, the file counts as another tool's.
         self._metadata: dict[str, str] | None = None
-        self._profile = ""
 
     def read(self, stream: BinaryIO) -> Run:
         """Raises EvidenceError for another format, BudgetExceeded, and what `container.records` and pydantic raise."""
@@ -276,8 +275,6 @@ class _RunBuilder:
                 raise ContainerError(f"more than {MAX_CHANNELS} channels")
         elif isinstance(record, mcap.Attachment):
             self._attach(record)
-        elif isinstance(record, mcap.Header):
-            self._profile = record.profile
         elif isinstance(record, mcap.Metadata) and record.name == METADATA_NAME and self._metadata is None:
             self._metadata = record.metadata
 

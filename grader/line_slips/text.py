@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from grader.line_slips.python import MERGE_MARKER
-
 
 class LineSlip(NamedTuple):
     """A slip in a file: why its line is wrong, the line's number (from 1), what to do, and the text without it.
@@ -41,17 +39,3 @@ def doubled_and_turned(lines: list[str], near: Iterable[int]) -> Iterator[LineSl
             turned = "\n".join([*lines[: number - 2], second, first, *lines[number:]])
             why = f"lines {number - 1} and {number} are the wrong way round"
             yield LineSlip(why, number, f"write line {number} above line {number - 1}", turned)
-
-
-def first_version(text: str) -> str:
-    """Return the text with empty lines in place of git's merge markers and of all versions but the first. The others
-    stand behind `=======` and, for the one that both come from, behind `|||||||`."""
-    kept, part = [], ""
-    for line in text.split("\n"):
-        marker = MERGE_MARKER.match(line)
-        # A line of `=======` alone is no marker: only `<<<<<<<` begins one of git's conflicts.
-        part = marker[1][0] if marker and (part or line[0] == "<") else part
-        # Each line stays, be it empty, so that those below it keep their numbers.
-        kept.append("" if part and (marker or part in "|=") else line)
-        part = "" if part == ">" else part
-    return "\n".join(kept)

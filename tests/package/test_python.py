@@ -11,8 +11,7 @@ import pytest
 
 from grader.checks.support.exit_causes import syntax_hint
 from grader.line_slips.python import corrected, other_quotes, parsed
-from grader.line_slips.text import first_version
-from grader.package.lint import syntax
+from grader.package.lint.script_blocks import first_version
 from grader.package.python import check_syntax, read_syntax_report, reason_of
 
 pytestmark = pytest.mark.usefixtures("without_processes")
@@ -499,13 +498,13 @@ def test_quotes_in_the_braces_of_an_f_string_become_the_others(line, right):
 
 
 @pytest.mark.parametrize(
-    "text",
+    ("text", "kept"),
     [
-        "a\n<<<<<<< HEAD\nb\n=======\nc\n>>>>>>> other\nd",
-        "<<<<<<< HEAD\nb\n||||||| base\na\n=======\nc\n>>>>>>> other",
-        "a heading\n=======\nb\n>>>>>>> c",
-        "<<<<<<< HEAD\nb",
+        ("a\n<<<<<<< HEAD\nb\n=======\nc\n>>>>>>> other\nd", "a\n\nb\n\n\n\nd"),
+        ("<<<<<<< HEAD\nb\n||||||| base\na\n=======\nc\n>>>>>>> other", "\nb\n\n\n\n\n"),
+        ("a heading\n=======\nb\n>>>>>>> c", "a heading\n=======\nb\n>>>>>>> c"),
+        ("<<<<<<< HEAD\nb", "\nb"),
     ],
 )
-def test_both_sides_keep_the_same_version_of_a_merge(text):
-    assert "\n".join(syntax.first_version(text.split("\n"))) == first_version(text)
+def test_the_first_version_of_a_merge_is_kept(text, kept):
+    assert first_version(text) == kept

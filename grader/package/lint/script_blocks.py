@@ -1,4 +1,4 @@
-"""What the indentation of lines that do not parse says of their blocks: for `syntax.py`, and for the repairs.
+"""What lines that do not parse say: their indentation of blocks, git's markers of versions. For `syntax.py`, and repairs.
 
 Python 3.8, standard library only.
 """
@@ -12,6 +12,10 @@ BRANCHES = re.compile(r"\s*(elif|else)\b")
 DEPTHS = (2, 3, 4, 8)
 """So much further in a block may begin."""
 PAUSES = re.compile(r"\s*[\w.]+\.(sleep|spin)\(\s*[\w.]*\s*\)")
+
+
+MARKER = re.compile(r"(<{7}|={7}|>{7}|\|{7})(\s|$)")
+"""Of git's, where two versions of a file were not merged."""
 
 
 def is_code(text):
@@ -45,3 +49,17 @@ def lacks_body(head, line):
     """Return whether the body of an `if` is missing where a line that belongs to the loop around it follows."""
     of_if = re.match(r"\s*(if|elif|else)\b", head)
     return bool(of_if and width_of(head) == width_of(line) and PAUSES.match(line))
+
+
+def first_version(text):
+    """Return the text with empty lines in place of git's merge markers and of all versions but the first. The others
+    stand behind `=======` and, for the one that both come from, behind `|||||||`."""
+    kept, part = [], ""
+    for line in text.split("\n"):
+        marker = MARKER.match(line)
+        # A line of `=======` alone is no marker: only `<<<<<<<` begins one of git's conflicts.
+        part = line[0] if marker and (part or line[0] == "<") else part
+        # Each line stays, be it empty, so that those below it keep their numbers.
+        kept.append("" if part and (marker or part in "|=") else line)
+        part = "" if part == ">" else part
+    return "\n".join(kept)

@@ -203,18 +203,23 @@ def is_of_series(name, other):
     )
 
 
+def meant_at_most(name, own):
+    """Return those of the names that another one may be meant for."""
+    stem = name.rstrip(DIGITS)
+    if name[0].islower() and any(one != stem != name and one.rstrip(DIGITS) == stem for one in own):
+        return set()  # the next of a series, `pub3` behind `pub` and `pub2`, means none of them
+    if name[:1].isupper():  # a class is not meant by a variable with a name like it
+        own = {one for one in own if one[:1].isupper() or one.lower() == name.lower()}
+    return {one for one in own if not is_of_series(name, one)}
+
+
 def spelt_alike(name, own, attributes):
     """Return the name that is meant, "" where none is alike."""
     if "self." + name in attributes:
         return "self." + name
     if name.strip("_") == "name" != name or difflib.get_close_matches(name.lower(), ["__name__"], 1, 0.8):
         return "__name__"
-    stem = name.rstrip(DIGITS)
-    if name[0].islower() and any(one != stem != name and one.rstrip(DIGITS) == stem for one in own):
-        return ""  # the next of a series, `pub3` behind `pub` and `pub2`, means none of them
-    if name[:1].isupper():  # a class is not meant by a variable with a name like it
-        own = {one for one in own if one[:1].isupper() or one.lower() == name.lower()}
-    own = {one for one in own if not is_of_series(name, one)}
+    own = meant_at_most(name, own)
     near = difflib.get_close_matches(name[:TEXT_LIMIT], sorted(own | {"None", "True", "False"}), 1, 0.8)
     near = near or [n for n in sorted(own) if sorted(n) == sorted(name) or n.lower() == name.lower()]
     return near[0] if near else ""

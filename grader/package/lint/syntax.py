@@ -20,7 +20,7 @@ import warnings
 
 # `-I` leaves this folder out, and a limited child does not begin in it.
 sys.path.append(os.path.dirname(os.path.abspath(__file__)))
-from script_blocks import is_code, lacks_body, lacks_head
+from script_blocks import MARKER, first_version, is_code, lacks_body, lacks_head
 from script_tree import (
     TEXT_LIMIT,
     slip,
@@ -52,7 +52,6 @@ FURTHER_LIMIT, FURTHER_BYTES = 12, 100_000
 """So many more errors are looked for, in a file of no more than that: each compiles all of it again."""
 OF_NAMES = ("node-name", "publisher", "publisher-type", "subscriber", "subscriber-type", "rate-number")
 DEPTHS_MAX = 4
-MARKER = re.compile(r"(<<<<<<<|=======|>>>>>>>|\|\|\|\|\|\|\|)( |$)")
 CPP = re.compile(rb"^#include\s*[<\"].*?^(int|void)\s+\w+\s*\(", re.MULTILINE | re.DOTALL)
 NO_SCRIPTS = (
     (re.compile(rb"\xff\xfe|\xfe\xff"), "the file is UTF-16"),
@@ -176,7 +175,7 @@ def in_its_place(lines, at):
 
 def slips_of_the_rest(text):
     """Return which names a file that does not parse gives to its node and topics, as far as the rest of it says."""
-    lines = first_version(text.splitlines())
+    lines = first_version("\n".join(text.splitlines())).split("\n")
     for _ in range(REFUSED_LIMIT):
         try:
             tree = ast.parse("\n".join(lines))
@@ -191,18 +190,6 @@ def slips_of_the_rest(text):
         indentation = re.match(r"\s*", lines[at]).group()
         lines[at] = "" if lines[at].lstrip() == "pass" else indentation + "pass"
     return []
-
-
-def first_version(lines):
-    """Return the lines with git's merge markers blank, and all versions between them but the first."""
-    # `line_slips/text.py` has the same for texts, and this side of the grader imports nothing of the other.
-    kept, part = [], ""
-    for line in lines:
-        marker = MARKER.match(line)
-        part = line[0] if marker and (part or line[0] == "<") else part
-        kept.append("" if part and (marker or part in "|=") else line)
-        part = "" if part == ">" else part
-    return kept
 
 
 ARGUMENT = re.compile(

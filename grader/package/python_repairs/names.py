@@ -16,7 +16,7 @@ from difflib import get_close_matches
 from functools import lru_cache
 from string import digits
 
-from grader.package.lint.script_names import is_of_series
+from grader.package.lint.script_names import is_value, meant_at_most
 from grader.package.lint.script_results import misnamed_targets
 from grader.package.python_repairs.syntax import (
     Step,
@@ -295,7 +295,8 @@ def with_names(text: str) -> Iterator[Step]:
         parts_of = [n for n in nodes_in(block) if isinstance(n, ast.Attribute)]
         member_of = {n.value.id: n.attr for n in parts_of if isinstance(n.value, ast.Name)}
         given = {one: kind for one, kind in made_by(nodes_in(tree)).items() if one in own}
-        values, idle = _values_in(block), _meant_calls(unread, block)
+        values = {n.id for n in nodes_in(block) if isinstance(n, ast.Name) and is_value(n, block)}
+        idle = _meant_calls(unread, block)
         alone = {one: word for one in stated for word in ALONE if is_one_edit(one.lower(), word)}
         called = {getattr(n.func, "id", "") for n in nodes_in(block) if isinstance(n, ast.Call) and n.args}
         for name in dict.fromkeys(n.id for n in missing):
@@ -416,20 +417,6 @@ MADE = re.compile("(Request|Response)$")
 """Classes of a service of which a script makes objects."""
 
 
-def _values_in(block: ast.stmt) -> set[str]:
-    """Return the names that stand where a function makes no sense: in a calculation, or in what is answered."""
-    found: list[ast.expr] = []
-    for one in nodes_in(block):
-        if isinstance(one, ast.BinOp):
-            found += [one.left, one.right]
-        elif isinstance(one, ast.Compare):
-            found += [one.left, *one.comparators]
-        elif isinstance(one, ast.Call):
-            called = getattr(one.func, "attr", getattr(one.func, "id", ""))
-            found += one.args if called.endswith(("Response", "Result", "Feedback")) else ()
-    return {one.id for one in found if isinstance(one, ast.Name)}
-
-
 def _meant_calls(unread: Sequence[ast.FunctionDef], block: ast.stmt) -> dict[str, str]:
     """Return by what is called in a block the one function of those that nothing names which takes as many arguments.
     Within a function it also has a word of the name: `add_server` for `server`."""
@@ -471,12 +458,7 @@ def _is_guard(node: ast.stmt) -> bool:
 def meant_by(name: str, own: AbstractSet[str], unused: Collection[str] = ()) -> str:
     """Return the one name of the script's own that is meant by one that has no value; "" where there is not one. Of the
     `unused`, one that is nearly the same is meant before all others."""
-    stem = name.rstrip(digits)
-    if name[0].islower() and any(one != stem != name and one.rstrip(digits) == stem for one in own):
-        return ""  # the next of a series, `pub3` behind `pub` and `pub2`, means none of them
-    if name[:1].isupper():  # a class is not meant by a variable with a name like it
-        own = {one for one in own if one[:1].isupper() or one.lower() == name.lower()}
-    own = {one for one in own if not is_of_series(name, one)}
+    own = meant_at_most(name, own)
     always = ("__name__", "True", "False", "None", *({"self", "rospy", "sys"} & own))
     if sure := [one for one in always if is_one_edit(name, one)]:
         return sure[0]

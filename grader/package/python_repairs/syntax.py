@@ -24,8 +24,7 @@ from grader.line_slips.python import (
     without_comment_sign,
     without_texts,
 )
-from grader.line_slips.text import first_version
-from grader.package.lint.script_blocks import lacks_body, lacks_head
+from grader.package.lint.script_blocks import first_version, lacks_body, lacks_head
 from grader.package.python_repairs.lost_heads import lost_head, lost_method
 from grader.package.python_repairs.python2 import as_python3
 

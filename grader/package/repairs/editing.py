@@ -18,9 +18,9 @@ from typing import BinaryIO
 
 from grader.files import atomic_write, open_untrusted
 from grader.line_slips.python import MERGED
-from grader.line_slips.text import first_version
 from grader.model.package import CMAKE, MANIFEST
 from grader.model.repair import Repair, RepairKind, added_lines, messages_of
+from grader.package.lint.script_blocks import first_version
 from grader.package.reading import LEFT_OUT
 from grader.package.repairs.well_formed import well_formed
 from grader.package.xml import (
@@ -165,7 +165,7 @@ KEEP_ONE = "keep one of the two versions; for the first one, delete {emptied}"
 def keep_first_version(files: Files, file: str, kind: RepairKind) -> bool:
     """Of git's merge markers and the versions between them, keep the first one; return whether there are any."""
     text = files.text(file) or ""
-    kept = first_version(text)
+    kept: str = first_version(text)
     if kept != text:
         line, _, _ = changed_lines(text, kept)
         fix = KEEP_ONE.format(emptied=emptied_lines(text, kept))
