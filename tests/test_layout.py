@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -121,7 +122,7 @@ def test_imports_go_one_way() -> None:
     wrong = [
         f"{path.relative_to(GRADER)}: {module}"
         for path in _sources(GRADER)
-        for module in _imports(path)
+        for module in _read(path).imports
         if module.startswith("grader.") and not _may(_station(path), module.removeprefix("grader."))
     ]
     assert wrong == []
@@ -132,7 +133,7 @@ def test_checks_and_records_do_no_io() -> None:
         f"{path.relative_to(GRADER)}: {name}"
         for folder in ("checks", "report/figures", "model")
         for path in _sources(GRADER / folder)
-        for name in [*_imports(path), *_calls(path)]
+        for name in [*_read(path).imports, *_read(path).calls]
         if name.split(".")[0] in IO_MODULES or name in IO_CALLS
     ]
     assert wrong == []
@@ -145,14 +146,17 @@ def test_checks_parse_python_where_threads_can() -> None:
 
 def test_checks_see_evidence_as_records_only() -> None:
     seen = {
-        m for path in _sources(GRADER / "checks") for m in _imports(path) if m.startswith("grader.evidence")
+        m
+        for path in _sources(GRADER / "checks")
+        for m in _read(path).imports
+        if m.startswith("grader.evidence")
     }
     assert {module.split(".")[2] for module in seen} <= {"run", "events"}
 
 
 def test_the_support_of_checks_imports_no_family_of_checks() -> None:
     shared = {"support", "registry"}
-    found = {m for path in _sources(GRADER / "checks" / "support") for m in _imports(path)}
+    found = {m for path in _sources(GRADER / "checks" / "support") for m in _read(path).imports}
     assert {m.split(".")[2] for m in found if m.startswith("grader.checks.")} <= shared
 
 
@@ -160,7 +164,7 @@ def test_the_ros_side_needs_ros_and_the_standard_library_only() -> None:
     own = {path.stem for side in ROS_SIDE for path in side.glob("*.py")}
     known = own | ROS_MODULES | sys.stdlib_module_names | {"distutils"}  # which ROS's own Python has
     found = {
-        module.split(".")[0] for side in ROS_SIDE for path in _sources(side) for module in _imports(path)
+        module.split(".")[0] for side in ROS_SIDE for path in _sources(side) for module in _read(path).imports
     }
     assert found - known == set()
 
@@ -192,7 +196,7 @@ def test_modules_that_the_docstring_of_a_room_names_are_there() -> None:
     wrong = [
         f"{path.relative_to(ROOT)}: {name}"
         for path in GRADER.rglob("__init__.py")
-        for name in NAMED.findall(ast.get_docstring(_nodes(path)[0]) or "")
+        for name in NAMED.findall(_read(path).about)
         if re.fullmatch("[a-z_.]+", name)
         and not name.endswith((".jsonl", ".yaml", ".html", ".py"))
         and not set(name.split(".")) & (modules | NO_MODULES)
@@ -224,13 +228,8 @@ def _texts() -> Iterator[tuple[str, str]]:
     for page in ("docs/design.md", "CONTRIBUTING.md"):
         yield page, (ROOT / page).read_text(encoding="utf-8")
     for path in _sources(GRADER):
-        for node in _nodes(path):
-            if (
-                isinstance(node, ast.Expr)
-                and isinstance(node.value, ast.Constant)
-                and isinstance(node.value.value, str)
-            ):
-                yield f"{path.relative_to(ROOT)}:{node.lineno}", node.value.value
+        for line, text in _read(path).docstrings:
+            yield f"{path.relative_to(ROOT)}:{line}", text
 
 
 def _sources(folder: Path) -> Iterator[Path]:
@@ -246,29 +245,33 @@ def _may(station: str, module: str) -> bool:
     return parts[0] == station or bool({parts[0], ".".join(parts[:2])} & ALLOWED[station])
 
 
-def _nodes(path: Path) -> list[ast.AST]:
-    """The module, and all that is in it."""
-    return list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+class _Module(NamedTuple):
+    """What stands in a module: what it imports, in functions too, with `from grader import pipeline` as
+    `grader.pipeline`; the names that it calls; its docstrings, each with its line."""
+
+    about: str
+    imports: list[str]
+    calls: list[str]
+    docstrings: list[tuple[int, str]]
 
 
 @cache
-def _imports(path: Path) -> list[str]:
-    """The modules that a file imports, in functions too; `from grader import pipeline` as `grader.pipeline`."""
-    found: list[str] = []
-    for node in _nodes(path):
+def _read(path: Path) -> _Module:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    found = _Module(ast.get_docstring(tree) or "", [], [], [])
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            found += (alias.name for alias in node.names)
+            found.imports.extend(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module == "grader":
-            found += (f"grader.{alias.name}" for alias in node.names if alias.name != "__version__")
+            named = (alias.name for alias in node.names if alias.name != "__version__")
+            found.imports.extend(f"grader.{name}" for name in named)
         elif isinstance(node, ast.ImportFrom):
-            found.append(f"{'.' * node.level}{node.module or ''}")
+            found.imports.append(f"{'.' * node.level}{node.module or ''}")
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            found.calls.append(node.func.id)
+        elif isinstance(node, ast.Expr) and isinstance(getattr(node.value, "value", None), str):
+            found.docstrings.append((node.lineno, node.value.value))
     return found
-
-
-def _calls(path: Path) -> Iterator[str]:
-    for node in _nodes(path):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-            yield node.func.id
 
 
 WITHOUT_EXTRAS = """

@@ -192,6 +192,9 @@ def test_blanks_without_end_are_read_in_linear_time(text: str) -> None:
     blanks = text.format(" " * 200_000).encode()
     assert not any(pattern.search(blanks) for pattern in (SLEEPING, IDLE, NAPS))
     assert not gives_up(blanks)
+
+
+def test_loops_within_loops_are_read_in_linear_time() -> None:
     assert not gives_up(b"\n".join([b"while True:", *[b" while True:" + b" " * 300] * 5000]))
 
 

@@ -460,37 +460,40 @@ def _opened_by_somebody(root, workdir):
 SCRIPT = "import rospy\nrospy.init_node('x')\npub = rospy.Publisher('c', String, queue_size=1)\n"
 
 
+LINES = [
+    "".join(f"def f{number}():\n    pub.publish(x)\n" for number in range(400)),
+    SCRIPT + "while a:\n    pub.publish(b)\n" * 400,
+    SCRIPT + "rospy.spin()\n" * 2000,
+    SCRIPT + "class A:\n    def f(self):\n" + "".join(f"        print(self.a{n}x)\n" for n in range(2000)),
+]
+MORE_LINES = [
+    SCRIPT + "while not rospy.is_shutdown():\n" + "    if a: pub.publish(b)\n" * 400,
+    SCRIPT + "while not rospy.is_shutdown():\n" + "    a = a + 1\n    pub.publish(a)\n" * 400,
+    "".join(f"def f{n}():\n    print(d{n})\nrospy.Subscriber('a', String, f{n})\n" for n in range(1000)),
+    "for r in m.ranges:\n"
+    + "    if r < 1:\n        v.x = 1\n    else:\n        v.x = 2\n" * 1200
+    + "    p.publish(v)\n",
+    "".join(f"q{n}.z = sin(a)\nq{n}.w = cos(a)\n" for n in range(2000)),
+    "while a:\n" + "    for i in b:\n        p.publish(i)\n" * 1500,
+    SCRIPT + "while a < 3:\n    t.angular.z = 1\n    pub.publish(t)\nrospy.spin()\n" * 1200,
+    SCRIPT + "rospy.spin()\ndef f():\n" + "    if a:\n        g()\n" * 4000,
+    SCRIPT
+    + "".join(f"def f{n}(m):\n    global x{n}\n    x{n} = m.data\n" for n in range(1000))
+    + "".join(f"rospy.Subscriber('t{n}', String, f{n})\n" for n in range(1000))
+    + "def f0(m):\n    global x0\n    x0 = m.data\n"
+    + "    y = x0 + z\n" * 2000,
+    SCRIPT
+    + "def heard(m):\n"
+    + "".join(f"    x{n} = m.data\n    print(x{n})\n" for n in range(700))
+    + "".join(f"rospy.Subscriber('t{n}', String, heard)\n" for n in range(700)),
+    "def f(m):\n    r = m.ranges[0]\n" + "    if r == float('inf'): return 0\n    return r\n" * 1500,
+    SCRIPT + "def f(m):\n" + "    a = A()\n    a.x = 1\n    p.publish(a)\n" * 1500,
+]
+"""These take longer."""
+
+
 @pytest.mark.parametrize(
-    "text",
-    [
-        SCRIPT + "while not rospy.is_shutdown():\n" + "    if a: pub.publish(b)\n" * 400,
-        SCRIPT + "while not rospy.is_shutdown():\n" + "    a = a + 1\n    pub.publish(a)\n" * 400,
-        "".join(f"def f{number}():\n    pub.publish(x)\n" for number in range(400)),
-        SCRIPT + "while a:\n    pub.publish(b)\n" * 400,
-        SCRIPT + "rospy.spin()\n" * 2000,
-        "".join(f"def f{n}():\n    print(d{n})\nrospy.Subscriber('a', String, f{n})\n" for n in range(1000)),
-        "for r in m.ranges:\n"
-        + "    if r < 1:\n        v.x = 1\n    else:\n        v.x = 2\n" * 1200
-        + "    p.publish(v)\n",
-        "".join(f"q{n}.z = sin(a)\nq{n}.w = cos(a)\n" for n in range(2000)),
-        "while a:\n" + "    for i in b:\n        p.publish(i)\n" * 1500,
-        SCRIPT + "while a < 3:\n    t.angular.z = 1\n    pub.publish(t)\nrospy.spin()\n" * 1200,
-        SCRIPT + "rospy.spin()\ndef f():\n" + "    if a:\n        g()\n" * 4000,
-        SCRIPT
-        + "".join(f"def f{n}(m):\n    global x{n}\n    x{n} = m.data\n" for n in range(1000))
-        + "".join(f"rospy.Subscriber('t{n}', String, f{n})\n" for n in range(1000))
-        + "def f0(m):\n    global x0\n    x0 = m.data\n"
-        + "    y = x0 + z\n" * 2000,
-        SCRIPT
-        + "def heard(m):\n"
-        + "".join(f"    x{n} = m.data\n    print(x{n})\n" for n in range(700))
-        + "".join(f"rospy.Subscriber('t{n}', String, heard)\n" for n in range(700)),
-        SCRIPT
-        + "class A:\n    def f(self):\n"
-        + "".join(f"        print(self.a{n}x)\n" for n in range(2000)),
-        "def f(m):\n    r = m.ranges[0]\n" + "    if r == float('inf'): return 0\n    return r\n" * 1500,
-        SCRIPT + "def f(m):\n" + "    a = A()\n    a.x = 1\n    p.publish(a)\n" * 1500,
-    ],
+    "text", [*LINES, *(pytest.param(text, marks=pytest.mark.full) for text in MORE_LINES)]
 )
 def test_lines_that_all_have_to_do_with_each_other(tmp_path, text) -> None:
     """Where each is compared with all the others, these took up to twenty seconds."""
