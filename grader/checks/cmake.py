@@ -147,8 +147,8 @@ def _respell(call: CMakeCall, name: str) -> Wrong:
 
 
 def _of_another(package: PackageFacts, facts: CMakeFacts, wanted: str) -> Wrong | None:
-    """Return the fault of a file that was never a package's of ROS 1: a workspace's, or one for ROS 2."""
-    made = _first(facts, "catkin_workspace")
+    """Return the fault of a file that was never a package's of catkin: a workspace's, or one for ROS 2 or rosbuild."""
+    made, rosbuild = _first(facts, "catkin_workspace"), _first(facts, "rosbuild_init")
     found = [c for c in facts.calls if c.name == "find_package" and c.args]
     ament = next((c for c in found if c.args[0].startswith("ament_")), None)
     if made is not None and _first(facts, "catkin_package") is None:
@@ -156,6 +156,9 @@ def _of_another(package: PackageFacts, facts: CMakeFacts, wanted: str) -> Wrong 
         why = f"{why} calls catkin_workspace()"
     elif ament is not None and all(c.args[0] != "catkin" for c in found):
         made, why = ament, f"it is for a ROS 2 package: line {ament.line} finds {ament.args[0]}"
+    elif rosbuild is not None and all(_makes_nothing(c) for c in facts.calls):
+        made = rosbuild
+        why = f"it is for rosbuild, which came before catkin: line {made.line} calls {made.name}()"
     else:
         return None
     declared = package.manifest.dependencies if package.manifest and made is not ament else ()
@@ -163,6 +166,12 @@ def _of_another(package: PackageFacts, facts: CMakeFacts, wanted: str) -> Wrong 
     catkin = f"find_package(catkin REQUIRED{f' COMPONENTS {needs}' if needs else ''})"
     lines = f"cmake_minimum_required(VERSION 3.0.2), project({wanted}), {catkin} and catkin_package()"
     return Wrong(why, f"write these lines in place of all of it: {lines}", made.line)
+
+
+def _makes_nothing(call: CMakeCall) -> bool:
+    """Return whether a call neither finds nor makes anything, so that nothing is lost with its line."""
+    makes = call.name.startswith(("add_", "rosbuild_add_", "rosbuild_gen", "target_", "generate_"))
+    return not makes and call.name not in ("find_package", "catkin_package")
 
 
 def _wrong(package: PackageFacts, facts: CMakeFacts, names: tuple[str, str]) -> Iterator[Wrong]:

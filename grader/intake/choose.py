@@ -87,7 +87,7 @@ def choose_loose(
     found = [c for c in own if _files_of(c.folder, wanted.files, near=not c.has_cmake)]
     above = {str(folder) for c in found for folder in PurePosixPath(c.path).parents}
     found = [c for c in found if c.path not in above]
-    if len(found) != 1 or _where_it_went(root, wanted.name, git_links):
+    if len(found) != 1 or _where_it_went(root, wanted.name, git_links, own=found[0].path):
         return None
     return _best([replace(found[0], manifest=wanted.name)], wanted)
 
@@ -281,8 +281,9 @@ TAKE_IN = "delete {0}/.git, `git rm --cached {0}`, `git add {0}`, commit and pus
 POINTER = "is only a pointer to another repository, and its files are not in this one: " + TAKE_IN
 
 
-def _where_it_went(root: Path, wanted: str, git_links: tuple[str, ...]) -> str:
-    """Return what students do to a package so that it is there and cannot be seen."""
+def _where_it_went(root: Path, wanted: str, git_links: tuple[str, ...], *, own: str = "") -> str:
+    """Return what students do to a package so that it is there and cannot be seen; a file in place of a manifest hides
+    none in its `own` folder, where the check of the manifest tells of it."""
     links = [path for path in git_links if path.rpartition("/")[2].casefold() == wanted.casefold()]
     # nothing else was handed in, so the package is behind one of the links, whatever its name
     if not links and not any(folder.others for folder in walk(root, tolerant=True)):
@@ -298,7 +299,12 @@ def _where_it_went(root: Path, wanted: str, git_links: tuple[str, ...]) -> str:
             if entry.name == wanted and entry.is_symlink():
                 return f"{printable(folder.inside(wanted))} is a link: hand in the folder itself."
         meant = next(filter(None, map(meant_manifest, sorted(files - {MANIFEST}))), "")
-        if meant and MANIFEST not in files and BUILD_SPACES.isdisjoint(folder.path.split("/")):
+        if (
+            meant
+            and folder.path != own
+            and MANIFEST not in files
+            and BUILD_SPACES.isdisjoint(folder.path.split("/"))
+        ):
             where = "" if folder.path == "." else f"In {printable(folder.path)}/, "
             return f"{where}{printable(meant)}."
         packed = [entry.name for entry in folder.others if is_archive_name(entry.name)]

@@ -99,7 +99,7 @@ def meant_manifest(name: str) -> str:
     # `package (1).xml`, as browsers call a second download, and `Package.xml`.
     plain = re.sub(r"\s|\(\d+\)", "", name.casefold())
     alike = plain == MANIFEST or is_one_edit(plain, MANIFEST) or plain.startswith(f"{MANIFEST}.")
-    if name == MANIFEST or not alike:
+    if name == MANIFEST or plain.endswith(".stamp") or not alike:  # catkin leaves a stamp where it builds
         return ""
     return f"{name} has to be called package.xml: git mv {shlex.quote(name)} package.xml"
 

@@ -188,6 +188,10 @@ def test_what_has_the_labs_files_is_named(files, message, hint, tmp_path):
         (("ws/src/week1/scripts/talker.py", "ws/src/week1/launch/a.launch"), "ws/src/week1"),
         (("week1/src/listener.py", "week2/src/other.py"), "week1"),
         (("week1/CMakeLists.txt", "week1/nodes/talker.py"), "week1"),
+        # what is there in place of the manifest is told by its criterion
+        (("manifest.xml", "CMakeLists.txt", "src/talker.py"), "."),
+        (("week1/package (1).xml", "week1/scripts/talker.py"), "week1"),
+        (("manifest.xml", "catkin_generated/stamps/a/package.xml.stamp", "scripts/talker.py"), "."),
     ],
 )
 def test_without_any_manifest_the_only_folder_with_the_labs_files_is_taken(files, path, tmp_path):
@@ -203,7 +207,7 @@ def test_without_any_manifest_the_only_folder_with_the_labs_files_is_taken(files
         {"a/scripts/talker.py": "x", "b/scripts/talker.py": "x"},
         {"a/scripts/other.py": "x"},
         {**tree("other"), "a/scripts/talker.py": "x"},
-        {"a/scripts/talker.py": "x", "a/package (1).xml": ""},
+        {"a/scripts/talker.py": "x", "b/package (1).xml": ""},
         {"a/scripts/talker.py": "x", **tree("build/lab1")},
         {"ws/src/week1/talker.py": "x"},
         {"ws/src/CMakeLists.txt": "x", "ws/src/week1/talker.py": "x"},

@@ -88,6 +88,14 @@ CASES = {
         "use four spaces everywhere",
     ),
     "indent_missing": ("if 1:\nx = 1\n", 2, "must be indented"),
+    "indent_first": (
+        "#!/a\n x = 1\n\n  # a\n y = 2\nz = 3\n",
+        2,
+        "the space that each line from 2 to 5 begins with",
+    ),
+    "indent_first_only": ("\n    x = 1\n", 2, "delete the 4 spaces that this line begins with"),
+    "indent_first_tab": ("\tx = 1\n\ty = 2\n", 1, "delete the tab that each line from 1 to 2 begins with"),
+    "head_in_comment_first": ("# def f():\n    x = 1\n", 1, "commented out"),
     "indent_more": ("x = 1\n  y = 2\n", 2, "further than the one above"),
     "indent_less": ("if 1:\n    x = 1\n  y = 2\n", 3, "matches none of the lines above"),
     "cpp": (

@@ -359,13 +359,17 @@ def block_fault(lines, line, message):
             told = "nothing in the block on line %d" % (head + 1)
         if told:
             return fault("IndentationError", line, 1, told, text=lines[line - 1])
-    head = commented_head(lines, line) if indented else None
-    if head is not None:
-        at, text = lines[head].index("#") + 1, lines[head]
-        return fault("IndentationError", head + 1, at, "block commented out" + moved(lines, head), text=text)
-    odd = out_of_block(lines, line) if indented else None
-    if indented and odd is None and lacks_head(lines, line - 1):
-        return fault("IndentationError", line, 1, "block without its first line", text=lines[line - 1])
+    gone = commented_head(lines, line) if indented else None
+    if gone is not None:
+        at, text = lines[gone].index("#") + 1, lines[gone]
+        return fault("IndentationError", gone + 1, at, "block commented out" + moved(lines, gone), text=text)
+    odd, told = out_of_block(lines, line) if indented else None, ""
+    if indented and head is None:
+        told = "indented at the top of the file: " + outdented(lines, line)
+    elif indented and odd is None and lacks_head(lines, line - 1):
+        told = "block without its first line"
+    if told:
+        return fault("IndentationError", line, 1, told, text=lines[line - 1])
     inner = blanks_of(lines[line - 1]) if odd is not None else block_cut(lines, line)
     if inner is None:
         return None
@@ -435,9 +439,25 @@ def moved(lines, head):
 
 
 def begin_with(blanks):
+    return "begin it with %s" % (counted(blanks) or "no spaces")
+
+
+def counted(blanks):
+    """Return how many tabs and spaces these are, in words."""
     counts = [(blanks.count("\t"), "tab"), (blanks.count(" "), "space")]
-    words = ["%d %s%s" % (count, kind, "s" * (count > 1)) for count, kind in counts if count]
-    return "begin it with %s" % (" and ".join(words) or "no spaces")
+    return " and ".join("%d %s%s" % (count, kind, "s" * (count > 1)) for count, kind in counts if count)
+
+
+def outdented(lines, line):
+    """Return what to delete in front of that line, which is the first one with code, and of those below it that are as
+    far in."""
+    blanks, last = blanks_of(lines[line - 1]), line
+    for number, text in enumerate(lines[line:], line + 1):
+        if is_code(text) and not text.startswith(blanks):
+            break
+        last = number if text.startswith(blanks) and text.strip() else last
+    where = "this line" if last == line else "each line from %d to %d" % (line, last)
+    return "delete the %s that %s begins with" % (re.sub("^1 (?!.* and )", "", counted(blanks)), where)
 
 
 def blanks_of(text):
