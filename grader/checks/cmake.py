@@ -37,6 +37,7 @@ from grader.wording import is_one_edit, join_words
 NOT_CALLED = "no catkin_install_python(…) is called"
 NO_FILE = "there is no CMakeLists.txt"
 BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
+IN_PLACE_OF_ALL = "in place of all of it"
 CALLS_SHOWN, ARGS_SHOWN = 6, 12
 
 
@@ -165,7 +166,7 @@ def _of_another(package: PackageFacts, facts: CMakeFacts, wanted: str) -> Wrong 
     needs = " ".join(dict.fromkeys(d.name for d in declared if d.name != "catkin"))
     catkin = f"find_package(catkin REQUIRED{f' COMPONENTS {needs}' if needs else ''})"
     lines = f"cmake_minimum_required(VERSION 3.0.2), project({wanted}), {catkin} and catkin_package()"
-    return Wrong(why, f"write these lines in place of all of it: {lines}", made.line)
+    return Wrong(why, f"write these lines {IN_PLACE_OF_ALL}: {lines}", made.line)
 
 
 def _makes_nothing(call: CMakeCall) -> bool:

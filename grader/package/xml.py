@@ -59,6 +59,7 @@ _TAGS = re.compile(
     rb"|<!DOCTYPE[^\[>]*(?:\[.*?(?:\]\s*>|\Z)|>|\Z)|(?P<tag><)[^\s/>!?]",
     re.DOTALL,
 )
+_VERSION = re.compile(rb"\A((?:\xef\xbb\xbf)?<\?xml\s+version\s*=\s*[\"'])[\w.:-]*([\"'])")
 _MESSAGE_CHARS_MAX = 300
 _TAGS_MAX = 2_000
 _OPENERS_A_TAG = 20
@@ -82,8 +83,10 @@ def parse_xml(
     if data.count(b"<") > _OPENERS_A_TAG * _TAGS_MAX:
         return None, _too_many(file)
     parser = _parser(encoding)
+    # catkin and roslaunch read a file of any version
+    readable = _VERSION.sub(rb"\g<1>1.0\g<2>", data, count=1)
     try:
-        element = etree.fromstring(data, parser)
+        element = etree.fromstring(readable, parser)
     except etree.XMLSyntaxError as error:
         return None, _fault(error, parser, data, file, root)
     dtd = element.getroottree().docinfo.internalDTD

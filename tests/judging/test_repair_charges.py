@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -17,6 +15,7 @@ from grader.model.result import CriterionResult
 from grader.package.launch import parse_launch_files
 from tests.support.rubrics import (
     ALL,
+    CMAKE_CHECK,
     EXECUTABLE,
     GOOD_RUN,
     NODE,
@@ -525,10 +524,18 @@ def test_a_dependency_is_told_with_one_tag() -> None:
     )
     depends = [["buildtool_depend", "catkin"]]
     runs = built({"manifest": {"dependencies": depends}}, exit_code=1)
-    copy = built({"manifest": {"dependencies": [*depends, ["depend", "rospy"]]}}, exit_code=0)["package"]
-    about = {**copy.metadata, "repairs": json.dumps([tag.model_dump()])}
-    manifest, _ = judge(asked, {**runs, "repaired-1/package": replace(copy, metadata=about)})
+    copy = built({"manifest": {"dependencies": [*depends, ["depend", "rospy"]]}}, exit_code=0)
+    manifest, _ = judge(asked, runs | on_copy(copy, tag))
     assert re.fullmatch(r"add <exec_depend>rospy</exec_depend> below line \d+", manifest.hint)
+
+
+def test_a_file_that_is_written_as_a_whole_gets_no_hint_on_its_lines() -> None:
+    line = Repair(kind="build-line", file="CMakeLists.txt", line=1, before="a", message="m", fix="f")
+    runs = built({"manifest": {}, "cmake": {"calls": [["rosbuild_init"]]}}, exit_code=1)
+    calls = [["project", "lab1"], ["find_package", "catkin"], ["catkin_package"]]
+    copy = built({"cmake": {"calls": calls}}, exit_code=0)
+    (cmake,) = judge(rubric(CMAKE_CHECK), runs | on_copy(copy, line))
+    assert re.fullmatch("write these lines in place of all of it: [^;]+", cmake.hint)
 
 
 @pytest.mark.parametrize(

@@ -113,6 +113,23 @@ def test_declared_encoding_does_not_matter_as_catkin_reads_utf8():
     assert manifest.maintainers[0].name == "Adél"
 
 
+@pytest.mark.parametrize(
+    ("declaration", "is_read"),
+    [
+        ('<?xml version="0.1"?>', True),
+        ("<?xml version = '2.0' ?>", True),
+        ('<?xml version=""?>', True),
+        ('<?xml version="1,0"?>', False),
+        ("<?xml version=1.0?>", False),
+        ('<?xml vesion="1.0"?>', False),
+    ],
+)
+def test_the_version_of_xml_does_not_matter_as_catkin_reads_any(declaration, is_read):
+    text = MANIFEST.replace('<?xml version="1.0"?>', declaration)
+    assert declaration in text
+    assert (parse_manifest(text.encode())[1] is None) == is_read
+
+
 def test_format_1_and_conditions_of_format_3():
     one = MANIFEST.replace(' format="2"', "").replace(
         "<depend>rospy</depend>", "<run_depend>rospy</run_depend>"

@@ -156,12 +156,17 @@ CASES = {
     "all-further-in": Case(
         {TALKER: "#!/usr/bin/env python3\n" + "".join(f" {line}\n" for line in SCRIPT.split("\n")[1:-1] if line)},
         ["python-syntax"],
-        "line 2 of src/talker.py: this line is indented further than the one above",
+        "start lines 2 to 4 and 11 with no spaces, lines 5 to 8",
     ),
     "many-further-in": Case(
         {TALKER: f"{SCRIPT.split(chr(10))[0]}\n" + "".join(f" a{n} = {n}\n" for n in range(13))},
         ["python-syntax"],
-        "start the lines of each block exactly below each other, from line 2 to 14",
+        "change the indentation: start lines 2 to 14 with no spaces",
+    ),
+    "many-further-in-of-many-blocks": Case(
+        {TALKER: f"{SCRIPT.split(chr(10))[0]}\n" + "".join(f" if a:\n  b{n} = {n}\n" for n in range(7))},
+        ["python-syntax"],
+        "start the lines of each block exactly below each other, from line 2 to 15",
     ),
     "between-two-of-one-level": Case(
         swapped(TALKER, ("    rate = rospy", "count = 0\n    rate = rospy")),

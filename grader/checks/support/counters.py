@@ -11,8 +11,8 @@ from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field, model_validator
 
-from grader.checks.support.exit_causes import explain_early_end, explain_traceback, process_tracebacks
-from grader.checks.support.processes import OnTopic, lives, observed_until_ns, slips_of
+from grader.checks.support.exit_causes import explain_early_end, explain_error
+from grader.checks.support.processes import OnTopic, observed_until_ns, slips_of
 from grader.checks.support.recorder_losses import losses, whole_until_ns
 from grader.checks.support.text import loop_rate
 from grader.evidence.run import Channel, Run, once_for_each_run
@@ -185,11 +185,15 @@ def longest(run: Run, topic: str) -> Count | None:
 
 
 def _count(channel: Channel, until_ns: int | None) -> Count | None:
-    rows = [
-        (number, message.log_time_ns, message.sequence)
-        for message, value in zip(channel.messages, channel.data, strict=True)
-        if (number := _number(value)) is not None and (until_ns is None or message.log_time_ns <= until_ns)
-    ]
+    rows: list[tuple[float, int, int]] = []
+    without = 0
+    for message, value in zip(channel.messages, channel.data, strict=True):
+        number = _number(value)
+        if number is None:
+            # It came, so it was not lost: rospy sends an empty one where a number does not fit.
+            without += 1
+        elif until_ns is None or message.log_time_ns <= until_ns:
+            rows.append((number, message.log_time_ns, message.sequence - without))
     if not rows:
         return None
     values, times, sequences = zip(*rows, strict=True)
@@ -395,13 +399,15 @@ def bad_turn_message(step: Step, turns: list[Step], params: WrapParams) -> str:
 
 
 def _judge_death(count: Count, run: Run, package: PackageFacts, params: WrapParams) -> Verdict | None:
-    end = explain_early_end(package, run)
+    end, who = explain_early_end(package, run), "node dies"
+    if end is None and count.values[-1] == params.maximum and _is_silent(count, run):
+        end, who = explain_error(package, run), "node stops publishing"
     if end is None:
         return None
     last = count.values[-1]
     # A publisher that packs one number too many (int8: 128) dies where it should have reset.
     if last >= params.maximum - 1:
-        message = f"the node dies at {significant(last + 1)}, where the counter should reset: {end.cause}"
+        message = f"the {who} at {significant(last + 1)}, where the counter should reset: {end.cause}"
         limits = slips_of(package, run, count.callerid, "reset-limit")
         high = next((one for one in limits if int(one.message) > params.maximum), None)
         first = next((one for one in limits if one.fix), None)
@@ -430,17 +436,20 @@ def _stuck(count: Count, params: WrapParams) -> Verdict | None:
 
 def _silent(count: Count, run: Run, package: PackageFacts, params: WrapParams) -> Verdict | None:
     """Return the verdict where the node lives on, and has stopped publishing."""
-    until_ns = observed_until_ns(run)
-    if until_ns is None or losses(run, params.topic):
+    if losses(run, params.topic) or not _is_silent(count, run):
         return None
-    if until_ns - count.times_ns[-1] < max(SILENT_PERIODS * count.period_ns, SILENT_NS):
-        return None
-    found = [t for one in lives(run) for t in process_tracebacks(run, one.name)]
-    cause = f": {explain_traceback(found[-1], package).cause}" if found else ""
+    error = explain_error(package, run)
+    cause = f": {error.cause}" if error else ""
     message = f"the node stops publishing after {significant(count.values[-1])}, but keeps running{cause}"
     verdict = failed(message, hint=params.reset_hint) if len(count.values) > 1 else failed_or_blocked(message)
     # Without a traceback, the silence may be the machine's.
-    return verdict if found else verdict.if_repeated()
+    return verdict if error else verdict.if_repeated()
+
+
+def _is_silent(count: Count, run: Run) -> bool:
+    until_ns = observed_until_ns(run)
+    quiet_ns = max(SILENT_PERIODS * count.period_ns, SILENT_NS)
+    return until_ns is not None and until_ns - count.times_ns[-1] >= quiet_ns
 
 
 def _too_few(count: Count, good: list[Step], run: Run, params: WrapParams) -> Verdict:

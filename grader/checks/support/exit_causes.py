@@ -324,7 +324,7 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     source = package.file(place.file) if place and found.kind in SYNTAX else None
     fault = source.python_fault if source else None
     place = fault.place if fault and fault.line else place
-    wrong = _callback(found, place, package) if found.kind == "TypeError" else None
+    wrong = _callback(found, place, package) or _of_timer(found, package)
     hiding = hiding_file(found, package)
     unbuilt = None if hiding else unmade(found, package)
     known = hiding or unbuilt or _known_meaning(found, place, package)
@@ -516,12 +516,27 @@ def _misspelt(found: Traceback, place: FileCitation, package: PackageFacts) -> t
 
 def _callback(found: Traceback, place: FileCitation | None, package: PackageFacts) -> PythonSlip | None:
     """The callback that the error speaks of: one that is called on this line, or that ROS calls with other values."""
+    if found.kind != "TypeError":
+        return None
     called = [s for s in package.slips if s.kind == "callback-called" and place is not None]
     here = next((s for s in called if place and (s.file, s.line) == (place.file, place.line)), None)
     match = _ARITY.match(found.message)
     name = match[1].rpartition(".")[2] if match else ""
     taken = (s for s in package.slips if s.kind == "callback-values" and s.name == name)
     return here or (next(taken, None) if name and not found.own_frames else None)
+
+
+def _of_timer(found: Traceback, package: PackageFacts) -> PythonSlip | None:
+    """The timer whose thread divides by its period, 0, before its callback is called once."""
+    return next((s for s in package.slips if s.name == "zero" and _is_timers(found)), None)
+
+
+def _is_timers(found: Traceback) -> bool:
+    return (
+        found.kind == "ZeroDivisionError"
+        and bool(found.frames)
+        and found.frames[-1].file.endswith("/rospy/timer.py")
+    )
 
 
 def process_tracebacks(
@@ -546,8 +561,8 @@ def is_rospys_own(found: Traceback) -> bool:
     if found.innermost.source.startswith("raise ") and _is_answer(found):
         return True
     race = found.kind == "ROSException" and any(said in found.message for said in RACES)
-    if found.kind == "TypeError" and _ARITY.match(found.message):
-        return False  # a callback that takes other values: rospy's line calls it
+    if _is_timers(found) or (found.kind == "TypeError" and _ARITY.match(found.message)):
+        return False  # a timer's period, or a callback that takes other values: rospy's line uses it
     return race or (bool(found.frames) and not found.own_frames)
 
 

@@ -23,7 +23,7 @@ from grader.model.record import Record
 from grader.model.repair import Repair, RepairKind, as_code
 from grader.package.python import TOO_FAR_IN, reason_of
 from grader.package.repairs.editing import KEEP_ONE, Files, emptied_lines
-from grader.wording import is_one_edit, join_words, numbers_text, plural
+from grader.wording import is_one_edit, join_words, numbers_text, on_lines, plural
 
 EXAMINE = "grader.package.python_repairs.examine:examine"
 TURN = "grader.package.python_repairs.examine:with_sign_turned"
@@ -352,18 +352,20 @@ def _change(files: Files, file: str, cause: Cause, steps: list[_Step]) -> None:
 def _required_indentation(before: str, after: str, first: str) -> str:
     """How lines that are indented otherwise have to begin, so that the file parses; `first` goes before it."""
     pairs = enumerate(zip(before.split("\n"), after.split("\n"), strict=False), start=1)
-    lines: dict[int, list[int]] = {}
     changed = [(number, new) for number, (old, new) in pairs if old != new and new.strip()]
+    empty = {number for number, new in enumerate(after.split("\n"), start=1) if not new.strip()}
+    lines: dict[int, list[int]] = {}
     for number, new in changed:
-        lines.setdefault(len(new) - len(new.lstrip()), []).append(number)
-    if len(changed) > INDENTED_SHOWN:
+        some = lines.setdefault(len(new) - len(new.lstrip()), [])
+        between = range(some[-1] + 1, number) if some else range(0)
+        some += [*(between if empty.issuperset(between) else ()), number]
+    named = [f"{on_lines(some)} with {plural(n, 'space') if n else 'no spaces'}" for n, some in lines.items()]
+    if sum(len(re.findall(r"\d+ to \d+|\d+", one)) - 1 for one in named) > INDENTED_SHOWN:
         where = f"from line {changed[0][0]} to {changed[-1][0]}"
         if "\t" not in before:
             return f"{first}start the lines of each block exactly below each other, {where}"
         return f"indent with spaces only, the same at each level, {where}; `grader check --fix` does it"
-    named = [("line" if len(some) == 1 else "lines", spaces, some) for spaces, some in lines.items()]
-    begun = [f"{what} {numbers_text(some)} with {plural(spaces, 'space')}" for what, spaces, some in named]
-    return f"{first}start {join_words(begun)}"
+    return f"{first}start {join_words(named)}"
 
 
 def _rewritten(before: str, after: str) -> str:
