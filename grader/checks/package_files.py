@@ -420,8 +420,10 @@ def _as_dependencies(names: Sequence[str]) -> str:
 
 
 def _misspelt(found: Manifest, missing: Sequence[str], names: Sequence[str]) -> dict[str, list[Dependency]]:
-    """Return what is declared in place of a missing name: the only slip of it, or its words one by one."""
-    at_run_time = [d for d in found.dependencies if d.kind in RUNTIME_KINDS and d.name not in names]
+    """Return what is declared in place of a missing name: the only slip of it, or its words one by one. A name that is
+    another package's is none: who declares actionlib_msgs may need it beside actionlib."""
+    others = {*names, *CORE, *known_packages(), *noetic_messages()}
+    at_run_time = [d for d in found.dependencies if d.kind in RUNTIME_KINDS and d.name not in others]
     declared = {d.name for d in at_run_time}
     slips = {n: [d for d in at_run_time if d.name in near_names(n, declared)] for n in missing}
     apart = {n: [d for d in at_run_time if is_word_of(d.name, n, declared)] for n in missing}
