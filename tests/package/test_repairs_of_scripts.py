@@ -227,6 +227,11 @@ CASES = {
     "bracket": Case(swapped(TALKER, ("queue_size=10)", "queue_size=10")), ["python-syntax"], "never closed"),
     "quote": Case(swapped(TALKER, ("'talker')", "'talker)")), ["python-syntax"], "line 6 of src/talker.py: a quote"),
     "typographic": Case(swapped(TALKER, ("'talker'", "\u2018talker\u2019")), ["python-syntax"], "typographic quote"),
+    "no-such-future-above-a-print-with-brackets": Case(
+        swapped(TALKER, ("import rospy\n", "from __future__ import print_functions\nimport rospy\n"),
+                ("    rospy.init", "    print('print it: %s' % 1)\n    rospy.init")),
+        ["python-syntax"], "line 2 of src/talker.py: Python 3 needs nothing",
+    ),
     "future-behind-imports": Case(
         swapped(TALKER, ("import rospy\n", "import rospy\nfrom __future__ import print_function\n")),
         ["python-syntax"], "delete line 3",

@@ -38,7 +38,8 @@ def _fixed_statement(lines: list[str]) -> list[str] | None:
     before = head.get(keyword[0] if keyword else "", "")
     after = "    pass\n" if without_texts(lines[-1]).rstrip().endswith(":") else ""
     source = before + "\n".join([first, *lines[1:]]) + "\n" + after
-    tools = _tools()[::-1] if OLD_PRINT.search(source) else _tools()
+    # where each `print` has its brackets, it is no statement, and would get a second pair of them
+    tools = _tools()[::-1] if OLD_PRINT.search(without_texts(source)) else _tools()[:1]
     fixed = next((f for tool in tools if (f := _refactor(tool, source)) not in (None, source)), None)
     if fixed is None:
         return None

@@ -190,6 +190,10 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
     at = error["line"] - 1
     if not 0 <= at < len(lines):
         return
+    if ("future" in error["message"] and FUTURE.fullmatch(lines[at])) or reason_of_line(
+        lines[at]
+    ).fix == DELETE_LINE:
+        yield "token", _without_line(lines, at)
     yield "token", with_line(lines, at, ROSPY_COMMA.sub("rospy.", lines[at]))
     yield from _with_body_uncommented(lines, error["message"])
     if error["message"].startswith("expected an indented block") and _is_in_comments(lines, at):
@@ -212,11 +216,14 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
         moved += [("turned", candidate) for candidate in _with_lines_turned(lines, at)]
         right = [one for one in moved if _is_right(lines, at, one[1])]
         yield from right or [("level", candidate) for candidate in _read_furthest(lines, at)]
-    is_future = "future" in error["message"] and FUTURE.fullmatch(lines[at])
-    if is_future or reason_of_line(lines[at]).fix == DELETE_LINE:
-        first = lines[1] if not at and lines[1:] and lines[1].startswith("#!") else ""
-        emptied = with_line(lines, at, first)  # what follows is told by the lines that it has
-        yield "token", emptied if not first else with_line(emptied.split("\n"), 1, "")
+
+
+def _without_line(lines: list[str], at: int) -> str:
+    """Return the text with an empty line in its place: what follows is told by the lines that it has. The second line
+    takes the place of the first where it is meant to be the shebang."""
+    first = lines[1] if not at and lines[1:] and lines[1].startswith("#!") else ""
+    emptied = with_line(lines, at, first)
+    return emptied if not first else with_line(emptied.split("\n"), 1, "")
 
 
 def _in_their_blocks(lines: list[str], at: int, message: str) -> Iterator[tuple[str, str]]:
