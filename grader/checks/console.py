@@ -109,6 +109,11 @@ class PrintsParams(Record):
             text = text.replace(PLACE, significant(number), 1)
         return repr(text.replace(PLACE, "<number>"))
 
+    @property
+    def is_number_alone(self) -> bool:
+        """Whether no word stands beside the number."""
+        return not re.search(r"\w", self.text.replace(PLACE, ""))
+
     def found_in(self, line: Line) -> Iterator[re.Match[str]]:
         """Yield where the line has the words, without regard to capitals and blanks, with a group for each number."""
         pattern = f"({NUMBER})".join(words_pattern(words) for words in self.text.split(PLACE))
@@ -141,7 +146,9 @@ def prints(package: PackageFacts, run: Run, params: PrintsParams) -> Verdict:
     if one is None:
         return not_started(params.process).about(expected=expected)
     lines, errors = lines_and_errors(run, one.name)
-    right = next((line for line in (*lines, *errors) if _fits(line, params)), None)
+    # any error may have a number somewhere: `python3`
+    said = lines if params.is_number_alone else (*lines, *errors)
+    right = next((line for line in said if _fits(line, params)), None)
     if right is None:
         verdict = _not_printed(one, lines, package, run, params)
     else:
@@ -186,9 +193,8 @@ def _not_printed(
     asked = asked_services(one, run)
     absent = [name for name, is_there in asked.items() if not is_there and name not in offered_services(run)]
     lacking = absent[0] if absent and not one.ended_early else ""
-    is_number_alone = not re.search(r"\w", params.text.replace(PLACE, ""))  # then any number is no answer
     # Where the call failed or the program crashed, a number on a line need not be an answer.
-    if other and not (lacking or (failing and is_number_alone)):
+    if other and not (lacking or (failing and params.is_number_alone)):
         near = f", within {significant(params.tolerance)}" if params.tolerance else ""
         message = f"it prints {shown(other[0].text)!r}, not {params.words}{near}{_slip(other[0], params)}"
         return _of_client(asked, run)(message, hint=hint).about(said=other[0].text)

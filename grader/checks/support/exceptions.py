@@ -6,15 +6,13 @@ import ast
 import builtins
 import re
 from collections.abc import Callable
-from contextlib import suppress
 
-from grader.checks.support.console_output import Frame, Traceback
+from grader.checks.support.console_output import Traceback
 from grader.checks.support.rospy_calls import (
     Meaning,
     calls_in_line,
     explain_rate,
     explain_ros_call,
-    fields_of,
     line_tree,
     message_operand,
     no_items,
@@ -28,8 +26,6 @@ from grader.model.package import PackageFacts
 from grader.model.verdict import FileCitation
 from grader.wording import join_words, plural
 
-_CANNOT_ADD = r"can only concatenate str \(not \"(\w+)\"\) to str"
-_ADDED = re.compile(_CANNOT_ADD + r"|unsupported operand type\(s\) for \+=?: '(\w+)' and '(\w+)'")
 HIDDEN = (
     "str", "int", "float", "list", "dict", "len", "max", "min", "sum", "range", "input", "print", "type", "round",
 )  # fmt: skip
@@ -560,41 +556,3 @@ _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | Non
         "for its smallest values, return without that call, or loop",
     ),
 }
-
-
-def explain_operand(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
-    """A text or a message and something else are added: which of both does not fit, where Python marks the place."""
-    if not (match := _ADDED.search(found.message)) or {"Time", "Duration"}.intersection(match.groups()):
-        return None
-    of_text = bool(match[1]) or "str" in match.groups()
-    left = match[3] == "str" or (not of_text and bool(fields_of(package, match[2])))
-    kind, is_right = (match[1], True) if match[1] else (match[2], False) if left else (match[3], True)
-    other = _other_side(found.innermost, is_right=is_right)
-    if fields := fields_of(package, kind):
-        value = f"{other or 'msg'}.{fields[0]}"
-        value = value if kind == "String" or not of_text else f"str({value})"
-        whole = f"{other or 'one side'} is the whole message ({kind})"
-        return whole, f"write `{value}` instead of `{other or 'msg'}`"
-    if not of_text:
-        return None
-    if other and kind == "tuple":
-        fix = f"where {other} gets its value, write `%` instead of the comma behind the text"
-        return f"{other} is no text: a comma makes several values of it", fix
-    if other:
-        return f"{other} is not a string", f"write `str({other})` instead of `{other}`"
-    article = "an" if kind[0] in "aeiou" else "a"
-    return f"{article} {kind} is not a string", "wrap it in `str(…)` before you add it to a string"
-
-
-def _other_side(frame: Frame, *, is_right: bool) -> str:
-    """Return the side of a sum that is not text: of the one that Python marks, or of the line's only one."""
-    source = frame.source[slice(*frame.marked)] if frame.marked else frame.source
-    with suppress(SyntaxError, ValueError, RecursionError):
-        nodes = list(ast.walk(parsed(source)))
-        sums = [n for n in nodes if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Add)]
-        if sums and (frame.marked or len(sums) == 1):
-            return shown(ast.unparse(sums[0].right if is_right else sums[0].left))
-        more = next((n for n in nodes if isinstance(n, ast.AugAssign)), None)
-        if more is not None:
-            return shown(ast.unparse(more.value if is_right else more.target))
-    return ""

@@ -16,7 +16,6 @@ from grader.checks.support.exceptions import (
     explain_exception,
     explain_narrow_handler,
     explain_number_of_values,
-    explain_operand,
 )
 from grader.checks.support.launch_slips import unfound_program
 from grader.checks.support.missing_names import (
@@ -32,6 +31,7 @@ from grader.checks.support.missing_names import (
     unmade,
     unused_import,
 )
+from grader.checks.support.operands import explain_operand
 from grader.checks.support.processes import Life, early_end, lives, nodes_of, signal_name
 from grader.checks.support.rospy_calls import (
     explain_formatting,
