@@ -169,17 +169,18 @@ def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdic
 
 
 def _of_its_words(package: PackageFacts, file: LaunchFile, name: str) -> Slip | None:
-    """Return the slip of the only node whose program is missing, where its name is made of words of the script's, or
-    the other way round: `first_node` for `first_node_publisher`."""
+    """Return the slip of the only node whose program is missing, where no other than the script can be meant, or its
+    name is made of words of the script's, or the other way round: `first_node` for `first_node_publisher`."""
     absent = [(node, slip) for node in file.brings if (slip := node_slip(package, node)) and slip.lacks]
-    words = set(re.split(r"[\W_]+", PurePosixPath(name).stem.casefold()))
+    words, fix = set(re.split(r"[\W_]+", PurePosixPath(name).stem.casefold())), f'write type="{name}"'
     found = [
         slip
         for node, slip in absent
         if (own := set(re.split(r"[\W_]+", PurePosixPath(node.type or "").stem.casefold()))) <= words
         or words <= own
+        or slip.fix == fix
     ]
-    return found[0]._replace(fix=f'write type="{name}"') if len(found) == 1 else None
+    return found[0]._replace(fix=fix) if len(found) == 1 else None
 
 
 def _program(file: LaunchFile, program: str) -> Verdict | None:
