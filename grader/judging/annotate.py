@@ -25,6 +25,7 @@ from grader.checks.support.scripts import (
     installed,
     is_product,
     names_script,
+    programs,
 )
 from grader.checks.support.text import RATE_SLOT, TYPE_SLOT, VALUE_SLOT, in_language
 from grader.evidence.events import PACKAGE_RUN
@@ -54,7 +55,8 @@ def add_advice(
     # Only on one that passed: a loss has a hint of its own.
     good = [c for c in results if c.status is Status.PASS and c.id in visible]
     host = next((c for check in OF_FILES for c in good if c.check == check), None)
-    points = [point.text for point in _points(package) if not _is_told(point, results)][:POINTS_MAX]
+    every = (*_points(package), *_typed(package, rubric))
+    points = [point.text for point in every if not _is_told(point, results)][:POINTS_MAX]
     if host is None or not points:
         return tuple(results)
     told = host.model_copy(update={"hint": "; ".join(filter(None, (host.hint, *points)))})
@@ -97,6 +99,19 @@ def _points(package: PackageFacts) -> Iterator[_Point]:
             text = f"{launch.path}, line {launch.fault.line}, is not well-formed: {why}"
             yield _Point(launch.fault.place, text)
         yield from _nodes(package, launch)
+
+
+def _typed(package: PackageFacts, rubric: Rubric) -> Iterator[_Point]:
+    """Yield where a program of C++ that the rubric runs reads what is typed, though nothing is: it goes on without."""
+    runs = ((one, start) for one in rubric.scenarios.values() for start in one.start)
+    alone = {start.script for one, start in runs if start.script and start.name not in one.typed_to}
+    sources = {file for one in programs(package) if one.name in alone for file in one.call.args[1:]}
+    for slip in package.slips:
+        if slip.kind == "input" and slip.file in sources:
+            where = f"{slip.file}, line {slip.line}"
+            yield _Point(
+                slip.place, f"{where}, reads what is typed, and a graded node gets no input; {slip.fix}"
+            )
 
 
 def _nodes(package: PackageFacts, launch: LaunchFile) -> Iterator[_Point]:

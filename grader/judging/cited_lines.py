@@ -60,12 +60,16 @@ def cite_source(
     paths |= {one.before for one in renamed if PurePosixPath(one.after).name in started}
     lines = [one for one in _read(build, paths) if not one.text.lstrip().startswith(("#", "//"))]
     found = _lines_to_blame(verdict, criterion, lines)
-    if len(found) != 1:
+    if len(found) != 1 and not (1 < len(found) <= SAME_MAX and found == _that_give(found, verdict.measured)):
         return verdict
     is_sent = criterion.check == "message" or _field_of(verdict, criterion)
-    made = line_that_makes(lines, found[0]) if is_sent else None
+    made = line_that_makes(lines, found[0]) if is_sent and len(found) == 1 else None
     places = (FileCitation(file=one.file, line=one.number) for one in (made, *found) if one is not None)
     return verdict.model_copy(update={"citations": (*places, *verdict.citations)})
+
+
+# More lines that set one field to one value say nothing of which one was run.
+SAME_MAX = 3
 
 
 def _field_of(verdict: Verdict, criterion: Criterion) -> str:
@@ -95,10 +99,13 @@ def _lines_to_blame(verdict: Verdict, criterion: Criterion, lines: list[SourceLi
             found = lines_that_answer(lines, str(given["service"]))
         case "transform":
             found = lines_that_transform(lines)
+        case "action-result" if (
+            "is_preempt_requested" in verdict.hint
+        ):  # which belongs into the loop that reports
+            found = [one for one in lines if re.search(r"\bpublish_?feedback\(", one.text, re.IGNORECASE)]
         case "hears" | "logs":
             found = lines_that_say(lines, f"{verdict.measured} {verdict.said}")
-            if not found and verdict.status is Status.PARTIAL:
-                found = [one for one in lines if re.search(SAYS[criterion.check], one.text)]
+            found = found or _that_say(verdict, criterion, lines)
         case "prints" | "topic-type" | "node-name":
             found = _that_name(verdict.said, criterion, lines)
         case "message":
@@ -107,10 +114,27 @@ def _lines_to_blame(verdict: Verdict, criterion: Criterion, lines: list[SourceLi
         case "stamps":
             found = _published_of(lines_that_set(lines, "stamp"), lines, criterion)
         case _ if field := _field_of(verdict, criterion):
-            found = _published_of(lines_that_set(lines, field), lines, criterion)
+            found = lines_that_set(lines, field)
+            found = _that_give(found, verdict.measured) or _published_of(found, lines, criterion)
         case _:
             found = []
     return found
+
+
+def _that_say(verdict: Verdict, criterion: Criterion, lines: list[SourceLine]) -> list[SourceLine]:
+    """Return the lines that say anything, if some of what is asked for is said."""
+    partly = verdict.status is Status.PARTIAL
+    return [one for one in lines if partly and re.search(SAYS[criterion.check], one.text)]
+
+
+def _of_transform_or_action(
+    verdict: Verdict, criterion: Criterion, lines: list[SourceLine]
+) -> list[SourceLine]:
+    """Return the lines that send a transform, or report in the loop that never asks whether its goal is cancelled."""
+    if criterion.check == "transform":
+        return lines_that_transform(lines)
+    deaf = "is_preempt_requested" in verdict.hint
+    return [one for one in lines if deaf and re.search(r"\bpublish_?feedback\(", one.text, re.IGNORECASE)]
 
 
 def _that_name(said: str, criterion: Criterion, lines: list[SourceLine]) -> list[SourceLine]:
@@ -122,6 +146,14 @@ def _that_name(said: str, criterion: Criterion, lines: list[SourceLine]) -> list
     names = [one.strip("/") for one in (said, str(criterion.parameters["topic"]))]
     calls = [re.compile(rf'''\badvertise\b[^"]*"/?{re.escape(name)}"''') for name in names if name]
     return next((found for call in calls if (found := [one for one in lines if call.search(one.text)])), [])
+
+
+def _that_give(found: list[SourceLine], value: str) -> list[SourceLine]:
+    """Return those that set a field to this very number, where several set it, to others too."""
+    number = re.fullmatch(r"-?\d+(?:\.\d+)?", value)
+    given = re.compile(rf"=\s*{re.escape(value.removesuffix('.0'))}(?:\.0*)?\s*;?\s*(?:(?:#|//).*)?$")
+    right = [one for one in found if number and given.search(one.text)]
+    return right if len(found) > 1 and len({one.file for one in right}) == 1 else []
 
 
 def _published_of(found: list[SourceLine], lines: list[SourceLine], criterion: Criterion) -> list[SourceLine]:

@@ -17,7 +17,7 @@ from grader.checks.support.text import texts_in
 from grader.model.package import CMAKE, MANIFEST
 from grader.model.repair import Repair, advice_on, messages_of, place_of
 from grader.model.result import CriterionResult
-from grader.model.verdict import FileCitation, Status, Verdict, cited_lines, failed, share_text
+from grader.model.verdict import Citation, FileCitation, Status, Verdict, cited_lines, failed, share_text
 from grader.rubric.model import Criterion, Rubric
 from grader.wording import join_words
 
@@ -221,7 +221,7 @@ def charged_verdict(
     update: dict[str, object] = {
         "message": "; ".join(words),
         "hint": "; ".join(hints),
-        "citations": (*_uncited(verdict, repairs, told), *verdict.citations),
+        "citations": _with_repaired(verdict, repairs, told),
     }
     of_cmake = (one for one in repairs if PurePosixPath(one.file).name == CMAKE)
     if any(one not in told for one in of_cmake):  # how the call is written is told
@@ -254,6 +254,16 @@ def _hints_and_next(
         then = re.sub(r"^on line \d+ of [^,]+", f"on line {one.line} of {one.file}", then)
     hints = clauses + advice_on(one for one in repairs if one not in rewritten)
     return [*hints, *([f"{'then ' if hints else ''}{then}"] if then else [])]
+
+
+def _with_repaired(
+    verdict: Verdict, repairs: Sequence[Repair], told: Collection[Repair]
+) -> tuple[Citation, ...]:
+    """Return the verdict's citations with the repaired lines: before them, unless it names one of these lines itself
+    and so tells a cause."""
+    added = tuple(_uncited(verdict, repairs, told))
+    names_one = not cited_lines(verdict.citations).isdisjoint((one.file, one.line) for one in repairs)
+    return (*verdict.citations, *added) if names_one else (*added, *verdict.citations)
 
 
 def _uncited(verdict: Verdict, repairs: Sequence[Repair], told: Collection[Repair]) -> Iterator[FileCitation]:

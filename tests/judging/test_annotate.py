@@ -158,6 +158,23 @@ def test_a_value_that_is_given_to_a_misspelt_name_is_told_unless_a_loss_names_it
     assert add_advice([criterion(), lost], package, rubric(CMAKE_CHECK)) == (criterion(), lost)
 
 
+def test_a_program_that_reads_what_is_typed_is_told_unless_a_step_types_it(tmp_path) -> None:
+    source = "#include <ros/ros.h>\nint main(int argc, char **argv) {\n  std::cin >> name;\n}\n"
+    files = {"CMakeLists.txt": f"{CMAKE}add_executable(ask src/ask.cpp)\n", "src/ask.cpp": source}
+    start = [{"name": "asks", "script": "ask"}]
+    alone = {**SCENARIO, "start": start}
+    package = facts(tmp_path, **files)
+    (told,) = add_advice([criterion()], package, rubric(CMAKE_CHECK, scenarios={"talker": alone}))
+    why = "src/ask.cpp, line 3, reads what is typed, and a graded node gets no input"
+    assert told.hint == f"{why}; write a value in the code in place of what line 3 of src/ask.cpp reads"
+    steps = [{"type": {"process": "asks", "line": "12"}}]
+    typed = {"title": "t", "start": start, "steps": steps}
+    assert add_advice([criterion()], package, rubric(CMAKE_CHECK, scenarios={"talker": typed})) == (
+        criterion(),
+    )
+    assert add_advice([criterion()], package, rubric(CMAKE_CHECK)) == (criterion(),)
+
+
 def test_a_node_of_nearly_the_packages_name_is_told(tmp_path) -> None:
     nodes = [f'<node pkg="{name}" type="a.py" name="{name}"/>' for name in ("lab11", "rospy", "other")]
     files = {

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from grader.checks.actions import ASKED_TO_STOP
 from grader.checks.support.scripts import OF_INTERFACES, lines_making
 from grader.evidence.run import Run
 from grader.judging.cited_lines import (
@@ -141,6 +142,29 @@ def test_what_is_wrong_in_a_message_is_shown_where_it_is_set_or_published(
     assert found.citations == ((FileCitation(file=SCRIPT["path"], line=line + 1),) if line else ())
 
 
+@pytest.mark.parametrize(
+    ("source", "line"),
+    [
+        ("for i in range(3):\n    server.publish_feedback(said)\n    rate.sleep()", 2),
+        ("while (ros::ok()) {\n  as_.publishFeedback(feedback_);\n}", 2),
+        ("server.publish_feedback(a)\nserver.publish_feedback(b)", None),
+        ("server.set_succeeded(result)", None),
+    ],
+)
+def test_the_loop_that_reports_is_shown_where_a_goal_goes_on_when_it_is_cancelled(
+    source: str, line: int | None
+) -> None:
+    goal = {"check": "action-result", "with": {"action": "/count", "status": "PREEMPTED"}}
+    lab = rubric({"id": "cancelled", "scenario": "talker", **goal})
+    package = {"package": {"files": [SCRIPT]}, "attachments": {SCRIPT["path"]: f"#!\n{source}\n"}}
+    runs = build_runs({"runs": {"package": package}})
+    lost = failed("the goal ends SUCCEEDED", hint=f"in the loop, where {ASKED_TO_STOP} is true: …")
+    found = cite_source(lost, lab.criteria[0], try_facts(lab, runs), runs["package"])
+    assert found.citations == ((FileCitation(file=SCRIPT["path"], line=line + 1),) if line else ())
+    late = failed("the result comes too late", hint="do not sleep longer than the handout asks")
+    assert cite_source(late, lab.criteria[0], try_facts(lab, runs), runs["package"]) == late
+
+
 REACTS = {
     "check": "reacts",
     "with": {
@@ -175,6 +199,16 @@ REACTS = {
         (FIELD, 'ss << "Helo";\nmsg.linear.x = ss.str();', [1, 2]),
         (FIELD, 'ss << "Helo";\nss << n;\nmsg.linear.x = ss.str();', [3]),
         (FIELD, "goal.speed = 2\nmsg.linear.x = speed", [2]),
+        (
+            FIELD,
+            "double s = m->data;\nstd::sort(s.begin(), s.end());\ncout << s << endl;\nmsg.linear.x = s;",
+            [2, 4],
+        ),
+        (FIELD, "s = list(m.data)\ns.reverse()  # turn it round\nmsg.linear.x = s", [2, 3]),
+        (FIELD, "s = list(m.data)\nrandom.shuffle(s)\nmsg.linear.x = s", [2, 3]),
+        (FIELD, "s = list(m.data)\nt = merge(sort(s))\nmsg.linear.x = s", [3]),
+        (FIELD, "s = list(m.data)\ns.sort()\ns.reverse()\nmsg.linear.x = s", [4]),
+        (FIELD, "s = list(m.data)\nmsg.linear.x = s\ns.sort()", [2]),
         (REACTS, "msg.linear.x = 0.2\npub.publish(msg)", [1]),
         (REACTS, "speed = 0.2\nmsg.linear.x = speed\npub.publish(msg)", [1, 2]),
         (REACTS, "if near:\n    msg.linear.x = 0.1\nelse:\n    msg.linear.x = 0.2", []),
@@ -191,6 +225,29 @@ def test_a_wrong_field_is_shown_where_its_value_comes_from(
     assert found.citations == tuple(FileCitation(file=SCRIPT["path"], line=line) for line in lines)
     unsaid = cite_source(failed("nothing came"), lab.criteria[0], try_facts(lab, runs), runs["package"])
     assert unsaid.citations == (found.citations if asked is FIELD else ())
+
+
+@pytest.mark.parametrize(
+    ("values", "lines"),
+    [
+        (("2", "0.0", "2.0  # on"), [2, 6]),
+        (("3", "0", "1"), [7]),
+        (("2.5", "-2", "fast2"), [7]),
+        (("fast(2)", "2", "0"), [4]),
+    ],
+)
+def test_of_several_lines_that_set_a_field_those_with_the_wrong_value_are_shown(
+    values: tuple[str, ...], lines: list[int]
+) -> None:
+    source = "\n".join(f"if a == {n}:\n    m.linear.x = {value}" for n, value in enumerate(values))
+    package = {"package": {"files": [SCRIPT]}, "attachments": {SCRIPT["path"]: f"{source}\npub.publish(m)\n"}}
+    lab, runs = (
+        rubric({"id": "sent", "scenario": "talker", **FIELD}),
+        build_runs({"runs": {"package": package}}),
+    )
+    verdict = failed("it is 2").seeking("field", "linear.x").about(measured="2")
+    found = cite_source(verdict, lab.criteria[0], try_facts(lab, runs), runs["package"])
+    assert found.citations == tuple(FileCitation(file=SCRIPT["path"], line=line) for line in lines)
 
 
 @pytest.mark.parametrize(

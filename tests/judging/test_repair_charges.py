@@ -12,6 +12,7 @@ from grader.evidence.run import Run
 from grader.judging import judge
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult
+from grader.model.verdict import FileCitation
 from grader.package.launch import parse_launch_files
 from tests.support.rubrics import (
     ALL,
@@ -38,6 +39,11 @@ TABS = Repair(
     message="tabs and spaces are mixed in its indentation",
     fix="indent every line with four spaces",
 )
+TRACEBACK = [
+    '  File "/ws/src/lab1/src/numeric_talker.py", line 7',
+    "    x = 1",
+    "TabError: inconsistent use of tabs and spaces in indentation",
+]
 TOPIC = Repair(
     kind="topic-name",
     file="src/numeric_talker.py",
@@ -205,6 +211,13 @@ def test_what_is_wrong_besides_in_the_same_file_is_said_once() -> None:
     found = {c.id: c for c in judge(rubric(check), runs)}["manifest"]
     assert found.repaired is not None
     assert found.message.count("std_msgs") == found.hint.count("<exec_depend>std_msgs</exec_depend>") == 1
+
+
+def test_the_line_that_is_told_first_is_cited_first() -> None:
+    console = [{"process": "talker", "stream": "stderr", "at_s": 0.2, "every_s": 0.001, "lines": TRACEBACK}]
+    later = TABS.model_copy(update={"line": 3, "message": "an import is missing", "fix": "import math"})
+    found = judged({**DIED, "console": console}, GOOD_RUN, later, TABS)
+    assert [c.line for c in found["node"].citations if isinstance(c, FileCitation)] == [7, 3]
 
 
 def test_two_faults_are_two_losses() -> None:

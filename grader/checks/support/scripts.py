@@ -411,18 +411,28 @@ def lines_making(lines: Sequence[str], slip: PythonSlip, publishers: Iterable[Py
 
 def line_that_makes(lines: Sequence[SourceLine], setting: SourceLine) -> SourceLine | None:
     """Return the only line that gives a variable its value, where `setting` does no more than hand that variable on:
-    `speed = 2` of `msg.linear.x = speed`, and of `pub.publish(speed)`."""
+    `speed = 2` of `msg.linear.x = speed`, and of `pub.publish(speed)`. If it is sorted or turned round after that, and
+    nothing else is done to it, that line gives it its value."""
     handed = _HANDED.search(setting.text)
     if handed is None:
         return None
     name = rf"(?<![\w.]){re.escape(handed[1])}\b"
     # Whatever else may change it is reason enough to name no line.
     bound = re.compile(
-        rf"\b(?:def|for|global|nonlocal|lambda|with|import)\b.*{name}|{name}[^=()]*=(?!=)|{name}\s*(?:\.|\[|\+\+|--|<<)"
+        rf"\b(?:def|for|global|nonlocal|lambda|with|import)\b.*{name}|{name}[^=()]*=(?!=)|{name}\s*(?:\.|\[|\+\+|--)"
+        rf"|(?<!<)(?<!< ){name}\s*<<|\b{_IN_PLACE}\(.*{name}"
     )
     found = [one for one in lines if one.file == setting.file and one != setting and bound.search(one.text)]
     makes = re.compile(rf"\s*(?:[\w:<>]+\s+)*{name}\s*(?:=(?!=)|<<)")
-    return found[0] if len(found) == 1 and makes.match(found[0].text) else None
+    if not found or not makes.match(found[0].text):
+        return None
+    call = rf"(?:[\w.]+(?:\.|::))?{_IN_PLACE}\(\s*{name}|{name}\.{_IN_PLACE}\("
+    changed = rf"\s*(?:{call})[^;=]*\);?\s*(?:(?:#|//).*)?$"
+    between = [one for one in found[1:] if one.number < setting.number and re.match(changed, one.text)]
+    return found[-1] if len(found) == 1 + len(between) and len(between) <= 1 else None
+
+
+_IN_PLACE = r"(?:(?:stable_)?sort|reverse|(?:random_)?shuffle)"
 
 
 _HANDED = re.compile(
