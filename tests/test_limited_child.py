@@ -21,21 +21,27 @@ GRADER = Path(limited_child.__file__).parent
 FUNCTION = re.compile(r'"(grader\.[\w.]+:\w+)"')
 LINT = {path.stem for path in GRADER.glob("package/lint/[a-z]*.py")}
 OF_REPAIRS = {
-    *("errors", "installable", "package", "line_slips", "line_slips.python", "wording"),
-    *("package.python_repairs", "package.python_repairs.calls", "package.python_repairs.examine"),
-    *("package.python_repairs.imports", "package.python_repairs.members", "package.python_repairs.names"),
-    *(
-        "package.python_repairs.lost_heads",
-        "package.python_repairs.python2",
-        "package.python_repairs.rospy_names",
-    ),
-    *(
-        "package.python_repairs.syntax",
-        "package.lint",
-        "package.lint.script_blocks",
-        "package.lint.script_names",
-    ),
+    "errors",
+    "installable",
+    "line_slips",
+    "line_slips.python",
+    "package",
+    "package.lint",
+    "package.lint.script_blocks",
+    "package.lint.script_names",
     "package.lint.script_results",
+    "package.python_repairs",
+    "package.python_repairs.calls",
+    "package.python_repairs.examine",
+    "package.python_repairs.imports",
+    "package.python_repairs.lost_heads",
+    "package.python_repairs.members",
+    "package.python_repairs.names",
+    "package.python_repairs.python2",
+    "package.python_repairs.rospy_names",
+    "package.python_repairs.shared_variables",
+    "package.python_repairs.syntax",
+    "wording",
 }
 MAY_IMPORT = {
     "grader.intake.archive:unpack_here": {

@@ -49,6 +49,7 @@ LAUNCH_THREE = "".join(
         "</launch>",
     ]
 )
+HEARD = "def heard(m):\n    x = m.data\n    y = -x\n    n += 1\n"
 OWN_POINT = {"msg/Point.msg": "int8 X\n"}
 
 CASES = {
@@ -286,8 +287,14 @@ CASES = {
     "variable-of-a-callback": Case(
         swapped(TALKER, ("\ndef main():", "\nfront = None\n\ndef heard(msg):\n    front = msg.data\n\ndef main():"),
                         ("        rate.s", "        print(front)\n        rate.s")),
-        ["missing-call"], "the function around it gives a value to a front of its own",
+        ["missing-call"], "`heard(…)` gives a value to a variable front of its own",
         after={TALKER: "def heard(msg):\n    global front\n    front = msg.data\n"},
+    ),
+    "variables-of-a-callback": Case(
+        swapped(TALKER, ("\ndef main():", f"\ny = x = n = 0\n\n{HEARD}\ndef main():"),
+                        ("        rate.s", "        print(x, y)\n        rate.s")),
+        ["missing-call"], "`heard(…)` assigns to x, y and n: they are variables of its own",
+        after={TALKER: "def heard(m):\n    global x, y, n\n    x = m.data\n"},
     ),
     "variables-of-their-own": Case(
         {TALKER: SCRIPT, "src/own.py": "n = 0\ndef f(n):\n    n += 1\ndef g():\n    global n\n    n += 1\n"

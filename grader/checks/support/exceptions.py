@@ -21,7 +21,6 @@ from grader.checks.support.rospy_calls import (
 )
 from grader.checks.support.text import shown
 from grader.installable import noetic_messages
-from grader.line_slips.python import parsed
 from grader.model.package import PackageFacts
 from grader.model.verdict import FileCitation
 from grader.wording import join_words, plural

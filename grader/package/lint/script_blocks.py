@@ -1,4 +1,4 @@
-"""What lines that do not parse say: their indentation of blocks, git's markers of versions. For `syntax.py`, and repairs.
+"""What lines that do not parse say: indentation of blocks, git's markers. For `syntax.py`, and repairs.
 
 Python 3.8, standard library only.
 """

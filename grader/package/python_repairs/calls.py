@@ -14,14 +14,13 @@ import re
 from collections.abc import Iterator
 from collections.abc import Set as AbstractSet
 from itertools import chain, pairwise
-from typing import Literal, NamedTuple, TypeGuard
+from typing import NamedTuple, TypeGuard
 
 from grader.package.python_repairs.members import with_place
 from grader.package.python_repairs.names import bound_in, is_kept_by_self
 from grader.package.python_repairs.syntax import (
     Step,
     edited,
-    is_docstring,
     last_name,
     nodes_in,
     span_of,
@@ -40,15 +39,6 @@ class Argument(NamedTuple):
 
     edits: list[tuple[ast.expr, str]]
     why: str
-
-
-class Unbound(NamedTuple):
-    """A variable of the file to which a function gives a value of its own: it is read before it has one (`unbound`),
-    or only elsewhere, where it keeps its old one (`kept`). `first` is the function's first line."""
-
-    name: str
-    first: ast.stmt
-    cause: Literal["unbound", "kept"]
 
 
 def with_values_called(text: str) -> Iterator[Step]:
@@ -153,18 +143,6 @@ def with_arguments(text: str, kinds: list[str]) -> Iterator[Step]:
                 yield step
                 yield from with_arguments(step["text"], kinds)
                 return
-
-
-def with_globals(text: str) -> Iterator[Step]:
-    lines = text.split("\n")
-    for found in _unbound_variables(tree_of(text)):
-        at = found.first.lineno - 1
-        blanks = lines[at][: len(lines[at]) - len(lines[at].lstrip())]
-        after = "\n".join([*lines[:at], f"{blanks}global {found.name}", *lines[at:]])
-        for step in step_to(found.cause, found.first.lineno, text, after, found.name):
-            yield step
-            yield from with_globals(step["text"])
-            return
 
 
 def with_lines_turned(text: str) -> Iterator[Step]:
@@ -512,57 +490,6 @@ def _without_quotes(call: ast.Call, name: str, functions: set[str]) -> Iterator[
     if isinstance(first, ast.Name) and first.id in functions:
         what = "node" if name == "init_node" else "topic"
         yield Argument([(first, repr(first.id))], f"the name of the {what} has no quotes")
-
-
-def _unbound_variables(tree: ast.Module) -> Iterator[Unbound]:
-    """Yield variables of the whole file to which a function gives a value without a `global`, and which it has read
-    before, or never reads while others do."""
-    assigned = (one for one in tree.body if isinstance(one, ast.Assign | ast.AnnAssign))
-    targets = (t for one in assigned for t in getattr(one, "targets", None) or [getattr(one, "target", None)])
-    shared = {target.id for target in targets if isinstance(target, ast.Name)}
-    for function in (n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)):
-        inner = (n for n in nodes_in(function)[1:] if isinstance(n, ast.FunctionDef | ast.Lambda))
-        nodes = set(nodes_in(function)) - {n for one in inner for n in nodes_in(one)}
-        own = {n.arg for n in nodes_in(function.args) if isinstance(n, ast.arg)}
-        own |= {name for n in nodes if isinstance(n, ast.Global | ast.Nonlocal) for name in n.names}
-        for name in sorted(shared - own):
-            uses = sorted(_reads_and_writes(nodes, name))
-            is_read_first = bool(uses) and not uses[0][1] and any(written for _, written in uses)
-            only_written = bool(uses) and all(at[1] == 1 for at, _ in uses)
-            if is_read_first or (only_written and _is_read_outside(tree, name, function)):
-                first = next((s for s in function.body if not is_docstring(s)), None)
-                if first is not None and first.lineno > function.lineno:
-                    yield Unbound(name, first, "unbound" if is_read_first else "kept")
-
-
-def _is_read_outside(tree: ast.Module, name: str, function: ast.FunctionDef) -> bool:
-    """Return whether the file's own variable is read, and only outside of a function that has one of that name."""
-    inside = {*nodes_in(function)}
-    for one in nodes_in(tree):
-        if isinstance(one, ast.FunctionDef) and one not in inside and _has_its_own(one, name):
-            inside |= {*nodes_in(one)}
-    names = (n for n in nodes_in(tree) if isinstance(n, ast.Name) and n.id == name)
-    reads = {n for n in names if isinstance(n.ctx, ast.Load)}
-    return bool(reads - inside) and reads.isdisjoint(nodes_in(function))
-
-
-def _has_its_own(function: ast.FunctionDef, name: str) -> bool:
-    """Return whether a function takes a variable of that name, or gives it a value without a `global`."""
-    nodes = list(nodes_in(function))
-    given = any(isinstance(n, ast.Name) and n.id == name and not isinstance(n.ctx, ast.Load) for n in nodes)
-    shared = any(isinstance(n, ast.Global) and name in n.names for n in nodes)
-    return any(isinstance(n, ast.arg) and n.arg == name for n in nodes) or (given and not shared)
-
-
-def _reads_and_writes(nodes: set[ast.AST], name: str) -> Iterator[tuple[tuple[int, int], bool]]:
-    """Yield line and kind of each use. What is on one line is read before it is written, but for a loop's variable."""
-    loops = {n for one in nodes if isinstance(one, ast.For | ast.comprehension) for n in nodes_in(one.target)}
-    for node in nodes:
-        if isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name) and node.target.id == name:
-            yield (node.lineno, 0), False
-        if isinstance(node, ast.Name) and node.id == name:
-            written = not isinstance(node.ctx, ast.Load)
-            yield (node.lineno, -1 if node in loops else int(written)), written
 
 
 def _imported(tree: ast.Module, ending: str) -> set[str]:

@@ -23,7 +23,6 @@ from grader.package.python_repairs.calls import (
     with_arguments,
     with_callbacks,
     with_calls,
-    with_globals,
     with_lines_turned,
     with_quoted_calls,
     with_values_called,
@@ -54,6 +53,7 @@ from grader.package.python_repairs.rospy_names import (
     with_logger,
     with_rospy,
 )
+from grader.package.python_repairs.shared_variables import with_globals
 from grader.package.python_repairs.syntax import (
     Step,
     edited,

@@ -394,6 +394,8 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
     """Return what is wrong, and how it is repaired; "" where the changed line says it."""
     first, after = steps[0], steps[-1].text
     error, word, place = first.error, first.word, f"line {first.line} of {file}"
+    if cause in {"unbound", "kept"}:
+        return _shared_variables(place, cause, word.split(", "))
     if cause not in WORDS:
         reason = reason_of(error.message, error.text, column=error.column) if error else Reason()
         fix = _rewritten(before, after) if cause == "python2" else ""
@@ -417,6 +419,20 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
     if cause in {"tabs", "level", "inside"}:
         fix = _required_indentation(before, after, fix)
     return said, fix if cause != "old-name" or word == "raw_input" else ""
+
+
+def _shared_variables(place: str, cause: Cause, words: list[str]) -> tuple[str, str]:
+    """Return the same of a function that lacks a `global`; `words` are its name and those of its variables."""
+    function, *names = words
+    fix = f"write `global {', '.join(names)}` as the first line of the function"
+    if cause == "unbound":
+        they = (
+            "they are variables of its own and have" if names[1:] else "it is a variable of its own and has"
+        )
+        return f"{place}: `{function}(…)` assigns to {join_words(names)}: {they} no value yet", fix
+    what = f"values to variables {join_words(names)}" if names[1:] else f"a value to a variable {names[0]}"
+    those = "those" if names[1:] else "that"
+    return f"{place}: `{function}(…)` gives {what} of its own, not to {those} of the file", fix
 
 
 BELOW = "{place}: `global {word}` comes after a line that uses {word}"
@@ -444,10 +460,6 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "quoted": ("{place}: {word} is in quotes, so it never runs", ""),
     "callback": ("{place}: {calls} is called where the function itself is meant", ""),
     "argument": ("{place}: {word}", ""),
-    "unbound": ("{place}: the function around it assigns to {word}: it is a variable of its own and has no value yet",
-     "write `global {word}` as the first line of the function"),
-    "kept": ("{place}: the function around it gives a value to a {word} of its own, not to that of the file",
-     "write `global {word}` as the first line of the function"),
     "guard": ("{place}: {word}", ""),
     "line": ("{place}: the line `{word}` is missing", ""),
     "empty": ("{place}: this block needs a line of its own", "write there what it should do, or `pass` if nothing"),
