@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import PurePath
 
 from grader.checks import Check
@@ -50,15 +50,8 @@ class Requirements:
                 message = f"{message}; for this criterion: {_without_cause(verdict)}"
             # what is sure and explains it would come again with the run
             sure = self.verdicts[root].unjudged or self._criteria[root].scenario == criterion.scenario
-            update = {
-                "timing": verdict.timing and (self.verdicts[root].timing or not sure),
-                "status": Status.BLOCKED,
-                "score": 0.0,
-                "message": message,
-                "hint": f"fix {root} first",
-                "blocked_by": root,
-            }
-            return verdict.model_copy(update=update)
+            timing = self.verdicts[root].timing or not sure
+            return _blocked(verdict, root, message, timing=timing)
         undecided = next((r for r in criterion.requires if self.verdicts[r].status.is_open), None)
         if undecided is None:
             return verdict
@@ -129,6 +122,41 @@ class Requirements:
         """Return whether it is about a program that only a build makes: a script runs from its source."""
         starts = self._rubric.starts_of(criterion)
         return any(start.built or (start.script and not PurePath(start.script).suffix) for start in starts)
+
+
+def charge_exceptions_once(
+    rubric: Rubric, verdicts: Mapping[str, Verdict], judged: Collection[str] = ()
+) -> dict[str, Verdict]:
+    """Return the verdicts, with those blocked that lost all of their points to an exception which another one of the
+    same script lost its own to already: such a node goes on, so nothing that `requires` names is lost. `judged` are the
+    criteria that a repaired copy has judged."""
+    charged, told = dict[str, str](), dict(verdicts)
+    # students see the hint of the one that is charged
+    for criterion in sorted(rubric.criteria, key=lambda c: (c.visibility != "visible", not c.points)):
+        verdict = verdicts[criterion.id]
+        is_whole = verdict.status is Status.FAIL and not verdict.score and criterion.penalty is None
+        if not is_whole or criterion.scenario is None or not EXCEPTION.match(verdict.cause):
+            continue
+        root = charged.setdefault(verdict.cause, criterion.id)
+        if root != criterion.id and criterion.id not in judged and root not in judged:
+            told[criterion.id] = _blocked(verdict, root, f"blocked by {root}: {verdict.message}")
+    return told
+
+
+EXCEPTION = re.compile(r"[\w.]*(?:Error|Exception)\b.*\(.*, line \d+\)")
+"""The cause of a loss that is an exception of a line that is known."""
+
+
+def _blocked(verdict: Verdict, root: str, message: str, *, timing: bool = False) -> Verdict:
+    update = {
+        "timing": verdict.timing and timing,
+        "status": Status.BLOCKED,
+        "score": 0.0,
+        "message": message,
+        "hint": f"fix {root} first",
+        "blocked_by": root,
+    }
+    return verdict.model_copy(update=update)
 
 
 def _graph_names(criterion: Criterion) -> set[str]:

@@ -8,8 +8,9 @@ import pytest
 
 from grader.checks import CHECKS
 from grader.judging import judge
+from grader.judging.requirements import charge_exceptions_once
 from grader.model.result import CriterionResult
-from grader.model.verdict import Status, Verdict, partial
+from grader.model.verdict import Status, Verdict, failed, partial
 from grader.package.launch import parse_launch_files
 from grader.rubric.message_fields import said_types
 from tests.support.rubrics import (
@@ -365,6 +366,25 @@ def test_what_else_is_wrong_with_a_node_is_no_reason_for_its_end() -> None:
     assert "EOFError" in found["chatter"].message
     assert found["rate"].blocked_by == "chatter"
     assert found["rate"].message.count("EOFError") == 1
+
+
+@pytest.mark.parametrize(
+    ("cause", "judged", "blocked_by"),
+    [
+        ("NameError: name 'a' is not defined (src/a.py, line 3): nothing gives `a` a value", "", "rate"),
+        ("NameError: name 'a' is not defined (src/a.py, line 3)", "chatter", ""),
+        ("it ended by itself (src/a.py, line 3)", "", ""),
+    ],
+)
+def test_an_exception_is_charged_once(cause: str, judged: str, blocked_by: str) -> None:
+    """Also where its node goes on. What a repaired copy has judged keeps its share."""
+    lost = {name: failed("it never moves", hint="x").model_copy(update={"cause": cause}) for name in "ab"}
+    verdicts = {"rate": lost["a"], "chatter": lost["b"]}
+    told = charge_exceptions_once(
+        rubric({**RATE, "requires": []}, {**CHATTER, "requires": []}), verdicts, {judged}
+    )
+    assert told["rate"] == lost["a"]
+    assert told["chatter"].blocked_by == blocked_by
 
 
 def test_another_name_is_no_reason_for_silence() -> None:
