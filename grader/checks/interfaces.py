@@ -17,6 +17,7 @@ from grader.model.message_definitions import (
     FULL_NAMES,
     PARTS,
     exchanged_parts,
+    lacking_field,
     parse_definition,
     refuse_unknown,
 )
@@ -215,6 +216,8 @@ def _unreadable(found: Interface, fault: Fault, wanted: list[InterfaceField]) ->
     the last part where its fields are missing too."""
     fix = fault.fix or "one field per line, type before name"
     line = fault.line
+    if meant := lacking_field(fault, found.fields, wanted):
+        fix = f"write `{meant.type} {meant.name}{_value(meant)}`"
     if fault.kind == "OtherParts":
         parts = {one.name: one.part for one in wanted}
         there = sorted((one for one in found.fields if one.name in parts), key=lambda one: one.line)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import PurePosixPath
 
@@ -120,8 +120,10 @@ def _parse_line(text: str, part: str, line: int) -> InterfaceField | None:
 
 def _no_field(text: str, path: str, line: int) -> Fault:
     shown = text.strip()[:60]
-    message = f"`{shown}` is not a field: a line is a type and a name, like `float64 speed`"
-    cause, right = f"`{shown}` on line {line} is not a field", corrected_line(text, path)
+    right = corrected_line(text, path)
+    why, fix = ("", "") if right else _lacks(text.partition("#")[0].split())
+    cause = f"`{shown}` on line {line} is not a field{why and f': {why}'}"
+    message = f"`{shown}` is not a field: {why or 'a line is a type and a name, like `float64 speed`'}"
     if right == DIVIDING:
         message = cause = f"`{shown}` on line {line} does not divide its parts" + (
             ": it has to stand at the beginning of the line"
@@ -136,8 +138,39 @@ def _no_field(text: str, path: str, line: int) -> Fault:
         kind="NoField",
         message=message,
         cause=cause,
-        fix=f"write `{right}`" if right else "",
+        fix=f"write `{right}`" if right else fix,
     )
+
+
+def _lacks(words: Sequence[str]) -> tuple[str, str]:
+    """Return what a line lacks, or has too much, that is not a field, and what to write; "" where that is not plain."""
+    first = words[0]
+    is_type = first.partition("[")[0] in {*BUILT_IN, *FULL_NAMES, *OTHER_TYPES} or "/" in first
+    if len(words) == 1 and is_type:
+        return "it has a type, and no name", f"write the name of the field behind `{first}`"
+    if len(words) == 1 and first.isidentifier():
+        return "it has a name, and no type", f"write the type of the field before `{first}`"
+    if is_type and words[1] == "=":
+        return "it has no name before its `=`", f"write the name of the constant behind `{first}`"
+    if is_type and len(words) == 4 and words[2].partition("[")[0] in BUILT_IN:
+        return "it has two fields", f"write `{' '.join(words[2:])}` on a line of its own"
+    return "", ""
+
+
+def lacking_field(
+    fault: Fault, found: Collection[InterfaceField], wanted: Collection[InterfaceField]
+) -> InterfaceField | None:
+    """Return which of the fields that are wanted, and not there, the line is meant to be that cannot be read: the only
+    one, or the one that it is most like; None where that is not plain."""
+    there = {(one.part, one.name) for one in found}
+    lacking = {
+        f"{one.type} {one.name}": one for one in wanted if one.type and (one.part, one.name) not in there
+    }
+    line = re.match(r"`(.*)` ", fault.cause)
+    if fault.kind != "NoField" or line is None or fault.fix.startswith("write `"):
+        return None
+    likest = [*lacking] if len(lacking) == 1 else get_close_matches(line[1], lacking, n=1, cutoff=0.5)
+    return lacking[likest[0]] if likest else None
 
 
 def corrected_line(text: str, path: str) -> str:
@@ -172,6 +205,11 @@ _SLIPS = (
     (rf"^({_PLAIN})\s+(\[\d*\])\s*", r"\1\2 "),
     (rf"^({_PLAIN})\s+(\w+)\s*(\[\d*\])$", r"\1\3 \2"),
     (r"^(u?int|float) (8|16|32|64)\b", r"\1\2"),
+    (r"^(u?int(?:8|16|32|64)|float(?:32|64))(?=[A-Za-z]\w*$)", r"\1 "),
+    (rf"^({_PLAIN})\[?(\d*)\]?(?=\s+\w+$)", r"\1[\2]"),
+    (r"^(\w+)(?: ?[/\\] ?)(?=\w+(?:\[\d*\])?\s+\w+$)", r"\1/"),
+    (r"^[-*]\s+", ""),
+    (r"['\"`.\])]+$|(?<=\s)['\"`]|^['\"`]", ""),
     (rf"^((?:{_PLAIN})(?:\[\d*\])?\s+[A-Za-z]\w*) ([A-Za-z]\w*)$", r"\1_\2"),
     (r"(?<=\w)-(?=\w)", "_"),
 )  # fmt: skip

@@ -231,6 +231,27 @@ CASES = {
         ["build-line"], "write `string[] names`", asking(definitions=(("msg/Level.msg", LEVEL_FIELDS),)),
         {"msg/Level.msg": "float32 level\nstring[]  names  # of all\nbyte b\n"},
     ),
+    "own-message-with-fields-in-another-order": Case(
+        {**OWN, "msg/Level.msg": "int8 b\n# of all\nstring[] names # both\nfloat64 level\n", CMAKELISTS: GENERATED},
+        ["build-line"], "order them as the handout does: level, names then b",
+        asking(definitions=(("msg/Level.msg", LEVEL_FIELDS),)),
+        {"msg/Level.msg": "float64 level\n# of all\nstring[] names # both\nint8 b\n"},
+    ),
+    "own-message-with-a-whole-number": Case(
+        {**OWN, "msg/Level.msg": "int32 level\nstring[] names\nint16 b\n", CMAKELISTS: GENERATED},
+        ["build-line"], "write `float64 level`", asking(definitions=(("msg/Level.msg", LEVEL_FIELDS),)),
+        {"msg/Level.msg": "float64 level\nstring[] names\nint16 b\n"},
+    ),
+    "own-message-with-two-damaged-lines": Case(
+        {**OWN, "msg/Level.msg": "float64\n[] names  # of all\nint8 b\n", CMAKELISTS: GENERATED},
+        ["build-line"] * 2, "`float64` on line 1 is not a field: it has a type, and no name",
+        asking(definitions=(("msg/Level.msg", LEVEL_FIELDS),)),
+        {"msg/Level.msg": "float64 level\nstring[] names  # of all\nint8 b\n"},
+    ),
+    "own-message-with-a-bracket-missing": Case(
+        {**RUN_OWN, "msg/Level.msg": "float64[ level\n", CMAKELISTS: GENERATED}, ["build-line"],
+        "write `float64[] level`", after={"msg/Level.msg": "float64[] level\n"},
+    ),
     "own-message-of-no-type": Case(
         {**OWN, "msg/Level.msg": "Float64 level\n", CMAKELISTS: GENERATED}, ["build-line"], "write `float64 level`",
     ),

@@ -16,6 +16,8 @@ from grader.model.message_definitions import (
     PARTS,
     corrected_line,
     exchanged_parts,
+    integer_limits,
+    lacking_field,
     meant_field,
     parse_interface,
 )
@@ -241,19 +243,37 @@ _WITHOUT_ROSCPP = {"catkin", "rospy", "std_srvs", GENERATION, "message_runtime"}
 
 
 def define_as_asked(files: Files, package: PackageFacts, wanted: Wanted) -> None:
-    """Put the parts of a service or an action into the order of the handout where whole parts have changed places, and
-    between them the `---` that are missing; give fields the handout's types where others cannot stand for them."""
+    """Put the parts of a service or an action, and the fields of a part, into the order of the handout where they have
+    changed places, and between parts the `---` that are missing; give fields the handout's types where others cannot
+    stand for them."""
     for path, fields in wanted.definitions:
-        own = next((one for one in package.interfaces if one.path == path), None)
+        _write_lacking(files, path, fields)
         text = files.text(path)
-        if own is None or text is None:
+        if text is None or all(one.path != path for one in package.interfaces):
             continue
+        own = parse_interface(text.encode(), path)
         if own.fault is not None:
             _divide(files, own, fields, text)
         elif places := exchanged_parts(own.fields, fields):
             _move_parts(files, path, text, places)
         else:
             _change_types(files, own, fields, package.name or "")
+            _move_fields(files, own, fields)
+
+
+def _write_lacking(files: Files, path: str, fields: Sequence[InterfaceField]) -> None:
+    """Write the handout's field in place of each line that cannot be read, where it is plain which one is meant."""
+    for _ in range(LINES_MAX):
+        text = files.text(path) or ""
+        own = parse_interface(text.encode(), path)
+        meant = lacking_field(own.fault, own.fields, fields) if own.fault else None
+        if own.fault is None or own.fault.line is None or meant is None or meant.value is not None:
+            return
+        lines = text.split("\n")
+        comment = re.search(r"\s*#.*|$", lines[own.fault.line - 1])
+        lines[own.fault.line - 1] = f"{meant.type} {meant.name}{comment[0] if comment else ''}"
+        fix = f"write `{meant.type} {meant.name}`"
+        files.change("build-line", path, "\n".join(lines), f"{path}: {own.fault.cause}", fix)
 
 
 def _move_parts(files: Files, path: str, text: str, places: Mapping[str, str]) -> None:
@@ -264,6 +284,24 @@ def _move_parts(files: Files, path: str, text: str, places: Mapping[str, str]) -
     moved = join_words(part for part, other in places.items() if part != other)
     fix = f"the order of the parts is {join_words(order)}, with `---` between them"
     files.change("build-line", path, f"{changed}\n", f"{path}: {moved} have changed places", fix)
+
+
+def _move_fields(files: Files, own: Interface, fields: Sequence[InterfaceField]) -> None:
+    """Put the fields of a part into the order of the handout's `fields`, where it has these very names."""
+    for part in PARTS[PurePosixPath(own.path).suffix]:
+        there = [one for one in own.fields if one.part == part and one.value is None]
+        asked = [one.name for one in fields if one.part == part and one.value is None]
+        names = [one.name for one in there]
+        if names == asked or sorted(names) != sorted(asked):
+            continue
+        lines = (files.text(own.path) or "").split("\n")
+        ordered = [lines[there[names.index(name)].line - 1] for name in asked]
+        for one, line in zip(there, ordered, strict=True):
+            lines[one.line - 1] = line
+        where = f" of the {part}" if part else ""
+        message = f"{own.path}: the fields{where} are in a different order: {join_words(names, 'then')}"
+        fix = f"order them as the handout does: {join_words(asked, 'then')}"
+        files.change("build-line", own.path, "\n".join(lines), message, fix)
 
 
 def _change_types(files: Files, own: Interface, fields: Sequence[InterfaceField], package: str) -> None:
@@ -282,12 +320,13 @@ def _change_types(files: Files, own: Interface, fields: Sequence[InterfaceField]
 
 def _cannot_stand_for(kind: str, asked: str, path: str, package: str) -> bool:
     """Return whether a field of one type is none of the other: in a service or an action, who calls it needs the very
-    type; in a message, a number of another size does as well."""
+    type; in a message, a number that holds the values of the other does as well."""
     names = [FULL_NAMES.get(one.partition("[")[0], one.partition("[")[0]) for one in (kind, asked)]
     lists = [one.partition("[")[2] for one in (kind, asked)]
     same = names[0].removeprefix(f"{package}/") == names[1].removeprefix(f"{package}/")
-    sizes = re.compile(r"u?int\d+|float\d+")
-    alike = path.endswith(".msg") and all(sizes.fullmatch(one) for one in names)
+    limits = [integer_limits(one) for one in names]
+    holds = limits[0] and limits[1] and limits[0][0] <= limits[1][0] <= limits[1][1] <= limits[0][1]
+    alike = path.endswith(".msg") and (holds or all(one.startswith("float") for one in names))
     return lists[0] != lists[1] or not (same or alike)
 
 
