@@ -5,6 +5,8 @@ Nothing is executed. Python 3.8, standard library only.
 """
 
 import ast
+import builtins
+import math
 from collections import Counter
 
 from script_names import (
@@ -16,7 +18,6 @@ from script_tree import (
     FUNCTIONS,
     LOOPS,
     all_of,
-    argument,
     called_name,
     calls_in,
     dotted,
@@ -27,7 +28,6 @@ from script_tree import (
     loop_around,
     names_in,
     parents_of,
-    published_type,
     slip,
     statements_of,
     walk,
@@ -122,6 +122,12 @@ def unreached_fix(one, loop, behind, later, called):
     if isinstance(loop, ast.Expr) and getattr(called, "name", "") == "__init__":
         # What is behind needs the object, so it cannot move above
         return "move the spin() of line %d below line %d" % (loop.lineno, behind.lineno)
+    if "publish" in (called_name(behind), called_name(later)) and isinstance(loop, ast.While):
+        return (
+            into_loop(behind.lineno, loop)
+            if not calls_in(loop, "publish") and calls_in(loop, "sleep")
+            else ""
+        )
     above = "move line %d above line %d" % (behind.lineno, one.lineno)
     if isinstance(later, ast.While) and isinstance(loop, ast.While):
         both = "one loop has to do both: make above line %d what the loop on line %d uses, and do its work"
@@ -233,21 +239,48 @@ def run_after(loop, tree):
     return [one for one in found if not isinstance(one, (ast.FunctionDef, ast.ClassDef))]
 
 
+def into_loop(line, loop):
+    """Return how a line gets into a loop: above the pause that ends it, else below its last line."""
+    ends = [one.lineno for one in loop.body[-1:] if isinstance(one, ast.Expr) and is_call(one.value, "sleep")]
+    last = loop.body[-1]
+    where = "above line %d" % ends[0] if ends else "below line %d" % last.end_lineno
+    fix = "move line %d into the loop of line %d, %s, with the same spaces or tabs before it as line %d has"
+    return fix % (line, loop.lineno, where, last.lineno)
+
+
 def published_before(tree):
-    """The only `publish(…)` of a file, where it stands above a loop that does nothing but wait."""
-    published = calls_in(tree, "publish")
+    """The only `publish(…)` of a file, or the only call of the function that holds it, where it stands above a loop
+    that waits and publishes nothing."""
+    published, functions = calls_in(tree, "publish"), functions_in(tree)
+    named = Counter(getattr(n, "id", getattr(n, "attr", "")) for n in walk(tree))
+    sending = {n for n in functions.values() if calls_in(n, "publish") and named[n.name] == 1}
     for node in walk(tree) if len(published) == 1 else ():
         above = None
         for one in statements_of(node):
-            called = {called_name(n) for n in ast.walk(one) if isinstance(n, ast.Call)}
+            every = [n for n in ast.walk(one) if isinstance(n, ast.Call)]
+            called = {called_name(n) for n in every}
             waits = isinstance(one, ast.While) and is_endless(one) and "sleep" in called
-            if isinstance(one, ast.Expr) and one.value is published[0]:
+            value = getattr(one, "value", None)
+            if isinstance(one, ast.Expr) and (
+                value is published[0] or called_own(value, functions) in sending
+            ):
                 above = one.lineno
-            elif above and waits and called <= {"sleep", "is_shutdown"}:
-                message = "the publish(…) on line %d is above the loop on line %d, and runs once"
-                fix = "move line %d into that loop, above line %d, with the same spaces or tabs before it"
-                message, fix = message % (above, one.lineno), fix % (above, one.body[0].lineno)
-                yield slip(above, "loop-left", message, fix)
+            elif above and waits and all(map(only_computes, every)):
+                message = "line %d publishes above the loop on line %d, and so runs once"
+                yield slip(above, "loop-left", message % (above, one.lineno), into_loop(above, one))
+
+
+COMPUTES = {
+    *dir(str), *dir(list), *dir(math), "is_shutdown", "sleep", "now", "get_time", "to_sec", "time", "Time", "random",
+    "uniform", "randint", "choice", "loginfo", "logwarn", "logdebug", "logerr", "loginfo_throttle",
+}  # fmt: skip
+"""Methods and functions of modules that do nothing in ROS but wait and log."""
+
+
+def only_computes(call):
+    """Whether what is called is Python's own, makes a message, or is one that only computes, waits or logs."""
+    name = call.func.id if isinstance(call.func, ast.Name) else ""
+    return name in dir(builtins) or name[:1].isupper() or (not name and called_name(call) in COMPUTES)
 
 
 def is_counted(loop):
@@ -383,54 +416,6 @@ def lines_said(numbers):
     """Return `line 3` or `lines 3, 5 and 8`."""
     *first, last = map(str, numbers)
     return "lines %s and %s" % (", ".join(first), last) if first else "line " + last
-
-
-def loops_of_numbers(tree):
-    """Loops outside the callbacks that compute with what a topic's callback keeps of its message, or publish it as a
-    number: neither is possible with a text."""
-    functions = functions_in(tree)
-    given = [one for call in calls_in(tree, "Subscriber") for one in argument(call, 2, "callback")]
-    called = [functions[name] for name in {dotted(n).rpartition(".")[2] for n in given} if name in functions]
-    inside = {n for function in called for n in ast.walk(function)}
-    kept = {arg.arg + ".data" for function in called for arg in function.args.args if arg.arg != "self"}
-    assigned = all_of(tree, ast.Assign)
-    for _ in range(KEPT_STEPS):
-        kept |= {dotted(t) for n in assigned if names_in(n.value) & kept for t in n.targets}
-    types = {dotted(n.targets[0]): published_type(n.value) for n in assigned if is_call(n.value, "Publisher")}
-    for loop in (n for n in all_of(tree, ast.While) if n not in inside):
-        of_number = (n for n in ast.walk(loop) if needs_number(n, kept, types))
-        for node in sorted(of_number, key=lambda n: n.lineno)[:1]:
-            lines = (loop.lineno, loop.end_lineno)
-            fix = "write `rospy.spin()` in place of the loop on lines %d to %d" % lines
-            inside.update(ast.walk(loop))
-            yield slip(loop.lineno, "takes-number", "line %d needs a number" % node.lineno, fix)
-
-
-KEPT_STEPS = 3
-NUMERIC = ("int", "float", "abs", "round", "range")
-
-
-def needs_number(node, kept, types):
-    """Return whether an expression raises an error if one of the names has a text."""
-    used = []
-    if isinstance(node, ast.BinOp):
-        used = [node.left] if isinstance(node.op, ast.Mod) else [node.left, node.right]
-        joins = {ast.Add: (int, float), ast.Mult: float}.get(type(node.op))
-        used = used if joins is None or has_number(used, joins) else []
-    elif isinstance(node, ast.UnaryOp) and not isinstance(node.op, ast.Not):
-        used = [node.operand]
-    elif isinstance(node, ast.Compare) and isinstance(node.ops[0], (ast.Lt, ast.LtE, ast.Gt, ast.GtE)):
-        used = [node.left, *node.comparators]
-        used = used if has_number(used, (int, float)) else []
-    elif is_call(node, "publish"):
-        used = node.args if types.get(dotted(node.func.value), "String") != "String" else []
-    elif isinstance(node, ast.Call):
-        used = node.args if called_name(node) in NUMERIC or dotted(node.func).startswith("math.") else []
-    return any(dotted(one) in kept for one in used)
-
-
-def has_number(nodes, kinds):
-    return any(isinstance(getattr(node, "value", None), kinds) for node in nodes)
 
 
 def is_short(sleep):

@@ -1,4 +1,5 @@
-"""Finds the rates that a student's Python asks for, for `slips.py`: numbers and parameters, of loops and of timers.
+"""Finds the rates that a student's Python asks for, for `slips.py`: numbers and parameters, of loops and of timers,
+and loops that need a number.
 
 Nothing is executed. Python 3.8, standard library only.
 """
@@ -9,9 +10,13 @@ from script_tree import (
     LOOPS,
     all_of,
     argument,
+    called_name,
     calls_in,
     dotted,
+    functions_in,
     is_call,
+    names_in,
+    published_type,
     slip,
     text_of,
     walk,
@@ -104,3 +109,51 @@ def read_parameter(node):
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and len(node.args) == 1:
         node = node.args[0] if node.func.id in ("float", "int") else node
     return text_of(node.args[0]) if is_call(node, "get_param") and node.args else ""
+
+
+def loops_of_numbers(tree):
+    """Loops outside the callbacks that compute with what a topic's callback keeps of its message, or publish it as a
+    number: neither is possible with a text."""
+    functions = functions_in(tree)
+    given = [one for call in calls_in(tree, "Subscriber") for one in argument(call, 2, "callback")]
+    called = [functions[name] for name in {dotted(n).rpartition(".")[2] for n in given} if name in functions]
+    inside = {n for function in called for n in ast.walk(function)}
+    kept = {arg.arg + ".data" for function in called for arg in function.args.args if arg.arg != "self"}
+    assigned = all_of(tree, ast.Assign)
+    for _ in range(KEPT_STEPS):
+        kept |= {dotted(t) for n in assigned if names_in(n.value) & kept for t in n.targets}
+    types = {dotted(n.targets[0]): published_type(n.value) for n in assigned if is_call(n.value, "Publisher")}
+    for loop in (n for n in all_of(tree, ast.While) if n not in inside):
+        of_number = (n for n in ast.walk(loop) if needs_number(n, kept, types))
+        for node in sorted(of_number, key=lambda n: n.lineno)[:1]:
+            lines = (loop.lineno, loop.end_lineno)
+            fix = "write `rospy.spin()` in place of the loop on lines %d to %d" % lines
+            inside.update(ast.walk(loop))
+            yield slip(loop.lineno, "takes-number", "line %d needs a number" % node.lineno, fix)
+
+
+KEPT_STEPS = 3
+NUMERIC = ("int", "float", "abs", "round", "range")
+
+
+def needs_number(node, kept, types):
+    """Return whether an expression raises an error if one of the names has a text."""
+    used = []
+    if isinstance(node, ast.BinOp):
+        used = [node.left] if isinstance(node.op, ast.Mod) else [node.left, node.right]
+        joins = {ast.Add: (int, float), ast.Mult: float}.get(type(node.op))
+        used = used if joins is None or has_number(used, joins) else []
+    elif isinstance(node, ast.UnaryOp) and not isinstance(node.op, ast.Not):
+        used = [node.operand]
+    elif isinstance(node, ast.Compare) and isinstance(node.ops[0], (ast.Lt, ast.LtE, ast.Gt, ast.GtE)):
+        used = [node.left, *node.comparators]
+        used = used if has_number(used, (int, float)) else []
+    elif is_call(node, "publish"):
+        used = node.args if types.get(dotted(node.func.value), "String") != "String" else []
+    elif isinstance(node, ast.Call):
+        used = node.args if called_name(node) in NUMERIC or dotted(node.func).startswith("math.") else []
+    return any(dotted(one) in kept for one in used)
+
+
+def has_number(nodes, kinds):
+    return any(isinstance(getattr(node, "value", None), kinds) for node in nodes)

@@ -59,7 +59,7 @@ def slips(tree):
         values.published_in_turn, arithmetic.arithmetic_slips, scans.scan_slips, values.flagged_loops,
         values.kept_velocities, values.values_never_set_back, values.emptied_files,
         callbacks.unprinted_messages, counters.values_left_out, counters.published_unchanged,
-        objects.unused_publishers, objects.unsent_messages, objects.lost_objects, loops.loops_of_numbers,
+        objects.unused_publishers, objects.unsent_messages, objects.lost_objects, rates.loops_of_numbers,
         goals.finished_goals, goals.finished_in_loops, goals.ended_without_result, counters.sends_no_time, without_node,
         debuggers, script_results.results,
     )  # fmt: skip
