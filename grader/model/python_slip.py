@@ -91,7 +91,7 @@ class PythonSlip(Placed, Record):
       distance without its square root, a parameter that is read where it is not set, what nothing sets back,
       a cell that is compared with a grid's side as if it had one more, `atan2(x, y)`, degrees beside radians, and a
       distance that is to be exactly 0 (`step`, `cut`, `half`, `secs`, `mean`, `rootless`, `unset`, `stuck`, `edge`,
-      `swapped`, `mixed`, `exact`), a cell that is a product (`times`), a file that
+      `swapped`, `mixed`, `exact`), a cell that is a product (`times`), a timer's period of 0 (`zero`), a file that
       each call empties (`emptied`), or of a scan an inf that is made 0, an index that is an angle, and a condition that
       drives where a wall is near (`inf`, `angle`, `turned`).
 

@@ -34,6 +34,23 @@ def test_a_rate_that_is_a_parameter_is_known(tmp_path, rate, found):
 @pytest.mark.parametrize(
     ("code", "found"),
     [
+        ("rospy.Timer(rospy.Duration(1 // 10), tell)", [("wrong-value", "zero", 2)]),
+        ("rospy.Timer(rospy.Duration(int(0.5)), tell)", [("wrong-value", "zero", 2)]),
+        ("while True:\n    rospy.sleep(1 // 10)", [("sleep-outside", "sleep", 3)]),
+        ("rospy.Timer(rospy.Duration(1 / 10), tell)", []),
+        ("rospy.Timer(rospy.Duration(10 // 4), tell)", []),
+        ("while True:\n    rospy.sleep(0)", []),
+    ],
+)
+def test_a_wait_of_which_nothing_is_left_is_known(tmp_path, code, found):
+    (tmp_path / "a.py").write_text(f"import rospy\n{code}\n")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [(s.kind, s.name, s.line) for s in slips if s.name in {"zero", "sleep"}] == found
+
+
+@pytest.mark.parametrize(
+    ("code", "found"),
+    [
         ("r = rospy.Rate(5)", [("5", 2)]),
         ("r = rospy.Rate(hz=1 / 10)", [("0.1", 2)]),
         ("rospy.Timer(callback=tell, period=rospy.Duration(2))", [("0.5", 2)]),

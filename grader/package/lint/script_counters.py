@@ -122,6 +122,7 @@ def counter_slips(tree):
     not count: `n =+ 1`, or the line below the loop.
     """
     yield from uncounted(tree)
+    yield from counted_elsewhere(tree)
     for loop in all_of(tree, *LOOPS):
         body, inside = loop.body, [n for one in loop.body for n in ast.walk(one)]
         sent = [i for i, one in enumerate(body) if calls_in(one, "publish")]
@@ -234,6 +235,44 @@ def uncounted(tree):
                     last = [after.lineno, *(n.end_lineno for n in body[at + 2 :] if name in names_in(n))][-1]
                     fix = "indent %s like the lines of that loop" % lines_from(after.lineno, last)
                     yield slip(after.lineno, "no-effect", message, fix, name)
+
+
+def counted_elsewhere(tree):
+    """A value that is published and never changes, beside one of its name that the same function counts: `count`, or
+    the `Talker.count` of the class, beside `self.count`.
+    """
+    changed = {dotted(t) for n in walk(tree) for t in changes(n)}
+    fixed = {dotted(t) for t in constants_in(walk(tree))}
+    for one in all_of(tree, ast.ClassDef):
+        fixed |= {"%s.%s" % (one.name, dotted(t)) for t in constants_in(one.body)}
+    for function in all_of(tree, ast.FunctionDef):
+        sent = [(call, one) for call in calls_in(function, "publish") for one in values_in(call)]
+        added = {dotted(t): n for n in ast.walk(function) for t in increments(n)} if sent else {}
+        published = {dotted(one) for _, one in sent}
+        for call, one in sent:
+            name = dotted(one)
+            alike = [other for other in added if other.rpartition(".")[2] == name.rpartition(".")[2]]
+            if name not in fixed - changed or len(alike) != 1 or alike[0] in published:
+                continue
+            line, other = added[alike[0]].lineno, alike[0]
+            message = "it publishes `%s`, while line %d counts in `%s`" % (name, line, other)
+            yield slip(
+                call.lineno, "no-effect", message, "on line %d, publish `%s`" % (call.lineno, other), name
+            )
+
+
+def values_in(call):
+    """Return the names whose values a call is given, as they are or in a message: `publish(Int8(n))`."""
+    given = [*call.args, *(one.value for one in call.keywords)]
+    made = [value for one in given if isinstance(one, ast.Call) for value in values_in(one)]
+    return [one for one in given if isinstance(one, (ast.Name, ast.Attribute))] + made
+
+
+def changes(node):
+    """Return what a statement gives another value than a number that is written there."""
+    if isinstance(node, ast.Assign) and signed(node.value) is None:
+        return node.targets
+    return [node.target] if isinstance(node, (ast.AugAssign, ast.For)) else []
 
 
 def increments(node):

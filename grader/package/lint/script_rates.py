@@ -66,6 +66,13 @@ def loop_rates(tree):
         pause = dotted(node.func) if timed == "sleep" else ""
         if is_call(value, "Duration") and value.args and not whole:
             pause, value = dotted(value.func) if timed == "Timer" else pause, given(value.args[0])
+        if timed != "Rate" and loses_all(value, given):
+            message = "`%s` gets 0 seconds, since only the whole part of a fraction is left" % dotted(
+                node.func
+            )
+            fix = "on line %d, write the time as a fraction of a second, such as `0.1`" % value.lineno
+            kind, name = ("sleep-outside", "sleep") if timed == "sleep" else ("wrong-value", "zero")
+            yield slip(node.lineno, kind, message, fix, name)
         yield from loop_rate(node, timed, value, whole or constant(value, given), pause)
 
 
@@ -102,6 +109,16 @@ def constant(node, given, depth=4):
         if left and right:
             return left / right if isinstance(node.op, ast.Div) else left * right
     return None
+
+
+def loses_all(node, given):
+    """Return whether a value is a fraction of which 0 is left: `1 // 10`, `int(0.1)`."""
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.FloorDiv):
+        left, right = constant(node.left, given), constant(node.right, given)
+        return bool(left and right and left < right)
+    whole = isinstance(node, ast.Call) and dotted(node.func) == "int" and len(node.args) == 1
+    part = constant(node.args[0], given) if whole else None
+    return part is not None and part < 1
 
 
 def read_parameter(node):
