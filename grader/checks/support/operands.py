@@ -9,8 +9,8 @@ from contextlib import suppress
 from grader.checks.support.console_output import Frame, Traceback
 from grader.checks.support.rospy_calls import fields_of
 from grader.checks.support.text import shown
-from grader.model.package import PackageFacts
 from grader.line_slips.python import parsed
+from grader.model.package import PackageFacts
 
 _ADDED = re.compile(
     r"can only concatenate str \(not \"(\w+)\"\) to str|unsupported operand type\(s\) for \+=?: '(\w+)' and '(\w+)'"

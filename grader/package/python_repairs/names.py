@@ -463,9 +463,7 @@ def meant_by(name: str, own: AbstractSet[str], unused: Collection[str] = ()) -> 
     if sure := [one for one in always if is_one_edit(name, one)]:
         return sure[0]
     inner = [one for one in own if is_letter_changed(name, one)]
-    slips = [
-        one for one in own.intersection(unused) if len(one) > SHORT_NAME_CHARS_MIN and is_one_edit(name, one)
-    ]
+    slips = [one for one in own & set(unused) if len(one) > SHORT_NAME_CHARS_MIN and is_one_edit(name, one)]
     if len(slips) == 1:
         return slips[0]
     if len(inner) == 1:
