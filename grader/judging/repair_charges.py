@@ -13,7 +13,6 @@ from collections.abc import Set as AbstractSet
 from graphlib import TopologicalSorter
 from pathlib import PurePosixPath
 
-from grader.checks.cmake import IN_PLACE_OF_ALL
 from grader.checks.support.text import texts_in
 from grader.model.package import CMAKE, MANIFEST
 from grader.model.repair import Repair, advice_on, messages_of, place_of
@@ -287,10 +286,7 @@ def _at_its_line(copy: Verdict) -> str:
 
 
 def is_told(repair: Repair, hint: str) -> bool:
-    """Return whether the check's own hint says how this is repaired: how git learns of a bit, what has a name; or that
-    all of the file is to be written otherwise."""
-    if PurePosixPath(repair.file).name == CMAKE and IN_PLACE_OF_ALL in hint:
-        return True
+    """Return whether the check's own hint says how this is repaired: how git learns of a bit, what has a name."""
     if repair.kind == "executable-bit":
         return repair.file in hint and "chmod" in hint
     if repair.kind == "parameter-name" and repair.before.strip() == repair.after.strip():
