@@ -212,7 +212,7 @@ def manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
 def _judge_manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
     found = package.manifest
     if found is None:
-        return _unreadable(package, params.name)
+        return _unreadable(package, params)
     if (found.build_type or "").startswith("ament"):
         return _of_ros_2(found, params)
     wrong = [v for v in (_judge_misnamed(package, found, params.name), _unbuilt(found)) if v is not None]
@@ -459,14 +459,21 @@ def _last_line(found: Manifest) -> int:
     return max((d.line for d in found.dependencies), default=found.name_line)
 
 
-def _unreadable(package: PackageFacts, name: str) -> Verdict:
-    fault = package.manifest_fault
+OF_WORKSPACE = (".catkin_workspace", ".catkin_tools/")
+"""How paths begin that only a workspace has, and no package."""
+
+
+def _unreadable(package: PackageFacts, params: ManifestParams) -> Verdict:
+    name, fault = params.name, package.manifest_fault
     if fault is None or package.has_no_manifest:
-        paths = (file.path for file in package.files if not is_product(file.path))
+        paths = [file.path for file in package.files if not is_product(file.path)]
         meant = next(filter(None, map(meant_manifest, paths)), "")
         hint = "write package.xml beside CMakeLists.txt, as catkin_create_pkg makes it, and push it"
         if package.cmake is None:
             hint = "write package.xml and CMakeLists.txt, as catkin_create_pkg makes them, and push both"
+        if package.cmake is None and any(path.startswith(OF_WORKSPACE) for path in paths):
+            made = " ".join(("catkin_create_pkg", name, *params.dependencies))
+            hint = f"this folder is a workspace: run `{made}` in its src/, and move the package's files into src/{name}"
         absent = failed("there is no package.xml", measured="no file", hint=meant or hint)
         return absent.lost_by("file-elsewhere" if meant else "file-missing", MANIFEST)
     line = f", line {fault.line}" if fault.line else ""

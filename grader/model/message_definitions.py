@@ -300,6 +300,16 @@ def other_fields(type_: str, found: str, wanted: str) -> str:
     return ""
 
 
+def fields_to_read(given: str, wanted: str) -> str:
+    """Return which fields a callback reads of a message of another type than it was written for; "" where that is the
+    same: most types of std_msgs have the one field `data`."""
+    if given.startswith("std_msgs/") == wanted.startswith("std_msgs/"):
+        return ""
+    if wanted.startswith("std_msgs/"):
+        return "its callback then reads the message's `data`"
+    return f"its callback then reads the fields that `rosmsg show {wanted}` lists"
+
+
 def _own_fields(type_: str, text: str) -> list[str]:
     """Return `type name` of each field, types in full."""
     package, found = type_.partition("/")[0], []

@@ -40,6 +40,7 @@ from grader.checks.support.text import (
 from grader.evidence.events import MISFIT, UNHEARD, UNSENDABLE
 from grader.evidence.run import Channel, Run
 from grader.model.launch_file import LaunchNode
+from grader.model.message_definitions import fields_to_read
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.verdict import (
@@ -354,6 +355,7 @@ def refused_type(run: Run, topic: str) -> Verdict | None:
     if isinstance(asked.value, str) and "/" in asked.value and asked.type != asked.value:
         of_types, _, name = asked.value.partition("/")
         hint = f"{hint}, with `{imports(of_types, name, 'msg')}` at the top"
+        hint = "; ".join(filter(None, (hint, fields_to_read(asked.type or "", asked.value))))
     return failed(message, hint=hint)
 
 
