@@ -139,7 +139,13 @@ if __name__ == "__main__":
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-@pytest.mark.parametrize("end", ["os.kill(os.getpid(), signal.SIGKILL)", "raise KeyboardInterrupt", "pass"])
+@pytest.mark.parametrize(
+    "end",
+    [
+        "os.kill(os.getpid(), signal.SIGKILL)",
+        *(pytest.param(end, marks=pytest.mark.full) for end in ("raise KeyboardInterrupt", "pass")),
+    ],
+)
 def test_workers_end_with_who_started_them(end, tmp_path) -> None:
     script = tmp_path / "killed.py"
     script.write_text(KILLED.replace("{end}", end))

@@ -85,6 +85,7 @@ def test_what_is_cut_off_shows_that_it_scrolls_and_is_reached_by_keys(visit, wri
         assert set(above) <= {"rgba(0, 0, 0, 0)"}, "nothing hides them"
 
 
+@pytest.mark.full
 def test_the_rate_and_a_short_graph_fit_a_phone(visit, written) -> None:
     page = opened(visit(written, size=PHONE))
     for kind in ("rate", "graph"):
@@ -92,6 +93,7 @@ def test_the_rate_and_a_short_graph_fit_a_phone(visit, written) -> None:
         assert plot.evaluate("one => one.scrollWidth <= one.clientWidth"), kind
 
 
+@pytest.mark.full
 def test_a_wrapped_line_of_code_keeps_its_indentation(visit, tmp_path) -> None:
     line = "        publisher.publish(some_message, " + "and_another, " * 5 + ")"
     shown = figures().model_copy(update={"by_criterion": {"chatter-rate": (code(lines=("x", line, "y")),)}})
@@ -164,6 +166,7 @@ def test_the_cited_line_is_marked_among_those_around_it(shown) -> None:
     assert {round(after["y"] - before["y"] - before["height"]) for before, after in pairwise(rows)} == {0}
 
 
+@pytest.mark.full
 def test_a_timeline_is_zoomed_by_keys_buttons_and_wheel_and_scrolled(visit, written) -> None:
     page = opened(visit(written))
     lanes = page.locator("[data-timeline]")

@@ -49,14 +49,16 @@ class Example:
         return judge_example(self.check, self.data)
 
 
+def exemplified() -> list[str]:
+    """The checks that have cases."""
+    return sorted(path.stem for path in TIMELINES.glob("*.yaml"))
+
+
 @cache
-def examples() -> tuple[Example, ...]:
-    """Every case: read once, changed by nobody."""
-    return tuple(
-        Example(check=path.stem, name=name, data=data)
-        for path in sorted(TIMELINES.glob("*.yaml"))
-        for name, data in _read(path).items()
-    )
+def examples_of(check: str) -> tuple[Example, ...]:
+    """The cases of one check: read once, changed by nobody."""
+    cases = _read(TIMELINES / f"{check}.yaml").items()
+    return tuple(Example(check=check, name=name, data=data) for name, data in cases)
 
 
 def _read(path: Path) -> dict[str, Any]:

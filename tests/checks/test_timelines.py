@@ -15,15 +15,14 @@ from grader.checks.support.text import in_language
 from grader.model.verdict import Status
 from grader.rubric.schema import inner_records, parameters
 from scripts.reference.checks import checks_page
-from tests.checks.examples import LOADER, Example, differences, examples
+from tests.checks.examples import LOADER, Example, differences, examples_of, exemplified
 
 REPOSITORY = Path(__file__).parents[2]
-EXAMPLES = examples()
 
 
-@pytest.mark.parametrize("name", sorted({e.check for e in EXAMPLES}))
+@pytest.mark.parametrize("name", exemplified())
 def test_verdicts(name: str) -> None:
-    wrong = {e.id: faults_of(e) for e in EXAMPLES if e.check == name}
+    wrong = {e.id: faults_of(e) for e in examples_of(name)}
     assert {case: faults for case, faults in wrong.items() if faults} == {}
 
 
@@ -67,7 +66,7 @@ def test_check_is_short(check: Check) -> None:
 
 @pytest.mark.parametrize("name", CHECKS)
 def test_check_has_a_passing_and_a_failing_timeline(name: str) -> None:
-    statuses = {e.expect["status"] for e in EXAMPLES if e.check == name}
+    statuses = {e.expect["status"] for e in examples_of(name)}
     assert {"pass", "fail"} <= statuses
 
 
@@ -80,7 +79,7 @@ def test_every_check_has_a_place_in_a_rubric() -> None:
 
 
 def test_timelines_are_for_checks() -> None:
-    assert {e.check for e in EXAMPLES} <= CHECKS.keys()
+    assert {*exemplified()} <= CHECKS.keys()
 
 
 def test_docs_are_what_the_docstrings_say() -> None:

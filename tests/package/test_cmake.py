@@ -245,7 +245,7 @@ def test_lists_are_split_as_cmake_does():
     assert split_lists(["a;b", "", "c\\;d", ";e;", "\ud800"]) == ("a", "b", "c;d", "e", "\\ud800")
 
 
-@settings(derandomize=True, max_examples=150, deadline=None)
+@settings(derandomize=True)
 @given(st.binary(max_size=200), st.integers(0, len(TEXT)))
 def test_never_raises(tmp_path_factory, noise, at):
     folder = tmp_path_factory.getbasetemp()
@@ -257,7 +257,7 @@ def test_never_raises(tmp_path_factory, noise, at):
         assert facts_of(folder, data, trace=folder / "noise.json").source == "parser"
 
 
-@settings(derandomize=True, max_examples=150, deadline=None)
+@settings(derandomize=True)
 @given(st.text(alphabet='if()endforach"${}[=]#\\;\n x', max_size=60))
 def test_never_raises_on_what_looks_like_cmake(tmp_path_factory, text):
     assert facts_of(tmp_path_factory.getbasetemp(), text).source == "parser"

@@ -163,7 +163,7 @@ def test_found_by_name_and_never_followed_out(tmp_path):
     assert launch.fault.kind == "OutsideLink"
 
 
-@settings(derandomize=True, max_examples=150, deadline=None)
+@settings(derandomize=True)
 @given(st.binary(max_size=200), st.integers(0, len(LAUNCH)))
 def test_never_raises(noise, at):
     text = LAUNCH.encode()

@@ -205,7 +205,7 @@ def test_missing_and_misnamed_files_and_links(tmp_path):
     assert read_manifest(tmp_path)[1].kind == "NotAFile"
 
 
-@settings(derandomize=True, max_examples=150, deadline=None)
+@settings(derandomize=True)
 @given(st.binary(max_size=200), st.integers(0, len(MANIFEST)))
 def test_never_raises(noise, at):
     text = MANIFEST.encode()

@@ -13,20 +13,18 @@ from grader.model.figure import CounterFigure, Figure, HeardFigure, PathFigure, 
 from grader.model.result import CriterionResult
 from grader.model.verdict import EvidenceCitation, Status
 from grader.report.figures import DRAWN, figures_of
-from tests.checks.examples import Example, examples, runs_of
+from tests.checks.examples import Example, examples_of, runs_of
 from tests.report.figures.made import criterion
 from tests.support.rubrics import SCENARIO, rubric
 
-EXAMPLES = [e for e in examples() if e.check in DRAWN]
 NOTHING = re.compile(r"no message|no number|not started|ended|no subscription|subscribed to|no path|nothing")
 
 
 def _examples(check: str) -> list[Any]:
     """The timelines of a check; every third of them in `make test`, which judges all of them elsewhere."""
-    found = [e for e in EXAMPLES if e.check == check]
     return [
         pytest.param(e, id=e.id, marks=[pytest.mark.full] if number % 3 else [])
-        for number, e in enumerate(found)
+        for number, e in enumerate(examples_of(check))
     ]
 
 
