@@ -30,6 +30,7 @@ OF_REPAIRS = {
     "package.lint.script_blocks",
     "package.lint.script_names",
     "package.lint.script_results",
+    "package.lint.script_tree",
     "package.python_repairs",
     "package.python_repairs.calls",
     "package.python_repairs.examine",

@@ -277,9 +277,10 @@ def _with_start(text: str) -> Iterator[Step]:
             between = lines[before.end_lineno or after.lineno : after.lineno - 1]
             if sum(not line.strip() for line in between) < BLANK_LINES:
                 continue
-            rest = ast.Module(function.body[function.body.index(after) :], [])
-            calls = {last_name(n.func) for n in nodes_in(rest) if isinstance(n, ast.Call)}
-            head = lost_head(text, ast.unparse(rest))
+            rest = function.body[function.body.index(after) :]
+            nodes = (n for one in rest for n in ast.walk(one))
+            calls = {last_name(n.func) for n in nodes if isinstance(n, ast.Call)}
+            head = lost_head(text, tree, rest)
             begins = not started and calls & {"init_node", *(one.name for one in functions)}
             line = head or ("if __name__ == '__main__':" if begins else "")
             changed = "\n".join([*lines[: after.lineno - 1], line, *lines[after.lineno - 1 :]])
@@ -299,11 +300,12 @@ def _with_method(text: str, tree: ast.Module, lines: list[str]) -> Iterator[Step
             first = after.lineno - 1
             apart = sum(not line.strip() for line in lines[before.end_lineno or 0 : first])
             body = "\n".join(lines[first : block.end_lineno])
+            rest = block.body[block.body.index(after) :]
             head = ""
             if block in owners and apart >= BLANK_LINES:
-                head = lost_head(text, body)
+                head = lost_head(text, tree, rest)
             elif block in methods and apart and DOES_WORK.search(body) and not SETS_UP.search(body):
-                head = lost_method(text, "\n".join(lines[:first]), body)
+                head = lost_method(text, tree, next(one for one in owners if block in one.body), rest)
                 head = f"{' ' * block.col_offset}{head}" if head else ""
             changed = "\n".join([*lines[:first], head, *lines[first:]])
             if head and kept.isdisjoint(re.findall(r"\w+", head)) and syntax_error(changed) is None:

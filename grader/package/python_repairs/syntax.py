@@ -25,7 +25,7 @@ from grader.line_slips.python import (
     without_texts,
 )
 from grader.package.lint.script_blocks import first_version, lacks_body, lacks_head
-from grader.package.python_repairs.lost_heads import lost_head, lost_method
+from grader.package.python_repairs.lost_heads import lost_head_at
 from grader.package.python_repairs.python2 import as_python3
 
 STEPS_MAX = 60
@@ -390,8 +390,7 @@ def _with_def(lines: list[str], at: int) -> Iterator[str]:
     stands_apart = "".join(lines[max(0, at - 2) : at]).strip() == ""
     if (_indentation(before) and not stands_apart) or not _indentation(lines[at]):
         return
-    body = "\n".join(takewhile(lambda line: not line.strip() or _indentation(line), lines[at:]))
-    if head := lost_head("\n".join(lines), body):
+    if head := lost_head_at(lines, at, ""):
         yield "\n".join([*lines[:at], head, *lines[at:]])
 
 
@@ -405,9 +404,7 @@ def _with_head_of_global(lines: list[str], at: int) -> Iterator[tuple[str, str]]
 def _with_method(lines: list[str], at: int) -> Iterator[str]:
     """Yield the text with the first line of a method above its body, which stands right in its class."""
     first, level = _body_in_class(lines, at)
-    body = "\n".join(takewhile(lambda line: not line.strip() or _width(line) > len(level), lines[first:]))
-    above = "\n".join(lines[:first])
-    if level and (head := lost_method("\n".join(lines), above, body, at_first=True)):
+    if level and (head := lost_head_at(lines, first, level)):
         yield "\n".join([*lines[:first], level + head, *lines[first:]])
 
 
