@@ -78,7 +78,8 @@ def _points(package: PackageFacts) -> Iterator[_Point]:
             why = fault.explanation
             hint = syntax_hint(fault)
             told = "" if hint == fault.advice else f"; {hint}"
-            text = f"{file.path} has a syntax error: {why}{told}"
+            where = f" on line {fault.line}" if fault.line else ""
+            text = f"{file.path} has a syntax error{where}: {why}{told}"
             yield _Point(FileCitation(file=file.path), text)
     known = noetic_messages()
     no_messages = {

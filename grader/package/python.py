@@ -73,6 +73,7 @@ _MESSAGES: tuple[tuple[str, ...], ...] = (
     (r"inconsistent use of tabs", "tabs and spaces are mixed in the indentation", _ONE_WIDTH),
     (r"unindent does not match",
      "this line's indentation matches none of the lines above it", "start it exactly below a line of the same block"),
+    (r"comment goes on", "this line goes on with the comment above it, and lacks its `#`", "begin it with `# `"),
     (r"indented at the top of the file: (.*)",
      "this line is indented, and no code is above it that it could belong to", "{0}"),
     (r"unexpected indent",

@@ -134,7 +134,7 @@ def test_what_does_not_start_is_told_where_nothing_is_lost(tmp_path) -> None:
     package = facts(tmp_path, **files)
     (told,) = add_advice([criterion()], package, rubric(CMAKE_CHECK))
     assert told.hint.split("; ") == [
-        "src/old.py has a syntax error: `print` has no brackets, as in Python 2: write `print(...)`",
+        "src/old.py has a syntax error on line 1: `print` has no brackets, as in Python 2: write `print(...)`",
         "line 1: write `print('a')`",
         f'{OUT} there is no talker in the package: type="talker" lacks the .py of src/talker.py',
         'write type="talker.py"',

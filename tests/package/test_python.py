@@ -88,6 +88,13 @@ CASES = {
         "use four spaces everywhere",
     ),
     "indent_missing": ("if 1:\nx = 1\n", 2, "must be indented"),
+    "comment_in_two_lines": (
+        "# the topic to\nsend Twist messages\nx = 1\n",
+        2,
+        "goes on with the comment above it",
+    ),
+    "no_comment_in_two_lines": ("import rospy\n# starts\nrospy init node\n", 3, ""),
+    "two_words_below_a_comment": ("# the\nsend it\n", 2, ""),
     "indent_first": (
         "#!/a\n x = 1\n\n  # a\n y = 2\nz = 3\n",
         2,

@@ -1,4 +1,4 @@
-"""What `lint/` finds in scripts that read a scan, and in what callbacks keep, or write to a file."""
+"""What `lint/` finds in scripts that read a scan, in what callbacks keep, or write to a file, and in loops that end."""
 
 from pathlib import Path
 
@@ -344,3 +344,19 @@ def test_a_word_of_python_that_is_misspelt_is_no_variable(tmp_path):
     (tmp_path / "a.py").write_text("def f(msg):\n    if msg.data:\n        retturn\n    print(msg.data)\n")
     (slip,) = [one for one in check_syntax(tmp_path, ["a.py"]).slips if one.name == "retturn"]
     assert (slip.kind, slip.line, slip.message) == ("misspelt", 3, "did you mean return?")
+
+
+@pytest.mark.parametrize(
+    ("asked", "ends"),
+    [
+        ("n < 9", "after a fixed number of rounds"),
+        ("not rospy.is_shutdown() and n < 9", "after a fixed number of rounds"),
+        ("not rospy.is_shutdown() and rospy.get_time() - start < 9", "after a fixed time"),
+        ("rospy.Time.now() < end", "after a fixed time"),
+    ],
+)
+def test_when_a_loop_ends_that_does_not_wait_for_the_nodes_end(tmp_path, asked, ends):
+    text = f"import rospy\nrospy.init_node('a')\nn = 0\nwhile {asked}:\n    pub.publish(n)\n    n += 1\n"
+    (tmp_path / "a.py").write_text(text)
+    (slip,) = [one for one in check_syntax(tmp_path, ["a.py"]).slips if one.kind == "loop-left"]
+    assert (slip.line, slip.message) == (4, f"the loop on line 4 ends {ends}")

@@ -32,6 +32,7 @@ from script_tree import (
     statements_of,
     walk,
 )
+from script_values import CLOCKS
 
 CALLED_BACK = {"Subscriber": "callback", "Service": "handler"}
 """What calls a function of the script's, and the name of that argument."""
@@ -169,6 +170,18 @@ def loops_that_never_go_round(tree):
             yield slip(block.lineno, "loop-left", message, fix, asks)
 
 
+def end_of_rounds(loop):
+    """Return when a loop ends whose first line does not wait for the node's end."""
+    if isinstance(loop, ast.For):
+        return "after a fixed number of rounds"
+    asked = {dotted(one) for one in ast.walk(loop.test)}
+    calls = {(dotted(one.func) or "").rpartition(".")[2] for one in all_of(loop.test, ast.Call)}
+    if calls.intersection(CLOCKS):
+        return "after a fixed time"
+    is_counted = any(dotted(one.target) in asked for one in all_of(loop, ast.AugAssign))
+    return "after a fixed number of rounds" if is_counted else "as soon as its condition is false"
+
+
 def stopped_loops(tree):
     """`spin()` in a loop that publishes: the loop does not come round. `break` or `return` in each of its turns, or so
     many turns and no more."""
@@ -186,9 +199,7 @@ def stopped_loops(tree):
         spins = is_robot and any(calls_in(one, "spin") for one in run_after(loop, tree))
         is_part = (called[name] > 1 and name != "publish") or spins
         if is_counted(loop) and ending is None and not turned[loop][1] and not is_part:
-            counted = isinstance(loop, ast.For) or any(isinstance(n, ast.AugAssign) for n in ast.walk(loop))
-            message = "after a fixed number of rounds" if counted else "as soon as its condition is false"
-            message = "the loop on line %d ends %s" % (loop.lineno, message)
+            message = "the loop on line %d ends %s" % (loop.lineno, end_of_rounds(loop))
             used = {n.id for one in loop.body for n in ast.walk(one) if isinstance(n, ast.Name)}
             fix = "write `while not rospy.is_shutdown():` on line %d" % loop.lineno
             last = next((one for one in reversed(run_after(loop, tree)) if calls_in(one, "publish")), None)

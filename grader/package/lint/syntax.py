@@ -12,6 +12,7 @@ import ast
 import contextlib
 import io
 import json
+import keyword
 import os
 import re
 import sys
@@ -44,6 +45,7 @@ BRACE = re.compile(
 )
 """A block that begins as in C++: what Python says of it is said of a line below."""
 ODD_LINES_MAX = 3
+WORDS = re.compile(r"\s*[^\W\d][\w'-]{0,40},?(\s+[\w'-]{1,40}[,.]?){2,30}\s*$")
 OUTERMOST = re.compile(r"(import|from)\s|if\s+__name__\b")
 COMMENTED = re.compile(r"\s*#[#\s]*((?:if|while|for|def|class|try|with)\b.*:)\s*$")
 """The first line of a block, commented out: Python speaks of the line below, which stands too far in."""
@@ -318,6 +320,8 @@ def syntax_fault(error, data):
     if first is not None and lines[first][:1] not in "=>|":
         at = lines[first].find("{") + 1 or 1
         return fault("SyntaxError", first + 1, at, "invalid syntax", text=lines[first])
+    if known and "invalid syntax" in str(error) and is_comment_below(lines, line):
+        return fault("SyntaxError", line, 1, "comment goes on", text=lines[line - 1])
     of_block = block_fault(lines, line, str(error)) if known else None
     if of_block is not None:
         return of_block
@@ -333,6 +337,17 @@ def syntax_fault(error, data):
         tab_size=tab_size(lines) if len(begins) > 1 else None,
         odd=odd_line(lines) if len(begins) > 1 else None,
     )
+
+
+def is_comment_below(lines, line):
+    """Return whether a line is the end of the comment above it, which a PDF or an editor has broken into two: at least
+    three words, the first of which is no name of the script."""
+    above, words = (lines[line - 2].strip() if line > 1 else ""), lines[line - 1].split()
+    is_comment = above.startswith("#") and WORDS.match(lines[line - 1]) is not None
+    if not is_comment or keyword.iskeyword(words[0]) or words[0] in ("print", "exec"):
+        return False
+    used = re.compile(r"\b%s\s*[.(=\[]|import.*\b%s\b" % (re.escape(words[0]), re.escape(words[0])))
+    return not any(used.search(text) for text in lines)
 
 
 def block_fault(lines, line, message):
