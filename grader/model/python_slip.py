@@ -56,7 +56,8 @@ class PythonSlip(Placed, Record):
       reads a parameter; `name` is the last.
     - `spin-in-loop`: a loop that publishes and waits in `spin()`.
     - `loop-left`: a loop that ends in its first turn, or after a number of them, or a callback that ends the node, or
-      the only `publish(…)`, above a loop that waits; `name` is the function that it asks, where a `not` is missing.
+      the only `publish(…)`, above a loop that waits or in none; `name` is the function that it asks, where a `not` is
+      missing.
     - `ends-node`: a callback that ends the node, at least sometimes; a slip only if the node ended by itself.
     - `sleep-outside`, `sleep-twice`: a loop whose `sleep()` is outside it, or that only makes its Rate, or that
       waits twice in each turn.

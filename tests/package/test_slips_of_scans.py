@@ -360,3 +360,22 @@ def test_when_a_loop_ends_that_does_not_wait_for_the_nodes_end(tmp_path, asked, 
     (tmp_path / "a.py").write_text(text)
     (slip,) = [one for one in check_syntax(tmp_path, ["a.py"]).slips if one.kind == "loop-left"]
     assert (slip.line, slip.message) == (4, f"the loop on line 4 ends {ends}")
+
+
+@pytest.mark.parametrize(
+    ("below", "found"),
+    [
+        (
+            "pub.publish(1)\nrate.sleep()\n",
+            [(4, "write `while not rospy.is_shutdown():` above line 4, and begin lines 4 to 5")],
+        ),
+        ("pub.publish(1)\nrate.sleep()\nrospy.spin()\n", []),
+        ("rate.sleep()\npub.publish(1)\n", []),
+        ("while not rospy.is_shutdown():\n    pub.publish(1)\n    rate.sleep()\n", []),
+        ("rospy.Timer(rospy.Duration(1), f)\npub.publish(1)\nrate.sleep()\n", []),
+    ],
+)
+def test_a_loop_that_is_missing_around_a_publish_and_its_pause(tmp_path, below, found):
+    (tmp_path / "a.py").write_text(f"import rospy\nrospy.init_node('a')\nrate = rospy.Rate(1)\n{below}")
+    slips = [one for one in check_syntax(tmp_path, ["a.py"]).slips if one.kind == "loop-left"]
+    assert [(one.line, one.fix.partition(" with")[0]) for one in slips] == found

@@ -170,6 +170,21 @@ def loops_that_never_go_round(tree):
             yield slip(block.lineno, "loop-left", message, fix, asks)
 
 
+def lacking_loops(tree):
+    """One `publish` and, below it, one `sleep` of a rate, in a script that has no loop and nothing else that waits."""
+    waits = ("spin", "Subscriber", "Timer", "Service", "SimpleActionServer", "run", "start")
+    if any(all_of(tree, *LOOPS)) or calls_in(tree, *waits) or not calls_in(tree, "Rate"):
+        return
+    for body in [getattr(node, "body", None) for node in ast.walk(tree)]:
+        alone = [one for one in body if isinstance(one, ast.Expr)] if isinstance(body, list) else []
+        sent = [one.lineno for one in alone if is_call(one.value, "publish")]
+        slept = [one.lineno for one in alone if is_call(one.value, "sleep")]
+        if len(sent) == len(slept) == 1 and sent < slept:
+            fix = "write `while not rospy.is_shutdown():` above line %d, and begin lines %d to %d with four more spaces"
+            message = "no loop is around line %d, so it publishes once" % sent[0]
+            yield slip(sent[0], "loop-left", message, fix % (sent[0], sent[0], slept[0]))
+
+
 def end_of_rounds(loop):
     """Return when a loop ends whose first line does not wait for the node's end."""
     if isinstance(loop, ast.For):

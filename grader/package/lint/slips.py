@@ -49,7 +49,7 @@ def slips(tree):
     finders = (
         uncalled_and_asked, objects.names_of_objects, names.misspelt, rates.loop_rates, rates.nanoseconds,
         counters.resets, never_run, loops.never_reached, loops.loops_that_never_go_round,
-        loops.stopped_loops, loops.published_before,
+        loops.stopped_loops, loops.lacking_loops, loops.published_before,
         loops.sleepless_loops, loops.sleeps_twice, loops.publishes_twice, callbacks.callbacks,
         callbacks.waiting_callbacks, objects.queue_sizes, graph_names,
         objects.object_slips, said_texts, loops.deaf_loops, counters.clock_values, counters.counter_slips,
