@@ -7,7 +7,8 @@ import os
 import re
 import shlex
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path, PurePosixPath
@@ -140,6 +141,32 @@ def _best(matches: list[Candidate], wanted: WantedPackage) -> Choice:
         hints.append(f"{name} is there more than once: {printable(chosen.path)} is graded, {rest} is not")
         hints += _left_behind(chosen, others, wanted)
     return Choice(package=chosen, hints=tuple(hints))
+
+
+def empty_beside(chosen: Candidate, git_links: Collection[str]) -> Iterator[str]:
+    """Yield the empty folders beside a package that have the name of one that it depends on: a repository in a
+    repository is empty in a clone and in an archive, or only one of the `git_links`."""
+    if chosen.path == "." or not chosen.has_manifest:
+        return
+    text = read_untrusted(chosen.folder / MANIFEST, _LARGEST_BYTES) or b""
+    beside = PurePosixPath(chosen.path)
+    there = [beside.with_name(name).as_posix() for name in _empty_folders(chosen.folder.parent)]
+    for path in dict.fromkeys((*there, *git_links)):
+        name = PurePosixPath(path).name
+        if re.search(rb"<\w*depend\b[^<>]*>\s*%s\s*<" % re.escape(os.fsencode(name)), text):
+            why = f"{printable(path)}/ is empty here, and {MANIFEST} names {printable(name)}"
+            yield f"{why}: if it is a repository of its own, {TAKE_IN.format(printable(path))}"
+
+
+def _empty_folders(around: Path) -> list[str]:
+    found: list[str] = []
+    with suppress(OSError, SubmissionError):
+        for below in islice(walk(around, tolerant=True), FOLDERS_OF_A_COPY):
+            if "/" in below.path:
+                break  # the nearest come first
+            if not below.folders and not below.others:
+                found.append(below.path)
+    return found
 
 
 def _above(candidate: Candidate) -> list[str]:

@@ -24,6 +24,7 @@ from grader.intake.choose import (
     WantedPackage,
     choose_loose,
     choose_package,
+    empty_beside,
     enclosing_package,
     find_candidates,
     linked_candidate,
@@ -332,6 +333,7 @@ def _read(opened: Opened, choice: Choice, repositories: Repositories, limits: In
                 f"{printable(path)} {POINTER.format(printable(path))}"
                 for path in _links_below(opened, chosen)
             ),
+            *empty_beside(chosen, opened.git_links),
         ),
     )
 

@@ -146,6 +146,16 @@ def test_an_empty_folder_of_the_name_may_be_a_submodule(path, tmp_path):
     )
 
 
+def test_an_empty_folder_of_a_package_that_is_needed_may_be_a_submodule(tmp_path):
+    needs = manifest("lab1").replace("</package>", "<exec_depend>lab_msgs</exec_depend></package>")
+    repo = write(tmp_path / "repo", {**tree("src/lab1"), "src/lab1/package.xml": needs, "src/full/a.txt": ""})
+    for name in ("lab_msgs", "other_msgs", "rospy"):
+        (repo / "src" / name).mkdir()
+    said = [hint for hint in opened(repo, tmp_path).hints if "is empty" in hint]
+    why = "src/lab_msgs/ is empty here, and package.xml names lab_msgs: if it is a repository of its own, delete "
+    assert [hint[: len(why)] for hint in said] == [why]
+
+
 @pytest.mark.parametrize(
     ("files", "message", "hint"),
     [
