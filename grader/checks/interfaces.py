@@ -10,6 +10,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
+from grader.checks.support.scripts import OF_FILES, cmake_calls
 from grader.checks.support.text import shown
 from grader.model.file_fault import Fault
 from grader.model.message_definitions import (
@@ -111,14 +112,27 @@ def definition(package: PackageFacts, params: DefinitionParams) -> Verdict:
         more = f"; and {len(faults) - FAULTS_SHOWN} more" if len(faults) > FAULTS_SHOWN else ""
         said = "; ".join(fault.message for fault in faults[:FAULTS_SHOWN])
         message = f"{f'{params.file}: ' if found else ''}{said}{more}"
-        verdict = failed(message, hint="; ".join(_fixes(faults[:FAULTS_SHOWN])))
+        hint = "; ".join(filter(None, (*_fixes(faults[:FAULTS_SHOWN]), _unlisted(found, package))))
+        verdict = failed(message, hint=hint)
     else:
-        verdict = passed(f"{params.file} defines {_words(wanted)}")
+        verdict = passed(f"{params.file} defines {_words(wanted)}", hint=_unlisted(found, package))
     lines = dict.fromkeys(fault.line for fault in faults) or {None: None}
     there = found.path if found else "CMakeLists.txt"
     measured = _words(found.fields) if found and found.fields else "no field" if found else "no such file"
     cited = tuple(FileCitation(file=there, line=line) for line in lines) if found else ()
     return verdict.about(expected=_words(wanted), measured=measured, citations=cited)
+
+
+def _unlisted(found: Interface | None, package: PackageFacts) -> str:
+    """Return where to list a definition of which the build makes nothing, since only others are listed."""
+    name = PurePosixPath(found.path).name if found else ""
+    command = next((one for one, kind in OF_FILES.items() if name.endswith(kind)), "")
+    calls = cmake_calls(package, command)
+    words = {PurePosixPath(word).name for call in calls for word in call.args}
+    if not name or "FILES" not in words or name in words or any("$" in word for word in words):
+        return ""
+    place = f"line {calls[-1].line} of {calls[-1].file}"
+    return f"list {name} in {command}(…), {place}: the build makes nothing of it yet"
 
 
 def _fixes(faults: list[_Fault]) -> Iterator[str]:
