@@ -205,7 +205,7 @@ def charged_verdict(
         clauses = [clause for clause in clauses if any(is_told(one, clause) for one in told)]
     hints = clauses + advice_on(one for one in repairs if one not in told)
     said = verdict.message
-    unsaid = [one for one in repairs if one.kind == "node-name" or PurePosixPath(one.file).name not in said]
+    unsaid = [one for one in repairs if one.kind == "node-name" or not _is_said(one, verdict)]
     words = [said, *(one for one in messages_of(unsaid) if (_PLACE.sub("", one) or one) not in said)]
     is_new = not copy.hint or not set(copy.hint.split("; ")) <= set(hints)
     if further:
@@ -227,6 +227,15 @@ def charged_verdict(
     if any(one not in told for one in of_cmake):  # how the call is written is told
         update["sought"] = tuple(one for one in verdict.sought if one.kind not in {"call", "uncalled"})
     return verdict.model_copy(update=update)
+
+
+def _is_said(repair: Repair, verdict: Verdict) -> bool:
+    """Return whether the verdict speaks of the file, and where it cites one line of CMakeLists.txt, of the repair's own
+    call in it."""
+    call = re.match(r"line (\d+) of ", repair.message) if repair.kind in OF_BUILDS else None
+    lines = {line for file, line in cited_lines(verdict.citations) if file == repair.file}
+    is_other = call is not None and len(lines) == 1 and lines.isdisjoint({int(call[1]), repair.line})
+    return PurePosixPath(repair.file).name in verdict.message and not is_other
 
 
 def _with_passed(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdict:
