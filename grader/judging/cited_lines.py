@@ -12,6 +12,7 @@ from pathlib import PurePosixPath
 
 from grader.checks.cmake import NOT_CALLED, below_catkin_package
 from grader.checks.support.launch_slips import find_launch
+from grader.checks.support.rospy_calls import fields_of
 from grader.checks.support.scripts import (
     SourceLine,
     commented_call,
@@ -359,9 +360,12 @@ PLACES = re.compile(r"%[-+0-9.]*[dioxXeEfFgG]\b")
 FIELDS_SHOWN, MESSAGES_READ = 3, 5
 
 
-def lost_fields(lines: Sequence[str], slip: PythonSlip, wanted: str) -> str:
+def lost_fields(
+    lines: Sequence[str], slip: PythonSlip, wanted: str, package: PackageFacts | None = None
+) -> str:
     """Return what to write in place of the fields that a script uses and that only the slip's type has: fields of the
-    messages that it makes, or of the one that its callback gets. "" where it uses none."""
+    messages that it makes, or of the one that its callback gets. "" where it uses none. `package` has the definitions
+    of its own types."""
     texts = [line[:LINE_CHARS].partition("#")[0] for line in lines[:LINES_READ]]
     made = re.compile(rf"\s*([\w.]+) *= *(?:[\w.]+\.)?{re.escape(slip.message)}\(")
     names, first, last = [found[1] for text in texts if (found := made.match(text))], 0, len(texts)
@@ -379,7 +383,8 @@ def lost_fields(lines: Sequence[str], slip: PythonSlip, wanted: str) -> str:
     taken = [(at + 1, field.findall(texts[at])) for at in range(first, last)]
     fields = list(dict.fromkeys(one for _, found in taken for one in found))
     if not OF_DATA.fullmatch(wanted):
-        return ""
+        own = fields_of(package, wanted) if package is not None and either else ()
+        return _own_fields(own, taken, wanted, slip)
     if slip.kind == "publisher-type" and slip.message == "String" and wanted != "Bool":
         return "put a number into its `data`, no text"
     alone = slip.kind == "publisher-type" and sum("Publisher(" in text for text in texts) == 1
@@ -403,6 +408,21 @@ def lost_fields(lines: Sequence[str], slip: PythonSlip, wanted: str) -> str:
     fields = [f"`{one}`" for one in fields]
     named = join_words(fields, most=FIELDS_SHOWN)
     return f"{use}, the only field of {wanted}, in place of {named} on {where}{text}{single and f', and {single}'}"
+
+
+def _own_fields(
+    own: Sequence[str], taken: Iterable[tuple[int, list[str]]], wanted: str, slip: PythonSlip
+) -> str:
+    """Return that a type of several fields has others than those that are taken on these lines; "" where it has them,
+    or is not known."""
+    lost = {number: other for number, found in taken if (other := [one for one in found if one not in own])}
+    if not own or not lost:
+        return ""
+    others = dict.fromkeys(f"`{one}`" for found in lost.values() for one in found)
+    absent = join_words(others, most=FIELDS_SHOWN)
+    given = join_words((f"`{one}`" for one in own), most=FIELDS_SHOWN)
+    use = "use" if slip.kind == "subscriber-type" else "set"
+    return f"{use} the fields of {wanted}, {given}, in place of {absent} on {on_lines(lost)} of {slip.file}"
 
 
 def _sends_several(line: str) -> bool:

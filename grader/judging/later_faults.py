@@ -511,7 +511,7 @@ class Later:
                 yield Fix(f"{slip.fix}: {slip.message}", (slip.fix,))
 
     def _fields(self, wanted: str, slip: PythonSlip) -> Iterator[Fix]:
-        yield from map(Fix, filter(None, [lost_fields(self._lines(slip.file), slip, wanted)]))
+        yield from map(Fix, filter(None, [lost_fields(self._lines(slip.file), slip, wanted, self._package)]))
 
     def _retype(self, verb: str, wanted: str, slip: PythonSlip) -> Iterator[Fix]:
         others, (package, _, name) = self._making(slip), wanted.partition("/")

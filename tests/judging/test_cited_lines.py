@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -23,7 +24,9 @@ from grader.judging.facts import try_facts
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.verdict import FileCitation, SoughtKind, failed, partial, passed
+from grader.package.facts import read_package
 from grader.package.launch import parse_launch_files
+from tests.package.trees import CMAKE, MANIFEST, make_package
 from tests.support.rubrics import CMAKE_CHECK, RATE, SCRIPT, rubric
 from tests.support.timeline import build_runs
 
@@ -475,6 +478,29 @@ def test_a_line_that_makes_a_message_for_another_publisher_keeps_its_type(
     slip = PythonSlip(file="a.py", line=5, kind="publisher-type", message="Int8")
     made = PythonSlip(file="a.py", line=5, kind="publisher", message="a", name=owner)
     assert lines_making(lines, slip, [made]) == numbers
+
+
+@pytest.mark.parametrize(
+    ("source", "told"),
+    [
+        (
+            "msg = Person()\nmsg.name = 'A'\nmsg.age = 4\nmsg.name += 'b'",
+            "in place of `name` and `age` on lines 2 to 4 of a.py",
+        ),
+        ("msg = Person()\nmsg.first = 1\nmsg.age = 4", "in place of `age` on line 3 of a.py"),
+        ("msg = Person()\nmsg.first = 1\nother.age = 4", ""),
+        ("pub.publish(msg)", ""),
+    ],
+)
+def test_the_fields_of_a_type_of_the_package_are_told_where_others_are_set(
+    source: str, told: str, tmp_path: Path
+) -> None:
+    tree = {"package.xml": MANIFEST, "CMakeLists.txt": CMAKE, "msg/Num.msg": "int64 first\nint64 second\n"}
+    package = read_package(make_package(tmp_path / "lab1", tree))
+    slip = PythonSlip(file="a.py", line=1, kind="publisher-type", message="Person")
+    found = lost_fields(source.split("\n"), slip, "Num", package)
+    assert found == (f"set the fields of Num, `first` and `second`, {told}" if told else "")
+    assert lost_fields(source.split("\n"), slip, "Unknown", package) == ""
 
 
 @pytest.mark.parametrize(
