@@ -383,8 +383,8 @@ def lost_fields(
     taken = [(at + 1, field.findall(texts[at])) for at in range(first, last)]
     fields = list(dict.fromkeys(one for _, found in taken for one in found))
     if not OF_DATA.fullmatch(wanted):
-        own = fields_of(package, wanted) if package is not None and either else ()
-        return _own_fields(own, taken, wanted, slip)
+        there = fields_of(package, wanted) if package is not None and either else ()
+        return _own_fields(there, taken, wanted, slip)
     if slip.kind == "publisher-type" and slip.message == "String" and wanted != "Bool":
         return "put a number into its `data`, no text"
     alone = slip.kind == "publisher-type" and sum("Publisher(" in text for text in texts) == 1

@@ -256,3 +256,18 @@ def test_a_module_that_is_used_and_not_imported_is_meant_by_one_that_is_not_ther
     assert here.hint == "write rospy instead of ros"
     assert not here.of_machine
     assert there.of_machine
+
+
+@pytest.mark.parametrize(
+    ("line", "hint"),
+    [
+        ("from lab import Num", "write `from lab.msg import Num`"),
+        ("from json import nums", "delete line 1: nothing in the script uses `nums`"),
+    ],
+)
+def test_an_import_of_the_packages_own_message_is_corrected_though_nothing_uses_it_yet(tmp_path, line, hint):
+    package, _, name = line.split()[1:]
+    files = {"src/a.py": f"{line}\nimport rospy\nrospy.init_node('a')\n", "msg/Num.msg": "int64 a\n"}
+    error = f"ImportError: cannot import name '{name}' from '{package}' (/ws/devel/lib/python3/{package}/__init__.py)"
+    end = explained(tmp_path, files, ("src/a.py", 1, line), error=error)
+    assert end.hint == hint

@@ -337,7 +337,9 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     cause, hint = known
     place = place or (wrong.place if wrong else None)
     if place is not None and found.kind in IMPORT_ERRORS and unbuilt is None and not hiding:
-        hint = unused_import(place, package) or hint
+        # what the build makes is imported to be used: its right import is the nearer fix
+        of_own = f"write `from {package.name}." in hint
+        hint = (not of_own and unused_import(place, package)) or hint
     where = f" ({place.file}, line {place.line})" if place else ""
     text = f"{shown(_said(found, cause).rstrip('.'))}{where}" + (f": {cause}" if cause else "")
     return Ending(text, hint, (place,) if place else (), unbuilt=unbuilt is not None)
