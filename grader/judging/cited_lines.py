@@ -61,7 +61,7 @@ def cite_source(
     paths |= {one.before for one in renamed if PurePosixPath(one.after).name in started}
     lines = [one for one in _read(build, paths) if not one.text.lstrip().startswith(("#", "//"))]
     found = _lines_to_blame(verdict, criterion, lines)
-    if len(found) != 1 and not (1 < len(found) <= SAME_MAX and found == _that_give(found, verdict.measured)):
+    if len(found) != 1 and not (found and _field_of(verdict, criterion)):
         return verdict
     is_sent = criterion.check == "message" or _field_of(verdict, criterion)
     made = line_that_makes(lines, found[0]) if is_sent and len(found) == 1 else None
@@ -69,7 +69,7 @@ def cite_source(
     return verdict.model_copy(update={"citations": (*places, *verdict.citations)})
 
 
-# More lines that set one field to one value say nothing of which one was run.
+# More lines that give one field one value say nothing of which one was run.
 SAME_MAX = 3
 
 
@@ -116,7 +116,12 @@ def _lines_to_blame(verdict: Verdict, criterion: Criterion, lines: list[SourceLi
             found = _published_of(lines_that_set(lines, "stamp"), lines, criterion)
         case _ if field := _field_of(verdict, criterion):
             found = lines_that_set(lines, field)
-            found = _that_give(found, verdict.measured) or _published_of(found, lines, criterion)
+            values = _wrong_values(verdict.measured, given)
+            found = (
+                _that_give(found, values)
+                or _that_hand(found, lines, values)
+                or _one_published(found, lines, criterion)
+            )
         case _:
             found = []
     return found
@@ -149,12 +154,53 @@ def _that_name(said: str, criterion: Criterion, lines: list[SourceLine]) -> list
     return next((found for call in calls if (found := [one for one in lines if call.search(one.text)])), [])
 
 
-def _that_give(found: list[SourceLine], value: str) -> list[SourceLine]:
+def _wrong_values(measured: str, given: Mapping[str, object]) -> list[str]:
+    """Return the numbers that were sent and are wrong, as a line may write them: all, or those outside the bounds."""
+    number = r"-?\d+(?:\.\d+)?"
+    found = re.fullmatch(rf"({number})(?: to ({number}))?", measured)
+    sent = [one for one in found.groups() if one is not None] if found else []
+    low, high = (float(str(given[key])) if given.get(key) is not None else None for key in ("min", "max"))
+    if low is not None or high is not None:
+        sent = [
+            n for n in sent if (low is not None and float(n) < low) or (high is not None and float(n) > high)
+        ]
+    return [one.removesuffix(".0") for one in sent] if len(sent) == 1 else []
+
+
+def _that_give(found: list[SourceLine], values: Sequence[str]) -> list[SourceLine]:
     """Return those that set a field to this very number, where several set it, to others too."""
-    number = re.fullmatch(r"-?\d+(?:\.\d+)?", value)
-    given = re.compile(rf"=\s*{re.escape(value.removesuffix('.0'))}(?:\.0*)?\s*;?\s*(?:(?:#|//).*)?$")
-    right = [one for one in found if number and given.search(one.text)]
-    return right if len(found) > 1 and len({one.file for one in right}) == 1 else []
+    either = "|".join(map(re.escape, values))
+    given = re.compile(rf"=\s*(?:{either})(?:\.0*)?\s*;?\s*(?:(?:#|//).*)?$")
+    right = [one for one in found if values and given.search(one.text)]
+    one_file = len({one.file for one in right}) == 1
+    return right if len(found) > 1 and one_file and len(right) <= SAME_MAX else []
+
+
+def _that_hand(found: list[SourceLine], lines: list[SourceLine], values: Sequence[str]) -> list[SourceLine]:
+    """Return the calls that hand this very number on to a function of Python that sets a field to it: `move(3, 2)`."""
+    calls: dict[SourceLine, None] = {}
+    for one in found if values else ():
+        name = re.search(r"=\s*-?\s*(?:abs\()?\s*([A-Za-z_]\w*)\s*\)?\s*(?:#.*)?$", one.text)
+        above = [a for a in lines if a.file == one.file and a.number < one.number]
+        head = next(
+            (h for a in reversed(above) if (h := re.match(r"\s*def (\w+)\(([^()]*)\)", a.text))), None
+        )
+        names = [part.partition("=")[0].strip() for part in head[2].split(",")] if head else []
+        if name is None or head is None or name[1] not in names:
+            continue
+        at = names.index(name[1]) - (names[:1] == ["self"])
+        call = re.compile(
+            rf"(?<!def )\b{head[1]}\((?:[^(),]*,){{{at}}}\s*(?:{name[1]}\s*=\s*)?(?:{'|'.join(values)})(?:\.0*)?\s*[,)]"
+        )
+        calls |= dict.fromkeys(a for a in lines if a.file == one.file and call.search(a.text))
+    return list(calls) if len(calls) <= SAME_MAX else []
+
+
+def _one_published(
+    found: list[SourceLine], lines: list[SourceLine], criterion: Criterion
+) -> list[SourceLine]:
+    published = _published_of(found, lines, criterion)
+    return published if len(published) == 1 else []
 
 
 def _published_of(found: list[SourceLine], lines: list[SourceLine], criterion: Criterion) -> list[SourceLine]:

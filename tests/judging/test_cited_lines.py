@@ -168,6 +168,33 @@ def test_the_loop_that_reports_is_shown_where_a_goal_goes_on_when_it_is_cancelle
     assert cite_source(late, lab.criteria[0], try_facts(lab, runs), runs["package"]) == late
 
 
+MOVES = "def move(speed, way, on=True):\n    v.linear.x = abs(speed)\n    pub.publish(v)\n"
+
+
+@pytest.mark.parametrize(
+    ("source", "measured", "lines"),
+    [
+        (f"{MOVES}move(3, 2, True)\nmove(1, 3)", "0 to 3", [4]),
+        (f"{MOVES}move(speed=3.0, way=2)\nrotate(3, 90)", "3", [4]),
+        (f"{MOVES}move(3, 2)\nmove(3, 4)\nmove(3, 1)", "0 to 3", [4, 5, 6]),
+        (f"{MOVES}move(2, 3)", "0 to 3", [2]),
+        (f"{MOVES}move(3, 2)", "-1 to 3", [2]),
+        ("def move(self, speed):\n    v.linear.x = speed\nrobot.move(3)", "3", [3]),
+        ("v.linear.x = speed\ndef move(speed): pass\nmove(3)", "3", [1]),
+    ],
+)
+def test_a_call_that_hands_a_wrong_speed_on_is_shown(source: str, measured: str, lines: list[int]) -> None:
+    bounds = {"check": "field-bounds", "with": {"topic": "/cmd_vel", "field": "linear.x", "min": 0, "max": 2}}
+    package = {"package": {"files": [SCRIPT]}, "attachments": {SCRIPT["path"]: f"{source}\n"}}
+    lab, runs = (
+        rubric({"id": "speed", "scenario": "talker", **bounds}),
+        build_runs({"runs": {"package": package}}),
+    )
+    verdict = failed("it is 3").about(measured=measured)
+    found = cite_source(verdict, lab.criteria[0], try_facts(lab, runs), runs["package"])
+    assert found.citations == tuple(FileCitation(file=SCRIPT["path"], line=line) for line in lines)
+
+
 REACTS = {
     "check": "reacts",
     "with": {
