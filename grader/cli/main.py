@@ -35,7 +35,7 @@ from grader.cli.declare import (
 )
 from grader.cli.output import guarded
 from grader.errors import ExitCode, UsageError
-from grader.wording import did_you_mean
+from grader.wording import did_you_mean, join_words
 
 
 def run(argv: Sequence[str]) -> int:
@@ -169,8 +169,9 @@ class Parser(argparse.ArgumentParser):
         near = did_you_mean(str(value), choices)
         if isinstance(action, argparse._SubParsersAction):  # noqa: SLF001 - argparse has no public way
             of = self.prog.partition(" ")[2]
+            few = f", which has {join_words(choices)}" if of else ""
             raise UsageError(
-                f'there is no command "{f"{of} {value}".strip()}"{near}', hint=f"see {self.prog} --help"
+                f'there is no command "{f"{of} {value}".strip()}"{near}', hint=f"see {self.prog} --help{few}"
             )
         raise argparse.ArgumentError(
             action, f"invalid choice: {value!r}{near}; choose from {', '.join(choices)}"

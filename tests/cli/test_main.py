@@ -80,6 +80,12 @@ def test_a_wrong_command_line_is_one_line_and_a_hint(argv, message, capsys):
     assert hint.startswith("  hint: see grader")
 
 
+def test_the_commands_of_a_group_are_named_where_none_is_meant(capsys):
+    assert run(["rubric", "check"]) == 2
+    hint = capsys.readouterr().err.splitlines()[-1]
+    assert hint == "  hint: see grader rubric --help, which has validate, schema, copy, new and test"
+
+
 def test_what_follows_two_hyphens_is_no_option(capsys):
     assert run(["judge", "--rubric", "y", "--", "--ouput"]) == 2
     assert capsys.readouterr().err.startswith('grader: error: there is no rubric "y"')
