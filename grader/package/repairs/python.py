@@ -201,7 +201,8 @@ def _makers(line: str, own: Sequence[PackageFacts]) -> list[str]:
             made.setdefault(f"{each.name}.{one.module}", set()).update(one.classes)
     there = made.get(module, set()) | {*noetic_messages().get(package, ())} | {*SERVICES_OF_ROS}
     is_known = package in {*noetic_messages(), "std_srvs", *(one.name for one in own)}
-    has_others = not is_known and exists_somewhere(package, [one.name for one in own])
+    is_part = any(f"{one.name}_".startswith(f"{package}_") for one in own)  # `lab` for `lab_a1`
+    has_others = not (is_known or is_part) and exists_somewhere(package, [one.name for one in own])
     if not names or names & there or has_others or (package, inner) == ("turtlesim", "srv"):
         return []
     return [module for module, classes in made.items() if names <= classes]
