@@ -314,6 +314,8 @@ def test_an_own_message_that_is_imported_from_a_part_of_the_packages_name(tmp_pa
     manifest = MANIFEST.replace(">lab<", ">r0018_a1<")
     changes = {**own_from("r0018.msg"), CMAKELISTS: GENERATED.replace("lab", "r0018_a1"), XML: manifest}
     folder = package(tmp_path, changes)
-    said = [(one.kind, one.message) for one in repair_all(folder, asking(package="r0018_a1"), name="r0018_a1")]
+    said = [
+        (one.kind, one.message) for one in repair_all(folder, asking(package="r0018_a1"), name="r0018_a1")
+    ]
     assert ("missing-import", "line 4 of src/talker.py: r0018.msg has no Level") in said
     assert "from r0018_a1.msg import Level\n" in (folder / TALKER).read_text()
