@@ -209,6 +209,7 @@ def _not_printed(
     deaf = unheard(run, package)
     never = f"it never prints {params.words}"
     unheard_of = failed_or_blocked(f"{never}: {deaf.message}", hint=deaf.hint) if deaf else None
+    unheard_of = unheard_of and unheard_of.model_copy(update={"cause": deaf.message if deaf else ""})
     if (
         why := _unserved(asked, lacking, own, run, never)
         or unheard_of

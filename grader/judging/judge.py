@@ -69,7 +69,7 @@ from grader.judging.repeats_and_repairs import (
     split_runs,
     was_built,
 )
-from grader.judging.requirements import Requirements, charge_exceptions_once
+from grader.judging.requirements import Requirements, charge_once
 from grader.judging.summary import leave_out, name_unchanged_files, round_half_up
 from grader.model.package import PackageFacts
 from grader.model.result import CriterionResult, EarlyVerdict, Repaired
@@ -124,7 +124,7 @@ def judge_all_runs(
     if repaired:
         verdicts, uses = _with_repaired_copy(facts, checks, verdicts, first, repaired)
     else:
-        verdicts, uses = add_later_faults(charge_exceptions_once(rubric, verdicts), rubric, facts), {}
+        verdicts, uses = add_later_faults(charge_once(rubric, verdicts), rubric, facts), {}
     shown = {
         c.id: _without_git(_with_cited_lines(verdicts[c.id], c, facts, uses.get(c.id)), facts.package)
         for c in rubric.criteria
@@ -187,7 +187,7 @@ def _with_repaired_copy(
         builds=was_built(first),
         launched=launched_in(of_copy.package, of_copy.runs.get(PACKAGE_RUN)),
     )
-    verdicts = charge_exceptions_once(rubric, verdicts, uses)
+    verdicts = charge_once(rubric, verdicts, uses)
     # what no repair helps still has all of its faults
     as_it_is = add_later_faults(verdicts, rubric, facts)
     behind = add_later_faults(verdicts, rubric, of_copy, handed_in=facts.package, repairs=repairs)

@@ -124,18 +124,18 @@ class Requirements:
         return any(start.built or (start.script and not PurePath(start.script).suffix) for start in starts)
 
 
-def charge_exceptions_once(
+def charge_once(
     rubric: Rubric, verdicts: Mapping[str, Verdict], judged: Collection[str] = ()
 ) -> dict[str, Verdict]:
-    """Return the verdicts, with those blocked that lost all of their points to an exception which another one of the
-    same script lost its own to already: such a node goes on, so nothing that `requires` names is lost. `judged` are the
-    criteria that a repaired copy has judged."""
+    """Return the verdicts, with those blocked that lost all of their points to what another one has lost its own to
+    already: an exception in a callback, or a topic that no node hears. Such a node goes on, so nothing that `requires`
+    names is lost. `judged` are the criteria that a repaired copy has judged."""
     charged, told = dict[str, str](), dict(verdicts)
     # students see the hint of the one that is charged
     for criterion in sorted(rubric.criteria, key=lambda c: (c.visibility != "visible", not c.points)):
         verdict = verdicts[criterion.id]
         is_whole = verdict.status is Status.FAIL and not verdict.score and criterion.penalty is None
-        if not is_whole or criterion.scenario is None or not EXCEPTION.match(verdict.cause):
+        if not is_whole or criterion.scenario is None or not OUTLIVED.match(verdict.cause):
             continue
         root = charged.setdefault(verdict.cause, criterion.id)
         if root != criterion.id and criterion.id not in judged and root not in judged:
@@ -143,8 +143,10 @@ def charge_exceptions_once(
     return told
 
 
-EXCEPTION = re.compile(r"[\w.]*(?:Error|Exception)\b.*\(.*, line \d+\)")
-"""The cause of a loss that is an exception of a line that is known."""
+OUTLIVED = re.compile(
+    r"[\w.]*(?:Error|Exception)\b.*\(.*, line \d+\)|the run publishes on .*, and no node subscribes to "
+)
+"""The cause of a loss that is an exception of a line that is known, or a topic that is not heard."""
 
 
 def _blocked(verdict: Verdict, root: str, message: str, *, timing: bool = False) -> Verdict:

@@ -8,7 +8,7 @@ import pytest
 
 from grader.checks import CHECKS
 from grader.judging import judge
-from grader.judging.requirements import charge_exceptions_once
+from grader.judging.requirements import charge_once
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status, Verdict, failed, partial
 from grader.package.launch import parse_launch_files
@@ -380,9 +380,7 @@ def test_an_exception_is_charged_once(cause: str, judged: str, blocked_by: str) 
     """Also where its node goes on. What a repaired copy has judged keeps its share."""
     lost = {name: failed("it never moves", hint="x").model_copy(update={"cause": cause}) for name in "ab"}
     verdicts = {"rate": lost["a"], "chatter": lost["b"]}
-    told = charge_exceptions_once(
-        rubric({**RATE, "requires": []}, {**CHATTER, "requires": []}), verdicts, {judged}
-    )
+    told = charge_once(rubric({**RATE, "requires": []}, {**CHATTER, "requires": []}), verdicts, {judged})
     assert told["rate"] == lost["a"]
     assert told["chatter"].blocked_by == blocked_by
 

@@ -167,6 +167,15 @@ def test_a_method_that_is_not_there_has_no_lost_first_line(tmp_path: Path) -> No
     assert repair_all(package(tmp_path, {TALKER: whole})) == ()
 
 
+@pytest.mark.parametrize(("given", "is_written"), [("0", True), ("", False), ("0, 1", False)])
+def test_parameters_of_a_lost_first_line_are_as_many_as_are_given(
+    given: str, is_written: bool, tmp_path: Path
+) -> None:
+    text = TICKER.replace("    def __init__(self, first):\n", "").replace("Ticker(0)", f"Ticker({given})")
+    found = repair_all(package(tmp_path, {TALKER: text}))
+    assert any("def __init__(self, first)" in one.after for one in found) == is_written
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_a_mistake_in_a_block_is_found_and_repaired(name: str, tmp_path: Path) -> None:
     check(CASES[name], tmp_path)

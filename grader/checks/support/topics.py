@@ -366,7 +366,7 @@ def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
         for _, e in run.actors
         if e.actor == "grader" and (e.action == "publish" or (e.action == "note" and e.detail == UNHEARD))
     ) | dict.fromkeys(offered := unheard_programs(run))
-    others = topics_with(run, "subscribers")
+    others = tuple(topic for topic in topics_with(run, "subscribers") if topic not in SYSTEM_TOPICS)
     missed = [topic for topic in topics if topic not in others]
     connected = {
         one.topic for _, e in run.graph for one in e.connections if run.is_student_node(one.subscriber)
@@ -386,9 +386,16 @@ def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
         fills = "`listener = tf2_ros.TransformListener(buffer)` fills the buffer"
         return failed(f"the run publishes on {topic}, and no node listens to tf", hint=fills)
     seen = f"; {nodes_on(run, found[0], 'subscribers')[0]} subscribes to {join_words(found)}" if found else ""
-    message = f"the run publishes on {topic}, and no node subscribes to it{seen}"
+    unused = {s.name for s in run_slips(package, run, "unused-import")} if package and not others else set()
+    played = [c.topic for c in run.channels if c.messages and c.type.rpartition("/")[2] in unused]
+    lacking = [topic] if near or offered else [*dict.fromkeys([*missed, *played])]
+    them = "them" if lacking[1:] else "it"
+    message = f"the run publishes on {join_words(lacking)}, and no node subscribes to {them}{seen}"
     remapped = _remap_to(package, run, topic, found[0]) if package and found else ""
-    add = f"add {subscriber(topic, f'{TYPE_SLOT}, callback')}"
+    types = {e.topic or "": plain_type(e.type or "") for _, e in run.actors if e.actor == "grader"}
+    types |= {channel.topic: plain_type(channel.type) for channel in run.channels}
+    kinds = {one: types.get(one, "").rpartition("/")[2] or TYPE_SLOT for one in lacking}
+    add = f"add {join_words(subscriber(one, f'{kinds[one]}, callback') for one in lacking)}"
     if topic in offered:
         add = f"subscribe to {topic} in place of {join_words(found, 'or')}, on which nothing is published"
     return failed(message, hint=remapped or add)

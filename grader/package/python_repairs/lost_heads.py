@@ -117,6 +117,10 @@ def lost_method(
     given = given_names(ast.Module([*body], []), inside) | outer | {*dir(builtins), "self"}
     inside.sort(key=lambda n: (n.lineno, n.col_offset))
     taken = [*dict.fromkeys(n.id for n in inside if n.id not in given)]
+    # what nothing defines may be misspelt, or lost as well: who makes an object shows how many values it takes
+    making = [n for n in all_of(tree, ast.Call) if dotted(n.func) == owner.name]
+    if lost == ["__init__"] and taken and len(taken) not in {len(n.args) + len(n.keywords) for n in making}:
+        return ""
     if not taken and lost[0] in makers:
         taken = ["event" if makers[lost[0]] == "Timer" else "msg"]
     return f"def {lost[0]}({', '.join(['self', *taken])}):"

@@ -18,7 +18,7 @@ from typing import Literal
 from grader.installable import exists_somewhere, known_packages, noetic_messages
 from grader.limited_child import ChildLimits, run_limited
 from grader.line_slips.python import COMMENTED_OUT, DELETE_LINE, MERGED, OUT_OF_BLOCK, Reason
-from grader.model.package import PackageFacts
+from grader.model.package import INTERFACE_FOLDERS, PackageFacts
 from grader.model.record import Record
 from grader.model.repair import Repair, RepairKind, as_code
 from grader.package.python import TOO_FAR_IN, reason_of
@@ -95,7 +95,7 @@ def repair_python(
     imported: nothing has to start in them."""
     _delete_imports(files, scripts, package)
     _delete_manifests(files, scripts, package)
-    _spell_package(files, scripts, package)
+    _spell_package(files, scripts, package, types)
     texts = {script: text for script in scripts if (text := files.text(script))}
     names: dict[str, tuple[Name, ...]] = {}
     fields = {
@@ -162,9 +162,10 @@ def _delete_manifests(files: Files, scripts: Sequence[str], package: PackageFact
             files.change("missing-import", file, _emptied(lines, number), message, f"delete line {number}")
 
 
-def _spell_package(files: Files, scripts: Sequence[str], package: PackageFacts) -> None:
+def _spell_package(files: Files, scripts: Sequence[str], package: PackageFacts, types: Sequence[str]) -> None:
     """Write the package's own name in place of a slip of it, or of a package that has no such classes, where its
-    messages and services are imported."""
+    messages and services are imported; that of the package which makes one of `types`, in place of one which has a copy
+    of its definition, and does not build it."""
     own = [one for one in (package, *package.also) if one.interfaces]
     names = [one.name for one in own]
     for file in scripts:
@@ -177,7 +178,7 @@ def _spell_package(files: Files, scripts: Sequence[str], package: PackageFacts) 
             meant = [one for one in names if is_one_edit(name, one) or name.lower() == one.lower()]
             what, end = f"there is no package {name}", found.end(2)
             if len(meant) != 1 or name in {*names, *known_packages()}:
-                meant, end = _makers(line, own), found.end(1)
+                meant, end = _makers(line, (package, *package.also), types), found.end(1)
                 what = f"{module} has no {join_words(_names_from(line))}"
             if len(meant) == 1:
                 lines[number - 1] = line[: found.start(1)] + meant[0] + line[end:]
@@ -191,13 +192,15 @@ def _names_from(line: str) -> list[str]:
     return re.split(r"\s*,\s*", found[1].strip(" ,")) if found else []
 
 
-def _makers(line: str, own: Sequence[PackageFacts]) -> list[str]:
+def _makers(line: str, own: Sequence[PackageFacts], types: Sequence[str]) -> list[str]:
     """Return the modules that the build makes with all that a line imports from another one, which has none of it."""
     module, names = [*line.split(), "", ""][1], set(_names_from(line))
     package, _, inner = module.partition(".")
     made: dict[str, set[str]] = {}
     for each in own:
-        for one in each.interfaces:
+        is_built = any(call.name in INTERFACE_FOLDERS for call in (each.cmake.calls if each.cmake else ()))
+        others = {f"{one.name}/{name}" for one in own if one is not each for name in names}
+        for one in each.interfaces if is_built or not others & {*types} else ():
             made.setdefault(f"{each.name}.{one.module}", set()).update(one.classes)
     there = made.get(module, set()) | {*noetic_messages().get(package, ())} | {*SERVICES_OF_ROS}
     is_known = package in {*noetic_messages(), "std_srvs", *(one.name for one in own)}
