@@ -34,6 +34,7 @@ from grader.judging.cited_lines import LINE_CHARS, LINES_READ
 from grader.judging.facts import Facts, language_of, scripts_of
 from grader.model.launch_file import LaunchFile
 from grader.model.package import PackageFacts
+from grader.model.python_slip import PythonSlip
 from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation, Status, Verdict, cited_lines
 from grader.rubric.model import Criterion, Rubric
@@ -61,6 +62,16 @@ def add_advice(
         return tuple(results)
     told = host.model_copy(update={"hint": "; ".join(filter(None, (host.hint, *points)))})
     return tuple(told if c is host else c for c in results)
+
+
+def _is_sure(slip: PythonSlip) -> bool:
+    """Return whether a line is wrong, whatever the runs have shown of it."""
+    steers = slip.kind == "wrong-value" and slip.message.endswith(STEERS_WRONG)
+    return steers or (slip.kind == "no-effect" and slip.fix.startswith("write "))
+
+
+STEERS_WRONG = ("takes y first, and then x", "points to another side", "by its sine, and then its cosine")
+"""Of a robot's angle, what is wrong wherever a script computes so, and shows only where the robot turns that far."""
 
 
 class _Point(NamedTuple):
@@ -92,7 +103,7 @@ def _points(package: PackageFacts) -> Iterator[_Point]:
         if slip.kind == "misspelt" and not is_right and not is_product(slip.file):
             text = f"{slip.file}, line {slip.line}: `{slip.name}` is not defined anywhere: {slip.message}"
             yield _Point(slip.place, text)
-        elif slip.kind == "no-effect" and slip.fix.startswith("write ") and not is_product(slip.file):
+        elif _is_sure(slip) and not is_product(slip.file):
             yield _Point(slip.place, f"{slip.file}, line {slip.line}: {slip.message}: {slip.fix}")
     for launch in package.launch_files:
         if launch.fault is not None:

@@ -175,6 +175,13 @@ def test_a_program_that_reads_what_is_typed_is_told_unless_a_step_types_it(tmp_p
     assert add_advice([criterion()], package, rubric(CMAKE_CHECK)) == (criterion(),)
 
 
+def test_an_angle_that_no_run_has_shown_to_be_wrong_is_told(tmp_path) -> None:
+    text = "import math\nwhile a > math.pi:\n    a -= 3 * math.pi\nb = math.atan2(dx, dy)\n"
+    (told,) = add_advice([criterion()], facts(tmp_path, **{"src/a.py": text}), rubric(CMAKE_CHECK))
+    assert "src/a.py, line 3: a whole turn is `2 * math.pi`" in told.hint
+    assert "src/a.py, line 4: `atan2` takes y first, and then x" in told.hint
+
+
 def test_a_node_of_nearly_the_packages_name_is_told(tmp_path) -> None:
     nodes = [f'<node pkg="{name}" type="a.py" name="{name}"/>' for name in ("lab11", "rospy", "other")]
     files = {

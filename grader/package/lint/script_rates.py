@@ -174,3 +174,37 @@ def needs_number(node, kept, types):
 
 def has_number(nodes, kinds):
     return any(isinstance(getattr(node, "value", None), kinds) for node in nodes)
+
+
+def turns_taken_off(tree):
+    """`angle -= 3 * math.pi` where an angle is brought between -pi and pi, which takes a whole turn."""
+    for node in all_of(tree, ast.While, ast.If):
+        bounds = [node.test.left, *node.test.comparators] if isinstance(node.test, ast.Compare) else []
+        least = max(map(abs, filter(None, map(halves_of_turn, bounds))), default=0)
+        for one in node.body if least in (1, 2) and len(bounds) == 2 else ():
+            steps = halves_of_turn(one.value) if isinstance(one, ast.AugAssign) else None
+            # half a turn may be meant, of a line that has no direction
+            if not steps or steps % 2 == 0 or abs(steps) == 1 or not isinstance(one.op, (ast.Add, ast.Sub)):
+                continue
+            name, sign = dotted(one.target), "-" if isinstance(one.op, ast.Sub) else "+"
+            if name in map(dotted, bounds):
+                pi = next(
+                    word for word in map(dotted, ast.walk(one.value)) if word.rpartition(".")[2] == "pi"
+                )
+                message = "a whole turn is `2 * %s`: with another angle, it points to another side" % pi
+                fix = "on line %d, write `%s %s= 2 * %s`" % (one.lineno, name, sign, pi)
+                yield slip(one.lineno, "wrong-value", message, fix, "angle")
+
+
+def halves_of_turn(node):
+    """Return how many times pi an expression is: 3 of `3 * math.pi`; None of any other."""
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        inner = halves_of_turn(node.operand)
+        return None if inner is None else -inner
+    if dotted(node).rpartition(".")[2] == "pi":
+        return 1
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult):
+        sides = (node.left, node.right)
+        number = next((n.value for n in sides if isinstance(getattr(n, "value", None), (int, float))), None)
+        return number if number is not None and any(halves_of_turn(n) == 1 for n in sides) else None
+    return None

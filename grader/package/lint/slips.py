@@ -61,7 +61,7 @@ def slips(tree):
         callbacks.unprinted_messages, counters.values_left_out, counters.published_unchanged,
         objects.unused_publishers, objects.unsent_messages, objects.lost_objects, rates.loops_of_numbers,
         goals.finished_goals, goals.finished_in_loops, goals.ended_without_result, counters.sends_no_time, without_node,
-        debuggers, script_results.results,
+        debuggers, script_results.results, rates.turns_taken_off,
     )  # fmt: skip
     found = [one for find in finders for one in find(tree)]
     # of two that say why a name is not there, the first is about the class that it belongs to
