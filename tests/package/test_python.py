@@ -455,6 +455,11 @@ def test_the_first_line_of_a_block_that_is_commented_out(tmp_path, comment, hint
         ("    a()\nb()\nc()\nd()\ne()\n    f()", "line 7: start it exactly below that one"),
         ("    a()\nimport b\n    c()", "line 4: start it exactly below that one"),
         ("    a()\n        b()", "line 3: start it exactly below that one"),
+        (
+            "    a()\n\nimport b\n\n\n    c()\n    d()",
+            "line 7: write it there, with the name that the script calls",
+        ),
+        ("    a()\n\nimport b\n\n    c()\n    d()", "line 6: start it exactly below that one"),
         ("    if a:\n        # b()\n    c()", "below line 2, write what it should do"),
     ],
 )

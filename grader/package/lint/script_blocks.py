@@ -45,6 +45,21 @@ def lacks_head(lines, at):
     return bool(BRANCHES.match(after) or (leaves and not LEAVES.match(above)) or resets)
 
 
+def lacks_def(lines, at):
+    """Return whether the first line of a function is missing above the line at index `at`, which is further in than the
+    code above it: it stands apart from that by two blank lines, or by one and is about `self`."""
+    code = [n for n, line in enumerate(lines) if is_code(line)]
+    if at not in code[1:]:
+        return False
+    first = code.index(at)
+    above, own = code[first - 1], width_of(lines[at])
+    body = list(takewhile(lambda n: width_of(lines[n]) >= own, code[first:]))
+    blank = sum(not line.strip() for line in lines[above + 1 : at])
+    is_method = any(re.search(r"\bself\.", lines[n]) for n in body) and width_of(lines[above]) > 0
+    apart = 1 if is_method else 2
+    return own - width_of(lines[above]) in DEPTHS and len(body) > 1 and blank >= apart
+
+
 def lacks_body(head, line):
     """Return whether the body of an `if` is missing where a line that belongs to the loop around it follows."""
     of_if = re.match(r"\s*(if|elif|else)\b", head)

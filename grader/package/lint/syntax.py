@@ -21,7 +21,7 @@ import warnings
 
 # `-I` leaves this folder out, and a limited child does not begin in it.
 sys.path.append(os.path.dirname(os.path.abspath(__file__)))
-from script_blocks import MARKER, first_version, is_code, lacks_body, lacks_head
+from script_blocks import MARKER, first_version, is_code, lacks_body, lacks_def, lacks_head
 from script_tree import (
     TEXT_LIMIT,
     slip,
@@ -383,6 +383,8 @@ def block_fault(lines, line, message):
         told = "indented at the top of the file: " + outdented(lines, line)
     elif indented and odd is None and lacks_head(lines, line - 1):
         told = "block without its first line"
+    elif indented and odd is None and lacks_def(lines, line - 1):
+        told = "function without its first line"
     if told:
         return fault("IndentationError", line, 1, told, text=lines[line - 1])
     inner = blanks_of(lines[line - 1]) if odd is not None else block_cut(lines, line)

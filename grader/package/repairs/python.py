@@ -392,6 +392,8 @@ def _further_in(before: str, after: str, line: int) -> str:
 
 
 INDENTATION = 4
+DEEPER = ("-2", "-4", "-8")
+"""How much less lines are indented in the end that may have lost the line which they belong to."""
 
 
 def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[str, str]:
@@ -422,6 +424,8 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
         fix = _rewritten(before, after)
     if cause in {"tabs", "level", "inside"}:
         fix = _required_indentation(before, after, fix)
+    if cause == "level" and further in DEEPER:
+        fix += f" (or, if the line that begins its block, `if …:`, is missing: write that above line {first.line})"
     return said, fix if cause != "old-name" or word == "raw_input" else ""
 
 
