@@ -398,18 +398,24 @@ class HalfComment(NamedTuple):
 
 def join_half_comment(text: str) -> HalfComment | None:
     """Return the call of which a part is in comments, where the text is right without the `#` of these."""
+    for half in half_comments(text):
+        try:
+            parse_raw(half.text, skip_comments=True)
+        except (CMakeError, RecursionError):
+            continue
+        return half
+    return None
+
+
+def half_comments(text: str) -> Iterator[HalfComment]:
+    """Yield the calls of which a part is in comments, each with the text without the `#` of its own."""
     lines = text.split("\n")
     found = (half for at in range(len(lines)) if (half := _half_comment(lines, at)) is not None)
     # Each try reads the whole file
     for name, first, end in islice(found, _HALVES_MAX):
         plain = [re.sub(r"#+ ?", "", line, count=1) for line in lines[first:end]]
         changed = "\n".join([*lines[:first], *plain, *lines[end:]])
-        try:
-            parse_raw(changed, skip_comments=True)
-        except (CMakeError, RecursionError):
-            continue
-        return HalfComment(line=first + 1, last=end, name=name, text=changed)
-    return None
+        yield HalfComment(line=first + 1, last=end, name=name, text=changed)
 
 
 def _half_comment(lines: list[str], at: int) -> tuple[str, int, int] | None:

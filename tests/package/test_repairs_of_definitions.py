@@ -64,7 +64,17 @@ TEMPLATE = """\
 #   std_msgs
 # )"""
 
+TWO_CALLS = CMAKE.replace("rospy)", "rospy\n)").replace("catkin_package()", "catkin_package(\n)")
+
 CASES = {
+    "two-brackets-in-comments": Case(
+        {CMAKELISTS: TWO_CALLS.replace("\n)", "\n# )")}, ["build-line"] * 2, "remove the `#` on line 6",
+        after={CMAKELISTS: TWO_CALLS},
+    ),
+    "two-brackets-missing": Case(
+        {CMAKELISTS: TWO_CALLS.replace("\n)", "\n")}, ["build-line"] * 2, "the `(` of `catkin_package(` is",
+        after={CMAKELISTS: "COMPONENTS rospy)\n"},
+    ),
     "definitions-that-nothing-uses": Case(
         {CMAKELISTS: OWN_CMAKE + "generate_messages(DEPENDENCIES std_msgs)\n"},
         ["build-line"], "add_message_files(…) needs the folder msg/, which is not there",

@@ -21,7 +21,7 @@ from grader.model.package import (
     meant_command,
 )
 from grader.model.repair import RepairKind
-from grader.package.cmake_parse import commands_of, join_half_comment, parse_tree_of
+from grader.package.cmake_parse import commands_of, half_comments, join_half_comment, parse_tree_of
 from grader.package.manifest import parse_manifest
 from grader.package.repairs.cmake_calls import (
     CALLS_MAX,
@@ -282,19 +282,11 @@ def _close_bracket(files: Files) -> None:
     text = cmake_text(files)
     if commands_of(text.encode()) is not None:
         return
-    if half := join_half_comment(text):
-        message = f"line {half.line} of {CMAKE}: {half.cause}: {half.fix}"
-        files.change("build-line", CMAKE, half.text, message, half.fix)
+    if steps := _closing_steps(text, BRACKETS_MAX):
+        for step in steps:
+            files.change("build-line", CMAKE, *step)
         return
     lines = text.rstrip().split("\n")
-    fault = parse_tree_of(text.encode(), CMAKE)[1]
-    if fault is not None and (place := _PLACE.fullmatch(fault.fix)):
-        number, begins = int(place["above"] or place["end"]), place["head"]
-        changed = [*lines[: number - 1], begins or f"{lines[number - 1]})", *lines[number - bool(begins) :]]
-        if commands_of("\n".join(changed).encode()) is not None:
-            message = f"line {fault.line} of {CMAKE}: {fault.cause}"
-            files.change("build-line", CMAKE, "\n".join([*changed, ""]), message)
-            return
     last = max((i for i, line in enumerate(lines) if line.split("#", maxsplit=1)[0].strip()), default=0)
     for added in ([lines[last] + ")"], [lines[last], ")"]):
         changed = [*lines[:last], *added, *lines[last + 1 :], ""]
@@ -302,6 +294,36 @@ def _close_bracket(files: Files) -> None:
             message = f"line {last + 1} of {CMAKE}: an opening bracket is never closed"
             files.change("build-line", CMAKE, "\n".join(changed), message)
             return
+
+
+BRACKETS_MAX = 3
+
+
+def _closing_steps(text: str, most: int) -> list[tuple[str, str, str]]:
+    """Return the text after each repair of a bracket, what is wrong and how it is fixed, up to where CMake can read the
+    file; nothing where so many do not suffice."""
+    if (half := join_half_comment(text)) and commands_of(half.text.encode()) is not None:
+        return [(half.text, f"line {half.line} of {CMAKE}: {half.cause}: {half.fix}", half.fix)]
+    lines, tried = text.rstrip().split("\n"), list[tuple[str, str, str]]()
+    fault = parse_tree_of(text.encode(), CMAKE)[1]
+    if fault is not None and (place := _PLACE.fullmatch(fault.fix)):
+        number, begins = int(place["above"] or place["end"]), place["head"]
+        changed = [
+            *lines[: number - 1],
+            begins or f"{lines[number - 1]})",
+            *lines[number - bool(begins) :],
+            "",
+        ]
+        tried = [("\n".join(changed), f"line {fault.line} of {CMAKE}: {fault.cause}", "")]
+    for half in half_comments(text):
+        tried.append((half.text, f"line {half.line} of {CMAKE}: {half.cause}: {half.fix}", half.fix))
+    for step in tried:
+        if commands_of(step[0].encode()) is not None:
+            return [step]
+    for step in tried if most > 1 else ():
+        if rest := _closing_steps(step[0], most - 1):
+            return [step, *rest]
+    return []
 
 
 _PLACE = re.compile(
