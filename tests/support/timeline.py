@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -100,11 +101,11 @@ def _record(line: TimelineRun, writer: EvidenceStream) -> None:
     events = [*_events(line)]
     end_ns = _end_ns(line, sent, events)
     events += [*_processes(line, end_ns), *_course(line, end_ns)]
-    for topic in line.topics:
-        writer.register_channel(**_identity(topic))
     queue: list[tuple[int, Callable[[], None]]] = []
     for topic, ones in sent:
-        queue += [(at_ns(one.at_s), _sender(writer, topic, one)) for one in ones]
+        channel = writer.register_channel(**_identity(topic))
+        times = ((at_ns(one.at_s), one) for one in ones)
+        queue += [(time_ns, partial(channel.message, time_ns, one.data)) for time_ns, one in times]
     queue += [(time_ns, _noter(writer, event)) for event in events for time_ns in [event[0]]]
     for _, write in sorted(queue, key=lambda item: item[0]):
         write()
@@ -143,10 +144,6 @@ def _bag(topics: Sequence[TopicLine]) -> bytes:
                 for one in messages(topic):
                     bag.write(number, at_ns(one.at_s), one.data)
         return path.read_bytes()
-
-
-def _sender(writer: EvidenceStream, topic: TopicLine, one: Sent) -> Callable[[], None]:
-    return lambda: writer.register_channel(**_identity(topic)).message(at_ns(one.at_s), one.data)
 
 
 def _noter(writer: EvidenceStream, event: Event) -> Callable[[], None]:
