@@ -338,6 +338,7 @@ if __name__ == '__main__':
         ("self.rate =", "rate =", "a value is given to `rate`, not to `self.rate`"),
         ("self.rate.sleep", "self.r.sleep", "`r` is called `rate`"),
         ("def hear(self, message)", "def hear(self)", "passes it `self` and the message"),
+        ("def hear(self, message)", "def hear(message)", "`hear` is a method, so its first parameter"),
         ("self.rate.sleep", "self.rate,sleep", "a dot belongs between `rate` and `sleep`"),
         ("self.hear)", "self,hear)", "a dot belongs between `self` and `hear`"),
         ("self.hear)", "selg.hear)", "selg is not defined"),

@@ -603,3 +603,11 @@ def test_a_service_that_answers_in_all_cases(tests: tuple[str, str], word: str, 
     text = f"def fit(m):\n    print(m)\n    if {first}    {word} {last}rospy.Service('fit', Fit, fit)\n"
     (tmp_path / "a.py").write_text(text, encoding="utf-8")
     assert [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"] == []
+
+
+def test_a_publisher_whose_name_another_one_gets_is_known(tmp_path: Path) -> None:
+    text = "pub = rospy.Publisher('a', String)\npub = rospy.Publisher('b', Int8)\npub.publish(1)\n"
+    (tmp_path / "a.py").write_text(text)
+    found = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "never-published"]
+    message = "line 2 gives `pub` another publisher, so nothing is sent by this one"
+    assert [(s.line, s.name, s.message) for s in found] == [(1, "a", message)]

@@ -133,6 +133,19 @@ class A:
 a = A()
 a.out.publish(1)
 """),
+    "publisher-of-two-branches": ("never-published", """\
+if loud:
+    pub = rospy.Publisher('a', Int8)
+else:
+    pub = rospy.Publisher('b', Int8)
+pub.publish(1)
+"""),
+    "publisher-used-and-replaced": ("never-published", """\
+pub = rospy.Publisher('a', Int8)
+pub.publish(1)
+pub = rospy.Publisher('b', Int8)
+pub.publish(2)
+"""),
     "publisher-of-a-class": ("never-published", """\
 class A:
     pub = rospy.Publisher('a', Int8)

@@ -385,6 +385,27 @@ def unused_publishers(tree):
             message = "nothing in the script calls `%s.publish(…)`" % name
             fix = "call `%s.publish(…)`%s" % (name, where)
             yield slip(node.lineno, "never-published", message, fix, text_of(topics[0]))
+    yield from replaced_publishers(tree)
+
+
+def replaced_publishers(tree):
+    """Yield each `pub = Publisher(…)` whose name another publisher gets in the same block, before anything uses it."""
+    blocks = [n.body for n in walk(tree) if isinstance(getattr(n, "body", None), list)]
+    for body in blocks:
+        made = {}
+        for one in body:
+            name = dotted(one.targets[0]) if isinstance(one, ast.Assign) else ""
+            first = made.get(name)
+            for used in [n for n in made if n in names_in(getattr(one, "value", one))]:
+                del made[used]
+            topics = argument(one.value, 0, "name") if name and is_call(one.value, "Publisher") else []
+            if topics and first and first[1] != text_of(topics[0]):
+                message = "line %d gives `%s` another publisher, so nothing is sent by this one"
+                fix = "on line %d, give it another name than `%s`, and publish with each of the two"
+                says = (one.lineno, name)
+                yield slip(first[0], "never-published", message % says, fix % says, first[1])
+            if topics:
+                made[name] = one.lineno, text_of(topics[0])
 
 
 def unsent_messages(tree):

@@ -161,7 +161,7 @@ def with_methods(text: str) -> Iterator[Step]:
         line, why = lines[at], ""
         if _is_meant_as_init(method, beside) and name not in read:
             line, why = f"{before}__init__{bracket}{line[head.end() :]}", OF_INIT % name
-        elif name in {*read, "__init__"} and _lacks_self(method):
+        elif name in {*read, "__init__"} and (_lacks_self(method) or _takes_only_the_message(tree, method)):
             comma = ", " if method.args.args else ""
             line, why = f"{head[0]}self{comma}{line[head.end() :]}", WITHOUT_SELF % name
         after = "\n".join([*lines[:at], line, *lines[at + 1 :]])
@@ -269,6 +269,23 @@ def _lacks_self(method: ast.FunctionDef) -> bool:
     taken = {one.arg for one in (*method.args.posonlyargs, *method.args.args)}
     used = {n.id for n in nodes_in(method) if isinstance(n, ast.Name)}
     return method.args.vararg is None and (not taken or ("self" in used and "self" not in taken))
+
+
+def _takes_only_the_message(tree: ast.Module, method: ast.FunctionDef) -> bool:
+    """Return whether ROS calls a method back by `self.…`, and its one argument stands for the value that ROS passes: no
+    part of it is one of the object's own."""
+    nodes, taken = nodes_in(tree), [one.arg for one in method.args.args]
+    calls = [n for n in nodes if isinstance(n, ast.Call) and last_name(n.func) in PASSED]
+    given = {ast.unparse(a) for n in calls for a in (*n.args, *(k.value for k in n.keywords))}
+    parts = [n for n in nodes if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)]
+    own = {n.attr for n in parts if n.value.id == "self"}  # type: ignore[attr-defined]
+    read = {
+        n.attr for n in nodes_in(method) if isinstance(n, ast.Attribute) and ast.unparse(n.value) in taken
+    }
+    plain = len(taken) == 1 and not (method.args.vararg or method.args.defaults)
+    return (
+        plain and f"self.{method.name}" in given and taken != ["self"] and bool(read - own) and not read & own
+    )
 
 
 def with_names(text: str) -> Iterator[Step]:
