@@ -378,13 +378,8 @@ def block_fault(lines, line, message):
     if gone is not None:
         at, text = lines[gone].index("#") + 1, lines[gone]
         return fault("IndentationError", gone + 1, at, "block commented out" + moved(lines, gone), text=text)
-    odd, told = out_of_block(lines, line) if indented else None, ""
-    if indented and head is None:
-        told = "indented at the top of the file: " + outdented(lines, line)
-    elif indented and odd is None and lacks_head(lines, line - 1):
-        told = "block without its first line"
-    elif indented and odd is None and lacks_def(lines, line - 1):
-        told = "function without its first line"
+    odd = out_of_block(lines, line) if indented else None
+    told = too_far_in(lines, line, alone=head is None) if indented and odd is None else ""
     if told:
         return fault("IndentationError", line, 1, told, text=lines[line - 1])
     inner = blanks_of(lines[line - 1]) if odd is not None else block_cut(lines, line)
@@ -393,6 +388,15 @@ def block_fault(lines, line, message):
     at = line - 1 if odd is None else odd
     message = "ends its block too early: " + begin_with(inner)
     return fault("IndentationError", at + 1, 1, message, text=lines[at])
+
+
+def too_far_in(lines, line, *, alone):
+    """Return what is missing above a line that is further in than it may be, `alone` where no code is above it."""
+    if alone:
+        return "indented at the top of the file: " + outdented(lines, line)
+    if lacks_head(lines, line - 1):
+        return "block without its first line"
+    return "function without its first line" if lacks_def(lines, line - 1) else ""
 
 
 def tab_size(lines):
