@@ -32,9 +32,8 @@ from grader.checks.support.text import near_names, texts_in
 from grader.checks.support.topics import (
     SYSTEM_TOPICS,
     explain_by_unheard_topic,
-    explain_by_waiting_callback,
-    explain_by_wrong_value,
 )
+from grader.checks.support.wrong_lines import explain_by_waiting_callback, explain_by_wrong_value
 from grader.errors import EvidenceError
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run

@@ -14,7 +14,6 @@ from grader.checks.support.processes import (
     NO_SCRIPT_HINT,
     copied_topic,
     early_end,
-    ends_twice,
     is_written_as,
     lives,
     named_at,
@@ -45,7 +44,6 @@ from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.verdict import (
     EvidenceCitation,
-    Status,
     Verdict,
     failed,
     failed_or_blocked,
@@ -212,7 +210,7 @@ def _not_advertised(
     published, what = published_topics(run), f"no message came on {topic}"
     measured = join_words(published) or "no topic"
     if slip := why_unreached(package, run):
-        verdict = of_node(f"{what}: {slip.message}", measured=measured, hint=_reach_hint(slip))
+        verdict = of_node(f"{what}: {slip.message}", measured=measured, hint=reach_hint(slip))
         return verdict.about(citations=(slip.place,))
     of_types, _, name = kind.partition("/")
     call = (
@@ -255,7 +253,7 @@ def _judge_advertised(
     if end := explain_error(package, run):
         return end.verdict(of_node, f"{message}: an error comes first: {end.cause}", measured="no message")
     if slip := why_unreached(package, run) or run_slip(package, run, "queue-size"):
-        verdict = of_node(f"{message}: {slip.message}", measured="no message", hint=_reach_hint(slip))
+        verdict = of_node(f"{message}: {slip.message}", measured="no message", hint=reach_hint(slip))
         return verdict.about(citations=(slip.place,))
     if deaf := unheard(run, package):
         verdict = of_node(f"{message}: {deaf.message}", measured="no message", hint=deaf.hint)
@@ -452,65 +450,6 @@ def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | 
     return next(iter(run_slips(package, run, *kinds)), None)
 
 
-SEEN_AS = {
-    "nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": "", "added": "",
-    "step": "order", "cut": "place", "half": "value", "secs": "never", "mean": "", "unset": "value",
-    "stuck": "stuck", "edge": "place", "times": "order",
-}  # fmt: skip
-"""How a verdict says that a value is `wrong`, by the name of the slip that makes it so; others always show."""
-
-STEERING = ("swapped", "mixed", "rootless", "inf", "angle", "turned", "negative", "ungiven")
-OF_STEERING = ("ends-at", "stays-within", "path", "reacts")
-"""What leads a robot astray wherever its script computes so, and the checks of what a robot does."""
-
-OF_TURNS = ("orientation", "rotation", "transform")
-"""What a quaternion can be wrong in."""
-
-
-def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
-    """Return a lost mark with the line of a script that runs on which the value goes wrong, or with its conditions that
-    are always or never true."""
-    silent = not any("Twist" in c.type and c.messages for c in run.student_channels())
-    if (
-        silent
-        and not verdict.cause
-        and check.name in OF_STEERING[:3]
-        and (slip := why_unreached(package, run))
-    ):
-        why = f"line {slip.line} of {slip.file}: {slip.message}"
-        return verdict.explained(why, _reach_hint(slip), (slip.place,), cause=slip.message)
-    files = files_that_run(package, run)
-    of_values = check.of_callbacks or check.name in OF_VALUES or (check.name == "prints" and verdict.silent)
-    kinds = ["wrong-value", "compared"] if of_values and not verdict.cause else []
-    if check.name == "action-result" and verdict.wrong != "nothing" and ends_twice(run):
-        kinds.append("goes-on")
-    found = [s for s in package.slips if s.kind in kinds and s.file in files]
-    # feedback that is not sent explains only what is missing of it
-    found = [s for s in found if "publish_feedback" not in s.fix or "feedback" in verdict.message]
-    wrong = verdict.wrong
-    steers = STEERING if check.name in OF_STEERING else ()
-    sure = [
-        s
-        for s in found
-        if s.kind in ("goes-on", "compared") or s.name in steers or (wrong and SEEN_AS.get(s.name) == wrong)
-    ]
-    turns = any(word in verdict.message for word in OF_TURNS)
-    sure = [s for s in sure if s.name != "half" or turns]
-    maybe = [s for s in found if not (SEEN_AS.get(s.name) or (wrong and s.name in SEEN_AS))]
-    for slip in sure[:1] or maybe[:4]:
-        why = f"line {slip.line} of {slip.file}: {slip.message}"
-        fix = f"on line {slip.line}, {slip.fix}" if slip.kind == "compared" else slip.fix
-        hint, cause = fix if sure else f"{verdict.hint}; {fix}", slip.message if sure else ""
-        verdict = verdict.explained(why, hint, (slip.place,), cause=cause)
-    return verdict
-
-
-OF_VALUES = ("action-result", "rostest", "stamps")
-"""Checks of what a node sends, besides those of what it does upon what it hears."""
-OF_RESULTS = ("prints", "rostest")
-"""Checks of what comes of callbacks in the end."""
-
-
 def files_that_run(package: PackageFacts, run: Run) -> set[str | None]:
     """Return the scripts that run, those that a launch file started, and the sources of programs of C++."""
     scripts = run_scripts(run)
@@ -527,25 +466,6 @@ def reads_keys(package: PackageFacts, run: Run) -> PythonSlip | None:
     return next((s for s in package.slips if s.kind == "input" and s.file in files), None)
 
 
-def explain_by_waiting_callback(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
-    """Return a lost mark with the callback that sleeps or never ends: until it returns, its script receives nothing."""
-    of_callbacks = check.of_callbacks or check.name in OF_RESULTS
-    files = files_that_run(package, run) if of_callbacks and not verdict.cause else ()
-    slip = next((s for s in package.slips if s.kind == "callback-waits" and s.file in files), None)
-    # What should come before any callback does not wait for one.
-    if slip is None or verdict.callbacks == "before":
-        return verdict
-    if slip.is_endless and verdict.dropped and verdict.status is Status.INCONCLUSIVE:
-        # the flood is the loop's own, and keeps the machine busy: neither excuses it
-        lost = verdict.excused or verdict.message
-        verdict = verdict.model_copy(update={"status": Status.FAIL, "message": lost})
-    if not verdict.status.is_lost or not (slip.is_endless or verdict.callbacks == "late"):
-        return verdict
-    ends = "the caller waits" if check.name == "service-answers" else "nothing else is heard"
-    hint = f"in {slip.file}, {slip.fix}" + (f": {ends} until the callback ends" if slip.name else "")
-    return verdict.explained(f"in {slip.file}, {slip.message}", hint, (slip.place,), cause=slip.message)
-
-
 def call_in_comment(package: PackageFacts, run: Run, call: str) -> PythonSlip | None:
     """Return where a script that runs has such a call in a comment: `Subscriber`."""
     found = run_slips(package, run, "commented-out")
@@ -557,7 +477,8 @@ def _commented_out(what: str, slip: PythonSlip, of_node: Callable[..., Verdict])
     return of_node(message, measured="no message", hint=slip.fix).about(citations=(slip.place,))
 
 
-def _reach_hint(slip: PythonSlip) -> str:
+def reach_hint(slip: PythonSlip) -> str:
+    """Return what to do about a line that is not reached."""
     if slip.kind == "never-called" and not slip.fix:
         return f"call it, or move its lines to where they run: line {slip.line}"
     return slip.fix or f"publish inside the loop `{LOOP}`, not after a loop that never ends"

@@ -1,0 +1,87 @@
+"""Lost marks that lines of a script explain: a value that goes wrong there, or a callback that waits."""
+
+from __future__ import annotations
+
+from grader.checks.registry import Check
+from grader.checks.support.processes import ends_twice
+from grader.checks.support.topics import files_that_run, reach_hint, why_unreached
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts
+from grader.model.verdict import Status, Verdict
+
+SEEN_AS = {
+    "nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": "", "added": "",
+    "step": "order", "cut": "place", "half": "value", "secs": "never", "mean": "", "unset": "value",
+    "stuck": "stuck", "edge": "place", "times": "order",
+}  # fmt: skip
+"""How a verdict says that a value is `wrong`, by the name of the slip that makes it so; others always show."""
+
+STEERING = ("swapped", "mixed", "rootless", "inf", "angle", "turned", "negative", "ungiven")
+OF_STEERING = ("ends-at", "stays-within", "path", "reacts")
+"""What leads a robot astray wherever its script computes so, and the checks of what a robot does."""
+
+OF_TURNS = ("orientation", "rotation", "transform")
+"""What a quaternion can be wrong in."""
+
+
+def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
+    """Return a lost mark with the line of a script that runs on which the value goes wrong, or with its conditions that
+    are always or never true."""
+    silent = not any("Twist" in c.type and c.messages for c in run.student_channels())
+    if (
+        silent
+        and not verdict.cause
+        and check.name in OF_STEERING[:3]
+        and (slip := why_unreached(package, run))
+    ):
+        why = f"line {slip.line} of {slip.file}: {slip.message}"
+        return verdict.explained(why, reach_hint(slip), (slip.place,), cause=slip.message)
+    files = files_that_run(package, run)
+    of_values = check.of_callbacks or check.name in OF_VALUES or (check.name == "prints" and verdict.silent)
+    kinds = ["wrong-value", "compared"] if of_values and not verdict.cause else []
+    if check.name == "action-result" and verdict.wrong != "nothing" and ends_twice(run):
+        kinds.append("goes-on")
+    found = [s for s in package.slips if s.kind in kinds and s.file in files]
+    # feedback that is not sent explains only what is missing of it
+    found = [s for s in found if "publish_feedback" not in s.fix or "feedback" in verdict.message]
+    wrong = verdict.wrong
+    steers = STEERING if check.name in OF_STEERING else ()
+    sure = [
+        s
+        for s in found
+        if s.kind in ("goes-on", "compared") or s.name in steers or (wrong and SEEN_AS.get(s.name) == wrong)
+    ]
+    turns = any(word in verdict.message for word in OF_TURNS)
+    sure = [s for s in sure if s.name != "half" or turns]
+    maybe = [s for s in found if not (SEEN_AS.get(s.name) or (wrong and s.name in SEEN_AS))]
+    for slip in sure[:1] or maybe[:4]:
+        why = f"line {slip.line} of {slip.file}: {slip.message}"
+        fix = f"on line {slip.line}, {slip.fix}" if slip.kind == "compared" else slip.fix
+        hint, cause = fix if sure else f"{verdict.hint}; {fix}", slip.message if sure else ""
+        verdict = verdict.explained(why, hint, (slip.place,), cause=cause)
+    return verdict
+
+
+OF_VALUES = ("action-result", "rostest", "stamps")
+"""Checks of what a node sends, besides those of what it does upon what it hears."""
+OF_RESULTS = ("prints", "rostest")
+"""Checks of what comes of callbacks in the end."""
+
+
+def explain_by_waiting_callback(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
+    """Return a lost mark with the callback that sleeps or never ends: until it returns, its script receives nothing."""
+    of_callbacks = check.of_callbacks or check.name in OF_RESULTS
+    files = files_that_run(package, run) if of_callbacks and not verdict.cause else ()
+    slip = next((s for s in package.slips if s.kind == "callback-waits" and s.file in files), None)
+    # What should come before any callback does not wait for one.
+    if slip is None or verdict.callbacks == "before":
+        return verdict
+    if slip.is_endless and verdict.dropped and verdict.status is Status.INCONCLUSIVE:
+        # the flood is the loop's own, and keeps the machine busy: neither excuses it
+        lost = verdict.excused or verdict.message
+        verdict = verdict.model_copy(update={"status": Status.FAIL, "message": lost})
+    if not verdict.status.is_lost or not (slip.is_endless or verdict.callbacks == "late"):
+        return verdict
+    ends = "the caller waits" if check.name == "service-answers" else "nothing else is heard"
+    hint = f"in {slip.file}, {slip.fix}" + (f": {ends} until the callback ends" if slip.name else "")
+    return verdict.explained(f"in {slip.file}, {slip.message}", hint, (slip.place,), cause=slip.message)
