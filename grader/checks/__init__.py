@@ -24,7 +24,7 @@ from grader.model.verdict import (
 
 FAMILIES = (
     "package_files", "cmake", "build", "executable", "node", "topics", "messages", "reacts", "stamps", "interfaces",
-    "transform", "rate", "counter", "listener", "console", "files_left", "launch_files", "launch_runs",
+    "transform", "rate", "counter", "listener", "console", "logs", "files_left", "launch_files", "launch_runs",
     "launch_params", "parameter_files", "parameters", "service_servers", "service_clients", "actions", "rostest",
     "two_copies", "robot_path", "ends_at", "stays_within",
 )  # fmt: skip

@@ -48,11 +48,11 @@ from grader.checks.support.scripts import (
     OF_INTERFACES,
     SYNTAX,
     argument_not_given,
-    copies_of,
     in_comments,
     move_hint,
     old_encoding,
     path_in_package,
+    real_copy,
     without_git,
 )
 from grader.checks.support.text import (
@@ -70,7 +70,7 @@ from grader.evidence.run import Run
 from grader.installable import install_hint
 from grader.line_slips.python import COMMENTED_OUT, corrected, without_brace
 from grader.model.file_fault import Fault
-from grader.model.package import PackageFacts, SourceFile
+from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.verdict import Citations, FileCitation, Span, Verdict, machine_lacks
 from grader.wording import NOTHING_TO_DO, ON_THE_MACHINE, join_words, on_lines
@@ -226,7 +226,7 @@ def _not_run(life: Life, run: Run, package: PackageFacts) -> Ending | None:
     """Explain a script that comes to its end because nothing calls what it defines, or because its loop is left."""
     script = package.file(life.start.script or "")
     is_node = bool(nodes_of(run, life.name))  # also by a name that no line of it says
-    if script is not None and not is_node and (other := _real_copy(script, package)):
+    if script is not None and not is_node and (other := real_copy(script, package)):
         cause = f"its script ran to the end: it makes no node, but {other}, which has the same name, does"
         return Ending(cause, without_git(move_hint(package, other, script.path), package), by_itself=True)
     if script is not None and script.shebang_fault == "empty-file":
@@ -249,13 +249,6 @@ def _not_run(life: Life, run: Run, package: PackageFacts) -> Ending | None:
     called = f"call {slip.name}() at the end of the script, below {MAIN}" if slip.name else f"write {MAIN}"
     cause = f"its script ran to the end: {slip.message} ({slip.file}, line {slip.line})"
     return Ending(cause, slip.fix or called, (slip.place,), by_itself=True)
-
-
-def _real_copy(script: SourceFile, package: PackageFacts) -> str:
-    """Return the only other file of a script's name, where that one makes a node and the script none; else ""."""
-    nodes = {s.file for s in package.slips if s.kind == "node-name"}
-    others = [one.path for one in copies_of(package, script.path) if one.path != script.path]
-    return others[0] if script.path not in nodes and len(others) == 1 and others[0] in nodes else ""
 
 
 def explain_error(

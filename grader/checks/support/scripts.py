@@ -505,3 +505,10 @@ def in_comments(slips: Sequence[PythonSlip]) -> dict[str, str]:
     where = on_lines(lines)
     told = {"message": f"{where} are commented out", "fix": f"remove the `#` from {where}"}
     return told if len(lines) > 1 else {}
+
+
+def real_copy(script: SourceFile, package: PackageFacts) -> str:
+    """Return the only other file of a script's name, where that one makes a node and the script none; else ""."""
+    nodes = {s.file for s in package.slips if s.kind == "node-name"}
+    others = [one.path for one in copies_of(package, script.path) if one.path != script.path]
+    return others[0] if script.path not in nodes and len(others) == 1 and others[0] in nodes else ""
