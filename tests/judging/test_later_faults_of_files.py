@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import pytest
+
 from grader.judging import judge
 from grader.package.launch import parse_launch_files
-from tests.support.rubrics import PACKAGE, SCENARIO, SCRIPT, rubric
+from tests.support.rubrics import GOOD_RUN, NODE, PACKAGE, SCENARIO, SCRIPT, built, rubric
 from tests.support.timeline import build_runs
 
 FILE = SCRIPT["path"]
@@ -51,3 +53,65 @@ def test_messages_that_are_not_there_are_named_where_catkin_sees_no_package() ->
         hint = judge(asked, runs)[0].hint
         assert ("; then add msg/Note.msg, which is not there, and push it" in hint) == told
         assert "instead of msg/Note.msg" not in hint
+
+
+@pytest.mark.parametrize(
+    ("said", "status", "hint"),
+    [
+        (
+            'CMake Error: Could not find a package configuration file provided by "tf" with any of the following',
+            "inconclusive",
+            "nothing for you to do: tell your instructor",
+        ),
+        ("/w/src/lab1/src/mean.cpp:3:1: error: 'x' was not declared", "fail", "first get the build to pass"),
+    ],
+)
+def test_a_program_that_the_build_did_not_make_is_no_missing_script(
+    said: str, status: str, hint: str
+) -> None:
+    files = [{"path": "src/mean.cpp"}, {"path": "CMakeLists.txt"}]
+    package = {
+        "name": "lab1",
+        "files": files,
+        "manifest": {},
+        "cmake": {"calls": [["add_executable", "mean", "src/mean.cpp"]]},
+    }
+    scenario = {**SCENARIO, "start": [{"name": "talker", "script": "mean"}]}
+    asked = ({"id": "build", "check": "build"}, {**NODE, "requires": []})
+    runs = build_runs({"runs": {"talker": {"outcome": "ended", "graph": []}}, "package": package})
+    runs |= built(package, exit_code=1, said=[said])
+    found = {c.id: c for c in judge(rubric(*asked, scenarios={"talker": scenario}), runs)}
+    assert found["node"].message.startswith("talker was not started: the build did not make the program mean")
+    assert (found["node"].status.value, found["node"].hint.startswith(hint)) == (status, True)
+
+
+def test_a_script_that_is_missing_is_named() -> None:
+    runs = build_runs(
+        {"runs": {"talker": {"outcome": "ended", "graph": []}}, "package": {"name": "lab1", "files": []}}
+    )
+    (node,) = judge(rubric({**NODE, "requires": []}), runs)
+    assert node.message == "talker was not started: there is no src/numeric_talker.py to run"
+    assert node.hint == "write src/numeric_talker.py"
+
+
+def test_what_runs_beside_a_program_that_was_not_built_is_left_open() -> None:
+    tf = 'CMake Error: Could not find a package configuration file provided by "tf" with any of the following'
+    package = {
+        "name": "lab1",
+        "files": [SCRIPT, {"path": "src/mean.cpp"}, {"path": "CMakeLists.txt"}],
+        "manifest": {},
+        "cmake": {"calls": [["add_executable", "mean", "src/mean.cpp"]]},
+    }
+    scenario = {**SCENARIO, "start": [*SCENARIO["start"], {"name": "mean", "script": "mean"}]}
+    text, ends = {"process": "talker", "text": "done"}, {"topic": "/numeric_chatter", "subscriber": "mean"}
+    done = {"id": "done", "check": "prints", "with": text, "scenario": "talker"}
+    apart = {"id": "apart", "check": "connected", "with": ends, "scenario": "talker"}
+    asked = rubric(done, apart, scenarios={"talker": scenario})
+    said = [{"process": "talker", "line": "waiting"}]
+    runs = build_runs({"runs": {"talker": {**GOOD_RUN, "console": said}}, "package": package})
+    for exit_code, status in ((1, "inconclusive"), (0, "fail")):
+        runs |= built(package, exit_code=exit_code, said=[tf] if exit_code else [])
+        found, connected = judge(asked, runs)
+        assert (found.status.value, connected.status.value) == (status, status)
+        assert ("did not make the program mean, which runs beside it" in found.message) == bool(exit_code)
+        assert ("did not make the program mean;" in connected.message) == bool(exit_code)

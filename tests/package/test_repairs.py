@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import stat
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,8 @@ from grader.model.message_definitions import parse_definition
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.repair import BY_HAND, DEFAULT_SHARES, KINDS, Repair, advice_on
 from grader.model.submission import chmod_hint
+from grader.package.python_repairs import examine
+from grader.package.python_repairs.syntax import Step, step_to
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs
 from grader.package.repairs.editing import changed_lines
 from grader.package.repairs.names import is_near, is_one_edit
@@ -572,3 +575,15 @@ def test_one_repair_puts_it_right(name: str, tmp_path: Path) -> None:
     folder = package(tmp_path, {"src/a.cpp": "int main() {}\n", **changes})
     assert [fix in (one.fix or one.after) for one in repair_all(folder, wanted)] == [True]
     assert find_repairs(folder, facts_of(folder), wanted) == ()
+
+
+def test_repairs_that_undo_each_other_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    def turn_round(text: str) -> Iterator[Step]:
+        """As a repair that works on what another has made of the text."""
+        turned = {"a = 1\n": "b = 1\n", "b = 1\n": "a = 1\n"}[text]
+        yield from step_to("name", 1, text, turned)
+        yield from turn_round(turned)
+
+    monkeypatch.setattr(examine, "with_names", turn_round)
+    (found,) = examine.examine([["a.py", "a = 1\n"]], [], {}, "")
+    assert [step["text"] for step in found["steps"]] == ["b = 1\n"]

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from grader.package.python_repairs import examine
-from grader.package.python_repairs.syntax import Step, step_to
 from tests.package.repairing import (
     CMAKELISTS,
     LAUNCHED,
@@ -593,15 +590,3 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_a_mistake_in_a_script_is_found_and_repaired(name: str, tmp_path: Path) -> None:
     check(CASES[name], tmp_path)
-
-
-def test_repairs_that_undo_each_other_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    def turn_round(text: str) -> Iterator[Step]:
-        """As a repair that works on what another has made of the text."""
-        turned = {"a = 1\n": "b = 1\n", "b = 1\n": "a = 1\n"}[text]
-        yield from step_to("name", 1, text, turned)
-        yield from turn_round(turned)
-
-    monkeypatch.setattr(examine, "with_names", turn_round)
-    (found,) = examine.examine([["a.py", "a = 1\n"]], [], {}, "")
-    assert [step["text"] for step in found["steps"]] == ["b = 1\n"]

@@ -126,7 +126,6 @@ def node(body: str) -> str:
 LOOP = "    while not rospy.is_shutdown():\n"
 SERVER = "    s = SimpleActionServer('a', A, f, auto_start=False)\n"
 OF_A = "try:\n    from a.msg import A\nfinally:\n    pass\n"
-UNHEARD = "def hear(msg):\n    print(msg.data)\ndef other(msg):\n    print(msg.data)\n"
 CALLED = "if __name__ == '__main__':\n    main()\n"
 
 
@@ -551,61 +550,6 @@ def test_a_condition_is_joined_with_another_where_that_changes_nothing_in_it(
     (tmp_path / "a.py").write_text(f"while {condition}:\n    time.sleep(1)\n", encoding="utf-8")
     (deaf,) = (s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "deaf")
     assert deaf.fix.startswith(fix)
-
-
-@pytest.mark.parametrize(
-    ("text", "kinds"),
-    [
-        ("def talk():\n    while True:\n        rate.sleep()\n    rate = rospy.Rate(10)\n", {"undefined"}),
-        (
-            "def talk():\n    def hear(msg):\n        pub.publish(msg)\n    pub = rospy.Publisher('a', Int8)\n",
-            set(),
-        ),
-        ("def talk():\n    global rate\n    rate.sleep()\n    rate = rospy.Rate(10)\n", set()),
-        ("def talk(rate):\n    rate.sleep()\n    rate = rospy.Rate(10)\n", set()),
-        (
-            "while not rospy.is_shutdown():\n    rospy.Subscriber('a', Int8, hear)\n    rate.sleep()\n",
-            {"subscribed-again"},
-        ),
-        ("while not rospy.is_shutdown():\n    rospy.Subscriber('a', Int8, hear)\n    rospy.spin()\n", set()),
-        ("while x:\n    print(rospy.wait_for_message('a', Int8))\n", {"subscribed-again"}),
-        ("m = rospy.wait_for_message('a', Int8)\nwhile x:\n    print(m)\n", set()),
-        ("m = None\nwhile m is None:\n    m = rospy.wait_for_message('a', Int8)\n", set()),
-        ("while x:\n    m = rospy.wait_for_message('a', Int8)\n    if m.data:\n        break\n", set()),
-        (
-            "def hear(msg):\n    pass\ndef hear(msg):\n    pass\nrospy.Subscriber('a', Int8, hear)\n",
-            {"defined-twice"},
-        ),
-        ("def hear(msg):\n    pass\ndef other(msg):\n    pass\nrospy.Subscriber('a', Int8, hear)\n", set()),
-        (
-            f"{UNHEARD}rospy.Subscriber('a', Int8, hear)\nrospy.Subscriber('b', String, hear)\n",
-            {"defined-twice"},
-        ),
-        (f"{UNHEARD}rospy.Subscriber('a', Int8, hear)\nrospy.Subscriber('b', Int8, hear)\n", set()),
-        (
-            "from rospy import Subscriber\nclass Subscriber:\n    pass\nSubscriber('a', Int8, print)\n",
-            {"defined-twice"},
-        ),
-        ("while rospy.is_shutdown():\n    pub.publish(1)\n", {"loop-left"}),
-        ("over = True\nwhile not over:\n    pub.publish(1)\n", {"loop-left"}),
-        ("self.go = False\nwhile self.go:\n    pub.publish(1)\n", {"loop-left"}),
-        ("over = True\nover = False\nwhile not over:\n    pub.publish(1)\n", set()),
-        ("over = True\ndef stop(over):\n    while not over:\n        pub.publish(1)\n", set()),
-        ("over, n = True, 1\nwhile not over:\n    pub.publish(1)\n", set()),
-        (
-            "while not rospy.is_shutdown():\n    pub.publish(1)\n    if n:\n        rate.sleep()\n",
-            {"sleep-outside"},
-        ),
-        ("while not rospy.is_shutdown():\n    if n:\n        pub.publish(1)\n        rate.sleep()\n", set()),
-    ],
-)
-def test_slips_that_hide_what_was_meant(tmp_path, text, kinds):
-    (tmp_path / "a.py").write_text(text)
-    looked_for = {"subscribed-again", "defined-twice", "loop-left", "sleep-outside"}
-    found = [
-        s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind in looked_for or "after it" in s.message
-    ]
-    assert {s.kind for s in found} == kinds
 
 
 def test_every_kind_is_described() -> None:

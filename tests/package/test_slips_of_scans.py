@@ -379,3 +379,84 @@ def test_a_loop_that_is_missing_around_a_publish_and_its_pause(tmp_path, below, 
     (tmp_path / "a.py").write_text(f"import rospy\nrospy.init_node('a')\nrate = rospy.Rate(1)\n{below}")
     slips = [one for one in check_syntax(tmp_path, ["a.py"]).slips if one.kind == "loop-left"]
     assert [(one.line, one.fix.partition(" with")[0]) for one in slips] == found
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        ("distance = (a - b) ** 2 + (c - d) ** 2\n", [1]),
+        ("def dist(a, b):\n    return pow(a, 2) + pow(b, 2)\n", [2]),
+        ("distance = ((a - b) ** 2 + (c - d) ** 2) ** 0.5\n", []),
+        ("distance = sqrt((a - b) ** 2 + (c - d) ** 2)\n", []),
+        ("dist_sq = (a - b) ** 2 + (c - d) ** 2\n", []),
+        ("d2 = (a - b) ** 2 + (c - d) ** 2\n", []),
+        ("dist = (a - b) ** 2 + (c - d) ** 2\nif math.sqrt(dist) < 1:\n    stop()\n", []),
+        ("dist = (a - b) ** 2 + (c - d) ** 2\nif dist < near ** 2:\n    stop()\n", []),
+        ("dist = (a - b) ** 2 + (c - d) ** 2\nif dist < near * near:\n    stop()\n", []),
+        ("def dist(a, b):\n    return a ** 2 + b ** 2\nfar = self.dist(1, 2) ** 0.5\n", []),
+        ("dist = (a - b) ** 2 + (c - d) ** 2\nif dist < near:\n    stop()\n", [1]),
+        ("dist = (a - b) ** 2 + (c - d) ** 2\nif dist < least:\n    least = dist\n", []),
+        ("distance = a + b\n", []),
+    ],
+)
+def test_distances_without_a_root(text: str, lines: list[int], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    assert [s.line for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "rootless"] == lines
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("a = atan2(goal.x - p.x, goal.y - p.y)\n", ["swapped"]),
+        ("dx = goal.x - p.x\ndy = goal.y - p.y\na = math.atan2(dx, dy)\n", ["swapped"]),
+        ("a = atan2(goal.y - p.y, goal.x - p.x)\n", []),
+        ("a = math.atan2(p.y - goal.y, p.x - goal.x)\n", []),
+        ("a = math.atan2(goal.y - p.y, p.x - goal.x)\n", ["turned"]),
+        ("dx, dy = x - goal_x, goal_y - y\na = atan2(dy, dx)\n", ["turned"]),
+        ("bearing = atan2(goal.x - p.x, goal.y - p.y)\n", []),
+        ("a = math.pi / 2 - atan2(goal.x - p.x, goal.y - p.y)\n", []),
+        ("a = degrees(atan2(goal.x - p.x, goal.y - p.y))\nb = 90 - a\n", []),
+        ("dx = goal.x - p.y\n", ["mixed"]),
+        ("e = self.target_y - self.pose.x\n", ["mixed"]),
+        ("slope = p.x - p.y\n", []),
+        ("a = math.atan2(cos(e), sin(e))\n", ["swapped"]),
+        ("a = math.atan2(sin(e - 1), sin(e - 1))\n", ["swapped"]),
+        ("a = math.atan2(cos(e), sin(f))\n", []),
+        ("def f(m):\n    self.x = m.x\n    self.y = m.x\n", ["mixed"]),
+        ("def f(m):\n    self.x, self.y = m.y, m.x\n", []),
+        ("y = 0\ndef f(m):\n    global x, y\n    x = m.x\nprint(x, y)\n", ["", "mixed"]),
+        ("y = read()\ndef f(m):\n    global x, y\n    x = m.x\nprint(x, y)\n", []),
+        ("y = 0\ndef f(m):\n    global x\n    x = m.x\nprint(x)\n", []),
+        ("if abs(e) > -0.1:\n    turn()\n", ["negative"]),
+        ("near = min(msg.ranges[:9])\nif near < 0 or far < 0:\n    turn()\n", [""]),
+        ("near = min(msg.ranges[:9])\nif near > 0 and far < 0:\n    turn()\n", []),
+        ("if abs(e) > 0:\n    turn()\n", []),
+        ("e = theta - atan2(dy, dx)\nv.angular.z = 2 * e\n", ["swapped"]),
+        ("a = math.atan2(sin(e), cos(e))\n", []),
+        ("res = rospy.get_param('~resolution')\nc = int(p.x * resolution)\n", ["times"]),
+        ("c = math.floor((p.x - x0) * info.resolution)\n", ["times"]),
+        ("x = column * resolution\nc = int(p.x / resolution)\n", []),
+        ("e = p.theta - atan2(dy, dx)\nv.angular.z = 2 * e\n", ["swapped"]),
+        ("goal = atan2(dy, dx)\nv.angular.z = K * norm(p.theta - goal)\n", []),
+        ("goal = atan2(dy, dx)\ne = norm(p.theta - goal)\nv.angular.z = K * e\n", ["swapped"]),
+        ("e = p.theta - atan2(dy, dx)\nv.angular.z = -2 * e\n", []),
+        ("K = -2\ne = p.theta - atan2(dy, dx)\nv.angular.z = K * e\n", []),
+        ("e = p.theta - atan2(dy, dx)\nv.angular.z = 1 if e < 0 else 0\n", []),
+        ("e = abs(p.theta - atan2(dy, dx))\nif e > 1:\n    v.angular.z = 1\n", []),
+        ("e = degrees(atan2(dy, dx)) - self.pose.theta\n", ["mixed"]),
+        ("self.theta = degrees(yaw)\ne = degrees(atan2(dy, dx)) - self.theta\n", []),
+        ("e = p.theta - atan2(dy, dx)\nv.angular.z = pid(e)\n", []),
+        ("K = get_param('~k', -1)\ne = p.theta - atan2(dy, dx)\nv.angular.z = K * e\n", []),
+        ("pitch = atan2(a.x, sqrt(a.y ** 2 + a.z ** 2))\n", []),
+        ("resolution = 1 / info.resolution\nc = int(p.x * resolution)\n", []),
+        ("e = degrees(atan2(dy, dx)) - degrees(self.pose.theta)\n", []),
+        ("e = degrees(atan2(dy, dx) - self.pose.theta)\n", []),
+        ("def far(p):\n    return sqrt(p.x ** 2 + p.y ** 2)\nwhile self.far(p) != 0:\n    go()\n", ["exact"]),
+        ("d = math.hypot(dx, dy)\nif d == 0.0:\n    stop()\n", ["exact"]),
+        ("d = math.hypot(dx, dy)\nif d < 0.1 or count == 0:\n    stop()\n", []),
+    ],
+)
+def test_angles_and_distances(text: str, names: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.name for s in slips] == names
