@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from typing import Any
 
 import pytest
 
-from grader.evidence.run import Run
 from grader.judging import judge
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult
@@ -24,6 +22,7 @@ from tests.support.rubrics import (
     RATE,
     SCENARIO,
     SCRIPT,
+    built,
     on_copy,
     rubric,
 )
@@ -466,13 +465,6 @@ def test_a_line_that_only_installs_scripts_costs_no_build_that_worked() -> None:
     assert (install.points, talker.points, build.points) == (0, 0, build.max_points)
     assert f"PROGRAMS {renamed.after} DESTINATION" in install.hint
     assert wanted not in install.hint
-
-
-def built(package: dict[str, Any], *, exit_code: int, said: Sequence[str] = ()) -> dict[str, Run]:
-    made = {"name": "catkin_make", "role": "build", "exit_s": 3, "exit_code": exit_code}
-    console = [{"process": "catkin_make", "stream": "stderr", "lines": [*said]}] if said else []
-    run = {"package": package, "processes": [made], "console": console}
-    return build_runs({"runs": {"package": run}})
 
 
 def test_a_build_that_the_machine_ends_after_the_repair_leaves_what_it_makes_open() -> None:

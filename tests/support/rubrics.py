@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from grader.evidence.run import Run
 from grader.model.repair import Repair
 from grader.rubric.model import Rubric
+from tests.support.timeline import build_runs
 
 SCENARIO = {
     "title": "t",
@@ -74,3 +75,11 @@ GOOD_RUN = {
     "processes": [{"name": "talker", "stopped_by": "INT", "exit_code": 0, "exit_s": 6.8}],
     "actors": [{"action": "interrupt", "actor": "grader", "detail": "talker", "at_s": 6.6}],
 }
+
+
+def built(package: dict[str, Any], *, exit_code: int, said: Sequence[str] = ()) -> dict[str, Run]:
+    """Return the run of a build that ended so, of a package with these facts."""
+    made = {"name": "catkin_make", "role": "build", "exit_s": 3, "exit_code": exit_code}
+    console = [{"process": "catkin_make", "stream": "stderr", "lines": [*said]}] if said else []
+    run = {"package": package, "processes": [made], "console": console}
+    return build_runs({"runs": {"package": run}})
