@@ -14,11 +14,12 @@ ros_packages=(
   python3-rosgraph-msgs python3-std-msgs python3-std-srvs
   python3-geometry-msgs python3-nav-msgs python3-sensor-msgs
 )
-# Students' packages may name these in find_package(), and import the last two: installed where apt has them and root is to be had.
+# Students' packages may name these in find_package(), and import the last three (Noetic's rospy brings numpy along):
+# installed where apt has them and root is to be had.
 ros_extras=(
   ros-message-generation libnav-msgs-dev libsensor-msgs-dev libstd-srvs-dev
   ros-std-msgs ros-std-srvs ros-geometry-msgs ros-nav-msgs ros-sensor-msgs
-  python3-actionlib python3-tf2-ros
+  python3-actionlib python3-tf2-ros python3-numpy
 )
 # Program to find on PATH, and the package that has it (`ip` is for the tests of hostile submissions). The grader does
 # without those of the second line, and so do its tests: those of pages are skipped.
