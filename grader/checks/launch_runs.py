@@ -446,6 +446,8 @@ def _wrong_name(file: LaunchFile, name: str, wanted: Mapping[str, str]) -> Verdi
         return wrong_name(meant, name).verdict()
     if slip := next(include_slips(file), None):
         return slip.verdict()  # what an <include> does not bring may be the node
+    if switched := _switched_off(file, name):
+        return switched.verdict()
     others = [n.full_name for n in file.brings]
     near = near_names(name, others) or tuple(others)
     seen = f"; it has {join_words(near)}" if near else ""
@@ -454,6 +456,17 @@ def _wrong_name(file: LaunchFile, name: str, wanted: Mapping[str, str]) -> Verdi
     return failed(
         f"{file.path} has no node {name}{seen}", hint=f'add <node pkg="{pkg}" name="{own}"{inside} …/>'
     )
+
+
+def _switched_off(file: LaunchFile, name: str) -> Slip | None:
+    """Return that an `if` or `unless` leaves out the node that is asked for, or the only one that it leaves out."""
+    off = [one for one in file.switched_off if PurePosixPath(one[0]).stem == name.rpartition("/")[2]]
+    found = off or file.switched_off
+    if len(found) != 1:
+        return None
+    kind, line, said = found[0]
+    why = f"{file.path} has no node {name}: {said} on line {line} leaves the <node> of {kind} out"
+    return Slip(file.path, line, why, "; then ".join(later_fixes(file, kind)))
 
 
 def _meant_node(file: LaunchFile, name: str, wanted: Mapping[str, str]) -> LaunchNode | None:

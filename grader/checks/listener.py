@@ -293,6 +293,9 @@ def _by_subscriber(
     # Taken off, it hears nothing from then on: what is missing has to be the last ones.
     if slip is not None and list(missing) == list(probes[-len(missing) :]):
         return _taken_off(lost, slip)
+    slip = run_slip(package, run, "stuck")
+    if slip is not None and len(missing) == len(probes):
+        return _taken_off(lost, slip)
     slip = run_slip(package, run, "callback-waits")
     # A callback that waits holds up later messages: where none at all is printed, there is another reason.
     if slip is None or len(missing) == len(probes):

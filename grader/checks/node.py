@@ -238,7 +238,9 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
         message = f"{_script(one)} did not end on Ctrl-C and had to be stopped with SIG{stopped_by}"
         # A line that is known to keep the node alive goes before any excuse.
         in_cpp = slips_of_program(one.start.argv, package, "deaf")
-        own = [s for s in package.slips if s.kind == "deaf" and s.file == one.start.script] + in_cpp
+        own = [
+            s for s in package.slips if s.kind in {"deaf", "stuck"} and s.file == one.start.script
+        ] + in_cpp
         if deaf := next((s for s in own if s.fix), None):
             return failed(f"{message}: {deaf.message}", hint=deaf.fix, citations=(deaf.place,))
         if slow := max(in_cpp, key=lambda s: float(s.name), default=None):

@@ -147,7 +147,11 @@ def _not_printed(
     own = [e for _, e in run.params if e.action == "set" and run.is_student_node(e.caller_id)]
     early = next((e for e in own if [absolute_name(e.name)] == missing and is_printed(e.value, lines)), None)
     if early is None:
-        return _share_printed(params, missing, message, log_param(missing[0]))
+        lost, stuck = (
+            _share_printed(params, missing, message, log_param(missing[0])),
+            run_slip(package, run, "stuck"),
+        )
+        return lost.explained(stuck.message, stuck.fix, (stuck.place,)) if stuck is not None else lost
     hint = f"read {missing[0]} into a variable above the line that sets it, and print that variable"
     why = f"{message}: it is set to that value before it is read"
     cited = named_at(package, run, "sets-parameter", missing[0])

@@ -20,7 +20,7 @@ SlipKind = Literal[
     "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed", "printed-in-part",
     "published-in-part", "never-published", "takes-number", "typed-text", "goes-on",
     "no-argument", "read-late", "debugger", "drops-result", "returns-list", "fills", "catches",
-    "no-result",
+    "no-result", "stuck", "runs-out", "base-unmade",
 ]  # fmt: skip
 
 
@@ -43,6 +43,11 @@ class PythonSlip(Placed, Record):
     - `hides-class`: a message is given the name of its class: `String = String()`.
     - `no-effect`, `compared`: a statement such as `++i`, or `i == 0`; or a loop that publishes what only a line above
       it made, `name`.
+    - `stuck`: a line that waits for what never comes, or where a thread, a process or a task is made whose work never
+      gets anywhere.
+    - `runs-out`: `next(…)` of a generator that has only so many values.
+    - `base-unmade`: an `__init__` that does not call its base class's; `name` is the class, and after it, the
+      attributes that lack a value then.
     - `commented-out`: a ROS call in a comment; `name` is `sleep`, or `pub = Publisher`.
     - `input`: the node asks for input, and nodes get none; `name` is `once` where no loop does it again, and `paused`
       in a loop that sleeps.
@@ -58,7 +63,8 @@ class PythonSlip(Placed, Record):
     - `loop-left`: a loop that ends in its first turn, or after a number of them, or a callback that ends the node, or
       the only `publish(…)`, above a loop that waits or in none; `name` is the function that it asks, where a `not` is
       missing.
-    - `ends-node`: a callback that ends the node, at least sometimes; a slip only if the node ended by itself.
+    - `ends-node`: a callback that ends the node, at least sometimes, or what leaves its loop upon an exception; a slip
+      only if the node ended by itself.
     - `sleep-outside`, `sleep-twice`: a loop whose `sleep()` is outside it, or that only makes its Rate, or that
       waits twice in each turn.
     - `publish-twice`: a loop that publishes on one topic more than once in each turn.

@@ -19,7 +19,32 @@ def drop_slips_of_modules(slips: Iterable[PythonSlip], texts: Mapping[str, str])
     given = tuple(slips)
     # of a script and its module, the script is told that it is no node
     without_init = {one.file for one in given if one.kind == "no-init"}
-    return tuple(one for one in given if not _is_done_elsewhere(one, texts, named, without_init))
+    kept = (one for one in given if not _is_done_elsewhere(one, texts, named, without_init))
+    return tuple(filter(None, (_with_attributes(one, texts, named) for one in kept)))
+
+
+_CLASS = r"^class {}\b(?:(?!^\S).)*?^[ \t]+def __init__\(self(.*?)\)[^\n]*:(.*?)(?=^[ \t]+(?:def|@)|^\S|\Z)"
+_GIVEN = re.compile(r"\bself\.(\w+)(?:[ \t]*:[^=\n]+)?[ \t]*=(?!=)")
+
+
+def _with_attributes(
+    slip: PythonSlip, texts: Mapping[str, str], named: Mapping[str, set[str]]
+) -> PythonSlip | None:
+    """Return a slip of a base class in another file with the attributes that the `__init__` of that one gives a value;
+    None where it gives none."""
+    if slip.kind != "base-unmade" or " " in slip.name:
+        return slip
+    pattern = re.compile(_CLASS.format(re.escape(slip.message.rpartition(" ")[2])), re.MULTILINE | re.DOTALL)
+    for text in _imported(slip.file, texts, named):
+        if base := pattern.search(text):
+            fix = slip.fix.replace("(…)", "(…)" if base[1].strip() else "()")
+            own = {*_GIVEN.findall(base[2])} - {*_GIVEN.findall(texts[slip.file])}
+            return (
+                slip.model_copy(update={"name": " ".join([slip.name, *sorted(own)]), "fix": fix})
+                if own
+                else None
+            )
+    return None
 
 
 def _is_done_elsewhere(

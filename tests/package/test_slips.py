@@ -352,7 +352,7 @@ def test_what_never_runs_is_known(tmp_path, text, found):
     others = {
         "deaf", "rate-number", "no-clock", "misspelt", "undefined", "publishes", "prints", "not-called", "node-name",
         "no-init", "publisher", "publisher-type", "subscriber", "subscriber-type", "not-printed", "never-published",
-        "reset-limit",
+        "reset-limit", "stuck",
     }  # fmt: skip
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind not in others]
     assert [(s.kind, s.line) for s in slips] == [one[:2] for one in found]

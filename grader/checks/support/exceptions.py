@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import builtins
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from grader.checks.support.console_output import Traceback
 from grader.checks.support.rospy_calls import (
@@ -19,9 +19,10 @@ from grader.checks.support.rospy_calls import (
     rewritten,
     uncalled_proxy,
 )
-from grader.checks.support.text import shown
+from grader.checks.support.text import as_number, shown
 from grader.installable import noetic_messages
 from grader.model.package import PackageFacts
+from grader.model.python_slip import PythonSlip
 from grader.model.verdict import FileCitation
 from grader.wording import join_words, plural
 
@@ -79,6 +80,9 @@ SLIPS = {
     "is a non-ascii string": (
      "rospy names it by mistake, as a text may have such letters: another field has a value of the wrong type",
      "compare the value of each of the message's other fields with its type in the .msg file"),
+    "can't send non-None value to a just-started generator": (
+     "the generator has not come to its first `yield`, which takes what it is sent",
+     "call `next(…)` on it once, on the line below the one that makes it"),
     "exceptions must derive from BaseException": ("only an exception can be raised, and this is none",
      "write the exception that is meant around it: `raise ValueError(…)`"),
     "is not a bool": ("the message takes True or False, and gets something else", "publish a bool, without `str(…)`"),
@@ -409,6 +413,30 @@ def _future(message: str, source: str, _marked: tuple[int, int] | None) -> Meani
     return "it asks where the frame is now, and the newest transform is a little older", hint
 
 
+def no_number(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
+    """Return where a text comes from that a message takes for a number; None for what is published."""
+    kind = "int" if "integer" in found.message else "float"
+    read = next((s for s in package.slips if (s.file, s.kind) == (place.file, "argument-text")), None)
+    if read is not None:
+        fix = read.fix
+        if kind == "float":
+            fix = fix.replace("map(int, ", "map(float, ").replace("= int(", "= float(")
+        return "a command-line argument is a string", f"on line {read.line}, write `{fix}`"
+    if ".publish(" in found.innermost.source:
+        return None
+    fix = f"turn the value into one first: {as_number(kind, found.own_frames[-1].source)}"
+    return "it takes a number but gets something else", fix
+
+
+def without_base(message: str, slips: Iterable[PythonSlip]) -> Meaning | None:
+    """Return that an attribute lacks its value because the base class, which gives it, is never set up."""
+    for slip in (one for one in slips if one.kind == "base-unmade"):
+        owner, *given = slip.name.split()
+        if message.startswith(tuple(f"'{owner}' object has no attribute '{name}'" for name in given)):
+            return slip.message, f"in {slip.file}, {slip.fix}"
+    return None
+
+
 def _attribute(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
     if meaning := uncalled_proxy(message, source):
         return meaning
@@ -550,6 +578,10 @@ _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | Non
     "CalledProcessError": _command,
     "ServiceException": _service,
     "ZeroDivisionError": _zero,
+    "StopIteration": lambda *_: (
+        "what `next(…)` goes through has no more values",
+        "let it begin again: `while True:` around the loop in it that has a `yield`, or `itertools.cycle(…)`",
+    ),
     "RecursionError": lambda *_: (
         "a function calls itself endlessly",
         "for its smallest values, return without that call, or loop",

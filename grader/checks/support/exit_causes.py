@@ -16,6 +16,8 @@ from grader.checks.support.exceptions import (
     explain_exception,
     explain_narrow_handler,
     explain_number_of_values,
+    no_number,
+    without_base,
 )
 from grader.checks.support.launch_slips import unfound_program
 from grader.checks.support.missing_names import (
@@ -61,7 +63,6 @@ from grader.checks.support.text import (
     RATE_SLOT,
     SPIN,
     VALUE_SLOT,
-    as_number,
     explain_arguments,
     shown,
 )
@@ -358,7 +359,9 @@ def _misplaced(found: Traceback) -> tuple[str, str] | None:
 def _by_script(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
     """Return what the sides of a sum are, or what other lines of the script are to blame for."""
     sum_ = explain_operand(found, package) if found.kind == "TypeError" else None
-    sum_ = of_typed_text(found, place.file, package) or sum_
+    sum_ = of_typed_text(found, place.file, package) or sum_ or without_base(found.message, package.slips)
+    spent = (s for s in package.slips if (s.file, s.kind, s.line) == (place.file, "runs-out", place.line))
+    sum_ = sum_ or next(((s.message, s.fix) for s in spent if found.kind == "StopIteration"), None)
     return sum_ or (None if _misplaced(found) else _by_other_lines(found, place, package))
 
 
@@ -405,26 +408,14 @@ def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts
         here = (s for s in own if s.kind == "object" and s.line in lines)
         return next(((s.message, s.fix) for s in here if re.search(rf"\b{s.name}\b", found.message)), None)
     if found.kind == "SerializationError" and _NUMBER_WANTED.search(found.message):
-        return _no_number(found, place, package)
+        return no_number(found, place, package)
     if slip := next((name for said, name in OF_OTHER_LINES.items() if said in found.message), ""):
         return next(((s.message, s.fix) for s in own if slip in {s.kind, s.name}), None)
     late = found.kind in {"ROSInitException", "ROSException"} and "init_node" in found.message
+    # of a function that a line outside of it calls too early, that line
+    outermost = next((f.line for f in found.own_frames if path_in_package(package, f.file) == place.file), 0)
+    place = place.model_copy(update={"line": outermost or place.line}) if late else place
     return _late_init(place, package) if late else explain_narrow_handler(found, place, package)
-
-
-def _no_number(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
-    """Return where a text comes from that a message takes for a number; None for what is published."""
-    kind = "int" if "integer" in found.message else "float"
-    read = next((s for s in package.slips if (s.file, s.kind) == (place.file, "argument-text")), None)
-    if read is not None:
-        fix = read.fix
-        if kind == "float":
-            fix = fix.replace("map(int, ", "map(float, ").replace("= int(", "= float(")
-        return "a command-line argument is a string", f"on line {read.line}, write `{fix}`"
-    if ".publish(" in found.innermost.source:
-        return None
-    fix = f"turn the value into one first: {as_number(kind, found.own_frames[-1].source)}"
-    return "it takes a number but gets something else", fix
 
 
 def _late_init(place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:

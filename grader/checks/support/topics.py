@@ -442,7 +442,7 @@ def explain_by_unheard_topic(check: Check, package: PackageFacts, run: Run, verd
 
 def why_unreached(package: PackageFacts, run: Run) -> PythonSlip | None:
     """Return why a script that runs does not come to its `publish(…)`, or to what it offers."""
-    return run_slip(package, run, "never-reached", "never-called", "spin-in-loop")
+    return run_slip(package, run, "never-reached", "never-called", "spin-in-loop", "stuck")
 
 
 def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | None:

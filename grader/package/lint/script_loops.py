@@ -213,7 +213,12 @@ def stopped_loops(tree):
         # of what the node does; a robot's may stay alive in `spin()` once it has arrived
         spins = is_robot and any(calls_in(one, "spin") for one in run_after(loop, tree))
         is_part = (called[name] > 1 and name != "publish") or spins
-        if is_counted(loop) and ending is None and not turned[loop][1] and not is_part:
+        if (
+            (is_counted(loop) or runs_out(loop, tree))
+            and ending is None
+            and not turned[loop][1]
+            and not is_part
+        ):
             message = "the loop on line %d ends %s" % (loop.lineno, end_of_rounds(loop))
             used = {n.id for one in loop.body for n in ast.walk(one) if isinstance(n, ast.Name)}
             fix = "write `while not rospy.is_shutdown():` on line %d" % loop.lineno
@@ -317,6 +322,14 @@ def is_counted(loop):
     parts = asked.values if isinstance(asked, ast.BoolOp) and isinstance(asked.op, ast.And) else [asked]
     orders = (ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.NotEq)
     return any(isinstance(one, ast.Compare) and isinstance(one.ops[0], orders) for one in parts)
+
+
+def runs_out(loop, tree):
+    """Whether it goes through an object of a class of the script whose `__next__` comes to its end."""
+    name = called_name(loop.iter) if isinstance(loop, ast.For) else ""
+    owners = (n for n in all_of(tree, ast.ClassDef) if name and n.name == name)
+    ends = (n for owner in owners for n in ast.walk(owner) if isinstance(n, ast.Raise) and n.exc is not None)
+    return any("StopIteration" in names_in(n.exc) for n in ends)
 
 
 PAUSES = ("rospy.sleep", "time.sleep")

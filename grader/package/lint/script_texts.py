@@ -169,6 +169,9 @@ def graph_names(tree):
     publishes."""
     owners = targets_of(tree)
     own = {n.name for n in all_of(tree, ast.ClassDef)}
+    variables = {n.id for n in all_of(tree, ast.Name) if isinstance(n.ctx, ast.Store)}
+    variables |= {n.arg for n in all_of(tree, ast.arg)}
+    variables -= {a.asname or a.name for n in all_of(tree, ast.ImportFrom) for a in n.names}
     for node in walk(tree):
         kind = NAMED.get(called_name(node))
         if not kind or dotted(node.func) in own:
@@ -181,7 +184,8 @@ def graph_names(tree):
         elif names and kind == "node-name":
             for text, written in text_behind(names[0], tree):
                 yield slip(text.lineno, kind, text_of(text), written, owner)
-        if names and name.isidentifier() and kind in ("publisher", "subscriber"):
+        # a variable holds a type that is not known here
+        if names and name.isidentifier() and name not in variables and kind in ("publisher", "subscriber"):
             yield slip(names[0].lineno, kind + "-type", name)
 
 

@@ -78,6 +78,8 @@ def targets_of(tree):
 
 def argument(call, place, keyword):
     """Return the argument of a call at that place or of that name, as a list of one; an empty one where it has none."""
+    if any(isinstance(one, ast.Starred) for one in call.args[: place + 1]):
+        return []  # what it stands for, and in which place, is not known
     return call.args[place : place + 1] or [k.value for k in call.keywords if k.arg == keyword]
 
 

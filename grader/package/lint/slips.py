@@ -1,11 +1,13 @@
 """Finds what compiles in a student's Python and is not meant: `slips` of a syntax tree, for `syntax.py`.
 
 What nothing calls, statements without an effect, imports. Names are for `script_names.py`, texts for
-`script_texts.py`, objects for `script_objects.py`, callbacks for `script_callbacks.py`, ends of goals for
-`script_goals.py`, loops for `script_loops.py`, their rates for `script_rates.py`, values for `script_values.py`,
-arithmetic for `script_arithmetic.py`, scans for `script_scans.py`, counters and clocks for `script_counters.py`, what
-functions return for `script_results.py`. Nothing is executed. A file has to be parsed by ROS's own Python, which is to
-run it: Python 3.8, standard library only.
+`script_texts.py`, objects for `script_objects.py`, callbacks for `script_callbacks.py`, what these print for
+`script_prints.py`, base classes for `script_bases.py`, threads, locks and generators for `script_waits.py`, ends of
+goals for `script_goals.py`, loops for `script_loops.py`, their rates for `script_rates.py`, values for
+`script_values.py`, arithmetic for `script_arithmetic.py`, scans for `script_scans.py`, counters and clocks for
+`script_counters.py`, what functions return for `script_results.py`.
+
+Nothing is executed. A file has to be parsed by ROS's own Python, which is to run it: Python 3.8, standard library only.
 """
 
 import ast
@@ -13,16 +15,19 @@ import builtins
 import importlib.util
 
 import script_arithmetic as arithmetic
+import script_bases
 import script_callbacks as callbacks
 import script_counters as counters
 import script_goals as goals
 import script_loops as loops
 import script_names as names
 import script_objects as objects
+import script_prints
 import script_rates as rates
 import script_results
 import script_scans as scans
 import script_values as values
+import script_waits
 from script_texts import graph_names, said_texts
 from script_tree import (
     LOOPS,
@@ -46,6 +51,7 @@ SLIPS_LIMIT = 100
 
 def slips(tree):
     """What compiles and is not meant: names that are not called or not there, questions that wait for a keyboard."""
+    call_by_methods(tree)
     finders = (
         uncalled_and_asked, objects.names_of_objects, names.misspelt, rates.loop_rates, rates.nanoseconds,
         counters.resets, never_run, loops.never_reached, loops.loops_that_never_go_round,
@@ -58,10 +64,10 @@ def slips(tree):
         values.times_added_again, values.params_read_unset, values.defaults_first, values.overwritten_values,
         values.published_in_turn, arithmetic.arithmetic_slips, scans.scan_slips, values.flagged_loops,
         values.kept_velocities, values.values_never_set_back, values.emptied_files,
-        callbacks.unprinted_messages, counters.values_left_out, counters.published_unchanged,
+        script_prints.unprinted_messages, counters.values_left_out, counters.published_unchanged,
         objects.unused_publishers, objects.unsent_messages, objects.lost_objects, rates.loops_of_numbers,
         goals.finished_goals, goals.finished_in_loops, goals.ended_without_result, counters.sends_no_time, without_node,
-        debuggers, script_results.results, rates.turns_taken_off,
+        debuggers, script_results.results, rates.turns_taken_off, script_bases.unmade_bases, script_waits.waits,
     )  # fmt: skip
     found = [one for find in finders for one in find(tree)]
     # of two that say why a name is not there, the first is about the class that it belongs to
@@ -69,6 +75,18 @@ def slips(tree):
     first = {(one["line"], one["name"]): one for one in reversed(found) if one["kind"] == "undefined"}
     found = [one for one in found if one["kind"] != "undefined" or first[one["line"], one["name"]] is one]
     return sorted(found, key=lambda one: one["line"])[:SLIPS_LIMIT]
+
+
+def call_by_methods(tree):
+    """Write calls of `say = pub.publish` as calls of that method, `say.publish(…)`, which is what finders look for."""
+    nodes = list(ast.walk(tree))
+    given = [n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+    made = [n for n in nodes if isinstance(n, ast.Assign) and isinstance(n.value, ast.Attribute)]
+    named = {dotted(n.targets[0]): n.value.attr for n in made if n.value.attr in ("publish", "sleep")}
+    for call in (n for n in nodes if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)):
+        if call.func.id in named and given.count(call.func.id) == 1:
+            method = ast.Attribute(value=call.func, attr=named[call.func.id], ctx=ast.Load())
+            call.func = ast.copy_location(method, call.func)
 
 
 def uncalled_and_asked(tree):
