@@ -71,7 +71,8 @@ class PythonSlip(Placed, Record):
     - `deaf`: why the node goes on after Ctrl-C.
     - `callback-called`, `callback-values`, `callback-missing`: a callback that is called where it should only be named,
       that takes another number of values than ROS passes, or that does not exist.
-    - `callback-waits`: a topic's or service's callback that sleeps, or never ends, or makes its publisher itself.
+    - `callback-waits`: a topic's or service's callback that sleeps, or never ends, or makes its publisher itself; or a
+      lock that is taken where it is held already (`name`: `lock`).
     - `not-printed`: why a topic's callback prints nothing of any message; `name` is the topic as it is written there.
     - `printed-in-part`: why it prints some messages only, or something else than their values; `name` as above.
     - `subscribed-again`: a `Subscriber(…)` that a loop makes in each turn.
@@ -90,17 +91,18 @@ class PythonSlip(Placed, Record):
       number: a slip only if that message has to be a text.
     - `goes-on`: an `if`, or a loop's first turn, that ends an action's goal by the call `name`, and goes on.
     - `wrong-value`: a value that is none: a comparison with NaN, the sine of an angle in degrees, a service's answer
-      that is made and not returned, or of which no field is set, a message that is filled in and not sent, a speed that
-      a Twist keeps from the turn before, nanoseconds in place of seconds, a condition that all numbers fulfil, or none,
-      or what each turn of a loop adds or sets again (`name`: `nan`, `degrees`, `return`, `empty`, `unsent`, `kept`,
-      `nanoseconds`, `bounds`, `added`); a grid's index that steps by its height, a cell that `int(…)` works out of a
-      number below 0, a quaternion of a whole angle, a float for the seconds of a time, the mean of a scan's ranges, a
-      distance without its square root, a parameter that is read where it is not set, what nothing sets back,
-      a cell that is compared with a grid's side as if it had one more, `atan2(x, y)`, degrees beside radians, and a
-      distance that is to be exactly 0 (`step`, `cut`, `half`, `secs`, `mean`, `rootless`, `unset`, `stuck`, `edge`,
-      `swapped`, `mixed`, `exact`), a cell that is a product (`times`), a timer's period of 0 (`zero`), a file that
-      each call empties (`emptied`), or of a scan an inf that is made 0, an index that is an angle, and a condition that
-      drives where a wall is near (`inf`, `angle`, `turned`).
+      that is made and not returned, or of which no field is set, a message that is filled in and not sent, a speed
+      that a Twist keeps from the turn before, nanoseconds in place of seconds, a condition that all numbers fulfil,
+      or none, or what each turn of a loop adds or sets again (`name`: `nan`, `degrees`, `return`, `empty`, `unsent`,
+      `kept`, `nanoseconds`, `bounds`, `added`); a grid's index that steps by its height, a cell that `int(…)` works
+      out of a number below 0, a quaternion of a whole angle, a float for the seconds of a time, the mean of a scan's
+      ranges, a distance without its square root, a parameter that is read where it is not set, what nothing sets
+      back, a cell that is compared with a grid's side as if it had one more, `atan2(x, y)`, two values of a call in
+      each other's place, degrees beside radians, and a distance that is to be exactly 0 (`step`, `cut`, `half`,
+      `secs`, `mean`, `rootless`, `unset`, `stuck`, `edge`, `swapped`, `mixed`, `exact`), a cell that is a product
+      (`times`), a timer's period of 0 (`zero`), a file that each call empties (`emptied`), or of a scan an inf that
+      is made 0, an index that is an angle, and a condition that drives where a wall is near (`inf`, `angle`,
+      `turned`).
 
     No slips, but what a line says, for checks that compare it with what the lab asks; `message` is a name, a number or
     a text:
@@ -145,3 +147,8 @@ class PythonSlip(Placed, Record):
         """Whether a callback never ends, or is never called, or what it needs is made again and again: not a sleep."""
         told = re.search(r"never (?:ends|calls)|subscribes again|makes another publisher", self.message)
         return self.kind == "callback-waits" and bool(told)
+
+    @property
+    def is_lock(self) -> bool:
+        """Whether a callback waits for a lock that is held already."""
+        return self.kind == "callback-waits" and self.name == "lock"

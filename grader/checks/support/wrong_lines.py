@@ -70,9 +70,10 @@ OF_RESULTS = ("prints", "rostest")
 
 def explain_by_waiting_callback(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a lost mark with the callback that sleeps or never ends: until it returns, its script receives nothing."""
-    of_callbacks = check.of_callbacks or check.name in OF_RESULTS
+    of_callbacks = check.of_callbacks or check.name in (*OF_RESULTS, "action-result")
     files = files_that_run(package, run) if of_callbacks and not verdict.cause else ()
-    slip = next((s for s in package.slips if s.kind == "callback-waits" and s.file in files), None)
+    waits = (s for s in package.slips if s.kind == "callback-waits" and s.file in files)
+    slip = next((s for s in waits if check.name != "action-result" or s.is_lock), None)
     # What should come before any callback does not wait for one.
     if slip is None or verdict.callbacks == "before":
         return verdict
@@ -83,5 +84,7 @@ def explain_by_waiting_callback(check: Check, package: PackageFacts, run: Run, v
     if not verdict.status.is_lost or not (slip.is_endless or verdict.callbacks == "late"):
         return verdict
     ends = "the caller waits" if check.name == "service-answers" else "nothing else is heard"
-    hint = f"in {slip.file}, {slip.fix}" + (f": {ends} until the callback ends" if slip.name else "")
+    hint = f"in {slip.file}, {slip.fix}" + (
+        f": {ends} until the callback ends" if slip.name and not slip.is_lock else ""
+    )
     return verdict.explained(f"in {slip.file}, {slip.message}", hint, (slip.place,), cause=slip.message)

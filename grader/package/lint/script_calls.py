@@ -1,0 +1,166 @@
+"""Finds calls of a script's own functions that cannot work, for `slips.py`: with a lock held that they take again, and
+with two values in each other's place.
+
+Nothing is executed. Python 3.8, standard library only.
+"""
+
+import ast
+
+from script_tree import (
+    FUNCTIONS,
+    all_of,
+    dotted,
+    is_call,
+    is_call_alone,
+    parents_of,
+    slip,
+    statements_of,
+    targets_of,
+)
+
+TAKES_LATER = (*FUNCTIONS, ast.ClassDef)
+"""What stands in these runs when they are called."""
+
+
+def locks_taken_twice(tree):
+    """Where a function takes a lock that is held there: a `Lock()`, unlike an `RLock()`, lets nobody in twice."""
+    for scope, name, made in locks(tree):
+        functions = {n.name: n for n in statements_of(scope) if isinstance(n, ast.FunctionDef)}
+        prefix = name.rpartition(".")[0]
+        taking = {
+            ".".join(filter(None, (prefix, own.name))): line
+            for own in functions.values()
+            if not own.decorator_list and (line := first_taken(own, name))
+        }
+        for block in all_of(tree, ast.With, ast.AsyncWith, ast.Expr):
+            for node, line, called in taken_while_held(block, name, taking, tree):
+                if scope is tree or is_inside(node, scope, tree):
+                    yield held_twice(name, made, (block.lineno, node.lineno, line), called)
+                    break
+            else:
+                continue
+            break
+
+
+def locks(tree):
+    """Yield the locks of a module and of its classes, each with its name and the call that makes it; none that two
+    lines make."""
+    parents, kept = parents_of(tree), targets_of(tree)
+    given = [dotted(t) for n in all_of(tree, ast.Assign) for t in n.targets]
+    for call in all_of(tree, ast.Call):
+        name = kept.get(id(call), "...")
+        if dotted(call.func) not in ("threading.Lock", "Lock") or "..." in name or given.count(name) > 1:
+            continue
+        scope = parents[parents[call]]
+        while name.startswith("self.") and not isinstance(scope, (ast.ClassDef, ast.Module)):
+            scope = parents[scope]
+        if isinstance(scope, ast.ClassDef if name.startswith("self.") else ast.Module):
+            yield scope, name, call
+
+
+def first_taken(function, name):
+    """Return the line on which a function takes the lock, whatever else is the case; 0 where it may not."""
+    for one in function.body:
+        if takes(one, name):
+            return one.lineno
+        if any(isinstance(n, ast.Return) or is_call(n, "release", "locked") for n in ast.walk(one)):
+            break
+    return 0
+
+
+def takes(one, name):
+    """Whether a statement takes the lock and waits for it."""
+    if isinstance(one, (ast.With, ast.AsyncWith)):
+        return any(dotted(item.context_expr) == name for item in one.items)
+    asked = one.value if is_call_alone(one) else None
+    return (
+        is_call(asked, "acquire") and dotted(asked.func.value) == name and not (asked.args or asked.keywords)
+    )
+
+
+def taken_while_held(block, name, taking, tree):
+    """Yield what stands in a block that holds the lock, and takes it: with its line, and that of the function that it
+    calls for it."""
+    if not takes(block, name):
+        return
+    held = block.body if not isinstance(block, ast.Expr) else below(block, tree)
+    for node in now_run(held):
+        if is_call(node, "release") and dotted(node.func.value) == name:
+            return
+        if takes(node, name):
+            yield node, node.lineno, ""
+        elif isinstance(node, ast.Call) and dotted(node.func) in taking:
+            yield node, taking[dotted(node.func)], dotted(node.func)
+
+
+def below(statement, tree):
+    """Return the statements below one in its block."""
+    around = parents_of(tree)[statement]
+    blocks = (statements_of(around, part) for part in ("body", "orelse", "finalbody"))
+    block = next((one for one in blocks if statement in one), [])
+    return block[block.index(statement) + 1 :] if block else []
+
+
+def now_run(statements):
+    """Yield the nodes of statements from the first line to the last, without those that run only when called."""
+    for one in statements:
+        if not isinstance(one, TAKES_LATER):
+            yield one
+            yield from now_run(ast.iter_child_nodes(one))
+
+
+def is_inside(node, scope, tree):
+    while node is not None and node is not scope:
+        node = parents_of(tree).get(node)
+    return node is scope
+
+
+def held_twice(name, made, lines, called):
+    held, line, taken = lines
+    again = "`%s()` takes it again on line %d" % (called, taken) if called else "it is taken again"
+    message = "`%s`, taken on line %d, is still held on line %d, where %s: a `Lock()` lets nobody in twice, "
+    message += "and what waits for it never ends"
+    bare = isinstance(made.func, ast.Name)
+    fix = "write `%sRLock()` on line %d" % ("" if bare else "threading.", made.lineno)
+    fix += ", and import `RLock` from threading" if bare else ""
+    return slip(line, "callback-waits", message % (name, held, line, again), fix, "lock")
+
+
+def values_out_of_order(tree):
+    """Calls of the script's own functions and classes that give two values, named as parameters, in each other's
+    place."""
+    takers = own_takers(tree)
+    for call in all_of(tree, ast.Call):
+        name = dotted(call.func)
+        names = takers.get(name.removeprefix("self."))
+        if names is None or any(isinstance(one, ast.Starred) for one in call.args):
+            continue
+        given = [dotted(one).rpartition(".")[2] for one in call.args]
+        pairs = [(a, b) for a in range(min(len(given), len(names))) for b in range(a)]
+        for later, first in pairs:
+            if given[later] == names[first] != given[first] == names[later]:
+                message = "`%s(…)` takes `%s` before `%s`, and is given them the other way round"
+                fix = "on line %d, swap `%s` and `%s` in the brackets"
+                place = (call.lineno, dotted(call.args[first]), dotted(call.args[later]))
+                yield slip(
+                    call.lineno,
+                    "wrong-value",
+                    message % (name, names[first], names[later]),
+                    fix % place,
+                    "swapped",
+                )
+                break
+
+
+def own_takers(tree):
+    """Return the names of the parameters of the functions, methods and classes of a module, by theirs; of one that
+    two have, none."""
+    parents, found, twice = parents_of(tree), {}, set()
+    for one in all_of(tree, ast.FunctionDef):
+        owner = parents.get(one)
+        in_class = isinstance(owner, ast.ClassDef)
+        static = any(dotted(d) == "staticmethod" for d in one.decorator_list)
+        name = owner.name if in_class and one.name == "__init__" else one.name
+        twice |= {name} & set(found)
+        found[name] = [a.arg for a in one.args.args][1 if in_class and not static else 0 :]
+    return {name: names for name, names in found.items() if name not in twice}

@@ -1,0 +1,95 @@
+"""Calls of a script's own functions that cannot work: a lock taken twice, values in each other's place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from grader.package.python import check_syntax
+
+CLASS = """\
+import threading
+class Node:
+    def __init__(self):
+        self.lock = {lock}
+    def hear(self, msg):
+        {hear}
+    def send(self):
+        {send}
+    def show(self):
+        print(self.lock)
+"""
+HOLDS, TAKES = "with self.lock:\n            self.send()", "with self.lock:\n            print(1)"
+LOCKS = {
+    "called": ("threading.Lock()", HOLDS, TAKES, (7, "write `threading.RLock()` on line 4")),
+    "within": (
+        "threading.Lock()",
+        HOLDS.replace("self.send()", TAKES.replace("\n", "\n    ")),
+        "pass",
+        (7, "RLock"),
+    ),
+    "imported": ("Lock()", HOLDS, TAKES, (7, "write `RLock()` on line 4, and import `RLock` from threading")),
+    "acquired": (
+        "Lock()",
+        "self.lock.acquire(); x = self.send()",
+        "self.lock.acquire(); print(1)",
+        (6, "RLock"),
+    ),
+    "in-a-condition": ("Lock()", HOLDS.replace("self.send()", "if msg: self.send()"), TAKES, (7, "RLock")),
+    "may-be-taken-twice": ("threading.RLock()", HOLDS, TAKES, None),
+    "released-before": ("Lock()", "self.lock.acquire(); self.lock.release(); self.send()", TAKES, None),
+    "returns-before": ("Lock()", HOLDS, "if self.busy(): return\n        " + TAKES, None),
+    "does-not-wait": ("Lock()", HOLDS, "self.lock.acquire(False)", None),
+    "called-later": ("Lock()", HOLDS.replace("self.send()", "Timer(1, lambda e: self.send())"), TAKES, None),
+    "takes-none": ("Lock()", HOLDS.replace("send", "show"), TAKES, None),
+    "of-another-object": ("Lock()", HOLDS.replace("self.send", "other.send"), TAKES, None),
+    "another-lock": ("Lock()", HOLDS, TAKES.replace("lock", "other"), None),
+}
+
+
+@pytest.mark.parametrize("case", LOCKS)
+def test_a_lock_that_is_taken_where_it_is_held(case: str, tmp_path: Path) -> None:
+    lock, hear, send, found = LOCKS[case]
+    (tmp_path / "a.py").write_text(CLASS.format(lock=lock, hear=hear, send=send))
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "callback-waits"]
+    assert [(s.line, s.name, s.is_endless) for s in slips] == ([(found[0], "lock", True)] if found else [])
+    assert not found or found[1] in slips[0].fix
+
+
+def test_locks_of_other_classes_are_others(tmp_path: Path) -> None:
+    texts = (
+        CLASS.format(lock="threading.Lock()", hear=HOLDS, send="pass"),
+        CLASS.format(lock="0", hear="pass", send=TAKES),
+    )
+    (tmp_path / "a.py").write_text("\n".join(texts))
+    assert not [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "callback-waits"]
+
+
+GRID = """\
+class Grid:
+    def __init__(self, width, height, side=1):
+        pass
+    def put(self, row, col):
+        pass
+"""
+ORDERS = {
+    "of-a-class": (
+        "Grid(info.height, info.width)",
+        "on line 6, swap `info.height` and `info.width` in the brackets",
+    ),
+    "of-a-method": ("self.put(col, row)", "on line 6, swap `col` and `row` in the brackets"),
+    "right": ("Grid(info.width, info.height)", ""),
+    "one-of-two": ("Grid(height, 3)", ""),
+    "by-name": ("Grid(height=width, width=height)", ""),
+    "of-others": ("math.atan2(col, row), np.put(col, row)", ""),
+    "of-a-list": ("self.put(*place)", ""),
+}
+
+
+@pytest.mark.parametrize("case", ORDERS)
+def test_values_in_the_place_of_each_other(case: str, tmp_path: Path) -> None:
+    line, fix = ORDERS[case]
+    (tmp_path / "a.py").write_text(f"{GRID}{line}\n")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.fix for s in slips] == ([fix] if fix else [])
