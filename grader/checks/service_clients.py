@@ -206,7 +206,7 @@ def _other_request(
     if swapped := _swapped(nearest, wanted, params):
         by_name = ", ".join(f"{field}=…" for field in nearest.fields or {})
         message = f"{params.service} is called with {join_words(swapped)} swapped: {text}"
-        hint = f"pass the request's fields by name, so that none is swapped: ({by_name})"
+        hint = f"give {join_words(swapped)} each other's values where they are set, or pass them by name: ({by_name})"
         return failed(message, hint=hint)
     hint = f"set {join_words(one.path for one in found)} of the request to what the handout asks for"
     # Remappings are ROS's, and no arguments of the program.

@@ -96,13 +96,13 @@ class PythonSlip(Placed, Record):
       or none, or what each turn of a loop adds or sets again (`name`: `nan`, `degrees`, `return`, `empty`, `unsent`,
       `kept`, `nanoseconds`, `bounds`, `added`); a grid's index that steps by its height, a cell that `int(…)` works
       out of a number below 0, a quaternion of a whole angle, a float for the seconds of a time, the mean of a scan's
-      ranges, a distance without its square root, a parameter that is read where it is not set, what nothing sets
-      back, a cell that is compared with a grid's side as if it had one more, `atan2(x, y)`, two values of a call in
-      each other's place, degrees beside radians, and a distance that is to be exactly 0 (`step`, `cut`, `half`,
-      `secs`, `mean`, `rootless`, `unset`, `stuck`, `edge`, `swapped`, `mixed`, `exact`), a cell that is a product
-      (`times`), a timer's period of 0 (`zero`), a file that each call empties (`emptied`), or of a scan an inf that
-      is made 0, an index that is an angle, and a condition that drives where a wall is near (`inf`, `angle`,
-      `turned`).
+      ranges, a distance without its square root, a parameter that is read where it is not set, or before the node has
+      its name (`early`), what nothing sets back, a cell that is compared with a grid's side as if it had one more,
+      `atan2(x, y)`, two values of a call in each other's place, degrees beside radians, and a distance that is to be
+      exactly 0 (`step`, `cut`, `half`, `secs`, `mean`, `rootless`, `unset`, `stuck`, `edge`, `swapped`, `mixed`,
+      `exact`), a cell that is a product (`times`), a timer's period of 0 (`zero`), a file that each call empties
+      (`emptied`), or of a scan an inf that is made 0, an index that is an angle, and a condition that drives where a
+      wall is near (`inf`, `angle`, `turned`).
 
     No slips, but what a line says, for checks that compare it with what the lab asks; `message` is a name, a number or
     a text:

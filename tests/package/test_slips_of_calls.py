@@ -93,3 +93,25 @@ def test_values_in_the_place_of_each_other(case: str, tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(f"{GRID}{line}\n")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
     assert [s.fix for s in slips] == ([fix] if fix else [])
+
+
+LAMP = "def main():\n    rospy.init_node('lamp')\n"
+EARLY = {
+    "in-a-class": (f"class A:\n    c = rospy.get_param('~c', 1)\n{LAMP}main()\n", "`__init__`"),
+    "above-main": (f"c = rospy.get_param('~c', 1)\n{LAMP}main()\n", "move line 1 below"),
+    "above-the-node": ("c = rospy.get_param('~c', 1)\nrospy.init_node('lamp')\n", "move line 1 below"),
+    "below-the-node": ("rospy.init_node('lamp')\nc = rospy.get_param('~c', 1)\n", ""),
+    "below-main": (f"{LAMP}main()\nclass A:\n    c = rospy.get_param('~c', 1)\n", ""),
+    "in-a-function": (f"def f():\n    return rospy.get_param('~c', 1)\n{LAMP}    f()\nmain()\n", ""),
+    "of-all-nodes": (f"c = rospy.get_param('/c', 1)\n{LAMP}main()\n", ""),
+    "to-be-imported": ("c = rospy.get_param('~c', 1)\n", ""),
+}
+
+
+@pytest.mark.parametrize("case", EARLY)
+def test_a_parameter_that_is_read_before_the_node_has_a_name(case: str, tmp_path: Path) -> None:
+    text, fix = EARLY[case]
+    (tmp_path / "a.py").write_text(text)
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "early"]
+    assert len(slips) == bool(fix)
+    assert all(fix in s.fix for s in slips)

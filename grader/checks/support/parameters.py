@@ -256,7 +256,9 @@ def explain_by_unread_parameter(check: Check, package: PackageFacts, run: Run, v
 
 def _is_misread(package: PackageFacts, run: Run, verdict: Verdict) -> bool:
     """Return whether a line that reads a parameter the wrong way explains a wrong value: `wrong-value` tells it."""
-    return verdict.wrong == "value" and any(s.name == "unset" for s in run_slips(package, run, "wrong-value"))
+    return verdict.wrong == "value" and any(
+        s.name in ("early", "unset") for s in run_slips(package, run, "wrong-value")
+    )
 
 
 def _asked_before(run: Run, asked: str, right: str) -> str:

@@ -12,7 +12,7 @@ from grader.model.verdict import Status, Verdict
 SEEN_AS = {
     "nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": "", "added": "",
     "step": "order", "cut": "place", "half": "value", "secs": "never", "mean": "", "unset": "value",
-    "stuck": "stuck", "edge": "place", "times": "order",
+    "stuck": "stuck", "edge": "place", "times": "order", "early": "value",
 }  # fmt: skip
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so; others always show."""
 

@@ -1,5 +1,5 @@
-"""Finds calls of a script's own functions that cannot work, for `slips.py`: with a lock held that they take again, and
-with two values in each other's place.
+"""Finds calls that cannot work where they stand, for `slips.py`: of functions that take a lock that is held, with two
+values in each other's place, and of a node's own parameters before it is one.
 
 Nothing is executed. Python 3.8, standard library only.
 """
@@ -9,6 +9,8 @@ import ast
 from script_tree import (
     FUNCTIONS,
     all_of,
+    argument,
+    called_name,
     dotted,
     is_call,
     is_call_alone,
@@ -16,6 +18,7 @@ from script_tree import (
     slip,
     statements_of,
     targets_of,
+    text_of,
 )
 
 TAKES_LATER = (*FUNCTIONS, ast.ClassDef)
@@ -164,3 +167,38 @@ def own_takers(tree):
         twice |= {name} & set(found)
         found[name] = [a.arg for a in one.args.args][1 if in_class and not static else 0 :]
     return {name: names for name, names in found.items() if name not in twice}
+
+
+def params_read_early(tree):
+    """The node's own parameters that a script reads while it is loaded, above all that may make it a node."""
+    inits = [n for n in all_of(tree, ast.Call) if called_name(n) == "init_node"]
+    own = {n.name for n in all_of(tree, ast.FunctionDef, ast.ClassDef)}
+    loaded = [n for one in tree.body for n in at_load(one)]
+    begins = [n.lineno for n in loaded if called_name(n) in own or n in inits]
+    for call in loaded if inits and begins else ():
+        private = any(text_of(one).startswith("~") for one in argument(call, 0, "param_name"))
+        if called_name(call) != "get_param" or not private or call.lineno >= min(begins):
+            continue
+        in_class = isinstance(parents_of(tree)[statement_of(call, tree)], ast.ClassDef)
+        message = "a parameter is read before `rospy.init_node(…)` on line %d, when the node has no name yet"
+        fix = "move line %d below `rospy.init_node(…)`" % call.lineno
+        if in_class:
+            fix = "read the parameter of line %d in `__init__`: a class's own lines run when it is defined"
+            fix %= call.lineno
+        yield slip(call.lineno, "wrong-value", message % inits[0].lineno, fix, "early")
+
+
+def at_load(node):
+    """Yield the calls that run when the file is loaded."""
+    if isinstance(node, FUNCTIONS):
+        return
+    if isinstance(node, ast.Call):
+        yield node
+    for one in ast.iter_child_nodes(node):
+        yield from at_load(one)
+
+
+def statement_of(node, tree):
+    while not isinstance(node, ast.stmt):
+        node = parents_of(tree)[node]
+    return node

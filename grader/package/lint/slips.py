@@ -5,8 +5,7 @@ What nothing calls, statements without an effect, imports. Names are for `script
 `script_prints.py`, base classes for `script_bases.py`, threads, locks and generators for `script_waits.py`, ends of
 goals for `script_goals.py`, loops for `script_loops.py`, their rates for `script_rates.py`, values for
 `script_values.py`, arithmetic for `script_arithmetic.py`, scans for `script_scans.py`, counters and clocks for
-`script_counters.py`, what functions return for `script_results.py`, calls of a script's own
-functions for `script_calls.py`.
+`script_counters.py`, what functions return for `script_results.py`, calls that cannot work for `script_calls.py`.
 
 Nothing is executed. A file has to be parsed by ROS's own Python, which is to run it: Python 3.8, standard library only.
 """
@@ -70,7 +69,7 @@ def slips(tree):
         objects.unused_publishers, objects.unsent_messages, objects.lost_objects, rates.loops_of_numbers,
         goals.finished_goals, goals.finished_in_loops, goals.ended_without_result, counters.sends_no_time, without_node,
         debuggers, script_results.results, rates.turns_taken_off, script_bases.unmade_bases, script_waits.waits,
-        calls.locks_taken_twice, calls.values_out_of_order,
+        calls.locks_taken_twice, calls.values_out_of_order, calls.params_read_early,
     )  # fmt: skip
     found = [one for find in finders for one in find(tree)]
     # of two that say why a name is not there, the first is about the class that it belongs to
