@@ -460,3 +460,43 @@ def test_angles_and_distances(text: str, names: list[str], tmp_path: Path) -> No
     (tmp_path / "a.py").write_text(text, encoding="utf-8")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
     assert [s.name for s in slips] == names
+
+
+FIRST = """\
+class Robot:
+    def __init__(self):
+        self.scan = None
+        rospy.Subscriber('/scan', {kind}, self.hear)
+    def hear(self, msg):
+        {hear}
+    def go(self):
+        {go}
+"""
+KEPT = {
+    "the-first": ("LaserScan", "if self.scan is None: self.scan = msg", "pass", 6),
+    "its-ranges": (
+        "LaserScan",
+        "with self.lock:\n            if not self.scan: self.scan = msg.ranges",
+        "pass",
+        7,
+    ),
+    "each": ("LaserScan", "self.scan = msg", "pass", 0),
+    "set-back": ("LaserScan", "if self.scan is None: self.scan = msg", "self.scan = None", 0),
+    "more-of-each": (
+        "LaserScan",
+        "if self.scan is None: self.scan = msg\n        print(min(msg.ranges))",
+        "pass",
+        0,
+    ),
+    "only-its-form": ("LaserScan", "if self.scan is None: self.scan = msg.angle_min", "pass", 0),
+    "once": ("LaserScan", "if self.scan is None: self.scan = msg; self.sub.unregister()", "pass", 0),
+    "where-it-began": ("Odometry", "if self.scan is None: self.scan = msg", "pass", 0),
+}
+
+
+@pytest.mark.parametrize("case", KEPT)
+def test_a_callback_that_keeps_the_first_scan(case, tmp_path):
+    kind, hear, go, line = KEPT[case]
+    (tmp_path / "a.py").write_text(FIRST.format(kind=kind, hear=hear, go=go))
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "first"]
+    assert [s.line for s in slips] == ([line] if line else [])

@@ -16,7 +16,7 @@ SEEN_AS = {
 }  # fmt: skip
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so; others always show."""
 
-STEERING = ("swapped", "mixed", "rootless", "inf", "angle", "turned", "negative", "ungiven")
+STEERING = ("swapped", "mixed", "rootless", "inf", "angle", "turned", "negative", "ungiven", "first")
 OF_STEERING = ("ends-at", "stays-within", "path", "reacts")
 """What leads a robot astray wherever its script computes so, and the checks of what a robot does."""
 

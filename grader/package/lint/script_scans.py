@@ -14,10 +14,14 @@ from script_names import (
 from script_tree import (
     FUNCTIONS,
     all_of,
+    callback_of,
     called_name,
+    calls_in,
     dotted,
+    functions_in,
     names_in,
     parents_of,
+    published_type,
     slip,
     statements_of,
 )
@@ -396,3 +400,41 @@ def computed(left, op, right):
     if isinstance(op, (ast.Div, ast.FloorDiv)):
         return (times, by * number, 0) if times else (0, 1, more // number)
     return (times * number, by, more * number) if isinstance(op, ast.Mult) else None
+
+
+OF_MOMENTS = ("LaserScan", "Range")
+"""Messages that say how it is now, of which the first one alone is of no use."""
+
+
+def first_scans(tree):
+    """Callbacks that keep the first scan, and nothing of those that come later."""
+    functions = functions_in(tree)
+    for call in all_of(tree, ast.Call):
+        own = callback_of(call, functions)
+        if own is None or published_type(call) not in OF_MOMENTS:
+            continue
+        heard = next((a.arg for a in own.args.args if a.arg != "self"), "")
+        reads = [n for n in ast.walk(own) if isinstance(n, ast.Name) and n.id == heard]
+        for one in (n for n in ast.walk(own) if isinstance(n, ast.If)):
+            name = asked_for_none(one.test)
+            taken = (n for n in one.body if isinstance(n, ast.Assign))
+            whole = (n for n in taken if dotted(n.value) in (heard, heard + ".ranges"))
+            kept = {dotted(t) for n in whole for t in n.targets}
+            inside = set(ast.walk(ast.Module(one.body, [])))
+            given = [n for n in all_of(tree, ast.Name, ast.Attribute) if isinstance(n.ctx, ast.Store)]
+            given = [n for n in given if dotted(n) == name]
+            once = calls_in(own, "unregister", "signal_shutdown", "set")
+            # where it begins, and here
+            if name in kept and not once and not one.orelse and inside.issuperset(reads) and len(given) <= 2:
+                message = "`%s` keeps the first message of its topic, and none that comes later" % name
+                fix = "on line %d, take out the condition, so that each message takes its place" % one.lineno
+                yield slip(one.lineno, "wrong-value", message, fix, "first")
+                break
+
+
+def asked_for_none(test):
+    """Return the name of `name is None` and `not name`; "" of all else."""
+    if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
+        return dotted(test.operand)
+    is_none = isinstance(test, ast.Compare) and isinstance(test.ops[0], ast.Is) and len(test.ops) == 1
+    return dotted(test.left) if is_none and getattr(test.comparators[0], "value", 0) is None else ""

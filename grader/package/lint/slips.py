@@ -69,7 +69,7 @@ def slips(tree):
         objects.unused_publishers, objects.unsent_messages, objects.lost_objects, rates.loops_of_numbers,
         goals.finished_goals, goals.finished_in_loops, goals.ended_without_result, counters.sends_no_time, without_node,
         debuggers, script_results.results, rates.turns_taken_off, script_bases.unmade_bases, script_waits.waits,
-        calls.locks_taken_twice, calls.values_out_of_order, calls.params_read_early,
+        calls.locks_taken_twice, calls.values_out_of_order, calls.params_read_early, scans.first_scans,
     )  # fmt: skip
     found = [one for find in finders for one in find(tree)]
     # of two that say why a name is not there, the first is about the class that it belongs to
