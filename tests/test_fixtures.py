@@ -101,11 +101,15 @@ def test_declarations(lab) -> None:
 
 @each_lab
 def test_one_cause_explains_what_is_blocked(lab) -> None:
+    """What it requires is lost, or it says which other one has paid for the same exception or unheard topic."""
     requires = {criterion.id: criterion.requires for criterion in rubric_of(lab).criteria}
     for name in fixture_names(lab):
-        expect = read_fixture(lab, name).expect
-        blocked = [i for i, status in expect.items() if status == "blocked"]
-        assert [i for i in blocked if not set(requires[i]) & set(expect)] == [], name
+        fixture = read_fixture(lab, name)
+        failed = "|".join(i for i, status in fixture.expect.items() if status == "fail")
+        charged = re.compile(rf"blocked by (?:{failed}): .*(?:Error|no node subscribes)")
+        blocked = [i for i, status in fixture.expect.items() if status == "blocked"]
+        unexplained = [i for i in blocked if not set(requires[i]) & set(fixture.expect)]
+        assert [i for i in unexplained if not charged.match(fixture.message.get(i, ""))] == [], name
 
 
 @pytest.mark.full
