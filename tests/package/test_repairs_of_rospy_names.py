@@ -147,6 +147,13 @@ LACKING = {
                  "rospy.init_node('talker')\npub.publish(1)\n"},
         [],
     ),
+    "init-in-the-class-of-a-module": Case(
+        {"src/base.py": "import rospy\n\n\nclass Base:\n    def __init__(self):\n        rospy.init_node('talker')\n",
+         TALKER: "#!/usr/bin/env python3\nimport rospy\nfrom std_msgs.msg import Int8\nfrom base import Base\n\n\n"
+                 "class Talker(Base):\n    def run(self):\n        rospy.Subscriber('numeric_chatter', Int8, print)\n"
+                 "        rospy.spin()\n\n\nif __name__ == '__main__':\n    Talker().run()\n"},
+        [],
+    ),
     "init-without-topics": Case(
         {TALKER: "#!/usr/bin/env python3\nimport rospy\n\nprint(rospy.get_param_names())\n"}, [],
     ),

@@ -96,12 +96,16 @@ def examine(
     `fields` are those of the submission's own messages, by package and class, `site` is the folder that has fissix."""
     warnings.simplefilter("ignore")
     sys.path.append(site)
-    modules = {name for _, text in files for name in re.findall(IMPORTED, text)}
-    imported = {part for name in modules for part in re.findall(r"\w+", name)}
+    imports = {file: set(re.findall(r"\w+", " ".join(re.findall(IMPORTED, text)))) for file, text in files}
+    imported = set().union(*imports.values())
+    own = {PurePosixPath(file).stem: text for file, text in files}
+    makes_node = any("init_node" in text for name, text in own.items() if name in imported)
     for file, text in files:
         try:
             name = PurePosixPath(file).stem
-            steps = list(_steps(text, types, Known(ROSPY, fields), name, is_run=name not in imported))
+            # a module of the package may make the node of a script that imports it
+            node = "" if makes_node and imports[file] & own.keys() else name
+            steps = list(_steps(text, types, Known(ROSPY, fields), node, is_run=name not in imported))
             names = _names(steps[-1]["text"] if steps else text)
         except (RecursionError, MemoryError):
             steps, names = [], []
@@ -111,8 +115,9 @@ def examine(
 IMPORTED = re.compile(r"^\s*(?:from|import)\s+([\w.]+(?:\s+import\s+\w+)?)", re.MULTILINE)
 
 
-def _steps(text: str, types: list[str], known: Known, name: str, *, is_run: bool = True) -> Iterator[Step]:
-    """Yield what is wrong in a script of this name that `is_run`, or in a module that others import."""
+def _steps(text: str, types: list[str], known: Known, node: str, *, is_run: bool = True) -> Iterator[Step]:
+    """Yield what is wrong in a script that `is_run`, or in a module that others import. `node` is a name for the node
+    that the script does not make; "" where another file may make it."""
     for step in make_readable(text):
         text = step["text"]
         yield step
@@ -144,7 +149,7 @@ def _steps(text: str, types: list[str], known: Known, name: str, *, is_run: bool
             with_lines_turned,
             _with_lines_inside,
             _with_start,
-            *((_with_main, lambda t: with_init(t, name), _with_server_started, _with_spin) if is_run else ()),
+            *((_with_main, lambda t: with_init(t, node), _with_server_started, _with_spin) if is_run else ()),
         ):
             for step in repair(text):
                 if step["text"] in seen:  # two repairs that undo each other would do so for ever
