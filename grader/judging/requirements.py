@@ -128,8 +128,9 @@ def charge_once(
     rubric: Rubric, verdicts: Mapping[str, Verdict], judged: Collection[str] = ()
 ) -> dict[str, Verdict]:
     """Return the verdicts, with those blocked that lost all of their points to what another one has lost its own to
-    already: an exception in a callback, or a topic that no node hears. Such a node goes on, so nothing that `requires`
-    names is lost. `judged` are the criteria that a repaired copy has judged."""
+    already: an exception, or a topic that no node hears. `requires` names nothing that is lost where the node goes on
+    after it, as after one in a callback, or ends of it in another run. `judged` are the criteria that a repaired copy
+    has judged."""
     charged, told = dict[str, str](), dict(verdicts)
     # students see the hint of the one that is charged
     for criterion in sorted(rubric.criteria, key=lambda c: (c.visibility != "visible", not c.points)):

@@ -97,7 +97,7 @@ def examine(
     warnings.simplefilter("ignore")
     sys.path.append(site)
     imports = {file: set(re.findall(r"\w+", " ".join(re.findall(IMPORTED, text)))) for file, text in files}
-    imported = set().union(*imports.values())
+    imported = {part for parts in imports.values() for part in parts}
     own = {PurePosixPath(file).stem: text for file, text in files}
     makes_node = any("init_node" in text for name, text in own.items() if name in imported)
     for file, text in files:
