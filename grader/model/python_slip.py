@@ -71,8 +71,7 @@ class PythonSlip(Placed, Record):
     - `deaf`: why the node goes on after Ctrl-C.
     - `callback-called`, `callback-values`, `callback-missing`: a callback that is called where it should only be named,
       that takes another number of values than ROS passes, or that does not exist.
-    - `callback-waits`: a topic's or service's callback that sleeps, or never ends, or makes its publisher itself; or a
-      lock that is taken where it is held already (`name`: `lock`).
+    - `callback-waits`: a topic's or service's callback that sleeps, or never ends, or makes its publisher itself.
     - `not-printed`: why a topic's callback prints nothing of any message; `name` is the topic as it is written there.
     - `printed-in-part`: why it prints some messages only, or something else than their values; `name` as above.
     - `subscribed-again`: a `Subscriber(…)` that a loop makes in each turn.
@@ -146,9 +145,9 @@ class PythonSlip(Placed, Record):
     def is_endless(self) -> bool:
         """Whether a callback never ends, or is never called, or what it needs is made again and again: not a sleep."""
         told = re.search(r"never (?:ends|calls)|subscribes again|makes another publisher", self.message)
-        return self.kind == "callback-waits" and bool(told)
+        return self.is_lock or (self.kind == "callback-waits" and bool(told))
 
     @property
     def is_lock(self) -> bool:
-        """Whether a callback waits for a lock that is held already."""
-        return self.kind == "callback-waits" and self.name == "lock"
+        """Whether a function waits for a lock that is held already."""
+        return self.kind == "stuck" and self.name == "lock"

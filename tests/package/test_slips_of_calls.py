@@ -52,7 +52,7 @@ LOCKS = {
 def test_a_lock_that_is_taken_where_it_is_held(case: str, tmp_path: Path) -> None:
     lock, hear, send, found = LOCKS[case]
     (tmp_path / "a.py").write_text(CLASS.format(lock=lock, hear=hear, send=send))
-    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "callback-waits"]
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "lock"]
     assert [(s.line, s.name, s.is_endless) for s in slips] == ([(found[0], "lock", True)] if found else [])
     assert not found or found[1] in slips[0].fix
 
@@ -63,7 +63,7 @@ def test_locks_of_other_classes_are_others(tmp_path: Path) -> None:
         CLASS.format(lock="0", hear="pass", send=TAKES),
     )
     (tmp_path / "a.py").write_text("\n".join(texts))
-    assert not [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "callback-waits"]
+    assert not [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "lock"]
 
 
 GRID = """\

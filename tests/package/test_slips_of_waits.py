@@ -23,10 +23,6 @@ KINDS = {
 }
 KINDS |= {"publish-twice", "no-effect", "callback-missing"}
 TALK = "def talk():\n    pub.publish(1)\n"
-LOCKED = "lock = Lock()\ndef f():\n    with lock:\n        a()\ndef g():\n    with lock:\n        f()\n"
-RLOCK = (
-    "stuck:3:on line 1, write `RLock()` in place of `Lock()`, and import it: it lets its own thread in again"
-)
 OUT = "def out():\n    while True:\n        m = yield\n        print(m)\no = out()\n"
 TASK = "async def talk():\n    await x()\n"
 HEARD = "rospy.Subscriber('t', String, heard)\n"
@@ -42,10 +38,6 @@ SLIPS = {
     "thread-started": (TALK + "t = Thread(target=talk)\nt.daemon = True\nt.start()\n", []),
     "thread-listed": (TALK + "t = Thread(target=talk)\nfor one in [t]:\n    one.start()\n", []),
     "thread-handed": (TALK + "t = Thread(target=talk)\nbegin(t)\n", []),
-    "lock": (LOCKED, [RLOCK]),
-    "rlock": (LOCKED.replace("Lock()", "RLock()"), []),
-    "lock-behind": (LOCKED.replace("        f()", "        b()\n    f()"), []),
-    "lock-later": (LOCKED.replace("        f()", "        later(lambda: f())"), []),
     "process": (TALK + "pub = rospy.Publisher('a', Int8)\nProcess(target=talk).start()\n",
                 ["stuck:4:on line 4, write `threading.Thread(…)` in place of `Process(…)`, and import threading"]),
     "process-own": (("def talk():\n    rospy.init_node('a')\n    pub = rospy.Publisher('a', Int8)\n    pub.publish(1)\n"

@@ -72,7 +72,7 @@ def explain_by_waiting_callback(check: Check, package: PackageFacts, run: Run, v
     """Return a lost mark with the callback that sleeps or never ends: until it returns, its script receives nothing."""
     of_callbacks = check.of_callbacks or check.name in (*OF_RESULTS, "action-result")
     files = files_that_run(package, run) if of_callbacks and not verdict.cause else ()
-    waits = (s for s in package.slips if s.kind == "callback-waits" and s.file in files)
+    waits = (s for s in package.slips if (s.kind == "callback-waits" or s.is_lock) and s.file in files)
     slip = next((s for s in waits if check.name != "action-result" or s.is_lock), None)
     # What should come before any callback does not wait for one.
     if slip is None or verdict.callbacks == "before":

@@ -126,7 +126,7 @@ def held_twice(name, made, lines, called):
     bare = isinstance(made.func, ast.Name)
     fix = "write `%sRLock()` on line %d" % ("" if bare else "threading.", made.lineno)
     fix += ", and import `RLock` from threading" if bare else ""
-    return slip(line, "callback-waits", message % (name, held, line, again), fix, "lock")
+    return slip(line, "stuck", message % (name, held, line, again), fix, "lock")
 
 
 def values_out_of_order(tree):

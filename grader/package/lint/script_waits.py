@@ -30,7 +30,7 @@ SENDERS = ("publish", "put", "put_nowait")
 def waits(tree):
     """All that this module finds."""
     finders = (
-        unstarted_threads, locked_twice, forked_publishers, async_callbacks, unstarted_generators, lost_tasks,
+        unstarted_threads, forked_publishers, async_callbacks, unstarted_generators, lost_tasks,
         unused_calls, spent_generators, emptied_once, timed_twice, kept_errors, left_on_errors,
     )  # fmt: skip
     for find in finders:
@@ -71,46 +71,6 @@ def used_for(name, tree):
             parent = parents.get(node)
             used.add(parent.attr if isinstance(parent, ast.Attribute) else "")
     return used
-
-
-def locked_twice(tree):
-    """A function that takes a `Lock()` and calls another one of the script that takes it too, and so waits for ever."""
-    made = {}
-    for one in all_of(tree, ast.Assign):
-        made.setdefault(dotted(one.targets[0]), []).append(one)
-    locks = {name for name, given in made.items() if all(called_name(one.value) == "Lock" for one in given)}
-    functions, parents = functions_in(tree), parents_of(tree)
-    takers = {(f.name, name): node for f in functions.values() for node, name in held(f) if name in locks}
-    for block, name in held(tree):
-        for call in (n for one in block.body for n in ast.walk(one) if isinstance(n, ast.Call)):
-            owner, _, called = dotted(call.func).rpartition(".")
-            inner = takers.get((called, name)) if owner in ("", "self") else None
-            if inner is not None and not in_function_between(call, block, parents):
-                message = (
-                    "line %d waits for ever for `%s`, which line %d already holds when line %d calls `%s`"
-                )
-                message %= (inner.lineno, name, block.lineno, call.lineno, called)
-                line = made[name][0].lineno
-                fix = "on line %d, write `RLock()` in place of `Lock()`, and import it: it lets its own thread in again"
-                yield slip(inner.lineno, "stuck", message, fix % line, name)
-                return
-
-
-def held(node):
-    """Yield the `with lock:` blocks in a node, each with the lock's name."""
-    for block in ast.walk(node):
-        for item in block.items if isinstance(block, ast.With) else ():
-            if isinstance(item.context_expr, (ast.Name, ast.Attribute)):
-                yield block, dotted(item.context_expr)
-
-
-def in_function_between(node, block, parents):
-    """Return whether a node is in a function that a block only defines."""
-    while node is not block:
-        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)):
-            return True
-        node = parents[node]
-    return False
 
 
 def forked_publishers(tree):
