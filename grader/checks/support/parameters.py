@@ -16,9 +16,9 @@ from grader.checks.registry import Check
 from grader.checks.support.console_output import Line
 from grader.checks.support.exit_causes import Ending, explain_end, explain_error
 from grader.checks.support.fields import value_text
-from grader.checks.support.processes import base_name, early_end, run_slips
+from grader.checks.support.processes import base_name, early_end
 from grader.checks.support.text import both, get_param, init, near_names, shown
-from grader.checks.support.topics import cite, nodes_on, published_topics
+from grader.checks.support.topics import cite, files_that_run, nodes_on, published_topics
 from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
 from grader.line_slips.yaml import YAML_LINES_MAX, slip_of_yaml
@@ -256,9 +256,9 @@ def explain_by_unread_parameter(check: Check, package: PackageFacts, run: Run, v
 
 def _is_misread(package: PackageFacts, run: Run, verdict: Verdict) -> bool:
     """Return whether a line that reads a parameter the wrong way explains a wrong value: `wrong-value` tells it."""
-    return verdict.wrong == "value" and any(
-        s.name in ("early", "unset") for s in run_slips(package, run, "wrong-value")
-    )
+    files = files_that_run(package, run)
+    found = (s for s in package.slips if s.kind == "wrong-value" and s.name in ("early", "unset"))
+    return verdict.wrong == "value" and any(s.file in files for s in found)
 
 
 def _asked_before(run: Run, asked: str, right: str) -> str:
