@@ -362,12 +362,8 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
         return failed(f"{message}: {asleep.message}", hint=hint, citations=(asleep.place,))
     others = _goes_on(found, run, params)
     # A loop that still publishes on another topic was not left.
-    kinds: tuple[SlipKind, ...] = (
-        "spin-in-loop",
-        "unregistered",
-        "stuck",
-        *(() if others else ("loop-left",)),
-    )
+    kinds: list[SlipKind] = ["spin-in-loop", "unregistered", "stuck"]
+    kinds += [] if others else ["loop-left"]
     if slip := next(iter(_slips(run, package, params, *kinds)), None):
         return failed(f"{message}: {slip.message}", hint=slip.fix, citations=(slip.place,))
     if end := explain_error(package, run):
