@@ -462,7 +462,7 @@ def test_angles_and_distances(text: str, names: list[str], tmp_path: Path) -> No
     assert [s.name for s in slips] == names
 
 
-FIRST = """\
+HEARS_SCANS = """\
 class Robot:
     def __init__(self):
         self.scan = None
@@ -472,7 +472,7 @@ class Robot:
     def go(self):
         {go}
 """
-KEPT = {
+SCANS_KEPT = {
     "the-first": ("LaserScan", "if self.scan is None: self.scan = msg", "pass", 6),
     "its-ranges": (
         "LaserScan",
@@ -494,9 +494,9 @@ KEPT = {
 }
 
 
-@pytest.mark.parametrize("case", KEPT)
+@pytest.mark.parametrize("case", SCANS_KEPT)
 def test_a_callback_that_keeps_the_first_scan(case, tmp_path):
-    kind, hear, go, line = KEPT[case]
-    (tmp_path / "a.py").write_text(FIRST.format(kind=kind, hear=hear, go=go))
+    kind, hear, go, line = SCANS_KEPT[case]
+    (tmp_path / "a.py").write_text(HEARS_SCANS.format(kind=kind, hear=hear, go=go))
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "first"]
     assert [s.line for s in slips] == ([line] if line else [])
