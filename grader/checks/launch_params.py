@@ -214,7 +214,8 @@ def _loaded_otherwise(
         moved = load.namespace.rstrip("/") + missing
         if moved in found and moved != missing:
             why = f"the file is loaded into {load.namespace}, where {missing} becomes {moved}"
-            return Slip(load.file, load.line, why, OUTSIDE.format(package.name, params.file)).verdict()
+            hint = OUTSIDE.format(package.name, params.file).replace("the <node>", "any <node> and <group>")
+            return Slip(load.file, load.line, why, hint).verdict()
     if missing in found:
         message = f"{missing} is set only after the node has started"
         return failed(message, hint=OUTSIDE.format(package.name, params.file))

@@ -495,7 +495,8 @@ def _find_swap(file: LaunchFile, name: str, params: LaunchRunsParams) -> Verdict
     for node in _nodes_named(file, name):
         program = PurePosixPath(node.type or "").stem
         if f"/{program}" != name and f"/{program}" in params.nodes:
-            why = f"{name} runs {node.type}, whose name is /{program}: the names are swapped"
+            swapped = any(n.full_name == f"/{program}" for n in file.brings)
+            why = f"{name} runs {node.type}, whose name is /{program}" + ": the names are swapped" * swapped
             fix = f'write name="{program}" beside type="{node.type}"'
             return Slip(node.file, node.line, why, fix).verdict()
     return None

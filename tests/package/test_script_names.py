@@ -140,6 +140,7 @@ def test_a_statement_that_changes_nothing(tmp_path, code, fix):
 
 PAIR = "    def go(self):\n        self.pub.publish(1)\n"
 MADE = "    def __init__(self):\n        self.pub = 1\n"
+SPINS = "    def __init__(self):\n        spin()\n        self.pub = 1\n"
 SET = "    def set(self):\n        self.pub = 1\n"
 OBJECTS = {
     "good": (f"class A:\n{MADE}{PAIR}a = A()\na.go()\nA.go(a)\n", ""),
@@ -158,6 +159,8 @@ OBJECTS = {
                      "indent `def __init__` on line 4 like the other methods of A, and its lines below it"),
     "without-self": (f"class A:\n{MADE.replace('self.pub', 'pub')}{PAIR}",
                      "on line 3, write `self.pub` instead of `pub`"),
+    "behind-a-spin": (f"class A:\n{SPINS}{PAIR}A()\n",
+                      "move line 4 above line 3"),
     "spelt-otherwise": (f"class A:\n{MADE}{PAIR.replace('pub.', 'pubs.')}",
                         "on line 5, write `self.pub` instead of `self.pubs`"),
     "other-method": (f"class A:\n{MADE.replace('__init__', 'setup')}{PAIR}",

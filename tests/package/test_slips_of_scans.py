@@ -500,3 +500,17 @@ def test_a_callback_that_keeps_the_first_scan(case, tmp_path):
     (tmp_path / "a.py").write_text(HEARS_SCANS.format(kind=kind, hear=hear, go=go))
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "first"]
     assert [s.line for s in slips] == ([line] if line else [])
+
+
+@pytest.mark.parametrize(
+    ("loop", "found"),
+    [
+        ("for k in s:\n        print(k, d[s][k])", [(3, "on line 2, write `for k in d[s]:`")]),
+        ("for k in d[s]:\n        print(k, d[s][k])", []),
+        ("for k in s:\n        print(d[k])", []),
+    ],
+)
+def test_letters_of_a_key(loop: str, found: list[tuple[int, str]], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"for s in d:\n    {loop}\n", encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "letters"]
+    assert [(s.line, s.fix) for s in slips] == found

@@ -391,6 +391,15 @@ OF_OTHER_LINES = {
 }
 
 
+EXPLAINED_ELSEWHERE = {
+    "TypeError",
+    "UnboundLocalError",
+    "ValueError",
+    "KeyError",
+    "ROSSerializationException",
+}
+
+
 def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
     """Return the cause and the hint of an error that other lines of the file explain."""
     own = [s for s in package.slips if s.file == place.file]
@@ -399,7 +408,8 @@ def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts
     hidden += [s for s in own if s.name == "nanoseconds" and "format requires" in found.message]
     if found.kind == "TypeError":
         hidden += [s for s in own if (s.kind, s.line) == ("defined-twice", place.line)]
-    if hidden and found.kind in {"TypeError", "UnboundLocalError", "ValueError", "ROSSerializationException"}:
+    hidden += [s for s in own if (s.name, s.line) == ("letters", place.line)]
+    if hidden and found.kind in EXPLAINED_ELSEWHERE:
         return hidden[0].message, hidden[0].fix
     if found.kind in {"NameError", "UnboundLocalError"}:
         return _misspelt(found, place, package)

@@ -443,7 +443,7 @@ def explain_failure(package: PackageFacts, run: Run) -> Ending | None:
     if end is None:
         return None
     key = re.match(r"KeyError: ['\"]?([^'\" (]+)", end.cause)
-    if key is None:
+    if key is None or "the letters of the key" in end.cause:
         return end
     names = list(without_system_params(params_on_server(run)))
     parts = {part for name in names for part in name.split("/") if part}

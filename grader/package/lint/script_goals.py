@@ -9,7 +9,6 @@ from script_callbacks import BELOW_LIMIT, excludes
 from script_names import (
     set_in,
 )
-from script_objects import FINISHING
 from script_tree import (
     LOOPS,
     all_of,
@@ -22,6 +21,7 @@ from script_tree import (
     slip,
     statements_of,
 )
+from script_unsent import FINISHING
 
 
 def finished_goals(tree):

@@ -12,14 +12,11 @@ from collections import Counter
 
 from script_names import (
     CALL_BACK,
-    USES_LIMIT,
     bound_names,
-    given_names,
     set_in,
 )
 from script_texts import NAMED
 from script_tree import (
-    LOOPS,
     TEXT_LIMIT,
     all_of,
     argument,
@@ -28,19 +25,16 @@ from script_tree import (
     calls_in,
     dotted,
     functions_in,
-    is_call,
     listed,
     names_in,
     parents_of,
     published_type,
-    reads_names_in_texts,
     slip,
     statements_of,
     targets_of,
-    text_of,
     walk,
 )
-from script_values import in_callback, stored_in
+from script_values import stored_in
 
 
 def object_slips(tree):
@@ -50,7 +44,9 @@ def object_slips(tree):
         return
     for one in classes:
         if all(dotted(base) == "object" for base in one.bases):
-            yield from lacking_attributes(Members(one, tree))
+            own = Members(one, tree)
+            yield from lacking_attributes(own)
+            yield from given_behind_spin(own)
     yield from methods_inside(tree)
     yield from fields_of_none(tree)
     yield from classes_as_objects({one.name: one for one in classes}, tree)
@@ -141,6 +137,18 @@ def lacking_attributes(own):
         else:
             continue
         yield slip(node.lineno, "object", message, fix, name)
+
+
+def given_behind_spin(own):
+    """Yield where an attribute is read whose only value is given behind a `spin()` of another method."""
+    for node, reader in own.reads:
+        stored, method = own.stores.get(node.attr, [(node, reader)])[0]
+        body = getattr(method, "body", ()) if len(own.stores.get(node.attr, ())) == 1 else ()
+        spins = [n.lineno for n in body if isinstance(n, ast.Expr) and called_name(n.value) == "spin"]
+        if method is not reader and spins and spins[0] < stored.lineno and node.attr not in own.fixed:
+            message = "line %d gives `self.%s` a value, behind line %d, which waits until the node ends"
+            fix = "move line %d above line %d" % (stored.lineno, spins[0])
+            yield slip(node.lineno, "object", message % (stored.lineno, node.attr, spins[0]), fix, node.attr)
 
 
 def fields_of_none(tree):
@@ -368,150 +376,6 @@ def below_the_last(block):
         if is_run and calls_in(getattr(one, "test", one), "spin", "is_shutdown"):
             return block[at + 1 :]
     return []
-
-
-def unused_publishers(tree):
-    """Yield each `pub = Publisher(…)` whose `pub` nothing in the script uses, so that nothing is published by it."""
-    # of an attribute, another object's name may stand for `self`, and a class's own is read by `self`
-    read = {dotted(n).rpartition(".")[2] for n in walk(tree) if isinstance(getattr(n, "ctx", None), ast.Load)}
-    if reads_names_in_texts(tree):
-        return
-    answers = calls_in(tree, "Subscriber", "Timer") and not all_of(tree, ast.While)
-    where = in_callback(tree) if answers else " inside the loop" if all_of(tree, *LOOPS) else ""
-    for node in all_of(tree, ast.Assign):
-        name = dotted(node.targets[0])
-        topics = argument(node.value, 0, "name") if is_call(node.value, "Publisher") else []
-        if topics and "..." not in name and name.rpartition(".")[2] not in read:
-            message = "nothing in the script calls `%s.publish(…)`" % name
-            fix = "call `%s.publish(…)`%s" % (name, where)
-            yield slip(node.lineno, "never-published", message, fix, text_of(topics[0]))
-    yield from replaced_publishers(tree)
-
-
-def replaced_publishers(tree):
-    """Yield each `pub = Publisher(…)` whose name another publisher gets in the same block, before anything uses it."""
-    blocks = [n.body for n in walk(tree) if isinstance(getattr(n, "body", None), list)]
-    for body in blocks:
-        made = {}
-        for one in body:
-            name = dotted(one.targets[0]) if isinstance(one, ast.Assign) else ""
-            first = made.get(name)
-            for used in [n for n in made if n in names_in(getattr(one, "value", one))]:
-                del made[used]
-            topics = argument(one.value, 0, "name") if name and is_call(one.value, "Publisher") else []
-            if topics and first and first[1] != text_of(topics[0]):
-                message = "line %d gives `%s` another publisher, so nothing is sent by this one"
-                fix = "on line %d, give it another name than `%s`, and publish with each of the two"
-                says = (one.lineno, name)
-                yield slip(first[0], "never-published", message % says, fix % says, first[1])
-            if topics:
-                made[name] = one.lineno, text_of(topics[0])
-
-
-def unsent_messages(tree):
-    """Yield where a message is made and its fields are set, and nothing takes it."""
-    froms = all_of(tree, ast.ImportFrom)
-    of_messages = {a.asname or a.name for n in froms for a in n.names if is_of_messages(n.module)}
-    if reads_names_in_texts(tree):
-        return
-    parents, made = parents_of(tree), []
-    for node in all_of(tree, ast.Assign):
-        kind = dotted(getattr(node.value, "func", None))
-        is_message = kind in of_messages or ("*" in of_messages and kind[:1].isupper())
-        if is_message or is_of_messages(kind.rpartition(".")[0]):
-            made.append((node, kind))
-    for node, kind in made[:USES_LIMIT]:
-        around, name = scope_of(node, tree, parents), dotted(node.targets[0])
-        if isinstance(around, ast.ClassDef):
-            around, name = tree, "self." + name
-        # a part of another message is sent with it
-        if "." in name.replace("self.", "", 1):
-            continue
-        filled = stores_in(name, around if name.isidentifier() else tree)
-        if filled and "..." not in name and len(node.targets) == 1:
-            last = max(n.lineno for n in filled)
-            message = "`%s` is filled in, and never used after that" % name
-            fix = how_to_send(name, kind.rpartition(".")[2], last, around, tree)
-            yield slip(last, "wrong-value", message, fix, "unsent")
-
-
-def is_of_messages(module):
-    return ".%s" % (module or "").rpartition(".")[2] in (".msg", ".srv")
-
-
-def lost_objects(tree):
-    """Yield where a name is used that is called like a class of messages or services, and gets no object of it."""
-    froms = [n for n in all_of(tree, ast.ImportFrom) if is_of_messages(n.module)]
-    kinds = {a.name.lower(): (a.name, n.module.endswith(".srv")) for n in froms for a in n.names}
-    names, waits = all_of(tree, ast.Name), calls_in(tree, "wait_for_service")
-    own = given_names(tree, names) if kinds else set()
-    topic = next((text_of(n.args[0]) for n in waits if n.args), "") or "…"
-    for node in (n for n in names if n.id in kinds and n.id not in own):
-        (kind, of_service), around = kinds[node.id], parents_of(tree).get(node)
-        is_set = isinstance(around, ast.Attribute) and isinstance(around.ctx, ast.Store)
-        if is_set or (of_service and getattr(around, "func", None) is node):
-            made = "%s()" % kind if is_set else "rospy.ServiceProxy('%s', %s)" % (topic, kind)
-            fix = "above line %d, write `%s = %s`" % (node.lineno, node.id, made)
-            yield slip(
-                node.lineno, "undefined", "nothing in the file gives `%s` a value" % node.id, fix, node.id
-            )
-            return  # the first is where the script ends
-
-
-def scope_of(node, tree, parents):
-    """Return the function or class that a statement is in, or the module, where the names that it gives are known."""
-    shared = {name for n in all_of(tree, ast.Global, ast.Nonlocal) for name in n.names}
-    while node in parents and not isinstance(node, (ast.FunctionDef, ast.ClassDef)):
-        if isinstance(node, ast.Assign) and shared.intersection(map(dotted, node.targets)):
-            return tree
-        node = parents[node]
-    return node
-
-
-def stores_in(name, scope):
-    """Return where fields of a variable are set; none where its value is read as well."""
-    inside = list(getattr(scope, "all_nodes", None) or ast.walk(scope))
-    filled = [n for n in inside if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)]
-    filled = [n for n in filled if dotted(n).startswith(name + ".")]
-    owners = {id(inner) for n in filled for inner in ast.walk(n.value)}
-    bare = name.rpartition(".")[2]
-    for n in inside:
-        is_read = isinstance(getattr(n, "ctx", None), ast.Load) and id(n) not in owners
-        # of an attribute, another object's name may stand for `self`
-        if is_read and (dotted(n) == name or (bare != name and getattr(n, "attr", "") == bare)):
-            return []
-    return filled
-
-
-FINISHING = ("set_succeeded", "set_aborted", "set_preempted", "set_rejected")
-SENDING = ("publish", "publish_feedback", "sendTransform", *FINISHING)
-
-
-def how_to_send(name, kind, last, scope, tree):
-    """Return what to write for a message that is filled in, up to line `last`, to be sent."""
-    servers = [n for n in all_of(tree, ast.Assign) if called_name(n.value) == "SimpleActionServer"]
-    server = dotted(servers[0].targets[0]) if servers else "server"
-    for n in ast.walk(scope):
-        for given in n.args if is_call(n, *SENDING) else [n.value] if isinstance(n, ast.Return) else ():
-            made = dotted(getattr(given, "func", given)).rpartition(".")[2]
-            if made == kind and not getattr(given, "args", ()) and not getattr(given, "keywords", ()):
-                empty = kind + ("()" if isinstance(given, ast.Call) else "")
-                return "on line %d, write `%s` instead of `%s`" % (given.lineno, name, empty)
-    if kind.endswith("Feedback"):
-        return "below line %d, write `%s.publish_feedback(%s)`" % (last, server, name)
-    if kind.endswith("Response"):
-        return "write `return %s` at the end of the callback" % name
-    made = [n for n in ast.walk(scope) if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)]
-    sent = {dotted(arg) for n in ast.walk(scope) if is_call(n, "publish") for arg in n.args[:1]}
-    taking = [n for n in made if dotted(n.targets[0]) in sent]
-    if kind == "Header" and taking:
-        last = max(last, taking[0].lineno)
-        return "below line %d, write `%s.header = %s`" % (last, dotted(taking[0].targets[0]), name)
-    publishers = [n for n in all_of(tree, ast.Assign) if is_call(n.value, "Publisher")]
-    publishers = [n for n in publishers if published_type(n.value) == kind]
-    if len(publishers) == 1:
-        return "below line %d, write `%s.publish(%s)`" % (last, dotted(publishers[0].targets[0]), name)
-    return "give `%s` to the call that should send it" % name
 
 
 def unstarted_servers(tree):

@@ -561,3 +561,23 @@ def in_callback(tree):
     own = {functions_in(tree).get(dotted(one).rpartition(".")[2]) for one in given}
     one = own.pop() if len(own) == 1 else None
     return " in the callback" + (" `%s`, line %d" % (one.name, one.lineno) if one else "")
+
+
+def letters_of_keys(tree):
+    """`for key in section:` goes through the letters of `section`, where that is a key itself: `d[section][key]`."""
+    for outer in all_of(tree, ast.For):
+        key, whole = dotted(outer.target), dotted(outer.iter)
+        for inner in [n for n in all_of(outer, ast.For) if dotted(n.iter) == key and "..." not in whole]:
+            for read in all_of(inner, ast.Subscript):
+                part, own = read.value, dotted(inner.target)
+                is_under = isinstance(part, ast.Subscript) and dotted(part.value) == whole
+                if is_under and names_in(part.slice) == {key} and names_in(read.slice) == {own}:
+                    message = "`for %s in %s` on line %d goes through the letters of the key `%s`"
+                    message %= (own, key, inner.lineno, key)
+                    fix = "on line %d, write `for %s in %s[%s]:`" % (
+                        inner.lineno,
+                        dotted(inner.target),
+                        whole,
+                        key,
+                    )
+                    yield slip(read.lineno, "wrong-value", message, fix, "letters")

@@ -5,7 +5,8 @@ What nothing calls, statements without an effect, imports. Names are for `script
 `script_prints.py`, base classes for `script_bases.py`, threads, locks and generators for `script_waits.py`, ends of
 goals for `script_goals.py`, loops for `script_loops.py`, their rates for `script_rates.py`, values for
 `script_values.py`, arithmetic for `script_arithmetic.py`, scans for `script_scans.py`, counters and clocks for
-`script_counters.py`, what functions return for `script_results.py`, calls that cannot work for `script_calls.py`.
+`script_counters.py`, what functions return for `script_results.py`, calls that cannot work for `script_calls.py`,
+publishers and messages that nothing uses for `script_unsent.py`.
 
 Nothing is executed. A file has to be parsed by ROS's own Python, which is to run it: Python 3.8, standard library only.
 """
@@ -27,6 +28,7 @@ import script_prints
 import script_rates as rates
 import script_results
 import script_scans as scans
+import script_unsent as unsent
 import script_values as values
 import script_waits
 from script_texts import graph_names, said_texts
@@ -63,10 +65,11 @@ def slips(tree):
         counters.counter_starts, without_effect, values.assigned_late, objects.hidden_names, objects.subscribed_again,
         imports, objects.taken_off, objects.unstarted_servers, values.wrong_values, values.decided_conditions,
         values.times_added_again, values.params_read_unset, values.defaults_first, values.overwritten_values,
-        values.published_in_turn, arithmetic.arithmetic_slips, scans.scan_slips, values.flagged_loops,
+        values.published_in_turn, values.letters_of_keys,
+        arithmetic.arithmetic_slips, scans.scan_slips, values.flagged_loops,
         values.kept_velocities, values.values_never_set_back, values.emptied_files,
         script_prints.unprinted_messages, counters.values_left_out, counters.published_unchanged,
-        objects.unused_publishers, objects.unsent_messages, objects.lost_objects, rates.loops_of_numbers,
+        unsent.unused_publishers, unsent.unsent_messages, unsent.lost_objects, rates.loops_of_numbers,
         goals.finished_goals, goals.finished_in_loops, goals.ended_without_result, counters.sends_no_time, without_node,
         debuggers, script_results.results, rates.turns_taken_off, script_bases.unmade_bases, script_waits.waits,
         calls.locks_taken_twice, calls.values_out_of_order, calls.params_read_early, scans.first_scans,
