@@ -100,8 +100,9 @@ class PythonSlip(Placed, Record):
       `atan2(x, y)`, two values of a call in each other's place, degrees beside radians, and a distance that is to be
       exactly 0 (`step`, `cut`, `half`, `secs`, `mean`, `rootless`, `unset`, `stuck`, `edge`, `swapped`, `mixed`,
       `exact`), a cell that is a product (`times`), letters of a key (`letters`), a timer's period of 0
-      (`zero`), a file that each call empties (`emptied`), or of a scan an inf that is made 0, the
-      first one alone, an index that is an angle, and a condition that drives where a wall is near (`inf`, `first`, `angle`, `turned`).
+      (`zero`), a file that each call empties (`emptied`), or of a scan an inf that is made 0, the first one
+      alone, an index that is an angle, and a condition that drives where a wall is near (`inf`, `first`,
+      `angle`, `turned`).
 
     No slips, but what a line says, for checks that compare it with what the lab asks; `message` is a name, a number or
     a text:
