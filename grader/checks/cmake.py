@@ -18,6 +18,7 @@ from grader.checks.support.scripts import (
     installed,
     is_bin,
     names_script,
+    where_written,
 )
 from grader.checks.support.text import near_names, shown
 from grader.model.file_fault import Fault
@@ -175,6 +176,17 @@ def _makes_nothing(call: CMakeCall) -> bool:
     return not makes and call.name not in ("find_package", "catkin_package")
 
 
+def _other_name(package: PackageFacts, project: CMakeCall, names: tuple[str, str], both: str) -> Wrong:
+    given, wanted = names
+    name = project.args[0] if project.args else ""
+    message = f"line {project.line}: project({name}) differs from the package's name {given}"
+    written = where_written(package, name, project)
+    fix = f"write project({wanted}){both}"
+    if written is not project:
+        fix = f"on line {written.line}, write {wanted} in place of {name}{both}"
+    return Wrong(message, fix, written.line)
+
+
 def _wrong(package: PackageFacts, facts: CMakeFacts, names: tuple[str, str]) -> Iterator[Wrong]:
     """Yield what is wrong or missing. The names are the manifest's and the lab's, which both are to have."""
     given, wanted = names
@@ -190,9 +202,7 @@ def _wrong(package: PackageFacts, facts: CMakeFacts, names: tuple[str, str]) -> 
         least = _first(facts, "cmake_minimum_required")
         yield Wrong("project(…) is missing", f"add project({wanted}){both}", below=least, uncalled="project")
     elif not project.args or project.args[0] not in names:
-        name = project.args[0] if project.args else ""
-        message = f"line {project.line}: project({name}) differs from the package's name {given}"
-        yield Wrong(message, f"write project({wanted}){both}", project.line)
+        yield _other_name(package, project, names, both)
     packages = [c for c in facts.calls if c.name == "find_package"]
     if slip := _misspelt(facts, "find_package"):
         yield _respell(slip, "find_package")
@@ -398,7 +408,13 @@ def _why_unnamed(
         return _named_elsewhere(package, names[near[0]], path)
     why = "catkin_install_python(…) does not name {}"
     if any(one.kind == "PROGRAMS" and is_bin(one.destination or "", package) for one in of_python):
-        nowhere = (one for name, one in names.items() if one.known and not copies_of(package, name))
+        own = [PurePosixPath(file.path).name for file in package.files]
+        # a slip of another script's name is told there
+        nowhere = (
+            one
+            for name, one in names.items()
+            if one.known and not copies_of(package, name) and not near_names(name, own)
+        )
         absent = next((shown(one.path) for one in nowhere), "")
         fix = "write {} " + (f"in place of `{absent}`" if absent else "into it, after PROGRAMS")
         why += f", and names `{absent}`, which does not exist" if absent else ""
@@ -409,7 +425,8 @@ def _why_unnamed(
 
 def _named_elsewhere(package: PackageFacts, one: Installed, path: str) -> Lack:
     """The call names a file that is not there, and the script lies at `path`."""
-    where = f"line {one.call.line}"
+    written = where_written(package, one.path, one.call)
+    where = f"line {written.line}"
     if path == f"{package.folder_beside}/{one.path}":
         why = f"{where}: {shown(one.path)} is in {package.folder_beside}/, beside which {CMAKE} lies"
         return Lack(why, move_into(package.folder_beside), _line(one))
@@ -417,8 +434,9 @@ def _named_elsewhere(package: PackageFacts, one: Installed, path: str) -> Lack:
     if one.path.rstrip(",;\\") == path:
         why = f"{where}: in {shown(one.path)}, the {one.path[-1]} counts as part of the name"
     if one.path.rstrip("\\") == path:
-        return Lack(why, f"delete each \\ behind {path}: in CMake a line goes on without it", _line(one))
-    return Lack(why, f"write {path} in place of {shown(one.path)}", _line(one))
+        return Lack(why, f"delete each \\ behind {path}: in CMake a line goes on without it", written.place)
+    on_line = "" if written is one.call else f"on line {written.line}, "
+    return Lack(why, f"{on_line}write {path} in place of {shown(one.path)}", written.place)
 
 
 def _without_call(

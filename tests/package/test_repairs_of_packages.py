@@ -185,6 +185,10 @@ CASES = {
     "no-catkin-package": Case(swapped(CMAKELISTS, ("catkin_package()\n", "")), ["build-line"], "catkin_package()"),
     "command": Case(swapped(CMAKELISTS, ("catkin_package", "catkin_pakage")), ["build-line"], "no command catkin_p"),
     "project": Case(swapped(CMAKELISTS, ("project(lab)", "project(xyz)")), ["build-line"], "project(xyz)"),
+    "project-by-a-variable": Case(
+        swapped(CMAKELISTS, ("project(lab)", "set(NAME labb)\nproject(${NAME})")),
+        ["package-name"], "project(labb), by line 2, is not", after={CMAKELISTS: "set(NAME lab)\n"},
+    ),
     "no-project": Case(swapped(CMAKELISTS, ("project(lab)\n", "")), ["build-line"], "does not call project(…)"),
     "modules-in-find-package": Case(
         {CMAKELISTS: CMAKE.replace("rospy)", "mediapipe rospy numpy serial)")}, ["build-line"],

@@ -171,6 +171,12 @@ def cmake_calls(package: PackageFacts, *names: str) -> tuple[CMakeCall, ...]:
     return tuple(c for c in package.cmake.calls if c.name in names) if package.cmake else ()
 
 
+def where_written(package: PackageFacts, text: str, call: CMakeCall) -> CMakeCall:
+    """Return the `set(…)` above a call that has a word of its: a variable brings it there; else the call."""
+    above = [c for c in cmake_calls(package, "set") if c.file == call.file and c.line < call.line]
+    return next((c for c in above if text in c.args[1:]), call)
+
+
 def programs(package: PackageFacts) -> tuple[Executable, ...]:
     """Return the programs that CMake makes, in the order of their calls."""
     return package.cmake.executables if package.cmake else ()

@@ -446,10 +446,22 @@ def _name_project(files: Files, package: PackageFacts, name: str, wanted: str) -
         if not words:
             text, at = cmake_text(files), command.span.stop - 1
             change_line(files, command, f"{text[:at]}{name}{text[at:]}", "project(…) has no name")
-        if words and words[0].value.strip('"') not in (name, right) and "$" not in words[0].value:
-            given = words[0].value
-            message = f"line {command.line} of {CMAKE}: project({given}) is not the package's name, {name}"
+        call, token = _set_by(files, command, words[0]) if words else (command, None)
+        if token is not None and token.value.strip('"') not in (name, right) and "$" not in token.value:
+            given = token.value
+            by = "" if call is command else f", by line {call.line},"
+            message = (
+                f"line {command.line} of {CMAKE}: project({given}){by} is not the package's name, {name}"
+            )
             kind: RepairKind = "package-name" if is_near(given, name) else "build-line"
             both = f"write project({wanted}) here, and <name>{wanted}</name> in {MANIFEST}"
             fix = both if wanted and wanted != right else ""
-            files.change(kind, CMAKE, replace_token(cmake_text(files), words[0], name), message, fix)
+            files.change(kind, CMAKE, replace_token(cmake_text(files), token, name), message, fix)
+
+
+def _set_by(files: Files, command: Command, token: Token) -> tuple[Command, Token]:
+    """Return the one `set(NAME value)` above that gives a variable its value, and that word; else what is given."""
+    name = token.value.strip('"').removeprefix("${").removesuffix("}")
+    above = [c for c in calls_of(files, "set") if c.line < command.line and words_of(c)[0].value == name]
+    words = words_of(above[0]) if len(above) == 1 and "${" in token.value else []
+    return (above[0], words[1]) if len(words) == 2 else (command, token)
