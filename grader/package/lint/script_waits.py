@@ -1,4 +1,4 @@
-"""Finds threads, locks, tasks and generators of a student's Python that do not do what they are there for.
+"""Finds threads, tasks, generators and queues of a student's Python that do not do what they are there for.
 
 For `slips.py`. Nothing is executed. Python 3.8, standard library only.
 """

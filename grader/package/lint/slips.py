@@ -2,7 +2,7 @@
 
 What nothing calls, statements without an effect, imports. Names are for `script_names.py`, texts for
 `script_texts.py`, objects for `script_objects.py`, callbacks for `script_callbacks.py`, what these print for
-`script_prints.py`, base classes for `script_bases.py`, threads, locks and generators for `script_waits.py`, ends of
+`script_prints.py`, base classes for `script_bases.py`, threads and generators for `script_waits.py`, ends of
 goals for `script_goals.py`, loops for `script_loops.py`, their rates for `script_rates.py`, values for
 `script_values.py`, arithmetic for `script_arithmetic.py`, scans for `script_scans.py`, counters and clocks for
 `script_counters.py`, what functions return for `script_results.py`, calls that cannot work for `script_calls.py`,
