@@ -40,7 +40,7 @@ from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, failed_or_blocked, passed
 from grader.wording import join_words, on_lines, significant, there_is
 
-OUTSIDE = 'write <rosparam file="$(find {})/{}"/> outside the <node>, without ns'
+OUTSIDE = 'write <rosparam file="$(find {})/{}"/> outside {}, without ns'
 Wanted = Mapping[str, int | float | str]
 
 
@@ -120,7 +120,7 @@ def _judge_loaded(
         or _of_another_name(package, file, params)
     ):
         message = f"{file.path} sets the parameters, but does not load {params.file}"
-        return failed(message, hint=OUTSIDE.format(package.name, params.file))
+        return failed(message, hint=OUTSIDE.format(package.name, params.file, "the <node>"))
     return _not_running(package, run, node)
 
 
@@ -201,7 +201,7 @@ def _not_loaded(
     loads = [load for load in file.loads if _is_of(load, params)]
     if not loads:
         message = f"{file.path} has no <rosparam> that loads {params.file}"
-        return failed(message, hint=OUTSIDE.format(package.name, params.file))
+        return failed(message, hint=OUTSIDE.format(package.name, params.file, "the <node>"))
     other = _loaded_otherwise(package, run, params, loads, missing[0])
     return other.model_copy(update={"unjudged": other.unjudged and not judged})
 
@@ -214,11 +214,11 @@ def _loaded_otherwise(
         moved = load.namespace.rstrip("/") + missing
         if moved in found and moved != missing:
             why = f"the file is loaded into {load.namespace}, where {missing} becomes {moved}"
-            hint = OUTSIDE.format(package.name, params.file).replace("the <node>", "any <node> and <group>")
+            hint = OUTSIDE.format(package.name, params.file, "any <node> and <group>")
             return Slip(load.file, load.line, why, hint).verdict()
     if missing in found:
         message = f"{missing} is set only after the node has started"
-        return failed(message, hint=OUTSIDE.format(package.name, params.file))
+        return failed(message, hint=OUTSIDE.format(package.name, params.file, "the <node>"))
     message = f"{params.file} is loaded, but {describe_missing(found, missing)}"
     return failed_or_blocked(message, hint=f"fix the names in {params.file}")
 

@@ -8,6 +8,8 @@ import ast
 TEXT_LIMIT = 300
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 LOOPS = (ast.While, ast.For)
+CALLBACKS = {"Subscriber": (2, "callback"), "Service": (2, "handler"), "Timer": (1, "callback")}
+"""The place and the name of the argument that is a callback."""
 
 
 def walk(tree):

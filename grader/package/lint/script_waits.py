@@ -6,6 +6,7 @@ For `slips.py`. Nothing is executed. Python 3.8, standard library only.
 import ast
 
 from script_tree import (
+    CALLBACKS,
     LOOPS,
     all_of,
     argument,
@@ -63,7 +64,7 @@ def unstarted_threads(tree):
 
 
 def used_for(name, tree):
-    """Return which attributes of what a name holds are used; "" among them where it is handed on as a whole."""
+    """Return which attributes of what a name holds are used; "" among them where all of it is passed on."""
     last, parents, used = name.rpartition(".")[2], parents_of(tree), set()
     for node in all_of(tree, ast.Name, ast.Attribute):
         own = getattr(node, "id", getattr(node, "attr", "")) == last
@@ -99,9 +100,6 @@ def forked_publishers(tree):
             )  # fmt: skip
 
 
-CALLED_BACK = {"Subscriber": (2, "callback"), "Timer": (1, "callback"), "Service": (2, "handler")}
-
-
 def async_callbacks(tree):
     """A callback that is an `async def`, or that has a `yield` in it: calling it runs none of its lines."""
     functions = {n.name: n for n in all_of(tree, ast.FunctionDef, ast.AsyncFunctionDef)}
@@ -110,9 +108,9 @@ def async_callbacks(tree):
     of_others |= {n.name for n in all_of(tree, ast.ClassDef)}
     for call in all_of(tree, ast.Call):
         name = called_name(call)
-        if name not in CALLED_BACK or dotted(call.func) in of_others:
+        if name not in CALLBACKS or dotted(call.func) in of_others:
             continue
-        given = argument(call, *CALLED_BACK[name])
+        given = argument(call, *CALLBACKS[name])
         own = functions.get(dotted(given[0]).rpartition(".")[2]) if given else None
         if own is None or own.decorator_list:
             continue
@@ -199,9 +197,7 @@ def unused_calls(tree):
         owner, _, name = dotted(node.value.func).rpartition(".")
         if owner not in ("", "self"):
             continue
-        around = parents.get(node)
-        while around is not None and not isinstance(around, (ast.FunctionDef, ast.AsyncFunctionDef)):
-            around = parents.get(around)
+        around = function_of(node, parents)
         call = "%s(…)" % dotted(node.value.func) if node.value.args else "%s()" % dotted(node.value.func)
         if name in own:
             message = "line %d makes a generator of `%s` and goes through none of its values" % (
@@ -313,6 +309,7 @@ def emptied_once(tree):
 
 
 def function_of(node, parents):
+    """Return the innermost function that a node is in, or that it is; None outside of all."""
     while node is not None and not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
         node = parents.get(node)
     return node

@@ -11,16 +11,14 @@ import re
 from collections.abc import Iterator, Sequence
 
 from grader.package.lint.script_names import bound_names, given_names
-from grader.package.lint.script_tree import all_of, argument, called_name, dotted, parents_of
+from grader.package.lint.script_tree import CALLBACKS, all_of, argument, called_name, dotted, parents_of
 from grader.wording import is_one_edit
 
 DEFINED = re.compile(r"\b(?:def|class)\s+(\w+)")
 """In a comment, too: there the line is not lost."""
 OF_LISTS = frozenset(dir(list) + dir(dict) + dir(str))
-CALLBACKS = {"Subscriber": (2, "callback"), "Service": (2, "handler"), "Timer": (1, "callback")}
-"""The place and the name of the argument that is a callback."""
 BLOCKS = (ast.If, ast.Try, ast.With, ast.For, ast.While)
-"""What they give a value may be handed over."""
+"""What they give a value may be passed on."""
 LOST = "_lost_head"
 REFUSED_MAX = 5
 
