@@ -193,8 +193,9 @@ def _not_printed(
     own = [line for line in lines if one.interrupt_ns is None or line.at_ns < one.interrupt_ns]
     deaf = unheard(run, package)
     never = f"it never prints {params.words}"
-    unheard_of = failed_or_blocked(f"{never}: {deaf.message}", hint=deaf.hint) if deaf else None
-    unheard_of = unheard_of and unheard_of.model_copy(update={"cause": deaf.message if deaf else ""})
+    unheard_of = (
+        failed_or_blocked(f"{never}: {deaf.message}", hint=deaf.hint).caused_by(deaf) if deaf else None
+    )
     if (
         why := _unserved(asked, lacking, own, run, never)
         or unheard_of

@@ -472,7 +472,7 @@ def _judge_unanswered(
     deaf = refused_type(run, params.trigger.topic) or unheard(run)
     if not answers and deaf:
         verdict = failed(f"{params.effect.words} follows nothing: {deaf.message}", hint=deaf.hint)
-        return verdict.model_copy(update={"cause": deaf.message})
+        return verdict.caused_by(deaf)
     if not answers:
         return _caused_too_late(params)
     slow = [one for one in answers if one.after_s is None or one.after_s > params.within_s]

@@ -22,7 +22,6 @@ from grader.model.verdict import (
     Verdict,
     failed_or_blocked,
     inconclusive,
-    machine_lacks,
     partial,
     passed,
 )
@@ -231,10 +230,7 @@ def _with_cause(verdict: Verdict, dead: Life, run: Run, package: PackageFacts) -
     """Return the same with what ended the student's process, on whose messages the tests may have waited."""
     end = explain_end(dead, run, package)
     message = f"{verdict.message}; {dead.name} ended by itself after {dead.lasted}: {end.cause}"
-    if end.of_machine:
-        return machine_lacks(message, hint=end.hint)
-    about = {"message": message, "hint": end.hint, "citations": end.citations, "cause": end.cause}
-    return verdict.model_copy(update=about)
+    return end.explain(verdict, message)
 
 
 def _why_late(late: Lateness) -> str:

@@ -136,18 +136,12 @@ def charge_once(
     for criterion in sorted(rubric.criteria, key=lambda c: (c.visibility != "visible", not c.points)):
         verdict = verdicts[criterion.id]
         is_whole = verdict.status is Status.FAIL and not verdict.score and criterion.penalty is None
-        if not is_whole or criterion.scenario is None or not OUTLIVED.match(verdict.cause):
+        if not is_whole or criterion.scenario is None or not verdict.charged_once:
             continue
         root = charged.setdefault(verdict.cause, criterion.id)
         if root != criterion.id and criterion.id not in judged and root not in judged:
             told[criterion.id] = _blocked(verdict, root, f"blocked by {root}: {verdict.message}")
     return told
-
-
-OUTLIVED = re.compile(
-    r"[\w.]*(?:Error|Exception)\b.*\(.*, line \d+\)|the run publishes on .*, and no node subscribes to "
-)
-"""The cause of a loss that is an exception of a line that is known, or a topic that is not heard."""
 
 
 def _blocked(verdict: Verdict, root: str, message: str, *, timing: bool = False) -> Verdict:

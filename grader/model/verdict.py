@@ -164,6 +164,8 @@ class Verdict(Record):
     """It is open until the machine has what it lacks, and grading again before changes nothing."""
     cause: str = ""
     """What a process ended of, in words that are the same in every verdict that rests on it."""
+    charged_once: bool = False
+    """The same cause costs one criterion its points, and blocks the others that lost theirs to it."""
     blocked_by: str = ""
     """The criterion that explains the absence."""
     right: str = ""
@@ -207,6 +209,10 @@ class Verdict(Record):
         fields = {"expected": expected, "measured": measured, "said": said, "citations": places}
         return self.model_copy(update={name: value for name, value in fields.items() if value is not None})
 
+    def caused_by(self, other: Verdict) -> Verdict:
+        """Return the verdict with what another one found as its cause."""
+        return self.model_copy(update={"cause": other.message, "charged_once": other.charged_once})
+
     def explained(self, why: str, hint: str, citations: Citations = (), *, cause: str = "") -> Verdict:
         """Return a loss with why it came to it behind its message, what to do about that, and its lines before its own.
         `cause` is what else rests on it."""
@@ -215,6 +221,7 @@ class Verdict(Record):
             "hint": hint,
             "citations": tuple(dict.fromkeys((*citations, *self.citations))),
             "cause": cause or self.cause,
+            "charged_once": self.charged_once and not cause,
         }
         return self.model_copy(update=update)
 

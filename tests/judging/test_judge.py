@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from grader.checks import CHECKS
+from grader.checks.support.exit_causes import Ending
 from grader.judging import judge
 from grader.judging.requirements import charge_once
 from grader.model.result import CriterionResult
@@ -369,16 +370,12 @@ def test_what_else_is_wrong_with_a_node_is_no_reason_for_its_end() -> None:
 
 
 @pytest.mark.parametrize(
-    ("cause", "judged", "blocked_by"),
-    [
-        ("NameError: name 'a' is not defined (src/a.py, line 3): nothing gives `a` a value", "", "rate"),
-        ("NameError: name 'a' is not defined (src/a.py, line 3)", "chatter", ""),
-        ("it ended by itself (src/a.py, line 3)", "", ""),
-    ],
+    ("raised", "judged", "blocked_by"), [(True, "", "rate"), (True, "chatter", ""), (False, "", "")]
 )
-def test_an_exception_is_charged_once(cause: str, judged: str, blocked_by: str) -> None:
+def test_an_exception_is_charged_once(raised: bool, judged: str, blocked_by: str) -> None:
     """Also where its node goes on. What a repaired copy has judged keeps its share."""
-    lost = {name: failed("it never moves", hint="x").model_copy(update={"cause": cause}) for name in "ab"}
+    end = Ending("NameError: name 'a' is not defined (src/a.py, line 3)", "x", raised=raised)
+    lost = {name: end.verdict(failed, "it never moves") for name in "ab"}
     verdicts = {"rate": lost["a"], "chatter": lost["b"]}
     told = charge_once(rubric({**RATE, "requires": []}, {**CHATTER, "requires": []}), verdicts, {judged})
     assert told["rate"] == lost["a"]

@@ -73,7 +73,7 @@ from grader.line_slips.python import COMMENTED_OUT, corrected, without_brace
 from grader.model.file_fault import Fault
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
-from grader.model.verdict import Citations, FileCitation, Span, Verdict, machine_lacks
+from grader.model.verdict import FileCitation, Span, Verdict, machine_lacks
 from grader.wording import NOTHING_TO_DO, ON_THE_MACHINE, join_words, on_lines
 
 OTHER_NAMES_SHOWN = 3
@@ -158,14 +158,29 @@ class Ending(NamedTuple):
     """The grading machine lacks what it needs."""
     unbuilt: bool = False
     """What it needs is made by the build alone."""
+    raised: bool = False
+    """It is an exception of a line that is known."""
 
     def verdict(self, kind: Callable[..., Verdict], message: str, measured: str = "") -> Verdict:
         """Return a verdict of this kind (`failed`, `failed_or_blocked`) with the ending's hint and citations, or
         `inconclusive` where the machine is at fault."""
-        kind = machine_lacks if self.of_machine else kind
-        verdict = kind(message, measured=measured, hint=self.hint, citations=self.citations)
-        verdict = verdict.model_copy(update={"cause": self.cause, "unbuilt": self.unbuilt})
-        return verdict.seeking("uncalled", *(OF_INTERFACES if self.unbuilt else ()))
+        return self.explain(kind(message, measured=measured), message)
+
+    def explain(self, verdict: Verdict, message: str) -> Verdict:
+        """Return a lost mark with this message, the ending's hint and its citations before those that it has;
+        `inconclusive` where the machine is at fault."""
+        if self.of_machine:
+            verdict = machine_lacks(message, expected=verdict.expected, measured=verdict.measured)
+        update = {
+            "message": message,
+            "hint": self.hint,
+            "citations": (*self.citations, *verdict.citations),
+            "cause": self.cause,
+            "charged_once": self.raised,
+            "unbuilt": self.unbuilt,
+        }
+        sought = OF_INTERFACES if self.unbuilt else ()
+        return verdict.model_copy(update=update).seeking("uncalled", *sought)
 
 
 def explain_early_end(package: PackageFacts, run: Run) -> Ending | None:
@@ -279,13 +294,7 @@ def explain_by_exception(check: Check, package: PackageFacts, run: Run, verdict:
             return verdict
         why, hint = f"at another time, a callback fails: {other.cause}", f"{verdict.hint}; {other.hint}"
         return verdict.explained(why, hint, other.citations)
-
-    def lost(message: str, *, hint: str, citations: Citations, measured: str) -> Verdict:
-        update = {"message": message, "hint": hint, "citations": (*citations, *verdict.citations)}
-        return verdict.model_copy(update=update).about(measured=measured)
-
-    message = f"{verdict.message}; a callback fails: {end.cause}"
-    return end.verdict(lost, message, measured=verdict.measured).about(expected=verdict.expected)
+    return end.explain(verdict, f"{verdict.message}; a callback fails: {end.cause}")
 
 
 def _limit(life: Life, run: Run) -> str:
@@ -336,7 +345,8 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
         hint = (not of_own and unused_import(place, package)) or hint
     where = f" ({place.file}, line {place.line})" if place else ""
     text = f"{shown(_said(found, cause).rstrip('.'))}{where}" + (f": {cause}" if cause else "")
-    return Ending(text, hint, (place,) if place else (), unbuilt=unbuilt is not None)
+    raised = place is not None
+    return Ending(text, hint, (place,) if place else (), unbuilt=unbuilt is not None, raised=raised)
 
 
 def _known_meaning(found: Traceback, place: FileCitation | None, package: PackageFacts) -> tuple[str, str]:

@@ -24,7 +24,7 @@ from grader.evidence.run import Run
 from grader.line_slips.yaml import YAML_LINES_MAX, slip_of_yaml
 from grader.model.launch_file import LaunchNode, LaunchParam
 from grader.model.package import PackageFacts
-from grader.model.verdict import EvidenceCitation, Verdict
+from grader.model.verdict import EvidenceCitation, Verdict, cited_lines
 from grader.wording import join_words, plural, there_is
 
 UNNAMED = "/unnamed"
@@ -443,7 +443,8 @@ def explain_failure(package: PackageFacts, run: Run) -> Ending | None:
     if end is None:
         return None
     key = re.match(r"KeyError: ['\"]?([^'\" (]+)", end.cause)
-    if key is None or "the letters of the key" in end.cause:
+    of_letters = {(s.file, s.line) for s in package.slips if s.name == "letters"}
+    if key is None or of_letters.intersection(cited_lines(end.citations)):
         return end
     names = list(without_system_params(params_on_server(run)))
     parts = {part for name in names for part in name.split("/") if part}

@@ -257,7 +257,7 @@ def _judge_advertised(
         return verdict.about(citations=(slip.place,))
     if deaf := unheard(run, package):
         verdict = of_node(f"{message}: {deaf.message}", measured="no message", hint=deaf.hint)
-        return verdict.model_copy(update={"cause": deaf.message})
+        return verdict.caused_by(deaf)
     if slip := call_in_comment(package, run, "publish"):
         return _commented_out(message, slip, of_node)
     # A node that hears something may have good reason to publish on a condition only.
@@ -396,7 +396,7 @@ def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
     add = f"add {join_words(subscriber(one, f'{kinds[one]}, callback') for one in lacking)}"
     if topic in offered:
         add = f"subscribe to {topic} in place of {join_words(found, 'or')}, on which nothing is published"
-    return failed(message, hint=remapped or add)
+    return failed(message, hint=remapped or add).model_copy(update={"charged_once": True})
 
 
 def unheard_programs(run: Run) -> dict[str, tuple[str, ...]]:
@@ -436,7 +436,7 @@ def explain_by_unheard_topic(check: Check, package: PackageFacts, run: Run, verd
     is_unexplained = check.of_callbacks and not verdict.cause and not early_end(run)
     if not is_unexplained or (found := unheard(run, package)) is None:
         return verdict
-    explained = verdict.explained(found.message, found.hint, cause=found.message)
+    explained = verdict.explained(found.message, found.hint).caused_by(found)
     return explained.about(citations=(cite(run, "/grader/graph"),))
 
 
