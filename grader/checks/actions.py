@@ -351,7 +351,7 @@ def _no_feedback(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | 
     publish = both("publish_feedback(feedback)", "publishFeedback(feedback)")
     verdict = failed(message, hint=f"call the action server's {publish} each time around the loop")
     # That none came at all is no matter of time.
-    nothing = verdict.model_copy(update={"wrong": "nothing"})
+    nothing = verdict.based_on(wrong="nothing")
     return nothing if came == 0 else _excused(verdict.if_repeated(), run, goal)
 
 

@@ -156,27 +156,24 @@ def explain_by_build(
     if verdict.hint == NO_SCRIPT_HINT and package is not None:
         verdict = _name_missing(package, build, verdict, asked)
     elif (
-        beside and package is not None and verdict.status.is_lost and not (verdict.unjudged or verdict.cause)
+        beside
+        and package is not None
+        and verdict.status.is_lost
+        and not (verdict.basis.unjudged or verdict.basis.cause)
     ):
         one = _name_missing(package, build, failed_or_blocked("there is no script to run"), beside)
-        if one.unbuilt:
+        if one.basis.unbuilt:
             which = "" if set(beside) & set(asked) else ", which runs beside it"
             message = f"{verdict.message}; {one.message}{which}"
             verdict = one.model_copy(update={"message": message}).about(expected=verdict.expected)
-    if not (verdict.unbuilt and verdict.status.is_lost) or package is None or build is None:
+    if not (verdict.basis.unbuilt and verdict.status.is_lost) or package is None or build is None:
         return verdict
     built = judge_build(package, build)
     if not built.status.is_open:
         return verdict
-    said = inconclusive(f"{verdict.message}; {built.message}", hint=built.hint, citations=built.citations)
-    update = {
-        "expected": verdict.expected,
-        "measured": verdict.measured,
-        "sought": built.sought,
-        "of_machine": built.of_machine,
-        "cause": verdict.cause,
-    }
-    return said.model_copy(update=update)
+    said = built.model_copy(update={"message": f"{verdict.message}; {built.message}"})
+    said = said.about(expected=verdict.expected, measured=verdict.measured)
+    return said.based_on(cause=verdict.basis.cause)
 
 
 def _name_missing(
@@ -200,7 +197,8 @@ def _name_missing(
         return verdict
     # A function, as a backslash in the text would begin an escape.
     message = re.sub("there (is no script|was nothing) to run", lambda _: why, verdict.message)
-    return verdict.model_copy(update={"message": message, "hint": hint, "unbuilt": hint == BUILD_FIRST_HINT})
+    told = verdict.model_copy(update={"message": message, "hint": hint})
+    return told.based_on(unbuilt=hint == BUILD_FIRST_HINT)
 
 
 def _stopped_build(build: Run, took: str) -> Verdict:
@@ -248,7 +246,7 @@ def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> V
         return verdict
     if UNKNOWN_COMMAND in error.text and not told.by_itself:
         return verdict
-    return verdict.model_copy(update={"cause": f"{line}{told.why}"})
+    return verdict.based_on(cause=f"{line}{told.why}")
 
 
 def _lost_scripts(package: PackageFacts, scripts: Sequence[str]) -> Verdict | None:

@@ -114,7 +114,7 @@ def _no_file(package: PackageFacts, wanted: str) -> Verdict:
         return failed(message, measured=slip, hint=hint, citations=(FileCitation(file=slip),))
     hint = f"create one with project({wanted}), find_package(catkin REQUIRED) and catkin_package()"
     absent = failed(NO_FILE, measured="no file", hint=hint)
-    return absent.model_copy(update={"cause": NO_FILE})
+    return absent.based_on(cause=NO_FILE)
 
 
 def _fault(fault: Fault | None) -> Iterator[str]:
@@ -294,7 +294,7 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
         absent = failed_or_blocked(
             message, expected=expected, measured="no file", hint="first add CMakeLists.txt"
         )
-        return absent.model_copy(update={"cause": NO_FILE})
+        return absent.based_on(cause=NO_FILE)
     all_named = list(installed(package))
     of_python = [one for one in all_named if one.call.name == PYTHON]
     named = join_words(dict.fromkeys(shown(one.path) for one in of_python))

@@ -205,7 +205,7 @@ def _not_printed(
     ):
         return why
     if not own:
-        return _nothing_printed(package, run, params, hint).if_repeated().model_copy(update={"silent": True})
+        return _nothing_printed(package, run, params, hint).if_repeated().based_on(silent=True)
     meant = max(own, key=lambda line: SequenceMatcher(None, params.words, line.text[:LINE_CHARS_MAX]).ratio())
     hint = _of_whole_answer(meant, params) or unfilled(meant.text) or hint
     lost = _of_client(asked, run)(f"{never}; it prints {shown(meant.text)!r}", hint=hint)

@@ -315,7 +315,7 @@ def _of_clock(verdict: Verdict, count: Count, run: Run, package: PackageFacts, p
         ),
         None,
     )
-    if slip is None or verdict.unjudged or verdict.status not in {Status.PASS, Status.FAIL}:
+    if slip is None or verdict.basis.unjudged or verdict.status not in {Status.PASS, Status.FAIL}:
         return verdict
     how = "made up at random" if slip.name == "random" else "read from a clock"
     message = f"the values on {params.topic} are {how}, not counted ({slip.file}, line {slip.line})"

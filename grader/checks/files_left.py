@@ -254,7 +254,7 @@ def _wrong_topic(
 
 def _cut_short(verdict: Verdict, package: PackageFacts, run: Run) -> Verdict:
     """Return a loss of messages with the option of `rosbag record` that ends it before they come."""
-    said = verdict.excused or verdict.message
+    said = verdict.basis.excused or verdict.message
     for place, node in recorders(package) if verdict.status is not Status.PASS and " holds " in said else ():
         for option in ENDS_IT.finditer(node.args or ""):
             number, wrote = int(option[1]), option[0].strip()

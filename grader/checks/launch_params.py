@@ -203,7 +203,7 @@ def _not_loaded(
         message = f"{file.path} has no <rosparam> that loads {params.file}"
         return failed(message, hint=OUTSIDE.format(package.name, params.file, "the <node>"))
     other = _loaded_otherwise(package, run, params, loads, missing[0])
-    return other.model_copy(update={"unjudged": other.unjudged and not judged})
+    return other.based_on(unjudged=other.basis.unjudged and not judged)
 
 
 def _loaded_otherwise(

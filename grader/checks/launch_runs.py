@@ -259,7 +259,7 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
     file = read_launch(package, params.launch, (*params.scripts, *params.programs))
     if isinstance(file, Verdict):
         # A file that cannot be read is charged by launch-xml, where scripts are asked for.
-        return file.about(expected=expected).model_copy(update={"unjudged": bool(params.scripts)})
+        return file.about(expected=expected).based_on(unjudged=bool(params.scripts))
     share, right = _right_parts(package, file, run, params)
     verdict = (
         not_run(run)
@@ -268,8 +268,8 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
     ).in_part(share, right)
     ended = early_end(run)
     refused = refusal(run, package) if ended is not None else None
-    if verdict.status is Status.FAIL and not verdict.cause and refused is not None:
-        verdict = verdict.model_copy(update={"cause": refused.why})
+    if verdict.status is Status.FAIL and not verdict.basis.cause and refused is not None:
+        verdict = verdict.based_on(cause=refused.why)
     citations = verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/graph"))
     return verdict.about(expected=expected, measured=_listed_nodes(run), citations=citations)
 
@@ -364,7 +364,7 @@ def _find_unnamed(
     something to judge here: others that are `found` running."""
     missing = joined([lost for one in params.scripts if (lost := missing_node(package, file, one))])
     if missing is not None:
-        return missing.model_copy(update={"unjudged": missing.unjudged or not found})
+        return missing.based_on(unjudged=missing.basis.unjudged or not found)
     if twins := _twins(file, params):
         return twins
     if wrong := _wrong_names(file, params):
@@ -512,7 +512,7 @@ def _not_up(package: PackageFacts, file: LaunchFile, run: Run, lacking: Wanted) 
     """A slip of the file's first, then what roslaunch and the script say."""
     if slip := next(refusals(package, file), None):
         # Slips on the student's own nodes are charged by launch-xml.
-        return slip.verdict(quoted(run)).model_copy(update={"unjudged": lacking.own})
+        return slip.verdict(quoted(run)).based_on(unjudged=lacking.own)
     node = lacking.node
     absence = why_not_up(package, run, node)
     name = node.full_name if is_exact(node) else f"the node of {node.type}"
@@ -595,4 +595,4 @@ def _not_connected(
     ) or blame_place(package, file, nodes, topic, other)
     if of_launch_file is not None:
         return of_launch_file
-    return other.model_copy(update={"unjudged": True}) if all(w.own for w in wanted) else other
+    return other.based_on(unjudged=True) if all(w.own for w in wanted) else other

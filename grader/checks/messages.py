@@ -459,7 +459,7 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
         nan = any(one.nan for v in wrong[0].values for one in differences(v, params.value, params.tolerance))
         near = near_texts(wrong[0].values, params.value)
         verdict = _other_value(wrong, found, run, params).seeking("quoted", *near)
-        verdict = verdict if verdict.wrong else verdict.of_value(nan=nan)
+        verdict = verdict if verdict.basis.wrong else verdict.of_value(nan=nan)
     else:
         count = f"all of {plural(len(found), 'message')}" if params.when == "every" else which
         verdict = passed(f"{params.field} of {params.topic} is {params.words} in {count}")
@@ -564,11 +564,10 @@ def _other_value(
     if params.when == "first":
         # What fails after the first message does not make it what it is
         due = ((run.start_ns, first.time_ns),)
-        return verdict.model_copy(update={"callbacks": "before", "due": due})
-    update: dict[str, object] = {"timing": True}
+        return verdict.based_on(callbacks="before", due=due)
     if since := turned_wrong(found, params.value):  # a callback that fails later did not do it
-        update |= {"wrong": "order" if MOVED in why else "place", "due": ((run.start_ns, since),)}
-    return verdict.model_copy(update=update)
+        verdict = verdict.based_on(wrong="order" if MOVED in why else "place", due=((run.start_ns, since),))
+    return verdict.if_repeated()
 
 
 def _why_first(

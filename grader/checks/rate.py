@@ -188,7 +188,7 @@ def _judge(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
         verdict = verdict.model_copy(update={"message": f"with {params.cause.words}, {verdict.message}"})
     citations = (cite(run, params.topic, found.times_ns[0], found.times_ns[-1]),)
     measured = found.described(*params.bounds_ns)
-    if verdict.status is Status.INCONCLUSIVE or verdict.own_load:
+    if verdict.status is Status.INCONCLUSIVE or verdict.basis.own_load:
         late = lateness(run, found.times_ns[0], found.until_ns, own=True) if found.gaps_ns else None
         measured += f", {late.described}" if late else ""
     return verdict.about(measured=measured, citations=citations)

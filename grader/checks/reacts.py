@@ -305,11 +305,7 @@ def _judge_silence(package: PackageFacts, run: Run, params: ReactsParams) -> Ver
 def _kept_silent(own: Sequence[Channel], params: ReactsParams) -> Verdict:
     verdict = passed(f"{params.effect.absence} came {_silent_words(params)}")
     # a node of which nothing comes at all shows nothing by it: another criterion has to see that it can publish
-    return (
-        verdict
-        if any(c.messages for c in own)
-        else verdict.model_copy(update={"unjudged": True, "silent": True})
-    )
+    return verdict if any(c.messages for c in own) else verdict.based_on(unjudged=True, silent=True)
 
 
 def _silent_words(params: ReactsParams) -> str:
@@ -393,7 +389,7 @@ def _unanswered(
     is_there = topic in offers(run) and calls
     why = no_answer(package, run, topic, calls[0]) if is_there else not_offered(package, run, topic)
     verdict = failed_or_blocked(f"nothing can be seen after a call of {topic}: {why.message}", hint=why.hint)
-    return verdict.late() if why.callbacks == "late" else verdict
+    return verdict.late() if why.basis.callbacks == "late" else verdict
 
 
 def _caused_too_late(params: ReactsParams) -> Verdict:

@@ -195,7 +195,7 @@ def _judge_results(found: Results, run: Run, package: PackageFacts, start_ns: in
     total = right + len(said)
     if not total:
         hint = "for the instructor: no testcase was run"
-        return inconclusive("every testcase was skipped", hint=hint).model_copy(update={"unjudged": True})
+        return inconclusive("every testcase was skipped", hint=hint).based_on(unjudged=True)
     if not said:
         return passed(f"all {total} testcases pass" if total > 1 else "its testcase passes")
     more = f" and {len(said) - 1} more" if len(said) > 1 else ""
@@ -209,9 +209,9 @@ def _judge_results(found: Results, run: Run, package: PackageFacts, start_ns: in
         of_types = error.hint == TYPES_HINT
         message = f"{verdict.message}; {'' if of_types else 'a callback fails: '}{error.cause}"
         # what no node hears is no fault of what it would do with it
-        unjudged = of_types and verdict.unjudged
-        about = {"message": message, "hint": error.hint, "citations": error.citations, "unjudged": unjudged}
-        verdict = verdict.model_copy(update=about)
+        unjudged = of_types and verdict.basis.unjudged
+        about = {"message": message, "hint": error.hint, "citations": error.citations}
+        verdict = verdict.model_copy(update=about).based_on(unjudged=unjudged)
     return excused(verdict.if_repeated(), run, start_ns, run.end_ns, _why_late)
 
 

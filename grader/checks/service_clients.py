@@ -328,4 +328,4 @@ def _judge_refusal(run: Run, service: str) -> Verdict | None:
 
 def _excuse(verdict: Verdict, run: Run) -> Verdict:
     """Calls that did not come may be the machine's fault; those that came are not."""
-    return excused(verdict, run, run.start_ns, run.end_ns, why_late) if verdict.timing else verdict
+    return excused(verdict, run, run.start_ns, run.end_ns, why_late) if verdict.basis.timing else verdict

@@ -248,7 +248,7 @@ def _judge_uncalled(
 
 def _not_there(package: PackageFacts, run: Run, params: ServiceAnswersParams) -> Verdict:
     """What a service that is not there would answer, no one knows: its own criterion says why it is not."""
-    return not_offered(package, run, params.service).model_copy(update={"unjudged": True})
+    return not_offered(package, run, params.service).based_on(unjudged=True)
 
 
 def _measured_text(one: Exchange | None) -> str:
@@ -389,7 +389,7 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
     if "returned None" in one.detail:
         hint = f"end the callback with return {kind}Response(…)"
         verdict = failed(f"{asked} fails: its callback returns nothing", hint=hint)
-        return verdict.model_copy(update={"wrong": "nothing"})
+        return verdict.based_on(wrong="nothing")
     if "returned invalid value" in one.detail or "wrong number of values" in one.detail:
         message = f"{asked} fails: its callback returns something that is not a {kind}Response ({shown(one.detail)})"
         return failed(message, hint=f"end the callback with return {kind}Response(…), its fields by name")

@@ -52,7 +52,7 @@ def cite_source(
     """Return the verdict; one on what a node says, sends or asks with the line of the script that does so, if it is
     plain which one that is. `repairs` are those of the copy that was judged."""
     package = facts.package_of(criterion)
-    lost = verdict.status in {Status.PARTIAL, Status.FAIL} and not verdict.unjudged
+    lost = verdict.status in {Status.PARTIAL, Status.FAIL} and not verdict.basis.unjudged
     if _is_placed(verdict) or not lost or package is None or package is not facts.package:
         return verdict
     paths = scripts_of(criterion, facts.rubric, package) | sources_of(criterion, facts.rubric, package)
@@ -105,12 +105,12 @@ def _lines_to_blame(verdict: Verdict, criterion: Criterion, lines: list[SourceLi
         ):  # which belongs into the loop that reports
             found = [one for one in lines if re.search(r"\bpublish_?feedback\(", one.text, re.IGNORECASE)]
         case "hears" | "logs":
-            found = lines_that_say(lines, f"{verdict.measured} {verdict.said}")
+            found = lines_that_say(lines, f"{verdict.measured} {verdict.basis.said}")
             found = found or _that_say(verdict, criterion, lines)
         case "prints" | "topic-type" | "node-name":
-            found = _that_name(verdict.said, criterion, lines)
+            found = _that_name(verdict.basis.said, criterion, lines)
         case "message":
-            found = lines_that_say(lines, verdict.said or verdict.measured)
+            found = lines_that_say(lines, verdict.basis.said or verdict.measured)
             found = _published_of(found, lines, criterion)
         case "stamps":
             found = _published_of(lines_that_set(lines, "stamp"), lines, criterion)
@@ -306,7 +306,7 @@ def cite_find(verdict: Verdict, criterion: Criterion, package: PackageFacts | No
 def cite_unused_argument(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run) -> Verdict:
     """Return the verdict; one of a run that gives a launch file an argument cites the `<arg>` that nothing uses."""
     package = facts.package_of(criterion)
-    if not verdict.status.is_lost or verdict.unjudged or _is_placed(verdict) or package is None:
+    if not verdict.status.is_lost or verdict.basis.unjudged or _is_placed(verdict) or package is None:
         return verdict
     for start in starts_of(criterion, facts.rubric):
         file = find_launch(package, start.launch or "")

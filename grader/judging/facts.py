@@ -195,7 +195,7 @@ class Facts:
             return failed_or_blocked(file.why, hint=file.hint, citations=cited) if file else None
         launch = self.unreadable_launch(scenario)
         if launch is not None and self._is_later(criterion):
-            launch = launch.model_copy(update={"unjudged": True})
+            launch = launch.based_on(unjudged=True)
         return launch or self._unparsed_scripts(criterion)
 
     def _is_later(self, criterion: Criterion) -> bool:
@@ -236,13 +236,11 @@ class Facts:
             slip = next(refusals(package, file), None) if isinstance(file, LaunchFile) else None
             lost = slip.verdict() if slip is not None else file
             if isinstance(lost, Verdict):
-                return lost.model_copy(update={"unjudged": self._judges({"launch-xml"}, name)})
+                return lost.based_on(unjudged=self._judges({"launch-xml"}, name))
             slip = next(refusals_unrun(lost), None) if lost is not None else None
             few = self._too_few_parse(lost) if lost is not None and known.until.connected else None
             if slip is not None or few is not None:
-                return (
-                    slip.verdict() if slip is not None else few and few.model_copy(update={"unjudged": True})
-                )
+                return slip.verdict() if slip is not None else few and few.based_on(unjudged=True)
         return None
 
     def _too_few_parse(self, launch: LaunchFile) -> Verdict | None:

@@ -116,7 +116,7 @@ def judge_all_runs(
     facts = _facts_as_recorded(rubric, runs, first)
     rubric = facts.rubric
     verdicts = judge_facts(rubric, facts, checks)
-    doubtful = frozenset(c.scenario for c in rubric.criteria if verdicts[c.id].timing and c.scenario)
+    doubtful = frozenset(c.scenario for c in rubric.criteria if verdicts[c.id].basis.timing and c.scenario)
     if repeated:
         again = judge_facts(rubric, try_facts(rubric, {**first, **repeated}), checks)
         verdicts = drop_unrepeated_losses(rubric, verdicts, again, repeated.keys())
@@ -154,7 +154,7 @@ def _undecided(rubric: Rubric, verdicts: Mapping[str, Verdict]) -> frozenset[str
     by_id, lacking = {c.id: c for c in rubric.criteria}, set[str]()
     for name in _in_order(rubric):
         is_open = verdicts[name].status is Status.INCONCLUSIVE
-        if verdicts[name].of_machine or (is_open and lacking.intersection(by_id[name].requires)):
+        if verdicts[name].basis.of_machine or (is_open and lacking.intersection(by_id[name].requires)):
             lacking.add(name)
     late = (
         c for c in rubric.criteria if verdicts[c.id].status is Status.INCONCLUSIVE and c.id not in lacking
@@ -175,7 +175,7 @@ def _with_repaired_copy(
     on_copy, repairs = judge_facts(rubric, of_copy, checks), repairs_of(rubric, repaired)
     # a build that goes on as far as what the machine lacks shows what the repaired line kept from being made
     shows = was_built(repaired) or any(
-        v.of_machine and verdicts[i].status.is_lost for i, v in on_copy.items()
+        v.basis.of_machine and verdicts[i].status.is_lost for i, v in on_copy.items()
     )
     verdicts, uses = apply_repaired_copy(
         rubric,
@@ -190,7 +190,7 @@ def _with_repaired_copy(
     # what no repair helps still has all of its faults
     as_it_is = add_later_faults(verdicts, rubric, facts)
     behind = add_later_faults(verdicts, rubric, of_copy, handed_in=facts.package, repairs=repairs)
-    told = {i: behind[i] if i in uses or not v.of_machine else as_it_is[i] for i, v in verdicts.items()}
+    told = {i: behind[i] if i in uses or not v.basis.of_machine else as_it_is[i] for i, v in verdicts.items()}
     return told, uses
 
 
@@ -259,16 +259,16 @@ def _seen_elsewhere(
         return None
     elsewhere = criterion.model_copy(update={"parameters": {**criterion.parameters, "topic": others[0]}})
     seen = _with_made_up(rubric, criterion, verdict_of(elsewhere, facts, checks))
-    if seen.unjudged or seen.status not in {Status.FAIL, Status.PARTIAL}:
+    if seen.basis.unjudged or seen.status not in {Status.FAIL, Status.PARTIAL}:
         return None
     message = f"on {others[0]}, which comes in place of {topic}: {seen.message}"
-    update = {"status": Status.FAIL, "score": 0.0, "message": message, "timing": False}
-    return seen.model_copy(update={**update, "expected": verdict.expected})
+    update = {"status": Status.FAIL, "score": 0.0, "message": message, "expected": verdict.expected}
+    return seen.model_copy(update=update).based_on(timing=False)
 
 
 def _with_made_up(rubric: Rubric, criterion: Criterion, verdict: Verdict) -> Verdict:
     """Return a verdict on what is wrong, without another cause, with where the values come from that are asked for."""
-    if verdict.status not in {Status.FAIL, Status.PARTIAL} or verdict.unjudged or verdict.cause:
+    if verdict.status not in {Status.FAIL, Status.PARTIAL} or verdict.basis.unjudged or verdict.basis.cause:
         return verdict
     hint = tell_made_up(rubric, criterion, verdict.hint, verdict.measured)
     return verdict if hint == verdict.hint else verdict.model_copy(update={"hint": hint})
@@ -480,7 +480,7 @@ class _Judging:
         verdict = verdict_of(criterion, facts, self._checks)
         final = not asked
         # Which criterion explains it is known only once all that it requires are judged.
-        if verdict.unjudged:
+        if verdict.basis.unjudged:
             if not self.results.keys() >= set(criterion.requires):
                 return
             final = final and all(self.results[r].final for r in criterion.requires)

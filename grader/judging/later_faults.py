@@ -94,14 +94,18 @@ def add_later_faults(
     """Return the verdicts; where there was nothing to judge of a node, the hint goes on with what its source shows of
     the criteria that were not reached. `facts` may be those of a copy with these `repairs` of `handed_in`."""
     later: dict[str, list[Fix]] = {}
-    moved = {v.meant: v.mistake.name for v in verdicts.values() if v.mistake and v.meant.endswith(".py")}
+    moved = {
+        v.basis.meant: v.mistake.name
+        for v in verdicts.values()
+        if v.mistake and v.basis.meant.endswith(".py")
+    }
     for criterion in rubric.criteria:
         verdict = verdicts[criterion.id]
         package = facts.package_of(criterion)
         if (
             package is None
             or criterion.visibility != "visible"
-            or not (verdict.status.is_lost or verdict.of_machine)
+            or not (verdict.status.is_lost or verdict.basis.of_machine)
         ):
             continue
         told = later.setdefault(verdict.blocked_by or criterion.id, [])
@@ -117,7 +121,7 @@ def add_later_faults(
         ):
             given = [word for start in rubric.starts_of(criterion) for word in start.args]
             told += map(Fix, unset_arg_fixes(file, verdict.hint, given))
-        elif verdict.unjudged or verdict.of_machine or criterion.check in OF_TOPICS:
+        elif verdict.basis.unjudged or verdict.basis.of_machine or criterion.check in OF_TOPICS:
             own_later = Later(criterion, verdict, package, facts, moved)
             told += own_later.syntax(handed_in or package)
             told += [one.as_handed_in(repairs) for one in own_later.faults()]
@@ -154,7 +158,7 @@ def _with_later(verdict: Verdict, later: Iterable[Fix]) -> Verdict:
     if not told:
         return verdict.model_copy(update={"hint": hint})
     texts = [one.text for one in told]
-    if verdict.of_machine:
+    if verdict.basis.of_machine:
         hint = hint.replace(NOTHING_TO_DO, "For the rest, ", 1)
         hint = f"{join_words(texts)}. {hint[:1].upper()}{hint[1:]}"
         return verdict.model_copy(update={"hint": hint})
@@ -185,7 +189,7 @@ class Later:
         self._paths = scripts | later | sources_of(criterion, facts.rubric, package)
         self._slips += self._texts_of_cpp()
         self._moved = later
-        self._ran = not verdict.cause and not later
+        self._ran = not verdict.basis.cause and not later
         """Names are told already then, and only what is behind them is not."""
 
     def faults(self) -> Iterator[Fix]:

@@ -88,7 +88,7 @@ def charge_repairs(
         named = [c for c in possible if repair.kind in NAMES and _names(c, repair)]
         failing = [c for c in possible if first[c.id].status is not Status.BLOCKED]
         # where nothing was printed, the line that is cited would print it, and is not to blame
-        citing = [c for c in failing if cites_file(first[c.id], repair) and not first[c.id].silent]
+        citing = [c for c in failing if cites_file(first[c.id], repair) and not first[c.id].basis.silent]
         builds = [c for c in possible if repair.kind in OF_BUILDS and c.check == BUILD]
         counting = [c.id for c in (*builds, *named, *citing, *failing, *possible) if c.points > 0]
         other = [name for name in counting if name not in misnamed]
@@ -189,12 +189,16 @@ def charged_verdict(
     """Return the loss, with the repairs that were seen to help as its hint, and what the copy loses it by, at these
     lines of the package as it is."""
     blocked = verdict.status is Status.BLOCKED
-    is_next = is_next_fault(verdict, copy, repairs) or (blocked and copy.status.is_lost and not copy.unjudged)
+    is_next = is_next_fault(verdict, copy, repairs) or (
+        blocked and copy.status.is_lost and not copy.basis.unjudged
+    )
     if blocked:
         message = "; ".join(messages_of(repairs))
         cited = verdict.citations
         verdict = failed(message, expected=copy.expected, measured=verdict.measured, citations=cited)
-    further = copy.status is Status.BLOCKED and verdict.unjudged and copy.cause != verdict.cause
+    further = (
+        copy.status is Status.BLOCKED and verdict.basis.unjudged and copy.basis.cause != verdict.basis.cause
+    )
     paths = re.findall(r"[\w-]+(?:/[\w.-]+)+", copy.hint)
     told_at_once = paths != [] and all(path in verdict.hint for path in paths)
     if copy.status.is_lost and verdict.hint and (told_at_once or not (is_next or further)):
@@ -218,14 +222,15 @@ def charged_verdict(
     of_file = verdict.mistake is not None and verdict.mistake.kind != "steers-wrong"
     if verdict.mistake and of_file and any(one.kind == "file-name" for one in repairs):
         verdict = verdict.lost_by("file-elsewhere", verdict.mistake.name)
-    update: dict[str, object] = {
+    update = {
         "message": "; ".join(words),
         "hint": "; ".join(hints),
         "citations": _with_repaired(verdict, repairs, told),
     }
     of_cmake = (one for one in repairs if PurePosixPath(one.file).name == CMAKE)
     if any(one not in told for one in of_cmake):  # how the call is written is told
-        update["sought"] = tuple(one for one in verdict.sought if one.kind not in {"call", "uncalled"})
+        untold_of = tuple(one for one in verdict.basis.sought if one.kind not in {"call", "uncalled"})
+        verdict = verdict.based_on(sought=untold_of)
     return verdict.model_copy(update=update)
 
 
@@ -240,7 +245,7 @@ def _is_said(repair: Repair, verdict: Verdict) -> bool:
 
 def _with_passed(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdict:
     """Return the loss of a node that ended; where the copy ended by another cause, with what it got past besides."""
-    if not copy.cause or not verdict.cause or copy.cause == verdict.cause:
+    if not copy.basis.cause or not verdict.basis.cause or copy.basis.cause == verdict.basis.cause:
         return verdict
     cited = cited_lines(verdict.citations)
     others = [one for one in repairs if (one.file, one.line) not in cited and one.kind in SEEN_IN_RUNS]
@@ -339,8 +344,8 @@ def is_next_fault(one: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> boo
     found = {(c.file, c.line) for c in one.citations if isinstance(c, FileCitation) and c.file in files}
     again = cited_lines(copy.citations)
     again -= lines_read_now(repairs)
-    in_repaired = found != set() or one.unjudged or any(is_told(repair, one.hint) for repair in repairs)
-    shown = not copy.unjudged or (one.unjudged and found != set())
+    in_repaired = found != set() or one.basis.unjudged or any(is_told(repair, one.hint) for repair in repairs)
+    shown = not copy.basis.unjudged or (one.basis.unjudged and found != set())
     return in_repaired and shown and not found & again and _is_other_fault(one, copy)
 
 

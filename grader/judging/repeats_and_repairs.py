@@ -66,13 +66,13 @@ def drop_unrepeated_losses(
         one, other = first[criterion.id], again[criterion.id]
         if criterion.scenario not in scenarios or not one.status.is_lost:
             continue
-        if (one.timing or one.status is Status.BLOCKED) and other.status is Status.PASS:
+        if (one.basis.timing or one.status is Status.BLOCKED) and other.status is Status.PASS:
             message = f"{other.message} (seen once and not again, so it costs nothing: {one.message})"
             verdicts[criterion.id] = other.model_copy(update={"message": message})
-        elif one.timing and other.status.is_lost:
+        elif one.basis.timing and other.status.is_lost:
             update = {"citations": tuple(dict.fromkeys(one.citations + other.citations))}
             verdicts[criterion.id] = one.model_copy(update=update)
-        elif one.timing and other.status.is_open:
+        elif one.basis.timing and other.status.is_open:
             verdicts[criterion.id] = other
     return verdicts
 
@@ -178,7 +178,7 @@ def _is_better(
     return verdict.status.is_lost and (
         not _is_worse(first, on_copy, criterion)
         or repair_charges.is_next_fault(verdict, copy, needed)
-        or (copy.of_machine and any(repair_charges.fails_in(verdict, one) for one in needed))
+        or (copy.basis.of_machine and any(repair_charges.fails_in(verdict, one) for one in needed))
     )
 
 
@@ -362,11 +362,11 @@ def _is_worse(first: Mapping[str, Verdict], on_copy: Mapping[str, Verdict], crit
     """Return whether the copy shows no more of a lost criterion than the package as it is."""
     one, copy = first[criterion.id], on_copy[criterion.id]
     if copy.status.is_lost and copy.score <= one.score:
-        same = copy.cause == one.cause and copy.blocked_by == one.blocked_by
-        return not one.unjudged or (copy.unjudged and same)
+        same = copy.basis.cause == one.basis.cause and copy.blocked_by == one.blocked_by
+        return not one.basis.unjudged or (copy.basis.unjudged and same)
     # what was judged before, and could not be on the copy, shows nothing of the repair, unless it ended in the same way
-    by_machine = copy.cause != "" and copy.cause == one.cause
-    return copy.status is Status.ERROR or (copy.status.is_open and not one.unjudged and not by_machine)
+    by_machine = copy.basis.cause != "" and copy.basis.cause == one.basis.cause
+    return copy.status is Status.ERROR or (copy.status.is_open and not one.basis.unjudged and not by_machine)
 
 
 LINES = re.compile(
@@ -390,11 +390,12 @@ def with_lines_as_handed_in(verdict: Verdict, repairs: Sequence[Repair]) -> Verd
     )
     files = {one.file for one in verdict.citations if isinstance(one, FileCitation)}
     alone = files.pop() if len(files) == 1 else ""
-    texts = {
-        name: text_as_handed_in(getattr(verdict, name), repairs, alone)
-        for name in ("message", "hint", "cause")
-    }
-    return verdict.model_copy(update={"citations": cited, **texts})
+    message, hint, cause = (
+        text_as_handed_in(text, repairs, alone)
+        for text in (verdict.message, verdict.hint, verdict.basis.cause)
+    )
+    update = {"citations": cited, "message": message, "hint": hint}
+    return verdict.model_copy(update=update).based_on(cause=cause)
 
 
 def text_as_handed_in(text: str, repairs: Sequence[Repair], alone: str = "") -> str:

@@ -33,7 +33,7 @@ class Requirements:
 
         What was found here stays in the message.
         """
-        if not verdict.unjudged:
+        if not verdict.basis.unjudged:
             return verdict
         lost = [r for r in criterion.requires if self._explains(r, criterion, verdict)]
         same = [r for r in lost if _cause(self.verdicts[r]) == _cause(verdict)]
@@ -42,15 +42,15 @@ class Requirements:
             # what is not there at all explains most, then what is said of the same topics and nodes
             names = _graph_names(criterion)
             shared = {r: len(names & _graph_names(self._criteria[r])) for r in lost}
-            blocking = min(same or lost, key=lambda r: (not self.verdicts[r].unjudged, -shared[r]))
+            blocking = min(same or lost, key=lambda r: (not self.verdicts[r].basis.unjudged, -shared[r]))
             # The root of a chain: what has to be fixed first, and not what is blocked itself.
             root = self._roots[criterion.id] = self._roots.get(blocking, blocking)
             message = f"blocked by {root}: {self.verdicts[root].message}"
             if verdict.message not in message:
-                message = f"{message}; for this criterion: {_without_cause(verdict)}"
+                message = f"{message}; for this criterion: {verdict.message_without_cause}"
             # what is sure and explains it would come again with the run
-            sure = self.verdicts[root].unjudged or self._criteria[root].scenario == criterion.scenario
-            timing = self.verdicts[root].timing or not sure
+            sure = self.verdicts[root].basis.unjudged or self._criteria[root].scenario == criterion.scenario
+            timing = self.verdicts[root].basis.timing or not sure
             return _blocked(verdict, root, message, timing=timing)
         undecided = next((r for r in criterion.requires if self.verdicts[r].status.is_open), None)
         if undecided is None:
@@ -75,24 +75,31 @@ class Requirements:
         same_run = self._criteria[required].scenario == criterion.scenario
         # a manifest that has the name which a launch file lacks
         is_named = (
-            f'pkg="{self._criteria[required].parameters.get("name")}"' in found.hint and not verdict.unjudged
+            f'pkg="{self._criteria[required].parameters.get("name")}"' in found.hint
+            and not verdict.basis.unjudged
         )
         if not verdict.status.is_lost or is_unmade(verdict) or is_named:
             return False  # a program that the build did not make is no reason for the build to fail
         if same_run and self._criteria[required].check == "topic-type" and OTHER_TYPE.search(found.message):
             return True  # its process ended of the wrong type
-        named = verdict.unjudged and any(text in found.message for text in _paths(self._criteria[required]))
-        unbuilt = found.unbuilt and verdict.unbuilt
-        if same_run and found.cause not in {"", verdict.cause} and not (named or same_line or unbuilt):
+        named = verdict.basis.unjudged and any(
+            text in found.message for text in _paths(self._criteria[required])
+        )
+        unbuilt = found.basis.unbuilt and verdict.basis.unbuilt
+        if (
+            same_run
+            and found.basis.cause not in {"", verdict.basis.cause}
+            and not (named or same_line or unbuilt)
+        ):
             return False  # its process ended of something else
-        if verdict.unjudged:
+        if verdict.basis.unjudged:
             return True
         if self._is_repaired(required, criterion, found) and not same_line:
             return False
-        was_there = (found.silent and (same_run or found.status is Status.PASS)) or self._leaves_it_there(
-            required, criterion
-        )
-        return not was_there or bool(verdict.cause) or _cause(verdict) in found.message
+        was_there = (
+            found.basis.silent and (same_run or found.status is Status.PASS)
+        ) or self._leaves_it_there(required, criterion)
+        return not was_there or bool(verdict.basis.cause) or _cause(verdict) in found.message
 
     def _is_repaired(self, required: str, criterion: Criterion, found: Verdict) -> bool:
         """Return whether the arena puts right what the required criterion asks for, bits and first lines, before it
@@ -102,7 +109,7 @@ class Requirements:
         of_build = criterion.scenario is None or criterion.check == "build-and-run"
         if check is None or not check.run_anyway or of_build:
             return False
-        return check.name != "build" or not (found.unbuilt or self._is_compiled(criterion))
+        return check.name != "build" or not (found.basis.unbuilt or self._is_compiled(criterion))
 
     def _leaves_it_there(self, required: str, criterion: Criterion) -> bool:
         """Return whether what the required criterion judges can be wrong of a node that is there and connected."""
@@ -136,9 +143,9 @@ def charge_once(
     for criterion in sorted(rubric.criteria, key=lambda c: (c.visibility != "visible", not c.points)):
         verdict = verdicts[criterion.id]
         is_whole = verdict.status is Status.FAIL and not verdict.score and criterion.penalty is None
-        if not is_whole or criterion.scenario is None or not verdict.charged_once:
+        if not is_whole or criterion.scenario is None or not verdict.basis.charged_once:
             continue
-        root = charged.setdefault(verdict.cause, criterion.id)
+        root = charged.setdefault(verdict.basis.cause, criterion.id)
         if root != criterion.id and criterion.id not in judged and root not in judged:
             told[criterion.id] = _blocked(verdict, root, f"blocked by {root}: {verdict.message}")
     return told
@@ -146,14 +153,13 @@ def charge_once(
 
 def _blocked(verdict: Verdict, root: str, message: str, *, timing: bool = False) -> Verdict:
     update = {
-        "timing": verdict.timing and timing,
         "status": Status.BLOCKED,
         "score": 0.0,
         "message": message,
         "hint": f"fix {root} first",
         "blocked_by": root,
     }
-    return verdict.model_copy(update=update)
+    return verdict.model_copy(update=update).based_on(timing=verdict.basis.timing and timing)
 
 
 def _graph_names(criterion: Criterion) -> set[str]:
@@ -166,11 +172,4 @@ def _paths(criterion: Criterion) -> list[str]:
 
 
 def _cause(verdict: Verdict) -> str:
-    return verdict.cause or verdict.message
-
-
-def _without_cause(verdict: Verdict) -> str:
-    """Return what was found, without the cause that the blocking criterion's message has named already."""
-    if not verdict.cause:
-        return verdict.message
-    return verdict.message.replace(f" ({verdict.cause})", "").replace(f": {verdict.cause}", "")
+    return verdict.basis.cause or verdict.message

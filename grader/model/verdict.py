@@ -140,17 +140,10 @@ Span = tuple[int, int]
 """From when until when, in ns since the epoch."""
 
 
-class Verdict(Record):
-    """One check's judgement."""
+class Basis(Record):
+    """What a verdict rests on, for the judge: whether another criterion explains it, whether it has to be repeated,
+    and which lines are cited with it."""
 
-    status: Status
-    score: float
-    """The share of the points, 0 to 1."""
-    message: str
-    expected: str = ""
-    measured: str = ""
-    hint: str = ""
-    citations: Citations = ()
     unjudged: bool = False
     """It rests on the absence of evidence: the judge turns it, even a pass, into `blocked` where a required criterion
     explains the absence."""
@@ -166,12 +159,6 @@ class Verdict(Record):
     """What a process ended of, in words that are the same in every verdict that rests on it."""
     charged_once: bool = False
     """The same cause costs one criterion its points, and blocks the others that lost theirs to it."""
-    blocked_by: str = ""
-    """The criterion that explains the absence."""
-    right: str = ""
-    """What earned a part of the points."""
-    mistake: Mistake | None = None
-    """The kind of what was done wrong."""
     meant: str = ""
     """The file that is told to become the one that is missing."""
     said: str = ""
@@ -194,6 +181,27 @@ class Verdict(Record):
     due: tuple[Span, ...] = ()
     """When what is missing had to come: an exception at another time does not explain that."""
 
+
+class Verdict(Record):
+    """One check's judgement."""
+
+    status: Status
+    score: float
+    """The share of the points, 0 to 1."""
+    message: str
+    expected: str = ""
+    measured: str = ""
+    hint: str = ""
+    citations: Citations = ()
+    blocked_by: str = ""
+    """The criterion that explains the absence."""
+    right: str = ""
+    """What earned a part of the points."""
+    mistake: Mistake | None = None
+    """The kind of what was done wrong."""
+    basis: Basis = Basis()
+    """What it rests on, which the judge needs and no report shows."""
+
     def about(
         self,
         *,
@@ -206,12 +214,24 @@ class Verdict(Record):
         shows, come behind those that it has."""
         # `dict.fromkeys` keeps the order, and each place once.
         places = None if citations is None else tuple(dict.fromkeys((*self.citations, *citations)))
-        fields = {"expected": expected, "measured": measured, "said": said, "citations": places}
-        return self.model_copy(update={name: value for name, value in fields.items() if value is not None})
+        fields = {"expected": expected, "measured": measured, "citations": places}
+        new = self.model_copy(update={name: value for name, value in fields.items() if value is not None})
+        return new if said is None else new.based_on(said=said)
+
+    def based_on(self, **fields: object) -> Verdict:
+        """Return the verdict with these fields of its `basis`."""
+        basis = Basis.model_validate({**dict(self.basis), **fields})
+        return self.model_copy(update={"basis": basis})
 
     def caused_by(self, other: Verdict) -> Verdict:
         """Return the verdict with what another one found as its cause."""
-        return self.model_copy(update={"cause": other.message, "charged_once": other.charged_once})
+        return self.based_on(cause=other.message, charged_once=other.basis.charged_once)
+
+    @property
+    def message_without_cause(self) -> str:
+        """What was found, without the cause that stands behind it."""
+        cause = self.basis.cause
+        return self.message.replace(f" ({cause})", "").replace(f": {cause}", "") if cause else self.message
 
     def explained(self, why: str, hint: str, citations: Citations = (), *, cause: str = "") -> Verdict:
         """Return a loss with why it came to it behind its message, what to do about that, and its lines before its own.
@@ -220,10 +240,9 @@ class Verdict(Record):
             "message": f"{self.message}; {why}",
             "hint": hint,
             "citations": tuple(dict.fromkeys((*citations, *self.citations))),
-            "cause": cause or self.cause,
-            "charged_once": self.charged_once and not cause,
         }
-        return self.model_copy(update=update)
+        new = self.model_copy(update=update)
+        return new.based_on(cause=cause, charged_once=False) if cause else new
 
     def moved(self, folder: str) -> Verdict:
         """Return the verdict with the files that it cites below `folder`: `../lab_msgs`."""
@@ -233,22 +252,22 @@ class Verdict(Record):
     def in_part(self, share: float, right: str) -> Verdict:
         """Return a fail as one that earns `share` of the points, 0 to 1, for what is right. Where nothing is, and
         where nothing could be judged, it stays as it is."""
-        if self.status is not Status.FAIL or self.unjudged or share <= 0:
+        if self.status is not Status.FAIL or self.basis.unjudged or share <= 0:
             return self
         return self.model_copy(update={"status": Status.PARTIAL, "score": share, "right": right})
 
     def lost_by(self, kind: MistakeKind, name: str, meant: str = "") -> Verdict:
         """Return the verdict with the kind of mistake that it is lost by, and the file that is meant to be `name`."""
-        return self.model_copy(update={"mistake": Mistake(kind=kind, name=name), "meant": meant})
+        return self.model_copy(update={"mistake": Mistake(kind=kind, name=name)}).based_on(meant=meant)
 
     def seeking(self, kind: SoughtKind, *names: str) -> Verdict:
         """Return the verdict with these names too to cite the lines of."""
         new = (Sought(kind=kind, name=name) for name in names)
-        return self.model_copy(update={"sought": (*self.sought, *new)})
+        return self.based_on(sought=(*self.basis.sought, *new))
 
     def sought_names(self, kind: SoughtKind) -> list[str]:
         """Return the names of this kind to cite the lines of."""
-        return [one.name for one in self.sought if one.kind == kind]
+        return [one.name for one in self.basis.sought if one.kind == kind]
 
     def sought_name(self, kind: SoughtKind) -> str:
         """Return the first name of this kind to cite the lines of; "" where none is sought."""
@@ -256,20 +275,20 @@ class Verdict(Record):
 
     def of_value(self, *, nan: bool) -> Verdict:
         """Return the verdict marked as one on a wrong value; `nan`: it is NaN, or should be."""
-        return self.model_copy(update={"wrong": "nan" if nan else "value"})
+        return self.based_on(wrong="nan" if nan else "value")
 
     def stuck(self, number: int = 2) -> Verdict:
         """Return the verdict marked as one on what is not done again, from its second time on."""
-        return self.model_copy(update={"wrong": "stuck"}) if number > 1 else self
+        return self.based_on(wrong="stuck") if number > 1 else self
 
     def late(self, due: Iterable[Span] = ()) -> Verdict:
         """Return the verdict marked as one that shows a callback which came too late, or never, when it was `due`."""
-        return self.model_copy(update={"callbacks": "late", "due": tuple(due)})
+        return self.based_on(callbacks="late", due=tuple(due))
 
     def if_repeated(self) -> Verdict:
         """Return the verdict as a loss that counts only if it is repeated: one run's timing could have made it, so its
         scenario is run again."""
-        return self.model_copy(update={"timing": True})
+        return self.based_on(timing=True)
 
 
 def joined(losses: Sequence[Verdict]) -> Verdict | None:
@@ -279,7 +298,7 @@ def joined(losses: Sequence[Verdict]) -> Verdict | None:
     different = list({one.message: one for one in losses}.values())
     if len(different) < 2:
         return different[0] if different else None
-    first = next((one for one in different if not one.unjudged), different[0])
+    first = next((one for one in different if not one.basis.unjudged), different[0])
     update = {
         "message": "; ".join(one.message for one in different),
         # Clause by clause: two hints may have a part in common.
@@ -321,7 +340,7 @@ def failed(message: str, **details: Unpack[Details]) -> Verdict:
 def failed_or_blocked(message: str, **details: Unpack[Details]) -> Verdict:
     """Return the verdict that there is nothing to judge: a fail, or `blocked` where a required criterion
     explains it."""
-    return Verdict(status=Status.FAIL, score=0.0, message=message, unjudged=True, **details)
+    return failed(message, **details).based_on(unjudged=True)
 
 
 def inconclusive(message: str, **details: Unpack[Details]) -> Verdict:
@@ -336,4 +355,4 @@ def grade_again(message: str, *, measured: str = "") -> Verdict:
 
 def machine_lacks(message: str, **details: Unpack[Details]) -> Verdict:
     """Return a verdict that is open until the grading machine has what it lacks."""
-    return Verdict(status=Status.INCONCLUSIVE, score=0.0, message=message, of_machine=True, **details)
+    return inconclusive(message, **details).based_on(of_machine=True)

@@ -168,7 +168,7 @@ def test_what_is_no_value_is_the_students(tmp_path: Path, function: str, says: s
     verdict = _judge(tmp_path, seen)
     assert (verdict.status, verdict.score) == (Status.FAIL, 0)
     assert says in verdict.hint
-    assert verdict.timing is (function == "stay")
+    assert verdict.basis.timing is (function == "stay")
 
 
 def test_what_ends_the_process_of_all_is_the_students(tmp_path: Path) -> None:

@@ -117,10 +117,10 @@ def differences(verdict: Verdict, expect: dict[str, Any]) -> list[str]:
     found = []
     if verdict.status is not Status(expect["status"]):
         found.append(f"status {verdict.status.value}, expected {expect['status']}")
-    if verdict.unjudged != expect.get("unjudged", False):
-        found.append(f"unjudged {verdict.unjudged}")
+    if verdict.basis.unjudged != expect.get("unjudged", False):
+        found.append(f"unjudged {verdict.basis.unjudged}")
     for field in expect.keys() - {"status", "unjudged", "cites"}:
-        text = str(getattr(verdict, field))
+        text = str(getattr(verdict if field in Verdict.model_fields else verdict.basis, field))
         if not re.search(str(expect[field]), text):
             found.append(f"{field} {text!r} does not match {expect[field]!r}")
     cited = [c.model_dump(exclude_none=True) for c in verdict.citations]

@@ -85,4 +85,4 @@ def test_a_gap_in_the_sequence_numbers_is_the_recorders() -> None:
 
 
 def test_a_decoded_value_that_is_no_number_is_left_out() -> None:
-    assert verdict("counter-start", type="std_msgs/Bool", values=[True, False]).unjudged
+    assert verdict("counter-start", type="std_msgs/Bool", values=[True, False]).basis.unjudged

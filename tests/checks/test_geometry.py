@@ -143,7 +143,7 @@ def test_a_way_beyond_the_tolerance_fails_and_says_why(way: list[Leg], longer: f
     assert found.status is Status.FAIL
     assert found.message
     assert found.hint
-    assert not found.unjudged
+    assert not found.basis.unjudged
 
 
 @given(way=WAYS)

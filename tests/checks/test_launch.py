@@ -250,7 +250,7 @@ def test_a_node_that_lacks_what_the_build_makes_has_not_been_built(tmp_path: Pat
     found = why_died(facts_of(tmp_path), run, node("a"))
     assert found is not None
     assert found.unbuilt
-    assert found.verdict("it died").unbuilt
+    assert found.verdict("it died").basis.unbuilt
 
 
 @pytest.mark.parametrize(

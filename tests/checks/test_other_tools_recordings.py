@@ -53,6 +53,6 @@ def test_a_latched_topic_is_known_by_its_connection_only() -> None:
 )
 def test_what_was_not_recorded(check: str, params: dict[str, Any]) -> None:
     found = verdict(check, params)
-    assert found.unjudged
+    assert found.basis.unjudged
     assert found.message.startswith("/map is not in ")
     assert found.hint.endswith("record it: rosbag record /map, or -a for all")

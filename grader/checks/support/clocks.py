@@ -263,9 +263,10 @@ def excused(verdict: Verdict, run: Run, from_ns: int, to_ns: int, why: Callable[
         message = f"{verdict.message}; but the grading machine was {what}"
         hint = "grade again when the machine is less busy"
         still_open = inconclusive(message, hint=hint, measured=verdict.measured)
-        return still_open.model_copy(update={"excused": verdict.message})
+        return still_open.based_on(excused=verdict.message)
     if why(whole):
-        return verdict.model_copy(update={"message": f"{verdict.message}; {NO_EXCUSE}", "own_load": True})
+        told = verdict.model_copy(update={"message": f"{verdict.message}; {NO_EXCUSE}"})
+        return told.based_on(own_load=True)
     return verdict
 
 

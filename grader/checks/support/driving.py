@@ -98,7 +98,7 @@ def tell_end(verdict: Verdict, package: PackageFacts, run: Run) -> Verdict:
             verdict = verdict.explained(why, hint)
     if end is None or end.by_itself or end.cause in verdict.message:
         return verdict
-    kind = failed_or_blocked if verdict.unjudged else failed
+    kind = failed_or_blocked if verdict.basis.unjudged else failed
     if "keeps moving" in verdict.message:  # it was there before that
         verdict = verdict.model_copy(update={"citations": (*verdict.citations, *end.citations)})
         return verdict.explained(f"the node ended: {end.cause}", f"{verdict.hint}; {end.hint}")

@@ -175,12 +175,10 @@ class Ending(NamedTuple):
             "message": message,
             "hint": self.hint,
             "citations": (*self.citations, *verdict.citations),
-            "cause": self.cause,
-            "charged_once": self.raised,
-            "unbuilt": self.unbuilt,
         }
-        sought = OF_INTERFACES if self.unbuilt else ()
-        return verdict.model_copy(update=update).seeking("uncalled", *sought)
+        told = verdict.model_copy(update=update)
+        told = told.based_on(cause=self.cause, charged_once=self.raised, unbuilt=self.unbuilt)
+        return told.seeking("uncalled", *(OF_INTERFACES if self.unbuilt else ()))
 
 
 def explain_early_end(package: PackageFacts, run: Run) -> Ending | None:
@@ -286,11 +284,11 @@ def explain_error(
 def explain_by_exception(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a lost mark with the exception that a callback raised, which rospy prints and outlives. One when nothing
     was due need not be why."""
-    if not check.of_callbacks or verdict.cause or early_end(run):
+    if not check.of_callbacks or verdict.basis.cause or early_end(run):
         return verdict
-    end = explain_error(package, run, during=verdict.due)
+    end = explain_error(package, run, during=verdict.basis.due)
     if end is None:
-        if not (verdict.due and (other := explain_error(package, run))):
+        if not (verdict.basis.due and (other := explain_error(package, run))):
             return verdict
         why, hint = f"at another time, a callback fails: {other.cause}", f"{verdict.hint}; {other.hint}"
         return verdict.explained(why, hint, other.citations)

@@ -172,7 +172,7 @@ class Absence(NamedTuple):
             else failed
         )
         verdict = kind(message, hint=self.hint, citations=self.citations)
-        verdict = verdict.model_copy(update={"unbuilt": self.unbuilt})
+        verdict = verdict.based_on(unbuilt=self.unbuilt)
         return verdict.seeking("package", self.about) if self.refused == NO_PACKAGE else verdict
 
 
@@ -313,12 +313,16 @@ def explain_by_refused_launch(_check: Check, package: PackageFacts, run: Run, ve
     ended = early_end(run)
     refused = refusal(run, package) if ended is not None and ended.start.argv[:1] == ("roslaunch",) else None
     is_told = NOTHING_STARTS in verdict.message or (refused is not None and refused.why in verdict.message)
-    if refused is None or is_told or not verdict.cause or (refused.hint and refused.hint in verdict.hint):
+    if (
+        refused is None
+        or is_told
+        or not verdict.basis.cause
+        or (refused.hint and refused.hint in verdict.hint)
+    ):
         return verdict
-    message = verdict.message.replace(f" ({verdict.cause})", "").replace(f": {verdict.cause}", "")
-    update = {"message": f"{message}: {refused.why}", "hint": refused.hint, "cause": refused.why}
+    update = {"message": f"{verdict.message_without_cause}: {refused.why}", "hint": refused.hint}
     citations = tuple(dict.fromkeys((*refused.citations, *verdict.citations)))
-    return verdict.model_copy(update={**update, "citations": citations})
+    return verdict.model_copy(update={**update, "citations": citations}).based_on(cause=refused.why)
 
 
 def _file_meant(package: PackageFacts, name: str) -> str:

@@ -225,7 +225,7 @@ def blame_renaming(
 
 def explain_by_late_remap(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a loss with the `<remap>` that would give a topic its name, and stands below the nodes that have it."""
-    if verdict.cause or check.name.endswith("-xml") or any(run_scripts(run)):
+    if verdict.basis.cause or check.name.endswith("-xml") or any(run_scripts(run)):
         return verdict
     had = {topic for end in ENDS for topic in topics_with(run, end)}
     said = f"{verdict.message} {verdict.expected}"

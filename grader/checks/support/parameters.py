@@ -216,8 +216,8 @@ def params_given(run: Run) -> dict[str, Given]:
 def _may_rest_on_one(check: Check, verdict: Verdict) -> bool:
     """Return whether a parameter may be the cause of a loss that nothing explains yet: what a node does upon what it
     hears, or other words of its own than the lab's."""
-    says = check.name in {"logs", "params-read", "prints"} and not verdict.unjudged
-    return (check.of_callbacks or says) and not verdict.cause
+    says = check.name in {"logs", "params-read", "prints"} and not verdict.basis.unjudged
+    return (check.of_callbacks or says) and not verdict.basis.cause
 
 
 def explain_by_unread_parameter(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
@@ -236,7 +236,7 @@ def explain_by_unread_parameter(check: Check, package: PackageFacts, run: Run, v
         # To read a map is to read what is in it, and a name below another one asks for a part of it.
         if not any(f"{name}/".startswith(f"{n}/") or f"{n}/".startswith(f"{name}/") for n in names)
     ]
-    if not asked or not unread or (verdict.unjudged and not published_topics(run)):
+    if not asked or not unread or (verdict.basis.unjudged and not published_topics(run)):
         return verdict  # what no node publishes at all, no parameter explains
     name = unread[0].name
     above, _, last = name.rpartition("/")
@@ -258,7 +258,7 @@ def _is_misread(package: PackageFacts, run: Run, verdict: Verdict) -> bool:
     """Return whether a line that reads a parameter the wrong way explains a wrong value: `wrong-value` tells it."""
     files = files_that_run(package, run)
     found = (s for s in package.slips if s.kind == "wrong-value" and s.name in ("early", "unset"))
-    return verdict.wrong == "value" and any(s.file in files for s in found)
+    return verdict.basis.wrong == "value" and any(s.file in files for s in found)
 
 
 def _asked_before(run: Run, asked: str, right: str) -> str:
@@ -315,7 +315,7 @@ def _without_colon(package: PackageFacts, run: Run, verdict: Verdict) -> Verdict
             why = f"`{shown(given[0])}` in args on line {node.line} of {node.file} sets no parameter"
             hint = f"write `{shown(given[0].replace('=', ':=', 1))}`"
             return verdict.explained(why, hint, (node.place,), cause=why)
-        if (own := _given_to_another(package, run, node)) and not verdict.cause:
+        if (own := _given_to_another(package, run, node)) and not verdict.basis.cause:
             why = f"nothing sets {node.full_name}/{own}, which other nodes of {node.type} are given"
             hint = f'add <param name="{own}" value="…"/> to the <node> on line {node.line} of {node.file}'
             return verdict.explained(why, f"{hint}: {verdict.hint}", (node.place,), cause=why)
@@ -366,7 +366,7 @@ def explain_by_overwritten_parameter(
 
 def explain_by_given_value(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a lost mark with the line of a launch file that gives a node the very value that it wrongly publishes."""
-    if check.name != "field-equals" or verdict.cause or verdict.unjudged:
+    if check.name != "field-equals" or verdict.basis.cause or verdict.basis.unjudged:
         return verdict
     nodes, there = _publishing(verdict, run), params_on_server(run)
     read = {absolute_name(e.topic or "") for _, e in run.actors if e.action == "read" and e.actor in nodes}

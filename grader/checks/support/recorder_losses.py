@@ -66,13 +66,14 @@ def account_for_losses(check: Check, facts: Mapping[str, object], verdict: Verdi
     if not found:
         return verdict
     taken = verdict.status in TAKEN and not check.heeds_losses
-    verdict = verdict.model_copy(update={"dropped": any(one.dropped for one in found)})
+    verdict = verdict.based_on(dropped=any(one.dropped for one in found))
     if not taken and verdict.status is not Status.INCONCLUSIVE:
         measured = "; ".join(filter(None, (verdict.measured, *(one.words for one in found))))
         return verdict.model_copy(update={"measured": measured})
     update: dict[str, object] = {"message": "; ".join([verdict.message, *(one.words for one in found)])}
     if taken:
-        update |= {"status": Status.INCONCLUSIVE, "score": 0.0, "unjudged": False, "hint": "grade again"}
+        update |= {"status": Status.INCONCLUSIVE, "score": 0.0, "hint": "grade again"}
+        verdict = verdict.based_on(unjudged=False)
     return verdict.model_copy(update=update)
 
 

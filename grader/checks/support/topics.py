@@ -396,7 +396,7 @@ def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
     add = f"add {join_words(subscriber(one, f'{kinds[one]}, callback') for one in lacking)}"
     if topic in offered:
         add = f"subscribe to {topic} in place of {join_words(found, 'or')}, on which nothing is published"
-    return failed(message, hint=remapped or add).model_copy(update={"charged_once": True})
+    return failed(message, hint=remapped or add).based_on(charged_once=True)
 
 
 def unheard_programs(run: Run) -> dict[str, tuple[str, ...]]:
@@ -433,7 +433,7 @@ def _remap_to(package: PackageFacts, run: Run, topic: str, heard: str) -> str:
 
 def explain_by_unheard_topic(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a lost mark with the topic on which the run publishes and that no node heard, whatever it did instead."""
-    is_unexplained = check.of_callbacks and not verdict.cause and not early_end(run)
+    is_unexplained = check.of_callbacks and not verdict.basis.cause and not early_end(run)
     if not is_unexplained or (found := unheard(run, package)) is None:
         return verdict
     explained = verdict.explained(found.message, found.hint).caused_by(found)

@@ -30,21 +30,23 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
     silent = not any("Twist" in c.type and c.messages for c in run.student_channels())
     if (
         silent
-        and not verdict.cause
+        and not verdict.basis.cause
         and check.name in OF_STEERING[:3]
         and (slip := why_unreached(package, run))
     ):
         why = f"line {slip.line} of {slip.file}: {slip.message}"
         return verdict.explained(why, reach_hint(slip), (slip.place,), cause=slip.message)
     files = files_that_run(package, run)
-    of_values = check.of_callbacks or check.name in OF_VALUES or (check.name == "prints" and verdict.silent)
-    kinds = ["wrong-value", "compared"] if of_values and not verdict.cause else []
-    if check.name == "action-result" and verdict.wrong != "nothing" and ends_twice(run):
+    of_values = (
+        check.of_callbacks or check.name in OF_VALUES or (check.name == "prints" and verdict.basis.silent)
+    )
+    kinds = ["wrong-value", "compared"] if of_values and not verdict.basis.cause else []
+    if check.name == "action-result" and verdict.basis.wrong != "nothing" and ends_twice(run):
         kinds.append("goes-on")
     found = [s for s in package.slips if s.kind in kinds and s.file in files]
     # feedback that is not sent explains only what is missing of it
     found = [s for s in found if "publish_feedback" not in s.fix or "feedback" in verdict.message]
-    wrong = verdict.wrong
+    wrong = verdict.basis.wrong
     steers = STEERING if check.name in OF_STEERING else ()
     sure = [
         s
@@ -71,17 +73,17 @@ OF_RESULTS = ("prints", "rostest")
 def explain_by_waiting_callback(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a lost mark with the callback that sleeps or never ends: until it returns, its script receives nothing."""
     of_callbacks = check.of_callbacks or check.name in (*OF_RESULTS, "action-result")
-    files = files_that_run(package, run) if of_callbacks and not verdict.cause else ()
+    files = files_that_run(package, run) if of_callbacks and not verdict.basis.cause else ()
     waits = (s for s in package.slips if (s.kind == "callback-waits" or s.is_lock) and s.file in files)
     slip = next((s for s in waits if check.name != "action-result" or s.is_lock), None)
     # What should come before any callback does not wait for one.
-    if slip is None or verdict.callbacks == "before":
+    if slip is None or verdict.basis.callbacks == "before":
         return verdict
-    if slip.is_endless and verdict.dropped and verdict.status is Status.INCONCLUSIVE:
+    if slip.is_endless and verdict.basis.dropped and verdict.status is Status.INCONCLUSIVE:
         # the flood is the loop's own, and keeps the machine busy: neither excuses it
-        lost = verdict.excused or verdict.message
+        lost = verdict.basis.excused or verdict.message
         verdict = verdict.model_copy(update={"status": Status.FAIL, "message": lost})
-    if not verdict.status.is_lost or not (slip.is_endless or verdict.callbacks == "late"):
+    if not verdict.status.is_lost or not (slip.is_endless or verdict.basis.callbacks == "late"):
         return verdict
     ends = "the caller waits" if check.name == "service-answers" else "nothing else is heard"
     hint = f"in {slip.file}, {slip.fix}" + (

@@ -97,7 +97,7 @@ def wrap_figures(run: Run, package: PackageFacts, params: WrapParams) -> Iterato
     goes_on = (s for s in found.bad if not (s.before > params.maximum and s.change > 0))
     marks = [(s.number, _turn_text(s, found.every, count, run, params)) for s in goes_on]
     verdict, _ = counters.judge_wraps(count, run, package, params)
-    if not found.bad and verdict.status is Status.FAIL and not verdict.unjudged:
+    if not found.bad and verdict.status is Status.FAIL and not verdict.basis.unjudged:
         # no turn is wrong, and it fails: there was none at all, which shows at the end
         marks = [(len(count.values) - 1, verdict.message)]
     yield _counter_figure(count, found.good, marks, run=run, topic=params.topic)
