@@ -80,9 +80,9 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
 
     How it is measured
         The recorder is connected before the publisher's registration returns, so the first message is not
-        missed. If the first value seen is a later one and earlier ones could have been missed, this counts
-        only if a second run shows it too. In a flood of messages the publisher itself may drop the first
-        ones: there it counts only where a line of the script shows why.
+        missed. If the grader may have missed the first values, a wrong start costs points only if a second
+        run shows it too. In a flood of messages the publisher itself may drop the first ones: there it
+        counts only where a line of the script shows why.
 
     How to fix
         Set the counter before the loop, publish it, and only then add one. `rostopic echo <topic>`, started
@@ -201,7 +201,7 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
 
 @check("counter-wrap", params=WrapParams, messages_only=True, heeds_losses=True)
 def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict:
-    """The counter starts again at its maximum.
+    """The counter goes back to its first value after its maximum.
 
     What it checks
         That the counter goes back to its first value when it has reached the maximum, several times.

@@ -66,7 +66,8 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
 
     Why it matters on a robot
         `rosrun` and `roslaunch` only find files that may be executed, and the `#!` line is all that tells
-        the robot that a file is Python. It works in your editor and fails on the robot.
+        the robot that a file is Python. Without them, your script still runs in the editor, but not on the
+        robot.
 
     How it is measured
         In a repository, git says whether it is executable; otherwise the archive or the disk does. The

@@ -141,8 +141,8 @@ def file_left(package: PackageFacts, run: Run, params: FileLeftParams) -> Verdic
         the handout names, and contains what it should.
 
     Why it matters on a robot
-        Only what a robot wrote down shows later what it saw and did. That a recording was not closed, or
-        lacks a topic, is noticed when the robot is back in its cupboard.
+        Only what a robot wrote down shows later what it saw and did. You notice that a recording was not
+        closed, or lacks a topic, only after the robot is back in its cupboard.
 
     How it is measured
         All files that the program left are listed after Ctrl-C, and the file is read: the messages of each

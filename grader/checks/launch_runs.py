@@ -239,7 +239,8 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
         or in another namespace, runs and talks to no one.
 
     How it is measured
-        `roslaunch` runs the file; names come from the master, connections from both nodes and the kernel.
+        `roslaunch` runs the file. The master says which names the nodes have; both nodes and the operating
+        system say whether they are connected.
         `<arg>`, `ns` and `<group>` are resolved, and `$(anon x)` may be followed by anything. Names given
         to `init_node` do not matter. If the lab names only one node, it may be connected to any other of
         the package's. Parameters are read as they were when the node started. Nodes, connection and

@@ -75,9 +75,9 @@ def logs(package: PackageFacts, run: Run, params: LogsParams) -> Verdict:
     How it is measured
         By the messages on /rosout, where every `rospy.loginfo(…)`, `logwarn(…)` and `logerr(…)` goes. The
         text has to be in one of them letter by letter, including capitals and punctuation; there may be
-        more text around it. What a line behind `rospy.spin()` logs counts only where a step stops the node:
-        at the end of the run it is too late. Other words of the same kind (`Hello ROS!` for `Hello World!`)
-        at the right level earn half of the points.
+        more text around it. A line after `rospy.spin()` runs only when the node is stopped: it counts if a
+        step stops the node during the run, and comes too late at its end. Other words of the same kind
+        (`Hello ROS!` for `Hello World!`) at the right level earn half of the points.
 
     How to fix
         `rospy.loginfo("…")` after `rospy.init_node(…)` for the level INFO. `print(…)` does not log.

@@ -94,8 +94,8 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
         Each text is compared with the template; capitals and the number of spaces between words do not
         matter. The number has to grow as the clock did between the arrivals, within 1.5 s and 5 %. Whole
         seconds and seconds since the node's start will do; nanoseconds, milliseconds and a number that
-        stays the same will not. Nor will a count of the messages in a script that reads no clock, even
-        though at 1 Hz it grows like the time. A right time in other words than the handout's earns half.
+        stays the same will not. A count of the messages in a script that reads no clock is no time, even
+        though at 1 Hz it grows as fast as one. A right time in other words than the handout's earns half.
 
     How to fix
         Build the text each time around the loop: `"hello world %s" % rospy.get_time()`. `rostopic echo
@@ -437,9 +437,9 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
         The robot also obeys a wrong constant, or a last command that is not a stop: it has nothing but the message.
 
     How it is measured
-        The messages are decoded by the definition that their publisher sent. Numbers
-        may differ by the tolerance; text, true and false have to be the same. Of a list with `[*]`, every
-        item counts: each has to be the value, or the one in its place in a list of values.
+        The messages are decoded by the definition that their publisher sent. Numbers may differ by the
+        tolerance; text, true and false have to be the same. With `[*]`, every item of a list is compared:
+        with the one value, or with the value at the same place in a list of values.
 
     How to fix
         Set the field before you call `publish(…)`. `rostopic echo <topic>/<field>` shows it.

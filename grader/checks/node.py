@@ -84,9 +84,10 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
 
     How it is measured
         By what the master lists, by the process's life until 5 s and more after its first message, and by
-        its exit after SIGINT. Any exit code is fine. A traceback `publish() to a closed topic` at the end,
-        or `topic was closed during publish()`, is a race in rospy itself and costs nothing, nor does rospy
-        hanging in a flood of messages, or, in a run with a fast clock, a `ROSInterruptException`.
+        its exit after SIGINT. Any exit code is fine. Three things at the end cost nothing: the traceback
+        `publish() to a closed topic` or `topic was closed during publish()`, which is a race in rospy
+        itself; rospy hanging in a flood of messages; and, in a run with a fast clock, a
+        `ROSInterruptException`.
 
     How to fix
         Call `rospy.init_node(…)` once. Loop with `while not rospy.is_shutdown():`, sleep with `rospy.Rate`,

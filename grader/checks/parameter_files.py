@@ -57,7 +57,7 @@ def params_loaded(package: PackageFacts, build: Run, run: Run, params: ParamsLoa
 
     Why it matters on a robot
         Settings that differ from robot to robot are kept in such files. If a file does not load, the robot
-        does not start, and no node reads a value under a wrong name.
+        does not start, or no node finds the value whose name is wrong.
 
     How it is measured
         `rosparam load` loads the file as it was handed in; what it sets is compared by name. Values are free. Each

@@ -150,10 +150,9 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
         In real time, over at least 5 s after the first message, or with a `cause` in each stretch of at least
         5 s in which it is true. The mean has to lie within 5 % of the
         nominal rate, and 95 % of the gaps within half a period of the nominal one (a rubric may set other
-        bounds). One single stall costs nothing. If the grading machine itself was late while a rate failed,
-        or had no time to spare and only a few long gaps are wrong, this costs nothing and the run is
-        repeated, unless the run's own processes kept the machine busy. The mean is given with its 95 %
-        confidence interval.
+        bounds). One single stall costs nothing. A failed rate also costs nothing, and the run is repeated,
+        if the grading machine itself was late, or had no time to spare and only a few long gaps are wrong;
+        unless your own nodes kept it busy. The mean is given with its 95 % confidence interval.
 
     How to fix
         `rate = rospy.Rate(10)` once before the loop, `rate.sleep()` (with the brackets) once each time

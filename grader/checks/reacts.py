@@ -101,9 +101,9 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
         A robot that stops half a second late has hit the wall, and one that always stops never arrives.
 
     How it is measured
-        By when the messages reach the recorder. A cause with a field counts when it begins: several
-        messages in a row for which it is true count once. If any message is a cause, each needs an answer
-        of its own. In a run with a fast clock, time is the clock's. Silence counts while the node is alive, up to
+        By when the messages reach the recorder. If the cause is the value of a field (an obstacle nearer
+        than 0.5 m), it counts once when it becomes true, and not for each message. If any message is a
+        cause, each needs an answer of its own. In a run with a fast clock, time is the clock's. Silence counts while the node is alive, up to
         Ctrl-C.
 
     How to fix

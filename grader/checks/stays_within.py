@@ -127,8 +127,8 @@ def stays_within(package: PackageFacts, run: Run, params: StaysWithinParams) -> 
 
     How it is measured
         By the positions that the simulator publishes, or else those of the package's own nodes; velocities
-        are added up over time. The robot's centre counts. A share is of the time after the robot sets off;
-        each position holds until the next one.
+        are added up over time. The robot's centre counts. If the lab asks for a share (say 90 %), it is one of
+        the time after the robot sets off; each position holds until the next one.
 
     How to fix
         The report draws the path and where it leaves the region. Stop, or turn away, before the robot is there:

@@ -109,7 +109,7 @@ def transform(package: PackageFacts, run: Run, params: TransformParams) -> Verdi
 
     How it is measured
         Each transform on `/tf` and `/tf_static` is compared within the tolerances. When a transform that
-        follows poses is sent, it has to be a pose of the last `within_s` seconds, or the last pose. A path
+        follows poses is sent, it has to equal a pose of the last `within_s` seconds, or the newest one. A path
         through other frames is combined as tf does it.
 
     How to fix

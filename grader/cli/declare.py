@@ -281,7 +281,7 @@ MERGE_EXIT_CODES = """exit codes:
 """
 MUTANTS_EXIT_CODES = """exit codes:
   0    the correct package gets full marks, and every mutant loses what it must and no more
-  1    it does not, or a mutant survives, or a criterion is worth points that no mutant loses
+  1    it does not, or a mutant survives, or a criterion has points that no faulty package loses
   2    the command line, the rubric or the mutants file is wrong
   3    nothing could be graded here
   130  interrupted

@@ -333,7 +333,7 @@ class Transform(Record):
 
 
 class Typed(Record):
-    """A line on the standard input of a process. Only processes that a step types to have one."""
+    """A line on the standard input of a process. A process has a standard input only if a step types to it."""
 
     process: Name
     """The scenario's name for the process."""

@@ -17,7 +17,7 @@ tracebacks of errors). {MADE}
 """
 CODES = f"""# Exit codes
 
-The code says the same as the last line of what is printed, to scripts. {MADE}
+Scripts read the exit code, people the last line of what is printed: both say the same. {MADE}
 
 A fault of the machine or of the grader is never 1: only what was judged can be below the pass mark. A CI job that
 fails with 3 or 4 has said nothing about the student's work.
