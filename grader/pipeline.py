@@ -57,7 +57,7 @@ from grader.ros_env import find_ros
 from grader.rubric.load import LoadedRubric, files_of, needs_package, origin_of
 
 if TYPE_CHECKING:
-    from grader.arena.static_recorder import Recording
+    from grader.arena.recording_files import Recording
     from grader.rubric.model import Rubric
 
 

@@ -150,7 +150,7 @@ def judge_recorded(
 ) -> RunsAndJudgement:
     """Judge what is in the folder. What this recorder recorded and cannot be judged because the machine was late is
     recorded again, alone, at most `RETRIES` times."""
-    from grader.arena.static_recorder import RETRIES  # noqa: PLC0415 - see DEFERRED_IMPORTS
+    from grader.arena.recording_files import RETRIES  # noqa: PLC0415 - see DEFERRED_IMPORTS
 
     runs, judged = judge_folder(evidence, rubric)
     for _ in range(RETRIES):

@@ -1,7 +1,8 @@
 """A repaired copy of a submission: which repairs could be the reason for a lost mark, and what runs with them.
 
 A judged submission comes in, another submission with a copy of its package goes out. What the copy then shows is the
-business of `judging`, what a repair is of `package.repairs`.
+business of `judging`, what a repair is of `package.repairs`. A copy is built and run within the limits of every
+submission (`arena/limits.py`, `arena/build.py`, `Until` in `rubric/scenario.py`).
 """
 
 from __future__ import annotations

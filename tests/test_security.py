@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from grader import files
-from grader.arena import build, process_environment, scenario_inputs, static_recorder, steps, workspace
+from grader.arena import build, process_environment, recording_files, scenario_inputs, steps, workspace
 from grader.arena.limits import SUBMISSION_MESSAGE_BYTES, RunLimits
 from grader.checks.support import text
-from grader.evidence import container, decode, definitions
+from grader.evidence import decode, definitions, mcap_records
 from grader.evidence.run import DECODED_BYTES_MAX, FOREIGN_BYTES_MAX, HELD_BYTES_MAX
 from grader.intake import archive, git, gitdir
 from grader.intake.limits import IntakeLimits
@@ -118,8 +118,8 @@ BOUNDS = {
         HELD_BYTES_MAX // MB, DECODED_BYTES_MAX // MB,
     ),
     "MCAP files": (
-        FOREIGN_BYTES_MAX // MB, container.MAX_RECORDS, container.MAX_CHUNK_BYTES // MB,
-        container.MAX_UNPACKED_BYTES // MB,
+        FOREIGN_BYTES_MAX // MB, mcap_records.MAX_RECORDS, mcap_records.MAX_CHUNK_BYTES // MB,
+        mcap_records.MAX_UNPACKED_BYTES // MB,
     ),
     "`package.xml`": (
         reading.MARKUP_LIMIT_BYTES // 10**6, launch._TAGS_MAX, launch._FILES_MAX, launch_loader.INCLUDES_MAX,
@@ -127,7 +127,7 @@ BOUNDS = {
     ),
     "`CMakeLists.txt`": (cmake_parse.FILE_BYTES_MAX // 1000, cmake_parse.STEPS_MAX),
     "files of the package": (reading.SOURCE_LIMIT_BYTES // 10**6,),
-    "files for the evidence": (static_recorder.ATTACHED_BYTES_MAX // KB, static_recorder.ATTACHED_FILES_MAX),
+    "files for the evidence": (recording_files.ATTACHED_BYTES_MAX // KB, recording_files.ATTACHED_FILES_MAX),
     "YAML files": (
         scenario_inputs.FILE_BYTES_MAX // KB, scenario_inputs.EVENTS_MAX, scenario_inputs.VALUES_MAX,
         scenario_inputs.DEPTH_MAX, scenario_inputs.ALIASES_MAX,

@@ -120,8 +120,8 @@ START_PATIENCE_S, ALONE_PATIENCE_S, ROOM_PATIENCE_S = 300.0, 900.0, 120.0
 """After so long one goes on in any case: the holder of what is waited for has hung."""
 
 
-class Leave:
-    """Leave to start processes, given back by `release`, or with the block that asked for it."""
+class StartPermit:
+    """Permission to start processes, given back by `release`, or with the block that asked for it."""
 
     def __init__(self, held: FileLock | bool) -> None:
         self._held = held
@@ -163,15 +163,15 @@ class Admission:
             yield
 
     @asynccontextmanager
-    async def start(self) -> AsyncIterator[Leave]:
+    async def start(self) -> AsyncIterator[StartPermit]:
         """Wait until processes may be started: one start a core at a time, fewer while the machine is late."""
         async with self._next:
             held = await _until(self._free, START_PATIENCE_S)
-        leave = Leave(held)
+        permit = StartPermit(held)
         try:
-            yield leave
+            yield permit
         finally:
-            leave.release()
+            permit.release()
 
     def note_lateness(self, late_ms: float) -> None:
         """Take note of how late an arena has just found this machine to be."""

@@ -15,8 +15,8 @@ from typing import Any
 from grader.arena.base_workspace import NAME as BASE_NAME
 from grader.arena.base_workspace import base_spec, catkin_make, has_base, keep_base
 from grader.arena.process_environment import ARCHIVE, ProcessEnvironment
+from grader.arena.recording_files import RunCost
 from grader.arena.session import ArenaSession
-from grader.arena.static_recorder import RunCost
 from grader.arena.workspace import read_member, run_in_place
 from grader.evidence.events import CATKIN_MAKE, ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter

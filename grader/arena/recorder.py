@@ -24,10 +24,7 @@ from grader.arena.build import BUILD_EXPECTED_S, CMakeTrace, build
 from grader.arena.interruption import Stop, run_together, run_until_signal
 from grader.arena.limits import RunLimits
 from grader.arena.process_environment import ProcessEnvironment
-from grader.arena.run_scenario import expected_s, run_scenario
-from grader.arena.sandbox import choose_sandbox, temporary_base
-from grader.arena.sandbox_files import prepare
-from grader.arena.static_recorder import (
+from grader.arena.recording_files import (
     RETRIES,
     Recording,
     copy_recorded,
@@ -35,6 +32,9 @@ from grader.arena.static_recorder import (
     metadata,
     write_files,
 )
+from grader.arena.run_scenario import expected_s, run_scenario
+from grader.arena.sandbox import choose_sandbox, temporary_base
+from grader.arena.sandbox_files import prepare
 from grader.arena.workspace import make_workspace
 from grader.errors import ArenaError, RosMissing
 from grader.evidence.events import PACKAGE_RUN, ActorEvent, ScenarioEvent

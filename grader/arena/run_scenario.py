@@ -11,9 +11,10 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from grader.arena.admission import Admission, Leave
+from grader.arena.admission import Admission, StartPermit
 from grader.arena.outcome import describe_wait, find_outcome, next_look_s, waits
 from grader.arena.process_environment import ProcessEnvironment
+from grader.arena.recording_files import RunCost
 from grader.arena.sandbox_files import FUNCTIONS, ROSTESTS
 from grader.arena.scenario_inputs import OVER, make_shots, settings
 from grader.arena.session import GRAPH_EVERY_S, ArenaSession
@@ -28,7 +29,6 @@ from grader.arena.source_waits import (
     polled,
     sleeps_elsewhere,
 )
-from grader.arena.static_recorder import RunCost
 from grader.arena.steps import CTRL_C_S, LAUNCH_CTRL_C_S, TERM_S, ProcessSpec, StepRunner, Tell
 from grader.errors import ArenaError
 from grader.evidence.events import ActorEvent, ScenarioEvent
@@ -113,10 +113,10 @@ async def run_scenario(
         try:
             session.live.watch_rates(rates)
             _tell_what_is_known(session, scenario, place, starts, watched_s)
-            async with admission.start() as leave, session as arena:
+            async with admission.start() as permit, session as arena:
                 arena.course(ScenarioEvent(event="begin"))
                 at_once = {spec["name"] for start, spec in starts if start.name not in scenario.started_later}
-                async with release_when_up(leave, at_once, arena):
+                async with release_when_up(permit, at_once, arena):
                     steps = StepRunner(scenario, starts, arena, tell, beside=beside, goals=goals)
                     outcome, detail = await _run(scenario, starts, arena, tell, steps)
                     if outcome == "complete":
@@ -375,14 +375,14 @@ def set_params(params: tuple[Param, ...], arena: ArenaSession) -> None:
 
 
 @asynccontextmanager
-async def release_when_up(leave: Leave, names: set[str], arena: ArenaSession) -> AsyncIterator[None]:
+async def release_when_up(permit: StartPermit, names: set[str], arena: ArenaSession) -> AsyncIterator[None]:
     """Give the start lock back as soon as these processes are up, or the block has ended."""
 
     async def give_back() -> None:
         live = arena.live
         await arena.wait(lambda: names <= live.registered | live.ended, UP_S)
         await arena.wait(lambda: time.monotonic() > live.graph_changed_s + SETTLE_S, SETTLE_S)
-        leave.release()
+        permit.release()
 
     task = asyncio.ensure_future(give_back())
     try:
@@ -391,7 +391,7 @@ async def release_when_up(leave: Leave, names: set[str], arena: ArenaSession) ->
         task.cancel()
         with suppress(asyncio.CancelledError, ArenaError):  # the block meets the same error itself
             await task
-        leave.release()
+        permit.release()
 
 
 async def stop(starts: tuple[Start, ...], arena: ArenaSession, *, warped: bool) -> None:

@@ -25,8 +25,9 @@ from typing_extensions import Self
 
 from grader.arena.outcome import LATE_MOST, is_settled, is_silent, starting, starts_until_s
 from grader.arena.scenario_inputs import make_shots
-from grader.arena.served import ServedAction, ServedServices, call_functions
+from grader.arena.served import ServedAction, ServedServices
 from grader.arena.session import NS, ArenaSession
+from grader.arena.unit_tests import call_functions
 from grader.errors import ArenaError, EvidenceError
 from grader.evidence.decode import FindText
 from grader.evidence.events import GOAL_STATUS, MISFIT, NOT_OFFERED, UNHEARD, UNSENDABLE, ActorEvent

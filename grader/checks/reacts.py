@@ -103,8 +103,8 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
     How it is measured
         By when the messages reach the recorder. If the cause is the value of a field (an obstacle nearer
         than 0.5 m), it counts once when it becomes true, and not for each message. If any message is a
-        cause, each needs an answer of its own. In a run with a fast clock, time is the clock's. Silence counts while the node is alive, up to
-        Ctrl-C.
+        cause, each needs an answer of its own. In a run with a fast clock, time is the clock's. Silence
+        counts while the node is alive, up to Ctrl-C.
 
     How to fix
         Publish the answer in the callback of the subscriber, or let the loop check what the callback

@@ -36,7 +36,7 @@ from grader.classes.gradebook import write_gradebook
 from grader.classes.gradebook.table import Book, GradebookFormat, GradebookRow
 from grader.classes.roster import Local, Roster, read_roster
 from grader.classes.roster.exports import is_download, unpack_download
-from grader.classes.similarity.comparison import PLACE, percent, stretches
+from grader.classes.similarity.sources import PLACE, percent, stretches
 from grader.cli import publishing
 from grader.cli.class_display import open_class_display, print_batch
 from grader.cli.declare import STDOUT

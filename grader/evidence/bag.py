@@ -20,9 +20,9 @@ from rosbags.rosbag1.reader import ChunkInfo, Header, RecordType, read_bytes, re
 
 from grader.errors import EvidenceError, OutputError
 from grader.evidence import decode
-from grader.evidence.container import MAX_CHUNK_BYTES, MAX_UNPACKED_BYTES
 from grader.evidence.definitions import DefinitionError
 from grader.evidence.events import FIELDS
+from grader.evidence.mcap_records import MAX_CHUNK_BYTES, MAX_UNPACKED_BYTES
 from grader.evidence.message_values import md5_of
 from grader.evidence.run import (
     LESS,

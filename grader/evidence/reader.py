@@ -20,8 +20,8 @@ from pydantic import ValidationError
 from zstandard import ZstdError
 
 from grader.errors import EvidenceError
-from grader.evidence.container import MAX_FILE_BYTES, ContainerError, records
 from grader.evidence.events import FIELDS, METADATA_NAME, PACKAGE_TOPIC, TOPICS
+from grader.evidence.mcap_records import MAX_FILE_BYTES, McapRecordError, records
 from grader.evidence.run import (
     LESS,
     OTHER_RUNS,
@@ -150,7 +150,7 @@ def _load(name: str, stream: BinaryIO, budget: MemoryBudget, *, shown: str = "")
         raise EvidenceError(message) from error
     except BudgetExceeded as error:
         raise EvidenceError(f"{shown}: {error}", hint=LESS) from error
-    except ContainerError as error:
+    except McapRecordError as error:
         raise EvidenceError(f"{shown}: not sound MCAP: {error}") from error
     except _DAMAGE as error:
         wrong, hint = _damage(stream)
@@ -248,7 +248,7 @@ class _RunBuilder:
         self._metadata: dict[str, str] | None = None
 
     def read(self, stream: BinaryIO) -> Run:
-        """Raises EvidenceError for another format, BudgetExceeded, and what `container.records` and pydantic raise."""
+        """Raises EvidenceError for another format, BudgetExceeded, and what `records` and pydantic raise."""
         for found in records(stream):
             if isinstance(found, dict):
                 for number, messages in found.items():
@@ -257,7 +257,7 @@ class _RunBuilder:
             else:
                 self._describe(found)
         if unknown := self._messages.keys() - self._channels.keys():
-            raise ContainerError(f"messages on {len(unknown)} channels that are not there")
+            raise McapRecordError(f"messages on {len(unknown)} channels that are not there")
         # Stable: messages of one time keep the order of the file.
         for messages in self._messages.values():
             messages.sort(key=ARRIVAL)
@@ -272,7 +272,7 @@ class _RunBuilder:
         elif isinstance(record, mcap.Channel):
             self._channels.setdefault(record.id, record)
             if len(self._channels) > MAX_CHANNELS:
-                raise ContainerError(f"more than {MAX_CHANNELS} channels")
+                raise McapRecordError(f"more than {MAX_CHANNELS} channels")
         elif isinstance(record, mcap.Attachment):
             self._attach(record)
         elif isinstance(record, mcap.Metadata) and record.name == METADATA_NAME and self._metadata is None:
@@ -324,7 +324,7 @@ class _RunBuilder:
             scenario, clock = self._metadata["scenario"], self._metadata["clock"]
             return {"scenario": scenario, "clock": clock, "warp": float(self._metadata["warp"])}
         except (KeyError, ValueError) as error:
-            raise ContainerError("its metadata does not say scenario, clock and warp") from error
+            raise McapRecordError("its metadata does not say scenario, clock and warp") from error
 
     def _refuse_what_is_not_ros(self) -> None:
         """Of another tool's recording; channels of other encodings beside ROS's are left alone."""

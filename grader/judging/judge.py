@@ -37,17 +37,6 @@ from grader.checks.support.wrong_lines import explain_by_waiting_callback, expla
 from grader.errors import EvidenceError
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
-from grader.judging.annotate import (
-    add_advice,
-    choose_hint_language,
-    compile_command,
-    fill_slots,
-    lab_names,
-    name_other_lines,
-    name_same_file,
-    with_lab_names,
-    with_own_name,
-)
 from grader.judging.cited_lines import (
     cite_commented_call,
     cite_find,
@@ -58,6 +47,17 @@ from grader.judging.cited_lines import (
     show_lines,
 )
 from grader.judging.facts import NOT_RUN, Facts, is_other_rate, try_facts, views_of
+from grader.judging.hint_additions import (
+    add_advice,
+    choose_hint_language,
+    compile_command,
+    fill_slots,
+    lab_names,
+    name_other_lines,
+    name_same_file,
+    with_lab_names,
+    with_own_name,
+)
 from grader.judging.later_faults import add_later_faults
 from grader.judging.repeats_and_repairs import (
     apply_repaired_copy,

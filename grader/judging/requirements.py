@@ -1,4 +1,5 @@
-"""What `requires` means: which lost criterion explains that there was nothing to judge for another one."""
+"""Which criteria are `blocked`: by a lost one that they require, which explains that there was nothing to judge, or by
+one that lost its points to the same cause."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ ALL_RUN = {0, 1}
 NOT_RUN = {3, 4}
 Outcome = Literal["passed", "failed", "skipped", "open"]
 MAX_BYTES = 1_000_000
-# More than all calls may take together (`TOGETHER_S` in `arena/served.py`), with pytest's own start.
+# More than all calls may take together (`TOGETHER_S` in `arena/unit_tests.py`), with pytest's own start.
 RECORDING_S = 120.0
 
 

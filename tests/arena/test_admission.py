@@ -17,7 +17,7 @@ from grader.arena import admission
 from grader.arena import admission as module
 from grader.arena.admission import Admission, FileLock, shared_folder
 from grader.arena.recorder import Recorder
-from grader.arena.static_recorder import RunCost
+from grader.arena.recording_files import RunCost
 from grader.intake.open import open_submission
 from grader.model.result import Silence
 from grader.package.facts import read_packages

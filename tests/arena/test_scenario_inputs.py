@@ -10,15 +10,15 @@ from types import SimpleNamespace
 import pytest
 
 from grader.arena.process_environment import TEXT_BYTES_MAX, ProcessEnvironment
-from grader.arena.run_scenario import set_params
-from grader.arena.scenario_inputs import FILE_BYTES_MAX, made_up, make_shots
-from grader.arena.source_waits import IDLE, NAPS, SLEEPING, gives_up, naps, polled, sleeps_elsewhere
-from grader.arena.static_recorder import (
+from grader.arena.recording_files import (
     ATTACHED_BYTES_MAX,
     ATTACHED_FILES_MAX,
     attachments,
     left_out_events,
 )
+from grader.arena.run_scenario import set_params
+from grader.arena.scenario_inputs import FILE_BYTES_MAX, made_up, make_shots
+from grader.arena.source_waits import IDLE, NAPS, SLEEPING, gives_up, naps, polled, sleeps_elsewhere
 from grader.evidence.events import ActorEvent
 from grader.files import read_untrusted
 from grader.package.facts import read_package

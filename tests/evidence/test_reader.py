@@ -14,7 +14,7 @@ from mcap.writer import CompressionType, Writer
 
 from grader.checks.support.console_output import printed_lines
 from grader.errors import EvidenceError
-from grader.evidence import container, reader
+from grader.evidence import mcap_records, reader
 from grader.evidence.events import ConsoleLine
 from grader.evidence.reader import load_evidence, load_run, package_facts
 from grader.evidence.run import Run, console_log
@@ -193,12 +193,12 @@ def bomb(claimed: int, real: int) -> bytes:
 def test_a_chunk_that_blows_up_is_refused(monkeypatch):
     assert "a chunk of more than 32 MiB" in refused(BytesIO(bomb(1 << 40, 10)))
     assert "another size" in refused(BytesIO(bomb(10, 50 << 20)))
-    monkeypatch.setattr(container, "MAX_UNPACKED_BYTES", 1000)
+    monkeypatch.setattr(mcap_records, "MAX_UNPACKED_BYTES", 1000)
     assert "unpacked" in refused(BytesIO(sample()))
 
 
 def test_too_many_messages_or_channels_are_refused(monkeypatch):
-    monkeypatch.setattr(container, "MAX_RECORDS", 10)
+    monkeypatch.setattr(mcap_records, "MAX_RECORDS", 10)
     assert "more than 10 records" in refused(BytesIO(sample()))
     monkeypatch.undo()
     monkeypatch.setattr(reader, "MAX_CHANNELS", 2)

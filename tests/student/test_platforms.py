@@ -25,6 +25,7 @@ LOADED = (
         "checks",
         "evidence",
         "report",
+        "arena/recording_files",
         "arena/static_recorder",
         "ros_env",
     ),

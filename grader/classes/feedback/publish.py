@@ -183,7 +183,7 @@ def publish(folder: BatchFolder, rubric: LoadedRubric, how: Publishing) -> tuple
                 jobs[place] = _job(folder, published, how, step)
         done: list[Publication] = []
         try:
-            write = partial(_try_freeze, rubric)
+            write = partial(_try_write, rubric)
             for place, error in run_each(write, jobs.items(), min(how.jobs, len(jobs)), ended=_worker_ended):
                 if error:
                     steps[place] = replace(steps[place], why=error, failed=True)
@@ -206,7 +206,7 @@ def refuse_other_rubric(folder: BatchFolder, rubric: LoadedRubric, then: str) ->
 
 
 @dataclass(frozen=True, kw_only=True)
-class Freezing:
+class StudentReports:
     """A result that is written `into` a folder with its student's reports; figures have their data in `evidence`."""
 
     publication: Publication
@@ -217,12 +217,12 @@ class Freezing:
     hidden: frozenset[str]
 
 
-def _job(folder: BatchFolder, published: Published, how: Publishing, step: PublishStep) -> Freezing:
+def _job(folder: BatchFolder, published: Published, how: Publishing, step: PublishStep) -> StudentReports:
     assert step.result is not None  # noqa: S101 - only a draft has none
     before = published.result(step.entry)
     changes = (changes_between(before, step.result, how.hidden) or (WORDING,)) if before else ()
     publication = publication_of(step.entry, step.result, by=how.by, changes=changes)
-    return Freezing(
+    return StudentReports(
         publication=publication,
         result=step.result,
         evidence=folder.folder_of(step.entry),
@@ -253,15 +253,15 @@ def history_words(history: Sequence[Publication]) -> tuple[str, ...]:
     return tuple(f"{one.at:%Y-%m-%d}: {change}" for one in history for change in one.changes)
 
 
-def _worker_ended(job: tuple[int, Freezing], error: WorkerEnded) -> tuple[int, str]:
+def _worker_ended(job: tuple[int, StudentReports], error: WorkerEnded) -> tuple[int, str]:
     return job[0], f"the process that wrote its reports {error.reason}"
 
 
-def _try_freeze(rubric: LoadedRubric, job: tuple[int, Freezing]) -> tuple[int, str]:
+def _try_write(rubric: LoadedRubric, job: tuple[int, StudentReports]) -> tuple[int, str]:
     """In a worker: return the job's place, and why it could not be done, empty if it was."""
     place, wanted = job
     try:
-        freeze(rubric, wanted)
+        write_student_reports(rubric, wanted)
     except GraderError as error:
         return place, error.message
     except Exception as error:  # noqa: BLE001 - whatever it is, the others are published
@@ -269,7 +269,7 @@ def _try_freeze(rubric: LoadedRubric, job: tuple[int, Freezing]) -> tuple[int, s
     return place, ""
 
 
-def freeze(rubric: LoadedRubric, job: Freezing) -> None:
+def write_student_reports(rubric: LoadedRubric, job: StudentReports) -> None:
     """Write a result and the student's reports of it. Raises OutputError."""
     shown = for_student(job.result, job.hidden)
     about = ReportInput(

@@ -22,7 +22,7 @@ from grader.classes.batch.folder import BatchFolder
 from grader.classes.batch.run import hold_folder
 from grader.classes.feedback import publish
 from grader.classes.feedback.forms import Feedback, FeedbackForm, Sender, Unsure
-from grader.classes.feedback.publish import Freezing, Published
+from grader.classes.feedback.publish import Published, StudentReports
 from grader.errors import NotSent, UsageError
 from grader.files import FILE as PRIVATE
 from grader.files import temporary_folder, unwritable
@@ -223,7 +223,7 @@ def _drafts(
     """Return the reports of results as they are now, written into `room`."""
     publish.refuse_other_rubric(folder, rubric, "publish it")
     wanted = {
-        safe_name(step.entry.id): Freezing(
+        safe_name(step.entry.id): StudentReports(
             publication=publish.publication_of(step.entry, step.result),
             result=step.result,
             evidence=folder.folder_of(step.entry),
@@ -234,20 +234,20 @@ def _drafts(
         for step in publish.plan(folder, published, only)
         if step.result is not None and step.state != "draft"
     }
-    write = partial(_freeze_draft, rubric)
-    done = run_each(write, wanted.values(), min(jobs, len(wanted)), ended=_freezing_ended)
+    write = partial(_write_draft, rubric)
+    done = run_each(write, wanted.values(), min(jobs, len(wanted)), ended=_writing_ended)
     for failed in filter(None, done):
         raise NotSent(failed)
     return {name: (one.publication, one.into) for name, one in wanted.items()}
 
 
-def _freeze_draft(rubric: LoadedRubric, job: Freezing) -> str:
+def _write_draft(rubric: LoadedRubric, job: StudentReports) -> str:
     """In a worker."""
-    publish.freeze(rubric, job)
+    publish.write_student_reports(rubric, job)
     return ""
 
 
-def _freezing_ended(job: Freezing, error: WorkerEnded) -> str:
+def _writing_ended(job: StudentReports, error: WorkerEnded) -> str:
     return f"{job.publication.id}: the process that wrote its report {error.reason}"
 
 

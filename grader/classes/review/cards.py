@@ -25,7 +25,7 @@ from grader.classes.gradebook import GradebookRow
 from grader.classes.review.session import mark
 from grader.classes.review.student_requests import StudentRequest
 from grader.classes.review.submissions import Stamp, stamp_of
-from grader.classes.similarity.comparison import EVIDENCE_BYTES_MAX, PLACE, SUFFIXES
+from grader.classes.similarity.sources import EVIDENCE_BYTES_MAX, PLACE, SUFFIXES
 from grader.errors import EvidenceError
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run

@@ -320,7 +320,7 @@ def similar(
     """Find nearly identical submissions, for a person to look at; marks do not change."""
     require_extra("similarity", "comparing submissions", "copydetect")
     with loading():
-        from grader.classes.similarity.comparison import compare, write_similarity
+        from grader.classes.similarity.sources import compare, write_similarity
         from grader.cli.class_actions import print_similarity, starter_of, submissions_in
         from grader.cli.output import say_json
         from grader.portable import cores

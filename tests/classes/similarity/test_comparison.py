@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.similarity.matching import compare_class
+from grader.classes.similarity.comparison import compare_class
 from grader.model.batch import Similarity
 from tests.classes.similarity.classes import (
     DISGUISES,

@@ -1,4 +1,4 @@
-"""Files that are meant to do harm cost their own submission the comparison, and nobody else anything."""
+"""Files that are meant to do harm cost their own submission the comparison, and no other anything."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import re
 
 import pytest
 
-from grader.classes.similarity import matching
-from grader.classes.similarity.comparison import ProgramText, compare
-from grader.classes.similarity.matching import CodeSource, read_files, read_place, reading_ended
+from grader.classes.similarity import comparison
+from grader.classes.similarity.comparison import CodeSource, read_files, read_place, reading_ended
+from grader.classes.similarity.sources import ProgramText, compare
 from grader.workers import WorkerEnded
 from tests.classes.similarity.classes import class_of, hand_in, solution
 
@@ -52,8 +52,8 @@ def test_a_regular_expression_without_end_is_interrupted(monkeypatch) -> None:
     def stuck(path: str, code: str, language: str) -> None:
         re.match(r"(a+)+$", "a" * 60 + "b")
 
-    monkeypatch.setattr(matching, "FILE_S", 0.2)
-    monkeypatch.setattr(matching, "read_text", stuck)
+    monkeypatch.setattr(comparison, "FILE_S", 0.2)
+    monkeypatch.setattr(comparison, "read_text", stuck)
     read = read_files(CodeSource(name="ann"), (ProgramText(path="a.py", code="", language="python"),))
     assert [(one.file, one.reason) for one in read.left_out] == [("a.py", "took longer than 0.2 s to read")]
 
@@ -67,7 +67,7 @@ def test_a_regular_expression_without_end_is_interrupted(monkeypatch) -> None:
 )
 def test_what_harms_the_reader_is_said(tmp_path, monkeypatch, harm, reason) -> None:
     """What ends it costs its own submission alone: tests/test_workers.py."""
-    monkeypatch.setattr(matching, "read_submission", harm)
+    monkeypatch.setattr(comparison, "read_submission", harm)
     place = CodeSource(name="bad", folder=tmp_path)
     assert [one.reason for one in read_place(place).left_out] == [reason]
     ended = reading_ended(place, WorkerEnded("ended by signal 9"))
@@ -124,9 +124,9 @@ def test_no_program_is_said(tmp_path) -> None:
 
 @pytest.mark.full
 def test_a_class_with_too_much_code_is_compared_as_far_as_there_is_room(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(matching, "PRINTS_MAX", 700)
+    monkeypatch.setattr(comparison, "PRINTS_MAX", 700)
     folders = class_of(tmp_path, {name: {"a.py": GOOD} for name in ("ann", "ben", "cem")})
-    similarity = matching.compare_class(folders, (), {}, threshold=0.8, jobs=1)
+    similarity = comparison.compare_class(folders, (), {}, threshold=0.8, jobs=1)
     assert [(pair.a, pair.b) for pair in similarity.pairs] == [("ann", "ben")]
     assert [(one.id, one.reason[:24]) for one in similarity.not_compared] == [
         ("cem", "the class has too much c")

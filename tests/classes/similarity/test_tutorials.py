@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.similarity.comparison import compare
-from grader.classes.similarity.matching import compare_class
+from grader.classes.similarity.comparison import compare_class
+from grader.classes.similarity.sources import compare
 from tests.classes.similarity.classes import class_of, renamed, solution
 
 ROOT = Path(__file__).parent.parent.parent.parent

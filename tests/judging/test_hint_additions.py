@@ -13,14 +13,14 @@ from grader.checks.support.exit_causes import CAUSES
 from grader.checks.support.text import LOOP, in_language, init, publisher, set_param
 from grader.integrations.bundle import Bundle, add_lab
 from grader.judging import judge
-from grader.judging.annotate import (
+from grader.judging.facts import Facts
+from grader.judging.hint_additions import (
     add_advice,
     choose_hint_language,
     fill_slots,
     name_same_file,
     with_own_name,
 )
-from grader.judging.facts import Facts
 from grader.judging.judge import judge_files
 from grader.model.package import PackageFacts
 from grader.model.result import CriterionResult

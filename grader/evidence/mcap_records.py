@@ -43,7 +43,7 @@ Messages: TypeAlias = dict[int, list[Message]]
 """Messages by channel, in file order."""
 
 
-class ContainerError(ValueError):
+class McapRecordError(ValueError):
     """The container breaks a limit or does not end where it says."""
 
 
@@ -71,7 +71,7 @@ def records(stream: BinaryIO) -> Iterator[McapRecord | Messages]:
     """Yield every record that carries content, those inside chunks included; indexes are passed over. Messages come
     many at a time, behind the schemas and channels that stand before them.
 
-    All checksums are verified, and so is the end of the file. Raises ContainerError, and whatever `mcap`,
+    All checksums are verified, and so is the end of the file. Raises McapRecordError, and whatever `mcap`,
     `zstandard` and `lz4` raise for a damaged file.
     """
     source, meter, known = _Source(stream), _Meter(), _OUTSIDE
@@ -93,7 +93,7 @@ def records(stream: BinaryIO) -> Iterator[McapRecord | Messages]:
             break
     read_magic(source)
     if stream.read(1):
-        raise ContainerError("bytes after its end")
+        raise McapRecordError("bytes after its end")
 
 
 class _Source(ReadDataStream):
@@ -124,17 +124,17 @@ class _Meter:
     def record(self, size_bytes: int) -> None:
         self.records(1)
         if size_bytes > MAX_CHUNK_BYTES:
-            raise ContainerError(f"a record of more than {MAX_CHUNK_BYTES >> 20} MiB")
+            raise McapRecordError(f"a record of more than {MAX_CHUNK_BYTES >> 20} MiB")
 
     def records(self, count: int) -> None:
         self._records += count
         if self._records > MAX_RECORDS:
-            raise ContainerError(f"more than {MAX_RECORDS} records")
+            raise McapRecordError(f"more than {MAX_RECORDS} records")
 
     def unpacked(self, size_bytes: int) -> None:
         self._unpacked_bytes += size_bytes
         if self._unpacked_bytes > MAX_UNPACKED_BYTES:
-            raise ContainerError(f"more than {MAX_UNPACKED_BYTES >> 20} MiB unpacked")
+            raise McapRecordError(f"more than {MAX_UNPACKED_BYTES >> 20} MiB unpacked")
 
 
 def _next(source: _Source, meter: _Meter) -> tuple[int, bytes | Messages]:
@@ -187,13 +187,13 @@ def _inside(chunk: Chunk, meter: _Meter) -> Iterator[McapRecord | Messages]:
 def _verify(said: int, found: int, what: str) -> None:
     """Check the bytes against a checksum; 0 stands for none."""
     if said not in {0, found}:
-        raise ContainerError(f"the checksum of {what} is wrong")
+        raise McapRecordError(f"the checksum of {what} is wrong")
 
 
 def _unpack(chunk: Chunk) -> bytes:
     """Return a chunk's unpacked bytes, never more than the limit, whatever the chunk and the compressed data claim."""
     if chunk.uncompressed_size > MAX_CHUNK_BYTES:
-        raise ContainerError(f"a chunk of more than {MAX_CHUNK_BYTES >> 20} MiB")
+        raise McapRecordError(f"a chunk of more than {MAX_CHUNK_BYTES >> 20} MiB")
     if chunk.compression == "zstd":
         # A frame may ask for a window of any size, which would be memory before a byte is unpacked.
         unpacker = zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK_BYTES)
@@ -207,7 +207,7 @@ def _unpack(chunk: Chunk) -> bytes:
     elif chunk.compression == "":
         plain = chunk.data
     else:
-        raise ContainerError(f"compressed by {chunk.compression[:20]!r}, which is not known")
+        raise McapRecordError(f"compressed by {chunk.compression[:20]!r}, which is not known")
     if len(plain) != chunk.uncompressed_size:
-        raise ContainerError("a chunk of another size than it says")
+        raise McapRecordError("a chunk of another size than it says")
     return plain
