@@ -8,6 +8,8 @@ from grader.checks.support.console_output import tracebacks
 from grader.checks.support.exit_causes import explain_traceback
 from tests.checks.tracebacks import SCRIPT, explained, package_of, raised
 
+pytestmark = pytest.mark.usefixtures("without_processes")
+
 
 @pytest.mark.parametrize(
     ("line", "source", "error", "hint"),

@@ -9,6 +9,8 @@ import pytest
 from grader.checks.support.exit_causes import explain_traceback
 from tests.checks.tracebacks import SCRIPT, explained, package_of, raised
 
+pytestmark = pytest.mark.usefixtures("without_processes")
+
 LIBRARY = "/opt/ros/noetic/lib/python3/dist-packages/rospy/__init__.py"
 IMPORTS = ("src/talker.py", 1, "import rospy")
 INSIDE = (LIBRARY, 47, "from .client import spin")

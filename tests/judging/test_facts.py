@@ -20,6 +20,8 @@ from tests.package.trees import CMAKE, MANIFEST, make_package
 from tests.package.trees import NODE as SCRIPT
 from tests.support.rubrics import CMAKE_CHECK, EXECUTABLE, NODE, rubric
 
+pytestmark = pytest.mark.usefixtures("without_processes")
+
 SAMPLES = [
     ("leeds-comp3631-lab1", "reference"),
     ("leeds-comp3631-lab1", "ok-install-python"),

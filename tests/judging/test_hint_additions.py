@@ -44,6 +44,8 @@ from tests.support.rubrics import (
 from tests.support.rubrics import NODE as LIVES
 from tests.support.timeline import build_runs
 
+pytestmark = pytest.mark.usefixtures("without_processes")
+
 OTHER = [{"name": "other", "script": "src/other.py"}]
 OUT = "roslaunch leaves a <node> out: launch/x.launch, line 2:"
 NODES = '<launch>\n<node pkg="lab1" type="talker" name="a"/>\n<node pkg="lab1" type="plain.py" name="b"/></launch>'

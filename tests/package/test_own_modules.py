@@ -9,6 +9,8 @@ import pytest
 from grader.package.repairs import find_repairs
 from tests.package.repairing import SCRIPT, TALKER, WANTED, facts_of, package
 
+pytestmark = pytest.mark.usefixtures("without_processes")
+
 LOOP = "rate = rospy.Rate(10)\nwhile not rospy.is_shutdown():\n    {}\n    rate.sleep()\n"
 MADE = "rospy.Publisher('numeric_chatter', Int8, queue_size=10)"
 HEAD = "import rospy\nfrom std_msgs.msg import Int8\n"

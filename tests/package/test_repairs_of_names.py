@@ -12,6 +12,8 @@ from grader.package.repairs import find_repairs
 from tests.package.repairing import TALKER, asking, package
 from tests.package.trees import facts_of
 
+pytestmark = pytest.mark.usefixtures("without_processes")
+
 NAMED = """\
 import rospy
 

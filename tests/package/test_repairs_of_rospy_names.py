@@ -9,6 +9,8 @@ import pytest
 from grader.package.python_repairs.rospy_names import with_attributes, with_logger
 from tests.package.repairing import SCRIPT, TALKER, Case, check, swapped
 
+pytestmark = pytest.mark.usefixtures("without_processes")
+
 PUBLISHER = "rospy.Publisher('numeric_chatter', Int8, queue_size=10)"
 LOOP = "        publisher.publish(1)"
 MADE = "    rate = rospy.Rate("

@@ -15,6 +15,8 @@ from grader.rubric.load import load_rubric
 from tests.package.repairing import repair_all
 from tests.package.trees import facts_of, plain
 
+pytestmark = pytest.mark.usefixtures("without_processes")
+
 SOLUTIONS = Path(__file__).parents[2] / "reference_solutions"
 TURTLE = str(Path(__file__).parents[2] / "rubrics" / "examples" / "turtle-square.yaml")
 LABS = (*rubric_ids(), TURTLE)

@@ -8,6 +8,8 @@ import pytest
 
 from tests.package.repairing import LAUNCHED, LEVELS, NESTED, TALKER, Case, asking, check, swapped
 
+pytestmark = pytest.mark.usefixtures("without_processes")
+
 # fmt: off
 CASES = {
     "keys-that-are-flat": Case(

@@ -8,6 +8,8 @@ import pytest
 
 from grader.package.python import check_syntax
 
+pytestmark = pytest.mark.usefixtures("without_processes")
+
 UNDEFINED = {
     "message": ("p = rospy.Publisher('a', Int32)\nfor i in range(3):\n    number.data = i\n    p.publish(number)\n",
                 "nothing in the file gives `number` a value: above line 4, create the message: `number = Int32()`"),

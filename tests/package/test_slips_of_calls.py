@@ -8,6 +8,8 @@ import pytest
 
 from grader.package.python import check_syntax
 
+pytestmark = pytest.mark.usefixtures("without_processes")
+
 CLASS = """\
 import threading
 class Node:

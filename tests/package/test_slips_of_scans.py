@@ -6,6 +6,8 @@ import pytest
 
 from grader.package.python import check_syntax
 
+pytestmark = pytest.mark.usefixtures("without_processes")
+
 HELPER = """\
 def get(self, degrees):
     return self.scan.ranges[int(degrees) % 360]

@@ -9,6 +9,8 @@ import pytest
 
 from grader.package.python import check_syntax
 
+pytestmark = pytest.mark.usefixtures("without_processes")
+
 SUBSCRIBED = "\nrospy.Subscriber('c', Int8, {})\n"
 
 
