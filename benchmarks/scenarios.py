@@ -86,6 +86,22 @@ FAULTS = (
     Fault(
         "a goal that never ends", "action-server", "goals", COUNT, "while total < goal.target", "while True"
     ),
+    Fault(
+        "a cancel that is ignored",
+        "action-server",
+        "goals",
+        COUNT,
+        "if self.server.is_preempt_requested()",
+        "if False",
+    ),
+    Fault(
+        "an action without a result",
+        "action-server",
+        "goals",
+        COUNT,
+        "        self.server.set_succeeded(",
+        "        rospy.spin()\n        self.server.set_succeeded(",
+    ),
     Fault("a client that asks again", "service-client", "adds", CLIENT, ADD, f"    while True:\n{AGAIN}"),
     Fault("a client that polls the list", "service-client", "adds", CLIENT, ADD, POLLING),
     Fault(

@@ -49,6 +49,7 @@ from grader.package.facts import python_paths, with_build_facts
 from grader.package.python import REPORT_BYTES_MAX, SyntaxReport, read_syntax_report
 from grader.ros_env import INSTALL_HINT, NO_ROS, find_ros
 from grader.rubric.model import Rubric
+from grader.rubric.scenario import JudgedGoal
 
 WAITING = "for its turn"
 WAITING_ALONE = "to be run again, alone"
@@ -78,7 +79,7 @@ class Recorder:
         beside: Path | None = None,
         rates: Mapping[str, tuple[RateBounds, ...]] | None = None,
         watched: Mapping[str, float] | None = None,
-        goals: Mapping[str, Mapping[tuple[str, int], float]] | None = None,
+        goals: Mapping[str, Mapping[tuple[str, int], JudgedGoal]] | None = None,
         recorded: Mapping[str, Path] | None = None,
         stop: Stop | None = None,
         about: Mapping[str, str] | None = None,

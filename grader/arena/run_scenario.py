@@ -19,6 +19,7 @@ from grader.arena.sandbox_files import FUNCTIONS, ROSTESTS
 from grader.arena.scenario_inputs import OVER, make_shots, settings
 from grader.arena.session import GRAPH_EVERY_S, ArenaSession
 from grader.arena.source_waits import (
+    ENDS_FOR_NEWER,
     IDLE,
     PROGRAM,
     PUBLISHER,
@@ -35,7 +36,7 @@ from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.model.message_rate import RateBounds
 from grader.rubric.course_packages import LAUNCH_ENDINGS
-from grader.rubric.scenario import Param, Scenario, Start
+from grader.rubric.scenario import JudgedGoal, Param, Scenario, Start
 
 # Of the run's time. A node's timer or sleep is late by one step at most.
 CLOCK_STEP_S = 0.05
@@ -89,7 +90,7 @@ async def run_scenario(
     tell: Tell,
     rates: tuple[RateBounds, ...] = (),
     watched_s: float = 0.0,
-    goals: Mapping[tuple[str, int], float] | None = None,
+    goals: Mapping[tuple[str, int], JudgedGoal] | None = None,
     admission: Admission | None = None,
     last_run: bool = False,
     beside: Path | None = None,
@@ -152,6 +153,7 @@ def _tell_what_is_known(
     session.live.gives_up = place.has_line(gives_up)
     session.live.serves = frozenset(one.name for one in scenario.serves)
     session.live.naps = place.has_line(naps)
+    session.live.ends_for_newer = place.has_line(ENDS_FOR_NEWER)
     scripts = {spec["name"]: spec["script"] for _, spec in starts if spec["script"] is not None}
     session.live.polled = {name: polled(place.text_of(path)) for name, path in scripts.items()}
     session.live.endless = frozenset(s["name"] for _, s in starts if place.has_line(IDLE, s["script"]))

@@ -68,6 +68,8 @@ class RunState:
     """The services and actions that the grader offers."""
     polled: dict[str, frozenset[str]] = field(default_factory=dict)
     """By process, the services for which its script looks in the list of all again and again."""
+    ends_for_newer: bool = False
+    """An action's server of the package ends its goal for a newer one."""
     gives_up: bool = False
     """A program of the package ends where its wait for a service does."""
     rates: dict[str, list[RateBounds]] = field(default_factory=lambda: defaultdict(list))

@@ -17,6 +17,10 @@ PUBLISHER = re.compile(rb"(?:Publisher|Broadcaster)\(|\.advertise\s*<")
 PROGRAM = re.compile(rb"\binit_node\s*\(|\bros::init\s*\(")
 GIVES_UP = re.compile(rb"[wW]ait_?[fF]or_?[sS]erv(?:er|ice)\([^)\n]*(?:,|timeout|Duration|\b\d)")
 """A wait for a service or an action's server that ends without it."""
+ENDS_FOR_NEWER = re.compile(
+    rb"^[^#\n]*?(?:is_?[pP]reempt_?[rR]equested|register_?[pP]reempt_?[cC]allback)", re.MULTILINE
+)
+"""An action's server that looks whether its goal was cancelled, or a newer one has come."""
 ENDLESS = rb"(?:True|1|not\s+(?:rospy\.)?is_shutdown\(\))"
 IDLE = re.compile(
     rb"^[ \t]*while(?:\s*\()?\s*" + ENDLESS + rb"\s*(?:\)\s*)?:\s*(?:#[^\n]*\n\s*)*(?:pass|continue)\b",

@@ -10,9 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import base64
-import math
 import time
-from collections import Counter
 from collections.abc import Callable, Coroutine, Mapping
 from collections.abc import Set as AbstractSet
 from contextlib import suppress
@@ -23,17 +21,29 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from typing_extensions import Self
 
-from grader.arena.outcome import LATE_MOST, is_settled, is_silent, starting, starts_until_s
+from grader.arena.goals import GoalSender
+from grader.arena.outcome import is_settled, is_silent, starting, starts_until_s
 from grader.arena.scenario_inputs import make_shots
 from grader.arena.served import ServedAction, ServedServices
 from grader.arena.session import NS, ArenaSession
 from grader.arena.unit_tests import call_functions
 from grader.errors import ArenaError, EvidenceError
 from grader.evidence.decode import FindText
-from grader.evidence.events import GOAL_STATUS, MISFIT, NOT_OFFERED, UNHEARD, UNSENDABLE, ActorEvent
+from grader.evidence.events import MISFIT, NOT_OFFERED, UNHEARD, UNSENDABLE, ActorEvent
 from grader.evidence.message_values import MessageType, Moment, ServiceTypes, md5_of
 from grader.model.message_definitions import other_fields
-from grader.rubric.scenario import Action, Call, Play, Publish, Scenario, Start, Step, Transform, Typed, Wait
+from grader.rubric.scenario import (
+    Call,
+    JudgedGoal,
+    Play,
+    Publish,
+    Scenario,
+    Start,
+    Step,
+    Transform,
+    Typed,
+    Wait,
+)
 from grader.wording import plural
 
 if TYPE_CHECKING:
@@ -45,14 +55,11 @@ ANSWER_S, AGAIN_S = 10.0, 2.0
 SUBSCRIBE_S = 6.0
 REFUSED_S, UNANSWERED_S = 1.0, 0.5
 """So long a node that asks for a topic of the grader's by another type may yet do something else."""
-BEHIND = "the server has not begun with it, since it still works on an earlier goal that got no result"
 CTRL_C_S = 5.0
 LAUNCH_CTRL_C_S = 20.0  # roslaunch gives its own nodes 15 s and more
 TERM_S = 2.0
 NOT_PLAYED = frozenset({"/clock", "/rosout", "/rosout_agg"})
 """Where none is named: they are the run's own."""
-GOAL_ID, GOALS = "actionlib_msgs/GoalID", "actionlib_msgs/GoalStatusArray"
-NOT_BEGUN, BEGUN = {"PENDING", "RECALLING"}, {"ACTIVE", "PREEMPTING"}
 
 ProcessSpec: TypeAlias = dict[str, Any]
 """What the arena needs to start a process (`ProcessEnvironment.spec`)."""
@@ -69,15 +76,12 @@ class StepRunner:
         tell: Tell,
         *,
         beside: Path | None = None,
-        goals: Mapping[tuple[str, int], float] | None = None,
+        goals: Mapping[tuple[str, int], JudgedGoal] | None = None,
     ) -> None:
         self._scenario = scenario
         self._starts = starts
-        self._results: dict[str, MessageType] = {}
-        self._goals: Counter[str] = Counter()
-        self._asked: dict[str, tuple[float, float]] = {}
-        self._unended: dict[str, float] = {}
-        self._judged, self._beside = goals or {}, beside or Path()
+        self._goals = GoalSender(scenario, arena, self, goals or {}, tell)
+        self._beside = beside or Path()
         self._bags: dict[str, tuple[Channel, ...]] = {}
         self._stopped: set[str] = set()
         self._arena, self._may_start = arena, False
@@ -110,12 +114,12 @@ class StepRunner:
             action.offer()
             self._endless.append(asyncio.ensure_future(action.serve()))
         for probe in self._scenario.probes:
-            self._advertise(probe.topic, probe.type, latched=False)
+            self.advertise_topic(probe.topic, probe.type, latched=False)
         for step in self._scenario.steps:
             if (sent := step.published) is not None:
-                self._advertise(sent.topic, sent.type, latched=sent.latched)
+                self.advertise_topic(sent.topic, sent.type, latched=sent.latched)
             if step.action is not None:
-                self._advertise_action(step.action)
+                self._goals.advertise(step.action)
             if step.play is not None:
                 self._advertise_bag(step.play)
 
@@ -126,7 +130,7 @@ class StepRunner:
         steps = (*(Step(call=call) for call in self._scenario.calls), *self._scenario.steps)
         for index, step in enumerate(steps):
             self._may_start = any(left.start or left.restart for left in steps[index:])
-            if self._is_over():
+            if self.is_over():
                 break
             await self._do(step)
         for start, spec in self._starts:
@@ -150,7 +154,7 @@ class StepRunner:
         if step.play is not None:
             await self._begin(self._play(step.play), background=step.play.background)
         if step.action is not None:
-            await self._act(step.action)
+            await self._goals.pursue(step.action)
         await self._do_to_process(step)
 
     async def _do_to_process(self, step: Step) -> None:
@@ -161,7 +165,7 @@ class StepRunner:
         if name := step.start or step.restart:
             self._start(name)
 
-    def _is_over(self) -> bool:
+    def is_over(self) -> bool:
         """Return whether nothing of the student's runs any more, nor will."""
         return not self._live.running and not self._may_start
 
@@ -177,7 +181,9 @@ class StepRunner:
 
     # --- Messages ----------------------------------------------------------------------------------------------------
 
-    def _advertise(self, topic: str, type_: str, *, latched: bool, find_text: FindText | None = None) -> None:
+    def advertise_topic(
+        self, topic: str, type_: str, *, latched: bool, find_text: FindText | None = None
+    ) -> None:
         if topic in self._types:
             return
         try:
@@ -192,6 +198,10 @@ class StepRunner:
         about = {"type": type_, "md5sum": found.md5sum, "definition": found.definition}
         self._announce(topic, {**about, "latching": latched})
 
+    def can_send(self, topic: str) -> bool:
+        """Return whether the type of a topic's messages is known."""
+        return topic in self._types
+
     def _announce(self, topic: str, fields: dict[str, Any]) -> None:
         """Advertise it to the master, once."""
         if topic not in self._announced:
@@ -201,7 +211,7 @@ class StepRunner:
     def _message_text(self, type_: str) -> str | None:
         return self._arena.place.type_text(type_, "msg")
 
-    def _send(
+    def send_message(
         self, topic: str, value: object, index: int, total: int | None, deed: dict[str, Any] | None = None
     ) -> None:
         """Send one message, and note it as `deed`. Raises ValueError where the value does not fit."""
@@ -245,7 +255,7 @@ class StepRunner:
 
     def _try_send(self, publish: Publish, value: object, index: int, total: int | None) -> bool:
         try:
-            self._send(publish.topic, value, index, total)
+            self.send_message(publish.topic, value, index, total)
         except ValueError as error:
             self._note_misfit(publish.topic, publish.type, error)
             return False
@@ -258,7 +268,7 @@ class StepRunner:
 
     async def _stream(self, publish: Publish) -> None:
         topic, total, values = publish.topic, publish.total, publish.in_turn
-        if not publish.latched and not await self._has_subscriber(topic):
+        if not publish.latched and not await self.has_subscriber(topic):
             return
         self._tell(f"publishing on {topic}")
         due_ns = self._arena.ros_now_ns()
@@ -271,7 +281,7 @@ class StepRunner:
             due_ns = max(due_ns + round(NS / publish.rate_hz), self._arena.ros_now_ns())
             await self._until(due_ns)
 
-    async def _has_subscriber(self, topic: str) -> bool:
+    async def has_subscriber(self, topic: str) -> bool:
         """Wait for one, once for each topic."""
         live = self._live
         if topic not in live.subscribed and topic not in self._deaf:
@@ -344,7 +354,7 @@ class StepRunner:
         topics = {channel.topic for channel in channels}
         self._tell(f"waiting for a subscriber on {', '.join(sorted(topics))}")
         patience_s = self._scenario.until.first_message_s
-        await self._come(lambda: bool(topics & self._live.subscribed), patience_s, self._is_over)
+        await self._come(lambda: bool(topics & self._live.subscribed), patience_s, self.is_over)
         if not topics & self._live.subscribed:
             self._note("note", play.bag, "nothing was played: no node has subscribed")
             return
@@ -363,7 +373,7 @@ class StepRunner:
     async def _until(self, time_ns: int) -> None:
         """Wait until that time of the run's clock; of the wall's, where that stands still."""
         left_s = max(0.0, (time_ns - self._arena.ros_now_ns()) / NS)
-        await self._arena.wait(lambda: self._arena.ros_now_ns() >= time_ns or self._is_over(), left_s)
+        await self._arena.wait(lambda: self._arena.ros_now_ns() >= time_ns or self.is_over(), left_s)
 
     async def _come_up(self) -> None:
         """Wait for processes that may yet become nodes: on a busy machine, a pause would be over before they are up."""
@@ -373,7 +383,7 @@ class StepRunner:
             now_s = time.monotonic()
             waited_for = live.helpers - live.registered if now_s <= starts_until_s(live, until) else set()
             waited_for |= starting(live, until, now_s) - typed_to
-            return not waited_for or is_settled(live, now_s) or self._is_over()
+            return not waited_for or is_settled(live, now_s) or self.is_over()
 
         await self._arena.wait(is_up, starts_until_s(live, until) - time.monotonic())
 
@@ -383,7 +393,7 @@ class StepRunner:
             await self._come_up()
             self._tell(f"waiting for {wait.seconds:g} s")
             await self._until(self._arena.ros_now_ns() + round(wait.seconds * NS))
-            if not self._is_over():
+            if not self.is_over():
                 self._note("wait", None, f"{wait.seconds:g} s have passed")
             return
         name = wait.topic or wait.node or ""
@@ -402,7 +412,7 @@ class StepRunner:
             return is_silent(live, (name,), until, now_s) if wait.topic else is_settled(live, now_s)
 
         begun_s = time.monotonic()
-        await self._arena.wait(lambda: is_there() or is_never() or self._is_over(), limit_s)
+        await self._arena.wait(lambda: is_there() or is_never() or self.is_over(), limit_s)
         what = plural(wait.messages, "message") if wait.topic else "the node"
         there = is_there()
         (self._in_vain.discard if there else self._in_vain.add)(name)
@@ -494,104 +504,6 @@ class StepRunner:
         about = {"topic": call.service, "type": call.type, "value": call.request}
         self._arena.note(ActorEvent(action="call", actor="grader", **about))
         self._answer(call, None, MISFIT + (error if text is not None else f"srv/{name}.srv is not there"))
-
-    # --- Actions (wiki.ros.org/actionlib/DetailedDescription) ---------------------------------------------------------
-
-    def _advertise_action(self, action: Action) -> None:
-        try:
-            find_text = self._arena.place.action_texts(action.type)
-            self._results[action.type] = MessageType(f"{action.type}ActionResult", find_text)
-            self._statuses = MessageType(GOALS, self._message_text)
-        except ValueError as error:
-            self._note("note", action.name, f"the grader cannot use {action.type}: {error}")
-            return
-        self._advertise(f"{action.name}/goal", f"{action.type}ActionGoal", latched=False, find_text=find_text)
-        self._advertise(f"{action.name}/cancel", GOAL_ID, latched=False)
-        self._arena.watch(f"{action.name}/result")
-        self._arena.watch(f"{action.name}/status")
-
-    async def _act(self, action: Action) -> None:
-        goal, cancel = f"{action.name}/goal", f"{action.name}/cancel"
-        is_heard = goal in self._types and await self._has_subscriber(goal)
-        if not is_heard or not await self._has_subscriber(cancel):
-            return
-        self._goals[action.name] += 1
-        name = f"grader-{sum(self._goals.values())}"
-        value = {"header": {"stamp": "now"}, "goal_id": {"stamp": "now", "id": name}, "goal": action.goal}
-        about = {"topic": action.name, "type": action.type}
-        try:
-            self._send(goal, value, 0, 1, {"action": "goal", **about, "value": action.goal})
-        except ValueError as error:
-            self._note("note", action.name, f"the grader cannot send the goal: {error}")
-            return
-        self._tell(f"waiting for the result of {action.name}")
-        left_s, found, since = action.limit_s, None, ""
-        self._asked[name] = time.monotonic(), self._live.lost_s
-        if action.cancel_after_s is not None:
-            found = await self._result(action, name, action.cancel_after_s)
-            if found is None:
-                self._send(cancel, {"id": name}, 0, 1, {"action": "cancel", **about})
-                self._asked[name] = time.monotonic(), self._live.lost_s
-                left_s, since = self._patience_s(action), " after it was cancelled"
-        found = found or await self._result(action, name, left_s)
-        # A short wait for a goal whose end nothing asks for is the rubric's own: the server may rightly go on with it.
-        is_overdue = bool(since) or self._judged.get((action.name, self._goals[action.name]), 0.0) > 0
-        if found is None and (is_overdue or action.limit_s >= ANSWER_S):
-            self._unended[name] = AGAIN_S if is_overdue else ANSWER_S
-        late = BEHIND if self._is_behind(action, name) else f"no result within {left_s:g} s{since}"
-        value_, detail = found or (None, late)
-        self._arena.note(ActorEvent(action="result", actor="grader", **about, value=value_, detail=detail))
-
-    def _patience_s(self, action: Action) -> float:
-        """Return how long the result of a cancelled goal is waited for. Before another goal, the server must end it."""
-        last = [s.action for s in self._scenario.steps if s.action and s.action.name == action.name][-1]
-        judged_s = self._judged.get((action.name, self._goals[action.name]), math.inf)
-        return min(action.limit_s, judged_s if action is last else math.inf)
-
-    async def _result(self, action: Action, name: str, limit_s: float) -> tuple[Any, str] | None:
-        """Return the result of that goal and the word for its status."""
-        type_, came = self._results[action.type], self._arena.watch(f"{action.name}/result")
-
-        def own() -> dict[str, Any] | None:
-            values = (type_.decode(data) for data in came)
-            return next((v for v in values if v and v["status"]["goal_id"]["id"] == name), None)
-
-        topics = tuple(f"{action.name}/{part}" for part in ("result", "feedback"))
-
-        def is_never() -> bool:
-            if self._is_over() or self._is_behind(action, name):
-                return True
-            # A server may work on its goal in silence, for as long as the rubric gives it
-            served = bool(self._live.listened.get(f"{action.name}/goal"))
-            return not served and is_silent(self._live, topics, self._scenario.until, time.monotonic())
-
-        await self._arena.wait(lambda: own() is not None or is_never(), limit_s)
-        found = own()
-        if found is None:
-            return None
-        status = found["status"]["status"]
-        return found["result"], GOAL_STATUS[status] if status < len(GOAL_STATUS) else f"status {status}"
-
-    def _is_older(self, goal: str, patience_s: float) -> bool:
-        """Return whether a goal was sent, or cancelled, so long ago; longer, where others fill the machine."""
-        sent_s, lost_before_s = self._asked[goal]
-        lost_s = self._live.lost_s - lost_before_s
-        if self._live.running <= self._live.at_rest.keys():
-            lost_s = min(lost_s, LATE_MOST * patience_s)
-        return time.monotonic() > sent_s + patience_s + lost_s
-
-    def _is_behind(self, action: Action, name: str) -> bool:
-        """Return whether the server has not begun with this goal for a while, since it still works on an earlier one
-        that got no result in its time. One that was not cancelled may end only because of this goal: it gets longer."""
-        stuck = {goal: left_s for goal, left_s in self._unended.items() if self._is_older(goal, ANSWER_S)}
-        stuck.pop(name, None)
-        came = self._arena.watch(f"{action.name}/status")
-        if not stuck or not came or not self._is_older(name, min(stuck.values())):
-            return False
-        seen = self._statuses.decode(came[-1]) or {"status_list": []}
-        status = {one["goal_id"]["id"]: one["status"] for one in seen["status_list"]}
-        known = {goal: GOAL_STATUS[at] for goal, at in status.items() if at < len(GOAL_STATUS)}
-        return known.get(name) in NOT_BEGUN and any(known.get(goal) in BEGUN for goal in stuck)
 
     def _answer(self, call: Call, value: object, detail: str) -> None:
         about = {"topic": call.service, "type": call.type, "value": value, "detail": detail}

@@ -26,8 +26,10 @@ LISTED = 10
 """So many values of the feedback are listed."""
 GOES_ON_NS = 1_000_000_000
 """Feedback so long after a goal was cancelled says that the server goes on with it."""
-CANCELLED_MORE_S = 5.0
-"""So much longer than `within_s`, at least, the result of a goal that is cancelled is waited for."""
+SURELY = 10
+"""With so many of these messages, that is no matter of a busy machine."""
+LONGER, LONGER_S = 1.5, 1.0
+"""So many times `within_s`, and so much longer at least, a result is waited for: its loss says how late it comes."""
 ENDS = {
     "SUCCEEDED": both("set_succeeded(result)", "setSucceeded(result)"),
     "ABORTED": both("set_aborted(result)", "setAborted(result)"),
@@ -71,11 +73,16 @@ class ActionResultParams(Record):
         return bool(self.feedback or self.reports) and not self.model_fields_set & of_end
 
     @property
-    def after_cancel_s(self) -> float | None:
-        """How long after a cancel the result still matters; None: for as long as the step waits."""
+    def matters_s(self) -> float | None:
+        """How long after the goal, or its cancelling, the result still matters; None: as long as the step waits."""
         if self.of_feedback_alone:
             return 0.0
-        return None if self.within_s is None else max(2 * self.within_s, self.within_s + CANCELLED_MORE_S)
+        return None if self.within_s is None else max(LONGER * self.within_s, self.within_s + LONGER_S)
+
+    @property
+    def least_feedback(self) -> int:
+        """How many feedback messages it takes."""
+        return max([self.feedback, *map(len, self.reports.values())])
 
     @property
     def words(self) -> str:
@@ -265,18 +272,19 @@ def _no_result(package: PackageFacts, run: Run, goal: Goal, params: ActionResult
     message = f"{said}: {shown(goal.end.detail) if goal.end else ''}"
     hint = "every path through the callback must end with set_succeeded, set_aborted or set_preempted"
     verdict = failed(message, hint=hint).if_repeated()
-    if _goes_on(run, goal, params):
+    late = _late_feedback(run, goal, params)
+    if late:
         verdict = failed(f"{said}: it goes on, though it was cancelled", hint=HINTS["PREEMPTED"])
-    return _excused(verdict, run, goal)
+    return verdict if late >= SURELY else _excused(verdict, run, goal)
 
 
-def _goes_on(run: Run, goal: Goal, params: ActionResultParams) -> bool:
-    """Whether feedback on a goal still comes long after it was cancelled."""
+def _late_feedback(run: Run, goal: Goal, params: ActionResultParams) -> int:
+    """Return how many feedback messages come long after the goal was cancelled."""
     reports = run.student_channels(f"{params.action}/feedback")
     stopped_ns, until_ns = goal.cancelled_ns, goal.ended_ns or run.end_ns
     if stopped_ns is None:
-        return False
-    return any(stopped_ns + GOES_ON_NS < t <= until_ns for channel in reports for t in channel.times_ns)
+        return 0
+    return sum(stopped_ns + GOES_ON_NS < t <= until_ns for channel in reports for t in channel.times_ns)
 
 
 def _other_end(package: PackageFacts, run: Run, goal: Goal, params: ActionResultParams) -> Verdict:

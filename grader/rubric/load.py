@@ -24,6 +24,7 @@ from grader.rubric.find import BUILT_IN, known_labs, locate, rubric_ids, rubrics
 from grader.rubric.made_up import draw_values, faults_of_sample, made_up_faults, sample_data, with_values
 from grader.rubric.model import Criterion, Rubric
 from grader.rubric.own_checks import Beside, known_checks, read_instructor, run_checks_file
+from grader.rubric.scenario import JudgedGoal
 from grader.rubric.spelling import misspelt_names, names_seen_once
 from grader.rubric.validation_warnings import warnings
 from grader.rubric.yaml_lines import Fault, KeyPath, Source, Value, WrittenRubric, as_map, read_source
@@ -347,17 +348,16 @@ def watched_of(rubric: Rubric) -> dict[str, float]:
     return dict(found)
 
 
-def goals_of(rubric: Rubric) -> dict[str, dict[tuple[str, int], float]]:
-    """Return, by scenario, the goals that criteria judge, by action and number, and for how many seconds after a cancel
-    the result still matters: 0 if no criterion asks for it, infinite if one says nothing of how soon it has to come."""
-    found: dict[str, dict[tuple[str, int], float]] = defaultdict(dict)
+def goals_of(rubric: Rubric) -> dict[str, dict[tuple[str, int], JudgedGoal]]:
+    """Return, by scenario, the goals that criteria judge, by action and number."""
+    found: dict[str, dict[tuple[str, int], JudgedGoal]] = defaultdict(dict)
     for criterion in rubric.criteria:
         if criterion.check == "action-result" and criterion.scenario:
             one = ActionResultParams.model_validate(criterion.parameters)
             own, goal = found[criterion.scenario], (one.action, one.goal)
-            own[goal] = max(
-                own.get(goal, 0.0), math.inf if one.after_cancel_s is None else one.after_cancel_s
-            )
+            matters_s, feedback = own.get(goal, JudgedGoal(0.0))
+            more_s = math.inf if one.matters_s is None else one.matters_s
+            own[goal] = JudgedGoal(max(matters_s, more_s), max(feedback, one.least_feedback))
     return dict(found)
 
 

@@ -14,7 +14,7 @@ A new kind of step takes
 from __future__ import annotations
 
 from hashlib import sha256
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field
 
@@ -259,8 +259,18 @@ class Action(Record):
     cancel_after_s: StepSeconds | None = None
     """How long after it was sent the goal is cancelled, if no result has come by then; null: never."""
     limit_s: StepSeconds = 30.0
-    """Without a result within this time, the run goes on. After cancelling the last goal of an action, it
-    waits no longer than twice the `within_s` of its criteria, or 5 s more than that."""
+    """Without a result within this time, the run goes on. It waits less long where the criteria on this goal
+    have a `within_s`: half as long again, or 1 s more than that, and until the feedback that they ask for has
+    come. That holds for the last goal of an action, and for others that are not cancelled, where the server
+    ends a goal for a newer one (`is_preempt_requested()`). So let the goal that is cancelled be the last."""
+
+
+class JudgedGoal(NamedTuple):
+    """What criteria ask of a goal: for how many seconds after it was sent, or cancelled, its result matters (0 if no
+    criterion asks for it, infinite if one says nothing of how soon it has to come), and how much feedback it takes."""
+
+    matters_s: float
+    feedback: int = 0
 
 
 class Play(Record):

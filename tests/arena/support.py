@@ -22,7 +22,7 @@ from grader.evidence.run import Run
 from grader.model.submission import SourcePackage, Submission
 from grader.package.facts import read_package
 from grader.ros_env import RosInstallation, find_ros
-from grader.rubric.scenario import Scenario, Start, Until
+from grader.rubric.scenario import JudgedGoal, Scenario, Start, Until
 
 MANIFEST = """<?xml version="1.0"?>
 <package format="2"><name>lab</name><version>0.0.0</version><description>lab</description>
@@ -108,7 +108,7 @@ def run(
     *,
     beside: Path | None = None,
     watched_s: float = 0.0,
-    goals: Mapping[tuple[str, int], float] | None = None,
+    goals: Mapping[tuple[str, int], JudgedGoal] | None = None,
 ) -> Run:
     """Record a scenario and read it back. `beside` is the rubric's folder."""
     about = {"beside": beside, "watched_s": watched_s, "goals": goals}

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from grader.arena.steps import BEHIND
+from grader.arena.goals import BEHIND
 from grader.checks.support.processes import lives, observed_until_ns
 from grader.evidence.events import NOT_OFFERED
 from grader.evidence.message_values import MessageType, action_texts
 from grader.evidence.run import Run
-from grader.rubric.scenario import Scenario, Start, Until
+from grader.rubric.scenario import JudgedGoal, Scenario, Start, Until
 from tests.arena.support import SCRIPT, make_place, printed, run
 from tests.evidence.bags import Topic, write_bag
 
@@ -37,7 +37,7 @@ def _run(
     steps: list[dict[str, Any]],
     *,
     sandbox: str = "auto",
-    goals: dict[tuple[str, int], float] | None = None,
+    goals: dict[tuple[str, int], JudgedGoal] | None = None,
     **more: Any,
 ) -> Run:
     """Do the steps with each of the scripts, which are processes by their names."""
@@ -304,7 +304,7 @@ def test_the_last_goal_that_is_cancelled_is_waited_for_no_longer_than_it_is_judg
         }
     )
     with make_place({"scripts/server.py": heedless, "action/Count.action": COUNT}) as place:
-        seen = run(place, scenario, tmp_path / "run.mcap", goals={("/count", goals): 1.0})
+        seen = run(place, scenario, tmp_path / "run.mcap", goals={("/count", goals): JudgedGoal(1.0)})
     assert _did(seen, "result")[0] == ("/count", None, f"no result within {since}")
     assert len(_did(seen, "result")) == goals
 
@@ -335,7 +335,7 @@ def test_a_goal_behind_one_that_never_ends_is_waited_for_until_that_shows(
     judged_s: float,
     detail: str,
 ) -> None:
-    monkeypatch.setattr("grader.arena.steps.ANSWER_S", 2.0)
+    monkeypatch.setattr("grader.arena.goals.ENDING_S", 2.0)
     find = action_texts("lab/Count", COUNT).get
     goal, result = (MessageType(f"lab/CountAction{part}", find).definition for part in ("Goal", "Result"))
     server = SERVER.format(goal=goal, result=result).replace("end(m.id, 2, -1)", "None")
@@ -346,7 +346,7 @@ def test_a_goal_behind_one_that_never_ends_is_waited_for_until_that_shows(
         tmp_path,
         {"scripts/server.py": server, "action/Count.action": COUNT},
         [{"action": {**about, "limit_s": limit_s}}, {"action": {**about, "limit_s": 6}}],
-        goals={("/count", 1): judged_s} if judged_s else None,
+        goals={("/count", 1): JudgedGoal(judged_s)} if judged_s else None,
     )
     results = [detail for _, _, detail in _did(seen, "result")]
     assert results == [f"no result within {limit_s} s", detail]
@@ -357,7 +357,7 @@ def test_a_goal_that_ends_an_earlier_one_late_is_waited_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, first_s: float, answer_s: float
 ) -> None:
     """The server looks for another goal every three seconds, or works on the first for longer than the step waits."""
-    monkeypatch.setattr("grader.arena.steps.ANSWER_S", answer_s)
+    monkeypatch.setattr("grader.arena.goals.ENDING_S", answer_s)
     find = action_texts("lab/Count", COUNT).get
     goal, result = (MessageType(f"lab/CountAction{part}", find).definition for part in ("Goal", "Result"))
     server = SERVER.format(goal=goal, result=result).replace("range(80 ", "range(30 ")

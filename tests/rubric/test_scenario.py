@@ -113,22 +113,30 @@ def test_what_a_run_does_makes_sense(old, new, fault, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "goals"),
     [
-        ("", "", {1: 6.5, 2: 5.5, 3: math.inf}),
-        (", within_s: 1.5}", "}", {1: math.inf, 2: 5.5, 3: math.inf}),
-        (", goal: 3, status: ABORTED", ", goal: 3, within_s: 8, status: ABORTED", {1: 6.5, 2: 5.5, 3: 16}),
-        (", result: {total: 5}, within_s: 1.5}", ", feedback: 3}", {1: 0, 2: 5.5, 3: math.inf}),
+        ("", "", {1: (2.5, 5), 2: (math.inf, 0), 3: (1.5, 0)}),
+        (", within_s: 1.5}", "}", {1: (math.inf, 5), 2: (math.inf, 0), 3: (1.5, 0)}),
+        (
+            ", goal: 2, status: ABORTED",
+            ", goal: 2, within_s: 8, status: ABORTED",
+            {1: (2.5, 5), 2: (12, 0), 3: (1.5, 0)},
+        ),
+        (
+            ", result: {total: 5}, within_s: 1.5}",
+            ", feedback: 7}",
+            {1: (0, 7), 2: (math.inf, 0), 3: (1.5, 0)},
+        ),
     ],
-    ids=["as it is", "no within_s", "twice", "of feedback alone"],
+    ids=["as it is", "no within_s", "half as long again", "of feedback alone"],
 )
-def test_how_long_the_result_of_a_goal_matters_once_that_is_cancelled(
-    old: str, new: str, goals: dict[int, float], tmp_path: Path
+def test_how_long_the_result_of_a_goal_matters_and_how_much_feedback_it_takes(
+    old: str, new: str, goals: dict[int, tuple[float, int]], tmp_path: Path
 ) -> None:
     text = (rubrics_folder() / "examples" / "action-server.yaml").read_text(encoding="utf-8")
     assert old in text
     path = tmp_path / "lab.yaml"
     path.write_text(text.replace(old, new).replace("limit_s: 5}", "limit_s: 20}"), encoding="utf-8")
     found = goals_of(load_rubric(str(path)).rubric)["goals"]
-    assert found == {("/count", number): matters_s for number, matters_s in goals.items()}
+    assert found == {("/count", number): judged for number, judged in goals.items()}
 
 
 CALL = "{service: /reset, type: std_srvs/Empty}"
