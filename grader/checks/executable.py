@@ -124,7 +124,7 @@ def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: Ex
     fault = syntax_fault(found)
     what = f"{found.path} {'; it also '.join(o.why for o in obstacles)}"
     if fault is not None:
-        may_do = asks_for_wrapper(package, found.path) and not any(_builds(build))
+        may_do = asks_for_wrapper(package, found.path)  # once the build passes, which is judged by itself
         verdict = _syntax_verdict(found, fault, [] if may_do else obstacles)
     elif found.executable and not obstacles:
         verdict = passed(f"{found.path} is executable and names {_interpreter(found)}", hint=hint)

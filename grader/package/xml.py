@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Callable, Iterator, Sequence
 from difflib import get_close_matches
@@ -43,7 +44,9 @@ _CAUSES: tuple[tuple[str, ...], ...] = (
     (r"invalid element name", "a `<` does not begin a tag",
      "delete the space after it, or write `&lt;` instead of `<`"),
     (r"EntityRef|Entity '.*' not defined", "a plain `&` is not allowed", "write `&amp;`"),
-    (r"character encoding|not proper UTF-8|Unsupported encoding|switch encoding",
+    (r"Unsupported encoding:? ?([^\s,]*)", "`{0}` is not the name of an encoding",
+     'write `<?xml version="1.0" encoding="utf-8"?>` for that line'),
+    (r"character encoding|not proper UTF-8|switch encoding",
      "the file is not saved in the encoding that it names", "save it as UTF-8"),
     (r"Invalid character|invalid Char|xmlChar", "an invisible control character", "type the line again"),
     (r"[Ee]ntity", "entities are not read", "write the text out"),
@@ -60,6 +63,7 @@ _TAGS = re.compile(
     re.DOTALL,
 )
 _VERSION = re.compile(rb"\A((?:\xef\xbb\xbf)?<\?xml\s+version\s*=\s*[\"'])[\w.:-]*([\"'])")
+_ENCODING = re.compile(rb"\A(<\?xml\b[^>]{0,80}?\sencoding\s*=\s*[\"'])([\w.:-]{1,20})(?=[\"'])")
 _MESSAGE_CHARS_MAX = 300
 _TAGS_MAX = 2_000
 _OPENERS_A_TAG = 20
@@ -83,8 +87,8 @@ def parse_xml(
     if data.count(b"<") > _OPENERS_A_TAG * _TAGS_MAX:
         return None, _too_many(file)
     parser = _parser(encoding)
-    # catkin and roslaunch read a file of any version
-    readable = _VERSION.sub(rb"\g<1>1.0\g<2>", data, count=1)
+    # catkin and roslaunch read a file of any version, and know encodings by the names that Python has for them
+    readable = _ENCODING.sub(_as_libxml_names_it, _VERSION.sub(rb"\g<1>1.0\g<2>", data, count=1))
     try:
         element = etree.fromstring(readable, parser)
     except etree.XMLSyntaxError as error:
@@ -98,6 +102,18 @@ def parse_xml(
         return None, _too_many(file)
     _set_first_lines(element, data)
     return element, None
+
+
+def _as_libxml_names_it(declared: re.Match[bytes]) -> bytes:
+    try:
+        name = codecs.lookup(declared[2].decode("ascii", "replace")).name
+    except LookupError:
+        return declared[0]
+    return (
+        declared[1] + name.replace("iso8859", "iso-8859").encode()
+        if name.startswith("iso8859-")
+        else declared[0]
+    )
 
 
 def parse_what_is_left(data: bytes) -> etree._Element | None:

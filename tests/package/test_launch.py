@@ -138,6 +138,15 @@ def test_faults_in_plain_words(text, line, cause):
 def test_encodings_and_line_ends():
     text = '<?xml version="1.0" encoding="{}"?>\r\n<launch>\r\n<!-- \xe9 -->\r\n<node name="x"/></launch>'
     assert parse_launch(text.format("ISO-8859-1").encode("latin-1"), "a.launch").nodes[0].line == 4
+    for name in (
+        "latin-1",
+        "latin1",
+        "L1",
+        "iso8859_15",
+    ):  # as Python names them, whose XML reader roslaunch uses
+        assert parse_launch(text.format(name).encode("latin-1"), "a.launch").nodes[0].line == 4
+    unknown = parse_launch(text.format("uft-8").encode(), "a.launch")
+    assert (unknown.fault.line, "`uft-8` is not the name" in unknown.fault.explanation) == (1, True)
     broken = parse_launch(text.format("UTF-8").encode("latin-1"), "a.launch")
     assert (broken.fault.line, "UTF-8" in broken.fault.explanation) == (3, True)
     assert parse_launch(b"\xef\xbb\xbf<launch/>", "a.launch").fault is None
