@@ -10,10 +10,10 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from grader.checks.conditions import Condition, how_shown, true_spans
 from grader.checks.reacts import ORDER_S
 from grader.checks.registry import Refers, check
 from grader.checks.support.clocks import Lateness, excused, lateness
+from grader.checks.support.conditions import Condition, how_shown, true_spans
 from grader.checks.support.exit_causes import explain_early_end, explain_error
 from grader.checks.support.fields import value_text
 from grader.checks.support.parameters import params_on_server, resolved_param, where_given

@@ -10,10 +10,9 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field, model_validator
 
-from grader.checks.conditions import Condition, is_called, true_spans
 from grader.checks.registry import Refers, check
-from grader.checks.service_servers import exchanges, no_answer, not_offered, offers
 from grader.checks.support.clocks import excused, no_clock, run_seconds, why_late
+from grader.checks.support.conditions import Condition, is_called, true_spans
 from grader.checks.support.fields import (
     Reading,
     changing_beside,
@@ -24,6 +23,7 @@ from grader.checks.support.fields import (
 from grader.checks.support.processes import observed_until_ns, run_slips
 from grader.checks.support.recorder_losses import losses
 from grader.checks.support.scans import SCAN, has_angles, looks_elsewhere, read_too
+from grader.checks.support.services import exchanges, no_answer, not_offered, offers
 from grader.checks.support.text import near_names
 from grader.checks.support.topics import (
     cite,

@@ -8,8 +8,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from grader.checks.conditions import Condition
 from grader.checks.rate import RateParams
+from grader.checks.support.conditions import Condition
 from grader.checks.support.fields import Reading, is_number
 from grader.rubric.scenario import ROSTEST_ENDING, Action, Probe, Scenario, Step, Until
 from grader.rubric.yaml_lines import (

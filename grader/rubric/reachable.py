@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
-from grader.checks.conditions import Condition
 from grader.checks.registry import Check
+from grader.checks.support.conditions import Condition
 from grader.checks.support.fields import PATH_PARTS, Reading, is_number
 from grader.rubric.definitions import is_form
 from grader.rubric.durations import (

@@ -9,7 +9,6 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from grader.checks.service_servers import exchanges
 from grader.checks.support.fields import (
     FieldPath,
     Reading,
@@ -22,6 +21,7 @@ from grader.checks.support.fields import (
     value_text,
 )
 from grader.checks.support.processes import GlobalName, observed_until_ns
+from grader.checks.support.services import exchanges
 from grader.evidence.events import NOT_OFFERED
 from grader.evidence.run import Channel, Run
 from grader.model.record import Record
