@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import Annotated, NamedTuple
 
@@ -13,7 +13,6 @@ from grader.checks.launch_params import params_in_place, params_misplaced
 from grader.checks.registry import DependencyName, LaunchName, ProgramName, check
 from grader.checks.support.launch import (
     NOTHING_STARTS,
-    finished,
     is_exact,
     node_slips,
     nodes_up,
@@ -26,13 +25,13 @@ from grader.checks.support.launch import (
     why_not_up,
 )
 from grader.checks.support.launch_connections import (
-    CONNECTED_WITHIN_S,
     RENAMES,
     blame_place,
     blame_renaming,
     blame_same_script,
+    ended_by_itself,
+    ended_soon,
     over_another_topic,
-    together_s,
     wrong_name,
 )
 from grader.checks.support.launch_slips import (
@@ -49,7 +48,7 @@ from grader.checks.support.launch_slips import (
 from grader.checks.support.parameters import absolute_name
 from grader.checks.support.processes import GlobalName, early_end, run_slips
 from grader.checks.support.scripts import asks_for_wrapper, shebang_obstacles
-from grader.checks.support.text import SPIN, near_names
+from grader.checks.support.text import near_names
 from grader.checks.support.topics import SYSTEM_TOPICS, cite, connected_nodes, nodes_on
 from grader.evidence.run import Run
 from grader.model.launch_file import LaunchFile, LaunchNode
@@ -284,8 +283,8 @@ def _judge_nodes(package: PackageFacts, file: LaunchFile, run: Run, params: Laun
     names = [name for w in wanted for name in nodes_up(run, w.node)]
     if params.topic and not _are_connected(package, run, params.topic, names, alone=len(wanted) < 2):
         return _not_connected(package, file, run, wanted, params.topic)
-    if params.topic and (ended := _ended_soon(run, [w.node for w in wanted], params.topic)):
-        return _ended_by_itself(package, file, ended)
+    if params.topic and (ended := ended_soon(run, [w.node for w in wanted], params.topic)):
+        return ended_by_itself(package, run, file, ended)
     if lost := _judge_deaths(package, run, wanted, "came up, but then") or _stopped_clock(package, run, file):
         return lost
     if params.programs and params.params:
@@ -317,7 +316,7 @@ def _right_parts(
     connected = (
         topic is not None
         and any(connected_nodes(package, run, topic))
-        and not _ended_soon(run, every, topic)
+        and not ended_soon(run, every, topic)
         and not _stopped_clock(package, run, file)
     )
     if not up:
@@ -564,32 +563,14 @@ def _stopped_clock(package: PackageFacts, run: Run, file: LaunchFile) -> Verdict
     )
 
 
-def _ended_soon(run: Run, nodes: Iterable[LaunchNode], topic: str) -> list[LaunchNode]:
-    """Return the nodes that ran to their own end while others still connect to them; whether one did, is chance."""
-    ended = [node for node in nodes if finished(run, node)]
-    return ended if together_s(run, topic) < CONNECTED_WITHIN_S else []
-
-
-def _ended_by_itself(package: PackageFacts, file: LaunchFile, ended: Sequence[LaunchNode]) -> Verdict:
-    """Return that nodes ended too soon to be connected, and the loop that let them, where one is seen."""
-    alone = "itself" if len(ended) == 1 else "themselves"
-    message = f"{join_words(n.full_name for n in ended)} came up and ended by {alone} before others connected"
-    scripts = {one.path for n in ended if (one := own_script(package, n)) is not None}
-    left = next((s for s in package.slips if s.kind == "loop-left" and s.file in scripts), None)
-    if left is not None:
-        return failed(f"{message}: {left.message}", hint=left.fix, citations=(left.place,))
-    cited = tuple(FileCitation(file=n.file or file.path, line=n.line) for n in ended)
-    return failed(message, hint=f"keep it alive: end with {SPIN}", citations=cited)
-
-
 def _not_connected(
     package: PackageFacts, file: LaunchFile, run: Run, wanted: list[Wanted], topic: str
 ) -> Verdict:
     """A node that died, the launch file's remaps and namespaces, or the scripts' own topics."""
     if dead := _judge_deaths(package, run, wanted, "came up, but before it was connected"):
         return dead
-    if ended := _ended_soon(run, [w.node for w in wanted], topic):
-        return _ended_by_itself(package, file, ended)
+    if ended := ended_soon(run, [w.node for w in wanted], topic):
+        return ended_by_itself(package, run, file, ended)
     other, nodes = over_another_topic(run, topic), [w.node for w in wanted]
     of_launch_file = blame_renaming(
         package, run, nodes if len(nodes) > 1 else file.brings, topic, other

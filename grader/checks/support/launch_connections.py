@@ -6,15 +6,17 @@ What `ns` and `<remap>` make of its name, which of them to remove to have the ri
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.registry import Check
-from grader.checks.support.launch import nodes_up
+from grader.checks.support.clocks import excused, why_late
+from grader.checks.support.launch import finished, nodes_up
 from grader.checks.support.launch_slips import Slip, own_script
 from grader.checks.support.processes import TYPES_HINT, disputed_types, run_scripts
+from grader.checks.support.text import SPIN
 from grader.checks.support.topics import End, nodes_on, topics_with
 from grader.evidence.events import GraphEvent
 from grader.evidence.run import Run
@@ -302,6 +304,29 @@ def together_s(run: Run, topic: str) -> float:
         return all(any(map(run.is_student_node, nodes)) for nodes in ends)
 
     return sum(after - at for (at, event), (after, _) in pairwise(run.graph) if has_both(event)) / 1e9
+
+
+def ended_soon(run: Run, nodes: Iterable[LaunchNode], topic: str) -> list[LaunchNode]:
+    """Return the nodes that ran to their own end while others still connect to them; whether one did, is chance."""
+    ended = [node for node in nodes if finished(run, node)]
+    return ended if together_s(run, topic) < CONNECTED_WITHIN_S else []
+
+
+def ended_by_itself(
+    package: PackageFacts, run: Run, file: LaunchFile, ended: Sequence[LaunchNode]
+) -> Verdict:
+    """Return that nodes ended too soon to be connected, and the loop that let them, where one is seen."""
+    alone = "itself" if len(ended) == 1 else "themselves"
+    message = f"{join_words(n.full_name for n in ended)} came up and ended by {alone} before others connected"
+    scripts = {one.path for n in ended if (one := own_script(package, n)) is not None}
+    left = next((s for s in package.slips if s.kind == "loop-left" and s.file in scripts), None)
+    if left is not None:
+        verdict = failed(f"{message}: {left.message}", hint=left.fix, citations=(left.place,))
+    else:
+        cited = tuple(FileCitation(file=n.file or file.path, line=n.line) for n in ended)
+        verdict = failed(message, hint=f"keep it alive: end with {SPIN}", citations=cited)
+    # on a quicker machine, the others may connect to it before it ends
+    return excused(verdict.if_repeated(), run, run.start_ns, run.end_ns, why_late)
 
 
 def _blame_scripts(
