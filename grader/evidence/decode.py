@@ -63,11 +63,12 @@ class Decoder:
         `time` and `duration` become `{"secs": …, "nsecs": …}`. None too for what would take more memory than
         a whole recording may.
         """
+        plan = self._plan
         # Before anything is read: a few bytes can stand for millions of values.
-        if self._plan is None or self.decoded_bytes(len(data)) > DECODED_BYTES_MAX:
+        if plan is None or plan.bound.decoded(len(data)) > DECODED_BYTES_MAX:
             return None
         try:
-            value, end = self._plan.read(data, 0)
+            value, end = plan.read(data, 0)
         except (struct.error, ValueError):
             return None
         # Bytes that are left over show that the definition is not this message's.

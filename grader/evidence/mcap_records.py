@@ -33,8 +33,8 @@ MAX_RECORDS = 2_000_000
 
 _HEAD = struct.Struct("<BQ")
 _MESSAGE_HEAD = struct.Struct("<HIQQ")
-_WHOLE_HEAD = struct.Struct("<BQHIQQ")
-"""Both at once."""
+_WHOLE_HEAD = struct.Struct("<BQHIQ8x")
+"""Both at once, without the time of publication, which is left out of a `Message`."""
 MESSAGE_HEAD_BYTES = _MESSAGE_HEAD.size
 BATCH = 1000
 KEPT_BYTES = 32 << 10
@@ -156,26 +156,27 @@ def _inside(chunk: Chunk, meter: _Meter) -> Iterator[McapRecord | Messages]:
     plain = _unpack(chunk)
     meter.unpacked(len(plain))
     _verify(chunk.uncompressed_crc, zlib.crc32(plain), "a chunk")
-    size_bytes, at, count, head_bytes = len(plain), 0, 0, _HEAD.size
+    size_bytes, at, count = len(plain), 0, 0
     padded = plain + bytes(_WHOLE_HEAD.size)  # so that the head of a message can be read of any record
     # Local names and `tuple.__new__`: this loop runs for each of up to two million records.
     read_head, new, message_op = _WHOLE_HEAD.unpack_from, tuple.__new__, int(Opcode.MESSAGE)
+    head_bytes, whole_bytes = _HEAD.size, _WHOLE_HEAD.size
     messages: Messages = defaultdict(list)
     described = _IN_CHUNK.keys()
     while at < size_bytes:
-        opcode, length, channel_id, sequence, time_ns, _ = read_head(padded, at)
-        begin = at + head_bytes
-        at = begin + length
+        opcode, length, channel_id, sequence, time_ns = read_head(padded, at)
+        begin = at
+        at += head_bytes + length
         if at > size_bytes:
             # A length that no record has is told as that, and not as the end of the file.
             meter.record(length)
             raise EndOfFile
         count += 1
         if opcode == message_op and length >= MESSAGE_HEAD_BYTES:
-            row = (time_ns, sequence, plain[begin + MESSAGE_HEAD_BYTES : at])
+            row = (time_ns, sequence, plain[begin + whole_bytes : at])
             messages[channel_id].append(new(Message, row))
         elif opcode in described:
-            yield _IN_CHUNK[opcode](plain[begin:at])
+            yield _IN_CHUNK[opcode](plain[begin + head_bytes : at])
         if count >= BATCH:
             meter.records(count)
             yield messages

@@ -241,8 +241,10 @@ def fill_slots(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdic
 
 def name_same_file(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdict:
     """Return the verdict; a loss goes on with the other script of the lab that has the very same code."""
+    if not verdict.status.is_lost or criterion.scenario is None:
+        return verdict
     package = facts.package_of(criterion)
-    if package is None or not verdict.status.is_lost or criterion.scenario is None:
+    if package is None:
         return verdict
     own = scripts_of(criterion, facts.rubric, package)
     started = {

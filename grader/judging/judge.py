@@ -151,6 +151,8 @@ def judge_all_runs(
 
 def _undecided(rubric: Rubric, verdicts: Mapping[str, Verdict]) -> frozenset[str]:
     """Return the scenarios of the open criteria, without those that rest on what the machine lacks."""
+    if all(verdict.status is not Status.INCONCLUSIVE for verdict in verdicts.values()):
+        return frozenset()
     by_id, lacking = {c.id: c for c in rubric.criteria}, set[str]()
     for name in _in_order(rubric):
         is_open = verdicts[name].status is Status.INCONCLUSIVE
@@ -205,7 +207,7 @@ def _facts_as_recorded(rubric: Rubric, runs: Mapping[str, Run], first: Mapping[s
 def _with_cited_lines(verdict: Verdict, criterion: Criterion, facts: Facts, used: Repaired | None) -> Verdict:
     """Return the verdict with the lines of the package that it is about, and their text."""
     build = facts.runs.get(PACKAGE_RUN)
-    if build is None:
+    if build is None or verdict.status is Status.PASS:
         return verdict
     package = facts.package_of(criterion)
     verdict = cite_quoted(verdict, criterion, facts, build)
@@ -297,6 +299,17 @@ def explain_loss(check: Check, package: PackageFacts | None, run: object, verdic
     return explain_by_waiting_callback(check, package, run, verdict)  # that may take back an excuse
 
 
+def _of_the_build(criterion: Criterion, facts: Facts, run: object, verdict: Verdict) -> Verdict:
+    """Return a lost mark with what explains it in the build."""
+    own = facts.rubric.starts_of(criterion)
+    started = {event.name for _, event in run.processes} if isinstance(run, Run) else set()
+    all_of_run = facts.rubric.starts_of(criterion.model_copy(update={"parameters": {}}))
+    beside = [s.script for s in all_of_run if s.script and s.name not in started]
+    asked_for = [s.script for s in own if s.script]
+    package = facts.package_of(criterion)
+    return explain_by_build(package, facts.runs.get(PACKAGE_RUN), verdict, asked_for, beside)
+
+
 def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> Verdict:
     """Return what the criterion's check says; an exception inside it is not the student's fault and says so."""
     if criterion.check == MANUAL:
@@ -308,20 +321,14 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
         return Verdict(status=Status.ERROR, score=0.0, message=message, hint=hint)
     try:
         asked = facts.of(check, criterion, check.params.model_validate(criterion.parameters))
-        found = (
-            asked
-            if isinstance(asked, Verdict)
-            else account_for_losses(check, asked, _sound(check.function(**asked)))
-        )
-        if not isinstance(asked, Verdict):
-            package, run = facts.package_of(criterion), asked.get("run")
-            found = explain_loss(check, package, run, found)
-            own = facts.rubric.starts_of(criterion)
-            started = {event.name for _, event in run.processes} if isinstance(run, Run) else set()
-            all_of_run = facts.rubric.starts_of(criterion.model_copy(update={"parameters": {}}))
-            beside = [s.script for s in all_of_run if s.script and s.name not in started]
-            asked_for = [s.script for s in own if s.script]
-            found = explain_by_build(package, facts.runs.get(PACKAGE_RUN), found, asked_for, beside)
+        if isinstance(asked, Verdict):
+            found = asked
+        else:
+            found = account_for_losses(check, asked, _sound(check.function(**asked)))
+            if found.status is not Status.PASS:  # a pass needs no explanation
+                run = asked.get("run")
+                found = explain_loss(check, facts.package_of(criterion), run, found)
+                found = _of_the_build(criterion, facts, run, found)
         found = fill_slots(choose_hint_language(found, criterion, facts), criterion, facts.rubric)
         found = _with_package_name(name_other_lines(found, facts), criterion, facts)
         found = name_same_file(found, criterion, facts)

@@ -244,10 +244,12 @@ def number_places(
     rows = sum(_NUMBER.search(line.text) is not None for line in shown)
     if rows > LINES_PER_PROBE * (len(probes) + len(set(texts))) + LINES_SPARE:
         return None
-    signs, dashes = (_places_read(probes, shown, dashes=dashes) for dashes in (False, True))
-    with_dashes = any(found and not other for found, other in zip(dashes, signs, strict=True))
+    signs = _places_read(probes, shown, dashes=False)
+    if all(signs):
+        return signs
     # A `-` is taken for a dash only where a number is not found otherwise.
-    return dashes if with_dashes and not all(signs) else signs
+    dashes = _places_read(probes, shown, dashes=True)
+    return dashes if any(found and not other for found, other in zip(dashes, signs, strict=True)) else signs
 
 
 def _places_read(probes: Sequence[Probe], lines: Sequence[Line], *, dashes: bool) -> list[tuple[int, ...]]:

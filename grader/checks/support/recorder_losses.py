@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 
 from grader.checks.registry import Check
 from grader.checks.support.text import texts_in
+from grader.evidence.events import RecorderEvent
 from grader.evidence.run import Run
 from grader.model.record import Record
 from grader.model.verdict import Status, Verdict, grade_again
@@ -34,11 +35,15 @@ class Losses(Record):
 def losses(run: Run, topic: str) -> Losses | None:
     """Return what is missing of a topic, None where the recorder took all that came."""
     events = [(at_ns, e) for at_ns, e in run.recorder if e.topic == topic]
-    lost = [at_ns for at_ns, e in events if e.event in {"limit", "behind"} or e.dropped]
+    lost = [at_ns for at_ns, e in events if _is_loss(e)]
     if not lost:
         return None
     kept = sum(len(c.messages) for c in run.channels if c.topic == topic)
     return Losses(topic=topic, at_ns=min(lost), kept=kept, dropped=sum(e.dropped for _, e in events))
+
+
+def _is_loss(event: RecorderEvent) -> bool:
+    return event.event in {"limit", "behind"} or event.dropped != 0
 
 
 def whole_until_ns(run: Run, topic: str, until_ns: int | None = None) -> int | None:
@@ -60,7 +65,7 @@ def account_for_losses(check: Check, facts: Mapping[str, object], verdict: Verdi
     """Return the verdict with what the recorder lost of its topics. A lost mark becomes `inconclusive`, unless the
     check rests on what came whole (`heeds_losses`): then what was lost only stands with what was measured."""
     run = facts.get("run")
-    if not isinstance(run, Run):
+    if not isinstance(run, Run) or not any(_is_loss(event) for _, event in run.recorder):
         return verdict
     found = [one for topic in _topics(check, facts.get("params")) if (one := losses(run, topic))]
     if not found:

@@ -158,7 +158,9 @@ def move_hint(package: PackageFacts, path: str, wanted: str) -> str:
 
 def without_git(hint: str, package: PackageFacts | None) -> str:
     """Return the hint with commands that work where the package is in no git repository."""
-    return hint if package is None or handed_in_with_git(package) else hint.replace("git mv ", "mv ")
+    if package is None or "git mv " not in hint or handed_in_with_git(package):
+        return hint
+    return hint.replace("git mv ", "mv ")
 
 
 def handed_in_with_git(package: PackageFacts) -> bool:
