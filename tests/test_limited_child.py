@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -142,14 +143,14 @@ def test_what_a_function_in_a_child_imports_is_there(function: str) -> None:
     files = [path / "__init__.py" if path.is_dir() else path.with_suffix(".py") for path in paths]
     files += GRADER.glob("package/lint/*.py")
     # a folder without __init__.py is a package, too
-    found = {
-        (file.name, root)
-        for file in files
-        if file.exists()
-        for root in _imported(ast.parse(file.read_text()))
-    }
+    found = {(file.name, root) for file in files if file.exists() for root in _imports_of(file)}
     known = {*sys.stdlib_module_names, "grader", *LINT}
     assert {one for one in found - LIBRARIES if one[1] not in known} == set()
+
+
+@cache
+def _imports_of(file: Path) -> frozenset[str]:
+    return frozenset(_imported(ast.parse(file.read_text())))
 
 
 def _imported(tree: ast.AST) -> Iterator[str]:

@@ -1,75 +1,60 @@
-"""Two and three faults at once: each is found and undone, and what the report says of them leads to full marks."""
+"""Two and three faults at once: each is found and undone, and advice on files alone leads to none of them.
+
+tests/test_shapes_graded.py grades them.
+"""
 
 from __future__ import annotations
 
-import re
-from collections import Counter
-from collections.abc import Iterator
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 import pytest
 
 from fixtures.make import labs, rubric_of, solution_of
 from grader.authoring.mutation.solution import read_tree, write_tree
 from grader.judging.judge import judge_files
-from grader.model.repair import DEFAULT_SHARES, KINDS, Repair
-from grader.model.result import CriterionResult, GradingResult, Silence
+from grader.model.repair import KINDS
+from grader.model.result import CriterionResult
 from grader.model.verdict import Status
-from grader.package.repairs import apply_repair, find_repairs, wanted_of
-from grader.pipeline import GradeOptions, grade
-from grader.rubric.model import Rubric
 from tests.package.trees import facts_of, plain
-from tests.support.advice import apply_advice, faulty_advice
-from tests.support.shapes import LOGIC, REPAIRED_AS, REWORDED, shapes
+from tests.support.advice import apply_advice
+from tests.support.shapes import LOGIC, REPAIRED_AS, REWORDED, ROUNDS_MAX, found_in, repair, shapes_of
 
 pytestmark = pytest.mark.usefixtures("without_processes")
-SHORTER = "mcr2-basic-comms/"
-QUICK = (
-    "eyantra-ros-basics/yaml-key-misspelt+bit-removed",
-    "leeds-comp3631-lab1/manifest-malformed+no-shebang",
+SHORTER = "mcr2-basic-comms"
+WITHOUT_NODES = {"unit-tests", "two-packages"}
+"""Or without any in the package that operators change."""
+each_lab = pytest.mark.parametrize(
+    "lab",
+    [
+        pytest.param(lab, marks=[] if lab == SHORTER else pytest.mark.full)
+        for lab in labs()
+        if lab not in WITHOUT_NODES
+    ],
 )
-BY_TEXT = (
-    "eyantra-ros-basics/bit-removed+launch-type-without-py",
-    "leeds-comp3631-lab1/bit-removed+tabs-and-spaces+no-catkin-package",
-    "mcr2-basic-comms/manifest-malformed+no-shebang",
-    "sheffield-com2009-week1/project-renamed+typographic-quote",
-    "york-ele00118m-lab7/buildtool-dropped+shebang-typo",
-)
-"""Graded too after what the report says has been done word by word, one for each lab."""
-ROUNDS_MAX = 3
 
 
+@pytest.mark.full
 def test_there_are_enough() -> None:
-    assert len(shapes()) >= 40
-    without_nodes = {"unit-tests", "two-packages"}  # or not in the package that operators change
-    assert {lab for lab, _ in shapes().values()} == set(labs()) - without_nodes
+    found = {lab: len(shapes_of(lab)) for lab in labs()}
+    assert sum(found.values()) >= 40
+    assert {lab for lab, number in found.items() if not number} == WITHOUT_NODES
 
 
-def found_in(folder: Path, lab: str) -> tuple[Repair, ...]:
-    """What can be repaired in the package below the folder."""
-    rubric = rubric_of(lab).rubric
-    package = folder / solution_of(lab).folder
-    return find_repairs(package, facts_of(package, rubric.package), wanted_of(rubric))
+@each_lab
+def test_each_fault_is_found_and_undone(lab: str, tmp_path: Path, subtests: pytest.Subtests) -> None:
+    for shape, tree in shapes_of(lab).items():
+        with subtests.test(shape):
+            folder = tmp_path / shape
+            write_tree(tree, folder)
+            check_undone(folder, lab, shape.partition("/")[2].split("+"))
 
 
-def repair(folder: Path, lab: str, repairs: tuple[Repair, ...]) -> None:
-    for one in repairs:
-        apply_repair(folder / solution_of(lab).folder, one)
-
-
-@pytest.mark.parametrize(
-    "shape",
-    [pytest.param(name, marks=[] if name.startswith(SHORTER) else pytest.mark.full) for name in shapes()],
-)
-def test_each_fault_is_found_and_undone(shape: str, tmp_path: Path) -> None:
-    lab, tree = shapes()[shape]
-    operators = shape.partition("/")[2].split("+")
-    write_tree(tree, tmp_path / "copy")
-    repairs = found_in(tmp_path / "copy", lab)
+def check_undone(folder: Path, lab: str, operators: list[str]) -> None:
+    repairs = found_in(folder, lab)
     wanted = [REPAIRED_AS[name] for name in operators if name not in LOGIC]
     assert [one.kind for one in repairs] == sorted(wanted, key=KINDS.index)
-    repair(tmp_path / "copy", lab, repairs)
-    right, now = solution_of(lab).tree, read_tree(tmp_path / "copy")
+    repair(folder, lab, repairs)
+    right, now = solution_of(lab).tree, read_tree(folder)
     assert {path: entry.executable for path, entry in now.items()} == {
         path: entry.executable for path, entry in right.items()
     }
@@ -82,15 +67,18 @@ def test_each_fault_is_found_and_undone(shape: str, tmp_path: Path) -> None:
 # ---- what the report says, done literally
 
 
-@pytest.mark.parametrize(
-    "shape",
-    [pytest.param(name, marks=[] if name.startswith(SHORTER) else pytest.mark.full) for name in shapes()],
-)
-def test_advice_on_files_is_followed_word_by_word(shape: str, tmp_path: Path) -> None:
+@each_lab
+def test_advice_on_files_is_followed_word_by_word(
+    lab: str, tmp_path: Path, subtests: pytest.Subtests
+) -> None:
     """Nothing is lost then that the files alone show, and on the way nothing that was not named at first."""
-    lab, tree = shapes()[shape]
-    write_tree(tree, tmp_path / "copy")
-    package = tmp_path / "copy" / solution_of(lab).folder
+    for shape, tree in shapes_of(lab).items():
+        with subtests.test(shape):
+            write_tree(tree, tmp_path / shape)
+            check_followed(tmp_path / shape / solution_of(lab).folder, lab)
+
+
+def check_followed(package: Path, lab: str) -> None:
     first = left = lost_by_files(package, lab)
     for _ in range(ROUNDS_MAX):
         for criterion in left.values():
@@ -105,97 +93,3 @@ def lost_by_files(package: Path, lab: str) -> dict[str, CriterionResult]:
     found = judge_files(loaded.rubric, facts_of(package, loaded.rubric.package), loaded.checks)
     lost = [verdict.criterion for verdict in found if verdict.criterion.status.is_lost]
     return {c.id: c for c in lost if c.status is not Status.BLOCKED}
-
-
-@pytest.mark.ros
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "shape", [pytest.param(name, marks=[] if name in QUICK else pytest.mark.full) for name in shapes()]
-)
-def test_the_hints_lead_to_full_marks(shape: str, tmp_path: Path) -> None:
-    lab, tree = shapes()[shape]
-    write_tree(tree, tmp_path / "copy")
-    first = last = graded(tmp_path, lab, 0)
-    assert_consistent(first, rubric_of(lab).rubric)
-    assert faulty_advice(first.criteria, tmp_path / "copy") == []
-    for number in range(1, ROUNDS_MAX + 1):
-        repairs = tuple(one for one in found_in(tmp_path / "copy", lab) if is_told(last, one))
-        if not repairs:
-            break
-        repair(tmp_path / "copy", lab, repairs)
-        last = graded(tmp_path, lab, number)
-        assert lost(last) <= lost(first), f"the first report did not name {lost(last) - lost(first)}"
-    logic = set(shape.partition("/")[2].split("+")) & {
-        *LOGIC,
-        "python2-print",
-    }  # it prints no message any more
-    assert logic or lost(last) == set(), [f"{c.id}: {c.message}" for c in last.criteria if c.id in lost(last)]
-    assert last.points >= first.points
-
-
-@pytest.mark.ros
-@pytest.mark.slow
-@pytest.mark.full
-@pytest.mark.parametrize("shape", BY_TEXT)
-def test_the_text_of_a_graded_report_leads_to_full_marks(shape: str, tmp_path: Path) -> None:
-    lab, tree = shapes()[shape]
-    write_tree(tree, tmp_path / "copy")
-    package = tmp_path / "copy" / solution_of(lab).folder
-    last = graded(tmp_path, lab, 0)
-    assert lost(last)
-    for number in range(1, ROUNDS_MAX + 1):
-        told = {c.hint: c for c in last.criteria if c.status.is_lost and c.status is not Status.BLOCKED}
-        for criterion in told.values():
-            if criterion.repaired is None or criterion.repaired.charged:
-                apply_advice(criterion, package)
-        last = graded(tmp_path, lab, number)
-        if not lost(last):
-            break
-    assert {c.id: c.hint for c in last.criteria if c.id in lost(last)} == {}
-
-
-def graded(folder: Path, lab: str, number: int) -> GradingResult:
-    options = GradeOptions(submission_id=str(number))
-    return grade(str(folder / "copy"), rubric_of(lab), folder / "out", options, Silence())
-
-
-def lost(result: GradingResult) -> set[str]:
-    """The criteria that are not reached; what is worth no points is advice, and counts as well."""
-    assert not [c.id for c in result.criteria if c.status.is_retryable]
-    return {c.id for c in result.criteria if c.status.is_lost}
-
-
-def is_told(result: GradingResult, one: Repair) -> bool:
-    """Return whether what is said of a lost criterion names the file, and the command or all that is new in a line."""
-    new = set(Counter(_words(one.after)) - Counter(_words(one.before)))
-    name = PurePosixPath(one.file).name
-    texts = [f"{c.message} {c.hint}" for c in result.criteria if c.status.is_lost]
-    return any(
-        name in text and (one.fix in text or bool(new and all(word in text for word in new)))
-        for text in texts
-    )
-
-
-def _words(text: str) -> Iterator[str]:
-    yield from re.findall(r"\w+|[^\w\s]", text)
-
-
-def assert_consistent(result: GradingResult, rubric: Rubric) -> None:
-    """One mistake is charged once, shares are kept, and no two hints contradict each other."""
-    used = [(c, c.repaired) for c in result.criteria if c.repaired is not None]
-    charged = [one for _, found in used if found.charged for one in found.repairs]
-    assert len(charged) == len(set(charged))
-    for criterion, found in used:
-        if found.charged or not criterion.max_points:
-            assert criterion.points < criterion.max_points or not criterion.max_points
-        else:
-            assert found.share == min(DEFAULT_SHARES[one.kind] for one in found.repairs)
-            assert criterion.points in (0, found.share * criterion.max_points)
-    fixes = {(one.file, one.line, one.fix) for _, found in used for one in found.repairs}
-    assert len({(file, line) for file, line, _ in fixes}) == len(fixes)
-    hints = [c.hint for c in result.criteria if c.status.is_lost]
-    assert {name for hint in hints for name in re.findall(r'(?<!for )pkg="([\w-]+)"', hint)} <= {
-        rubric.package
-    }
-    first = {name for hint in hints for name in re.findall(r"^fix ([\w-]+) first$", hint)}
-    assert first <= lost(result)

@@ -6,14 +6,16 @@ import difflib
 from collections.abc import Iterator
 from functools import cache
 from itertools import product
+from pathlib import Path
 
-from fixtures.make import labs, rubric_of
+from fixtures.make import rubric_of
 from fixtures.make import solution_of as reference_of
 from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.solution import Site, Solution, Tree, TreeFile
 from grader.authoring.mutation.source_edits import TextEdit, apply_edits
-from grader.model.repair import RepairKind
-from grader.package.repairs import wanted_of
+from grader.model.repair import Repair, RepairKind
+from grader.package.repairs import apply_repair, find_repairs, wanted_of
+from tests.package.trees import facts_of
 
 COMBINATIONS = (
     ("bit-removed", "tabs-and-spaces", "no-catkin-package"),
@@ -81,20 +83,33 @@ REWORDED = (
 """Those whose repair is right in other words than the reference solution's."""
 UNDECIDED = ("turtle-square", ("topic-misspelt", "sleep-without-brackets"))
 """Drives in a flood that ends the recording early, so most criteria stay inconclusive."""
+ROUNDS_MAX = 3
+"""So often a student may have to follow what the report says."""
 LAST = ("crlf", "byte-order-mark")
 """These change lines that others change too, so they come after them."""
 
 
 @cache
-def shapes() -> dict[str, tuple[str, Tree]]:
-    """Return every combination that fits a lab, by `lab/operator+operator`: the lab, and the package's files."""
+def shapes_of(lab: str) -> dict[str, Tree]:
+    """Return every combination that fits the lab, by `lab/operator+operator`: the package's files."""
     found = {}
-    for lab in labs():
-        for number, operators in enumerate(COMBINATIONS):
-            tree = _combined(lab, operators, number)
-            if tree is not None and (lab, operators) != UNDECIDED:
-                found[f"{lab}/{'+'.join(operators)}"] = (lab, tree)
+    for number, operators in enumerate(COMBINATIONS):
+        tree = _combined(lab, operators, number)
+        if tree is not None and (lab, operators) != UNDECIDED:
+            found[f"{lab}/{'+'.join(operators)}"] = tree
     return found
+
+
+def found_in(folder: Path, lab: str) -> tuple[Repair, ...]:
+    """Return what can be repaired in the package below the folder."""
+    rubric = rubric_of(lab).rubric
+    package = folder / reference_of(lab).folder
+    return find_repairs(package, facts_of(package, rubric.package), wanted_of(rubric))
+
+
+def repair(folder: Path, lab: str, repairs: tuple[Repair, ...]) -> None:
+    for one in repairs:
+        apply_repair(folder / reference_of(lab).folder, one)
 
 
 def _combined(lab: str, operators: tuple[str, ...], number: int) -> Tree | None:

@@ -11,8 +11,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from distributed.security import Security
-
 from tests.support.processes import until
 
 DASK = (sys.executable, "-m", "dask")
@@ -83,6 +81,8 @@ def _preload(name: str) -> list[str]:
 
 def _certificates(folder: Path) -> dict[str, Path]:
     """Files for both ends; the certificate has signed itself, so it is the authority too."""
+    from distributed.security import Security  # noqa: PLC0415 - takes half a second to load
+
     made = Security.temporary()
     files = {"ca-file": made.tls_ca_file, "cert": made.tls_client_cert, "key": made.tls_client_key}
     for name, text in files.items():

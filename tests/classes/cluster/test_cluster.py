@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import dask.config
 import pytest
 
 from grader.classes.batch.job import LocalExecutor
@@ -62,6 +61,8 @@ def test_a_cluster_with_certificates_needs_no_flag(tmp_path: Path) -> None:
         made.worker()
         names = {"ca-file": "ca-file", "client.cert": "cert", "client.key": "key"}
         files = {f"distributed.comm.tls.{key}": str(made.certificates[name]) for key, name in names.items()}
+        import dask.config  # noqa: PLC0415 - slow to load
+
         with dask.config.set(files):
             assert ids(ClusterExecutor(made.address, out).run(jobs_for(out, 2), begun=ignore)) == NAMES[:2]
     assert made.address.startswith("tls://")

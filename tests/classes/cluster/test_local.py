@@ -11,13 +11,15 @@ import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
-from distributed.security import Security
 
 from grader.classes.cluster.connect import LOCAL, connect
 from tests.classes.cluster.sockets import listening_ports, tree_of
+
+if TYPE_CHECKING:
+    from distributed.security import Security
 
 KEY = b"PRIVATE KEY"
 OUTSIDE = """
@@ -94,7 +96,7 @@ def test_nothing_listens_but_scheduler_nannies_and_workers(client: Any, ports: l
 
 
 def test_every_port_refuses_who_has_no_certificate_of_the_cluster(ports: list[int]) -> None:
-    foreign = Security.temporary()
+    foreign = _security()
     context = foreign.get_connection_args("client")["ssl_context"]
     bare = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     for one in (context, bare):
@@ -113,7 +115,7 @@ def test_every_port_refuses_who_has_no_certificate_of_the_cluster(ports: list[in
 @pytest.mark.parametrize("protocol", ["tcp", "tls"])
 @pytest.mark.parametrize("certificates", ["none", "foreign"])
 def test_a_client_without_the_certificates_is_refused(client: Any, protocol: str, certificates: str) -> None:
-    files = _files(Security.temporary()) if certificates == "foreign" else {}
+    files = _files(_security()) if certificates == "foreign" else {}
     said = _outside(f"{protocol}://{client.scheduler.address.partition('://')[2]}", files)
     assert said.startswith("refused")
 
@@ -148,6 +150,13 @@ def test_no_process_imports_from_a_folder_that_another_user_made(client: Any, te
 
 def _paths() -> list[str]:
     return list(sys.path)
+
+
+def _security() -> Security:
+    """Certificates that no cluster knows."""
+    from distributed.security import Security  # noqa: PLC0415 - takes half a second to load
+
+    return Security.temporary()
 
 
 def _files(security: Security) -> dict[str, str]:

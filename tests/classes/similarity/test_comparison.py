@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.similarity.comparison import compare_class
 from grader.model.batch import Similarity
 from tests.classes.similarity.classes import (
     DISGUISES,
@@ -25,6 +24,8 @@ ALL = ("average", "generator", "laser", "machine", "monitor", "odometry", "servi
 
 def compared(folders: dict[str, Path], **also: object) -> Similarity:
     fields = {"starter": (), "groups": {}, "threshold": 0.8, "jobs": 2} | also
+    from grader.classes.similarity.comparison import compare_class  # noqa: PLC0415 - loads matplotlib
+
     return compare_class(folders, **fields)
 
 

@@ -1,14 +1,14 @@
-"""Files that are meant to do harm cost their own submission the comparison, and no other anything."""
+"""Files that are meant to do harm cost their own submission the comparison, and nobody else anything."""
 
 from __future__ import annotations
 
 import os
 import re
+from importlib import import_module
+from typing import Any
 
 import pytest
 
-from grader.classes.similarity import comparison
-from grader.classes.similarity.comparison import CodeSource, read_files, read_place, reading_ended
 from grader.classes.similarity.sources import ProgramText, compare
 from grader.workers import WorkerEnded
 from tests.classes.similarity.classes import class_of, hand_in, solution
@@ -27,6 +27,12 @@ FILES = {
     "nothing": (b"", ""),
     "line ends": (b"\r\n\r\r\n\n" * 10_000, ""),
 }
+
+
+@pytest.fixture
+def comparison() -> Any:
+    """The module that loads copydetect and matplotlib, once a test needs it."""
+    return import_module("grader.classes.similarity.comparison")
 
 
 @pytest.mark.full
@@ -48,13 +54,15 @@ def test_evidence_of_fifty_megabytes_on_one_line_is_named(tmp_path) -> None:
     assert [one.id for one in similarity.not_compared] == ["bad"]
 
 
-def test_a_regular_expression_without_end_is_interrupted(monkeypatch) -> None:
+def test_a_regular_expression_without_end_is_interrupted(comparison, monkeypatch) -> None:
     def stuck(path: str, code: str, language: str) -> None:
         re.match(r"(a+)+$", "a" * 60 + "b")
 
     monkeypatch.setattr(comparison, "FILE_S", 0.2)
     monkeypatch.setattr(comparison, "read_text", stuck)
-    read = read_files(CodeSource(name="ann"), (ProgramText(path="a.py", code="", language="python"),))
+    read = comparison.read_files(
+        comparison.CodeSource(name="ann"), (ProgramText(path="a.py", code="", language="python"),)
+    )
     assert [(one.file, one.reason) for one in read.left_out] == [("a.py", "took longer than 0.2 s to read")]
 
 
@@ -65,12 +73,12 @@ def test_a_regular_expression_without_end_is_interrupted(monkeypatch) -> None:
         (lambda *_: 1 / 0, "could not be read: ZeroDivisionError"),
     ],
 )
-def test_what_harms_the_reader_is_said(tmp_path, monkeypatch, harm, reason) -> None:
+def test_what_harms_the_reader_is_said(comparison, tmp_path, monkeypatch, harm, reason) -> None:
     """What ends it costs its own submission alone: tests/test_workers.py."""
     monkeypatch.setattr(comparison, "read_submission", harm)
-    place = CodeSource(name="bad", folder=tmp_path)
-    assert [one.reason for one in read_place(place).left_out] == [reason]
-    ended = reading_ended(place, WorkerEnded("ended by signal 9"))
+    place = comparison.CodeSource(name="bad", folder=tmp_path)
+    assert [one.reason for one in comparison.read_place(place).left_out] == [reason]
+    ended = comparison.reading_ended(place, WorkerEnded("ended by signal 9"))
     assert [(one.id, one.reason) for one in ended.left_out] == [
         ("bad", "reading it took too long or too much memory")
     ]
@@ -123,7 +131,9 @@ def test_no_program_is_said(tmp_path) -> None:
 
 
 @pytest.mark.full
-def test_a_class_with_too_much_code_is_compared_as_far_as_there_is_room(tmp_path, monkeypatch) -> None:
+def test_a_class_with_too_much_code_is_compared_as_far_as_there_is_room(
+    comparison, tmp_path, monkeypatch
+) -> None:
     monkeypatch.setattr(comparison, "PRINTS_MAX", 700)
     folders = class_of(tmp_path, {name: {"a.py": GOOD} for name in ("ann", "ben", "cem")})
     similarity = comparison.compare_class(folders, (), {}, threshold=0.8, jobs=1)

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.similarity.comparison import compare_class
 from grader.classes.similarity.sources import compare
 from tests.classes.similarity.classes import class_of, renamed, solution
 
@@ -80,6 +79,8 @@ int main(int argc, char **argv)
 
 
 def compared(folders, **also):
+    from grader.classes.similarity.comparison import compare_class  # noqa: PLC0415 - loads matplotlib
+
     return compare_class(
         **{"folders": folders, "starter": (), "groups": {}, "threshold": 0.5, "jobs": 2} | also
     )
