@@ -28,7 +28,7 @@ from grader.checks.support.processes import (
 )
 from grader.checks.support.recorder_losses import whole_until_ns
 from grader.checks.support.scripts import slips_of_program
-from grader.checks.support.text import LOOP, SPIN, both, loop_rate
+from grader.checks.support.text import LOOP, SPIN, both, loop_rate, rate_hint
 from grader.checks.support.topics import (
     SYSTEM_TOPICS,
     Sender,
@@ -290,9 +290,10 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
 
 def _asked_flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> PythonSlip | None:
     """Return where the node's script asks for so many messages, or for more than it can send."""
-    asked = _slips(run, package, params, "rate-number")
     least_hz = max((1 - NUMBER_SHARE) * found.mean_hz, FLOOD_FACTOR * params.rate_hz)
-    return next((slip for slip in asked if float(slip.message) >= least_hz), None)
+    return next(
+        (s for s in _slips(run, package, params, "rate-number") if float(s.message) >= least_hz), None
+    )
 
 
 def _short(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
@@ -333,7 +334,8 @@ def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) 
     wrong = _wrong_mean(found, params)
     # What a line of the script, or the shape of the stream, explains goes before the bare numbers.
     return (
-        _fell_silent(found, run, package, params)
+        _at_random(found, run, package, params)
+        or _fell_silent(found, run, package, params)
         or _published_twice(found, run, package, params)
         or (_by_slip(wrong, "publish-twice", run, package, params) if mean_hz > params.high_hz else None)
         or _bursts(found, outside, even, params)
@@ -342,6 +344,17 @@ def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) 
         or _left_out(wrong, mean_hz, run, package, params)
         or _by_parameter(wrong, run, package, params, mean_hz)
     )
+
+
+def _at_random(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
+    """Name the line that waits for a time drawn at random, in a script that asks for no rate besides."""
+    asked = _slips(run, package, params, "rate-random", "rate-number")
+    if {slip.kind for slip in asked} != {"rate-random"}:
+        return None
+    uneven = failed(f"{params.topic} comes unevenly: {hertz(found.mean_hz)} on average")
+    is_right = params.low_hz <= found.mean_hz <= params.high_hz
+    wrong = uneven if is_right else _wrong_mean(found, params).model_copy(update={"timing": False})
+    return _with_line(wrong, asked[0], params)
 
 
 def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
@@ -361,8 +374,8 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
         return failed(f"{message}: {asleep.message}", hint=hint, citations=(asleep.place,))
     others = _goes_on(found, run, params)
     # A loop that still publishes on another topic was not left.
-    kinds: list[SlipKind] = ["spin-in-loop", "unregistered", "stuck"]
-    kinds += [] if others else ["loop-left"]
+    kinds: tuple[SlipKind, ...] = ("spin-in-loop", "unregistered", "stuck")
+    kinds = kinds if others else (*kinds, "loop-left")
     if slip := next(iter(_slips(run, package, params, *kinds)), None):
         return failed(f"{message}: {slip.message}", hint=slip.fix, citations=(slip.place,))
     if end := explain_error(package, run):
@@ -397,9 +410,8 @@ def _asked_slow(found: Rhythm, run: Run, package: PackageFacts, params: RatePara
     if slow is None or float(slow.message) >= params.low_hz:
         return None
     count = plural(len(found.times_ns), "message")
-    asked_hz = f"{significant(params.rate_hz)} Hz"
-    message = f"{params.topic} is too slow: {count} in {seconds(found.span_ns)} instead of {asked_hz}"
-    return _with_line(failed(message), slow, params)
+    seen = f"{params.topic} is too slow: {count} in {seconds(found.span_ns)}"
+    return _with_line(failed(f"{seen} instead of {significant(params.rate_hz)} Hz"), slow, params)
 
 
 def _published_twice(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
@@ -419,9 +431,8 @@ def _by_slip(
 
 
 def _named(verdict: Verdict, slip: PythonSlip | None) -> Verdict | None:
-    if slip is None:
-        return None
-    return verdict.explained(f"{slip.file}: {slip.message}", f"in {slip.file}, {slip.fix}", (slip.place,))
+    told = (f"{slip.file}: {slip.message}", f"in {slip.file}, {slip.fix}", (slip.place,)) if slip else None
+    return verdict.explained(*told) if told else None
 
 
 def _left_out(
@@ -429,9 +440,9 @@ def _left_out(
 ) -> Verdict | None:
     """Name the `if` around the `publish(…)` of a loop that goes round as often as it should."""
     asked = [float(s.message) for s in _slips(run, package, params, "rate-number")]
-    slips = _slips(run, package, params, "published-in-part")
     if mean_hz > params.rate_hz or not any(params.low_hz <= hz <= params.high_hz for hz in asked):
         return None
+    slips = _slips(run, package, params, "published-in-part")
     return _named(verdict, next((s for s in slips if is_written_as(s.name, params.topic)), None))
 
 
@@ -450,7 +461,7 @@ def _wrong_mean(found: Rhythm, params: RateParams) -> Verdict:
     direction, nominal = "slow" if found.mean_hz < params.rate_hz else "fast", significant(params.rate_hz)
     message = f"{params.topic} is too {direction}: {hertz(found.mean_hz)} instead of {nominal} Hz"
     ratio = found.mean_hz / params.rate_hz
-    verdict = failed(message, hint=_rate_hint(ratio, nominal, even=found.is_even))
+    verdict = failed(message, hint=rate_hint(ratio, nominal, even=found.is_even))
     return verdict.if_repeated() if abs(ratio - 1) < NEAR_SHARE else verdict
 
 
@@ -458,6 +469,8 @@ def _with_line(verdict: Verdict, slip: PythonSlip, params: RateParams) -> Verdic
     """Return the verdict with the line that asks for another rate."""
     where = f"{slip.file}, line {slip.line}"
     said = f": {slip.name}(…) gets two numbers: {slip.fix}" if slip.fix else f" asks for {slip.message} Hz"
+    if slip.kind == "rate-random":
+        said = f" {'waits for a time' if slip.name else 'asks for a rate'} drawn by {slip.message}(…)"
     hz, period_s = significant(params.rate_hz), significant(1 / params.rate_hz)
     right = f"{slip.name}({period_s})" if slip.name else loop_rate(hz)
     return verdict.explained(f"{where}{said}", f"make it {hz} Hz in {where}: use {right}", (slip.place,))
@@ -522,14 +535,14 @@ def _by_read_parameter(
     """Say it where the package's launch file gives a parameter that the node reads and that is the rate it has."""
     for name, value in read.items():
         given = where_given(package, name)
-        # In Python, true is the number 1.
         if given is None or isinstance(value, bool) or not isinstance(value, int | float):
             continue
         if value != params.rate_hz and abs(value - mean_hz) < NUMBER_SHARE * mean_hz:
             where = f"{given.file}, line {given.line}"
             why = f"the node reads {name}, which is {value_text(value)} in {where}"
-            hint = f"set {name} to {significant(params.rate_hz)} in {where}"
-            return verdict.explained(why, hint, (given.place,))
+            return verdict.explained(
+                why, f"set {name} to {significant(params.rate_hz)} in {where}", (given.place,)
+            )
     return verdict
 
 
@@ -541,20 +554,8 @@ def _by_default(
     if len(unset) != 1 or not verdict.status.is_lost:
         return verdict
     why = f"the node asks for {unset[0]}, which nothing sets in this run: its default counts"
-    hz = significant(params.rate_hz)
-    return verdict.explained(why, f"make {hz} the default of {unset[0]} in your program, if that is its rate")
-
-
-def _rate_hint(ratio: float, nominal: str, *, even: bool) -> str:
-    """Return what may be wrong where a loop comes round `ratio` times as often as it should."""
-    if abs(ratio - 0.5) < 0.05:
-        halved = "two of them halve the rate, and so does an `if` around publish(…)"
-        return f"use {loop_rate(nominal)}, and call rate.sleep() once per loop: {halved}"
-    if abs(ratio - 2) < 0.2 and not even:
-        return f"twice the rate: does the loop, or a second publisher, publish twice? {loop_rate(nominal)}"
-    if ratio < 1:
-        return f"use {loop_rate(nominal)} and call rate.sleep() once per loop, with nothing slow beside it"
-    return f"the number is in Hz, loops per second: {loop_rate(nominal)}"
+    default = f"{significant(params.rate_hz)} the default of {unset[0]}"
+    return verdict.explained(why, f"make {default} in your program, if that is its rate")
 
 
 def _why_late(found: Rhythm, late: Lateness, params: RateParams) -> str:
@@ -585,8 +586,7 @@ def sleeps_explain(found: Rhythm, late: Lateness, params: RateParams) -> bool:
     """A loop of plain sleeps would have the right rate if its sleeps had not been too long."""
     if late.sleep_ms is None or not 0 < found.mean_hz < params.low_hz:
         return False
-    own_ms = 1e3 / found.mean_hz - late.sleep_ms
-    return own_ms <= 1e3 / params.low_hz
+    return 1e3 / found.mean_hz - late.sleep_ms <= 1e3 / params.low_hz
 
 
 def stalls_explain(found: Rhythm, late: Lateness, params: RateParams) -> bool:

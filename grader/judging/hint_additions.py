@@ -56,7 +56,7 @@ def add_advice(
     # Only on one that passed: a loss has a hint of its own.
     good = [c for c in results if c.status is Status.PASS and c.id in visible]
     host = next((c for check in OF_FILES for c in good if c.check == check), None)
-    every = (*_points(package), *_typed(package, rubric))
+    every = (*_points(package, rubric.package), *_typed(package, rubric))
     points = [point.text for point in every if not _is_told(point, results)][:POINTS_MAX]
     if host is None or not points:
         return tuple(results)
@@ -82,7 +82,7 @@ class _Point(NamedTuple):
     lacks: str = ""
 
 
-def _points(package: PackageFacts) -> Iterator[_Point]:
+def _points(package: PackageFacts, name: str) -> Iterator[_Point]:
     for file in package.files:
         fault = None if file.path.endswith(BACKUPS) else file.python_fault
         if fault is not None and fault.kind in SYNTAX and not is_product(file.path):
@@ -110,7 +110,7 @@ def _points(package: PackageFacts) -> Iterator[_Point]:
             why = launch.fault.explanation
             text = f"{launch.path}, line {launch.fault.line}, is not well-formed: {why}"
             yield _Point(launch.fault.place, text)
-        yield from _nodes(package, launch)
+        yield from _nodes(package, launch, name)
 
 
 def _typed(package: PackageFacts, rubric: Rubric) -> Iterator[_Point]:
@@ -126,12 +126,15 @@ def _typed(package: PackageFacts, rubric: Rubric) -> Iterator[_Point]:
             )
 
 
-def _nodes(package: PackageFacts, launch: LaunchFile) -> Iterator[_Point]:
-    """Yield the nodes whose program is missing or not executable: roslaunch prints an error, and starts the others."""
+def _nodes(package: PackageFacts, launch: LaunchFile, name: str) -> Iterator[_Point]:
+    """Yield the nodes whose program is missing or not executable: roslaunch prints an error, and starts the others.
+    `name` is the name that the lab asks the package to have."""
     for node in launch.brings:
         script, slip = own_script(package, node), node_slip(package, node)
         # a name that the manifest may be told to take is none to change here
-        if node.uncertain or (node.pkg != package.name and (slip is None or slip.of_manifest)):
+        if node.uncertain or (
+            node.pkg != package.name and (slip is None or slip.of_manifest or node.pkg == name)
+        ):
             continue
         if slip is not None:
             text = f"roslaunch leaves a <node> out: {slip.file}, line {slip.line}: {slip.why}; {slip.fix}"

@@ -9,18 +9,17 @@ from grader.model.record import Record
 from grader.model.verdict import Placed
 
 SlipKind = Literal[
-    "not-called", "input", "no-clock", "misspelt", "rate-parameter", "rate-number", "reset-value", "reset-limit",
-    "set-in-loop", "reset-early", "never-called", "main-guard", "never-reached", "spin-in-loop", "loop-left",
-    "ends-node", "sleep-outside", "sleep-twice", "callback-called", "callback-missing", "callback-values",
-    "callback-waits", "defined-twice", "subscribed-again",
-    "clock-value", "queue-size", "deaf", "node-name", "no-init", "commented-out", "publisher", "publisher-type",
-    "subscriber", "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes",
-    "prints", "argument-text", "unused-import", "lacking-import", "unregistered", "not-started", "start-value",
-    "hides-class", "float-index", "ranges-read",
-    "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed", "printed-in-part",
-    "published-in-part", "never-published", "takes-number", "typed-text", "goes-on",
-    "no-argument", "read-late", "debugger", "drops-result", "returns-list", "fills", "catches",
-    "no-result", "stuck", "runs-out", "base-unmade",
+    "not-called", "input", "no-clock", "misspelt", "rate-parameter", "rate-number", "rate-random", "reset-value",
+    "reset-limit", "set-in-loop", "reset-early", "never-called", "main-guard", "never-reached", "spin-in-loop",
+    "loop-left", "ends-node", "sleep-outside", "sleep-twice", "callback-called", "callback-missing",
+    "callback-values", "callback-waits", "defined-twice", "subscribed-again", "clock-value", "queue-size", "deaf",
+    "node-name", "no-init", "commented-out", "publisher", "publisher-type", "subscriber", "subscriber-type",
+    "outside-method", "object", "undefined", "no-effect", "compared", "publishes", "prints", "argument-text",
+    "unused-import", "lacking-import", "unregistered", "not-started", "start-value", "hides-class", "float-index",
+    "ranges-read", "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed",
+    "printed-in-part", "published-in-part", "never-published", "takes-number", "typed-text", "goes-on",
+    "no-argument", "read-late", "debugger", "drops-result", "returns-list", "fills", "catches", "no-result",
+    "stuck", "runs-out", "base-unmade",
 ]  # fmt: skip
 
 
@@ -113,7 +112,8 @@ class PythonSlip(Placed, Record):
     - `publisher-type`, `subscriber-type`: the message type on that line.
     - `publishes`, `prints`: a text that is published or printed by the call `name` (`loginfo`), with `{}` for a value
       in it and `{data}` for that of a message. `fix` says where to move what an `if` or a `spin()` holds up.
-    - `rate-number`, `rate-parameter`: a loop or a timer whose rate is a number, in Hz, or a parameter.
+    - `rate-number`, `rate-parameter`, `rate-random`: a loop or a timer whose rate is a number, in Hz, a parameter, or
+      drawn at random by the call that `message` names.
     - `start-value`, `added-first`: where a counter, `name`, gets its first number, `message`, and where a loop adds one
       to it before it publishes (`fix`: which lines to move).
     - `reset-value`, `reset-limit`: where a counter goes back, to the number `message`, or when it reaches it (`name`:

@@ -194,6 +194,19 @@ def test_a_node_of_nearly_the_packages_name_is_told(tmp_path) -> None:
     assert told.hint == f'{OUT} there is no a.py in a package lab11; write pkg="lab1"'
 
 
+def test_a_node_of_the_name_that_the_lab_asks_for_is_right(tmp_path) -> None:
+    """The manifest is what is wrong then, which its own criterion tells."""
+    launch = '<launch>\n<node pkg="lab11" type="a.py" name="a"/></launch>'
+    files = {"src/a.py": "#!/usr/bin/env python3\n", "launch/x.launch": launch}
+    for name, hint in (
+        ("lab11", ""),
+        ("lab1", f'{OUT} there is no a.py in a package lab11; write pkg="lab1"'),
+    ):
+        asked = rubric(CMAKE_CHECK, package=name)
+        (told,) = add_advice([criterion()], facts(tmp_path / name, **files), asked)
+        assert told.hint == hint
+
+
 CMAKE_CPP = CMAKE + "\nadd_executable(talker src/talker.cpp)\n"
 LAUNCH = (
     '<launch>\n<node pkg="lab1" type="talker" name="sender"/>\n'

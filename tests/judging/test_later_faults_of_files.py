@@ -42,6 +42,36 @@ def test_arguments_without_a_value_are_named_behind_what_roslaunch_says_first() 
     )
 
 
+@pytest.mark.parametrize(
+    ("topic", "told"), [("/chatter", True), ("/bay/chatter", False), ("/bay/echo", False)]
+)
+def test_a_namespace_in_which_the_topic_belongs_is_not_told_as_wrong(topic: str, told: bool) -> None:
+    text = """<launch>
+      <group ns="bay">
+        <node pkg="lab1" type="numeric_talker.py" name="a"/>
+        <node pkg="other" type="numeric_talker.py" name="b"/>
+      </group>
+    </launch>"""
+    launch = parse_launch_files({"launch/a.launch": text.encode()}, ["lab1"])
+    asked = {"launch": "a.launch", "scripts": [FILE, "src/listener.py"]}
+    lab = {"id": "xml", "check": "launch-xml", "with": asked}
+    runs_it = {
+        "id": "launch",
+        "check": "launch-runs",
+        "with": {**asked, "topic": topic},
+        "scenario": "talker",
+        "requires": ["xml"],
+    }
+    package = {**PACKAGE, "launch_files": [one.model_dump() for one in launch]}
+    scenarios = {"talker": {**SCENARIO, "start": [{"name": "roslaunch", "launch": "a.launch"}]}}
+    run = {"processes": [{"name": "roslaunch", "exit_s": 0.5, "exit_code": 1}], "outcome": "ended"}
+    runs = build_runs({"runs": {"talker": run}, "package": package})
+    found, blocked = judge(rubric(lab, runs_it, scenarios=scenarios), runs)
+    assert blocked.blocked_by == "xml"
+    assert ('remove ns="bay" on line 2: then chatter is /chatter' in found.hint) == told
+    assert ("remove ns" in found.hint) == told
+
+
 def test_messages_that_are_not_there_are_named_where_catkin_sees_no_package() -> None:
     cmake = {"calls": [["add_message_files", "FILES", "Note.msg"], ["catkin_package"]]}
     built = {"processes": [{"name": "catkin_make", "role": "build", "exit_code": 0, "exit_s": 2}]}

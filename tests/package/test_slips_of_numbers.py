@@ -77,6 +77,25 @@ def test_a_rate_that_is_a_number_is_known(tmp_path, code, found):
 
 
 @pytest.mark.parametrize(
+    ("code", "found"),
+    [
+        ("while True:\n    time.sleep(random.randint(1, 9))", [("random.randint", 2, "time.sleep")]),
+        ("while True:\n    rest = uniform(1, 9)\n    rospy.sleep(rest)", [("uniform", 3, "rospy.sleep")]),
+        ("while True:\n    rospy.sleep(1 + np.random.rand())", [("np.random.rand", 2, "rospy.sleep")]),
+        ("rospy.Timer(rospy.Duration(random.random()), tell)", [("random.random", 1, "rospy.Duration")]),
+        ("rospy.Rate(random.choice([1, 2]))", [("random.choice", 1, "")]),
+        ("rospy.sleep(random.random())", []),
+        ("while True:\n    rest = 1\n    rest = random.random()\n    rospy.sleep(rest)", []),
+        ("while True:\n    pub.publish(random.random())\n    rospy.sleep(0.1)", []),
+    ],
+)
+def test_a_pause_that_is_drawn_is_known(tmp_path, code, found):
+    (tmp_path / "a.py").write_text(f"{code}\n")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [(s.message, s.line, s.name) for s in slips if s.kind == "rate-random"] == found
+
+
+@pytest.mark.parametrize(
     ("code", "name"),
     [
         ("rospy.Timer(rospy.Duration(20), tell)", "rospy.Duration"),

@@ -112,7 +112,9 @@ def _use_of(
     written = {slip.message for slip in _named_in(package, node)} if in_scripts else set[str]()
     had = _topics(run, node) if run is not None else None
     resolvable = UNRESOLVED not in f"{node.namespace}{node.remaps}"
-    for name in (topic.lstrip("/"), topic) if resolvable else ():
+    # of a topic that belongs into the node's namespace, the script writes what is behind it
+    below = topic.removeprefix(node.namespace).lstrip("/")
+    for name in dict.fromkeys((below, topic.lstrip("/"), topic)) if resolvable else ():
         use = _Use(node, name)
         if (not written or name in written) and (had is None or use.topic() in had):
             return use

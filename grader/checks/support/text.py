@@ -203,6 +203,18 @@ def loop_rate(hz: str) -> str:
     return both(f"rospy.Rate({hz})", f"ros::Rate rate({hz})")
 
 
+def rate_hint(ratio: float, nominal: str, *, even: bool) -> str:
+    """Return what may be wrong where a loop comes round `ratio` times as often as it should."""
+    if abs(ratio - 0.5) < 0.05:
+        halved = "two of them halve the rate, and so does an `if` around publish(…)"
+        return f"use {loop_rate(nominal)}, and call rate.sleep() once per loop: {halved}"
+    if abs(ratio - 2) < 0.2 and not even:
+        return f"twice the rate: does the loop, or a second publisher, publish twice? {loop_rate(nominal)}"
+    if ratio < 1:
+        return f"use {loop_rate(nominal)} and call rate.sleep() once per loop, with nothing slow beside it"
+    return f"the number is in Hz, loops per second: {loop_rate(nominal)}"
+
+
 def publisher(topic: str, python: str = "…", cpp: str = "10", *, type: str = "…") -> str:  # noqa: A002
     """Return the call that advertises the topic, with the other arguments of each language."""
     return both(f"rospy.Publisher('{topic}', {python})", f'nh.advertise<{type}>("{topic}", {cpp})')

@@ -82,12 +82,23 @@ def loop_rate(call, timed, value, number, pause):
     name = read_parameter(value) if timed == "Rate" else None
     if name:
         yield slip(value.lineno, "rate-parameter", name)
+    elif drawn(value):
+        yield slip(call.lineno, "rate-random", drawn(value), "", pause)
     elif number:
         hz = "%.12g" % (number if timed == "Rate" else 1.0 / number)
         fix = ""
         if is_call(value, "Duration"):
             pause, fix = dotted(value.func), "its second number counts nanoseconds, so it is %.9g s" % number
         yield slip(call.lineno, "rate-number", hz, fix, pause)
+
+
+def drawn(node):
+    """Return the call that draws a value at random, alone or in a sum: `random.randint`, or numpy's; "" of no such."""
+    names = [dotted(one.func) for one in ast.walk(node) if isinstance(one, ast.Call)]
+    return next((n for n in names if "random" in n.split(".") or n.rpartition(".")[2] in DRAWN), "")
+
+
+DRAWN = ("randint", "uniform", "randrange")
 
 
 def nanoseconds_apart(call):
