@@ -20,7 +20,7 @@ from grader.checks.support.scripts import (
     names_script,
     where_written,
 )
-from grader.checks.support.text import near_names, shown
+from grader.checks.support.text import IN_PLACE_OF_ALL, near_names, shown
 from grader.model.file_fault import Fault
 from grader.model.package import (
     CMAKE,
@@ -38,7 +38,6 @@ from grader.wording import is_one_edit, join_words
 NOT_CALLED = "no catkin_install_python(…) is called"
 NO_FILE = "there is no CMakeLists.txt"
 BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
-IN_PLACE_OF_ALL = "in place of all of it"
 CALLS_SHOWN, ARGS_SHOWN = 6, 12
 
 
@@ -113,6 +112,8 @@ def _no_file(package: PackageFacts, wanted: str) -> Verdict:
         hint = f"git mv {slip} CMakeLists.txt"
         return failed(message, measured=slip, hint=hint, citations=(FileCitation(file=slip),))
     hint = f"create one with project({wanted}), find_package(catkin REQUIRED) and catkin_package()"
+    if package.manifest is None and package.has_no_manifest:
+        hint = f"catkin_create_pkg {wanted} makes it beside package.xml"
     absent = failed(NO_FILE, measured="no file", hint=hint)
     return absent.based_on(cause=NO_FILE)
 

@@ -220,13 +220,12 @@ def _judge_manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
         wrong.append(lacking)
     strays = [*_strays(found, {one.name for one in package.also})]
     if wrong:
-        hints = [
-            *(v.hint for v in wrong),
-            *strays,
-            *(package.general_hints() if found.name != params.name else ()),
-        ]
-        others = [v.message.removeprefix(f"{found.file} ") for v in wrong[1:]]
-        update = {"message": join_words([wrong[0].message, *others]), "hint": "; ".join(hints)}
+        of_all = package.general_hints() if found.name != params.name else ()
+        named = f"the package is named {found.name} in"  # which the message says
+        others = [one for one in of_all if not one.startswith(named)]
+        hints = [*(v.hint for v in wrong), *strays, *others]
+        further = [v.message.removeprefix(f"{found.file} ") for v in wrong[1:]]
+        update = {"message": join_words([wrong[0].message, *further]), "hint": "; ".join(hints)}
         return wrong[0].model_copy(update=update)
     place = (FileCitation(file=found.file, line=found.name_line),)
     declares = f", declares {join_words(params.dependencies)}" if params.dependencies else ""

@@ -13,7 +13,7 @@ from collections.abc import Set as AbstractSet
 from graphlib import TopologicalSorter
 from pathlib import PurePosixPath
 
-from grader.checks.support.text import texts_in
+from grader.checks.support.text import IN_PLACE_OF_ALL, texts_in
 from grader.model.package import CMAKE, MANIFEST
 from grader.model.repair import Repair, advice_on, messages_of, place_of
 from grader.model.result import CriterionResult
@@ -303,6 +303,8 @@ def is_told(repair: Repair, hint: str) -> bool:
     """Return whether the check's own hint says how this is repaired: how git learns of a bit, what has a name."""
     if repair.kind == "executable-bit":
         return repair.file in hint and "chmod" in hint
+    if IN_PLACE_OF_ALL in hint and PurePosixPath(repair.file).name == CMAKE:
+        return True
     if repair.kind == "parameter-name" and repair.before.strip() == repair.after.strip():
         return f"line {repair.line}" in hint
     new = {

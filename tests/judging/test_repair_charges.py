@@ -535,9 +535,12 @@ def test_a_dependency_is_told_with_one_tag() -> None:
 
 
 def test_a_file_that_is_written_as_a_whole_gets_no_hint_on_its_lines() -> None:
-    line = Repair(kind="build-line", file="CMakeLists.txt", line=1, before="a", message="m", fix="f")
+    words = {"kind": "build-line", "file": "CMakeLists.txt", "message": "m"}
+    line = Repair(line=1, before="a", fix="f", **words)
+    project = Repair(line=1, before="a", after="a\nproject(lab1)", fix="project(lab1)", **words)
     runs = built({"manifest": {}, "cmake": {"calls": [["rosbuild_init"]]}}, exit_code=1)
     calls = [["project", "lab1"], ["find_package", "catkin"], ["catkin_package"]]
     copy = built({"cmake": {"calls": calls}}, exit_code=0)
-    (cmake,) = judge(rubric(CMAKE_CHECK), runs | on_copy(copy, line))
-    assert re.fullmatch("write these lines in place of all of it: [^;]+", cmake.hint)
+    for repairs in ([line], [project], [line, project]):
+        (cmake,) = judge(rubric(CMAKE_CHECK), runs | on_copy(copy, *repairs))
+        assert re.fullmatch("write these lines in place of all of it: [^;]+", cmake.hint)

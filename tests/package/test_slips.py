@@ -421,6 +421,9 @@ def test_where_names_of_the_graph_are_written_is_known(tmp_path):
         "rospy.init_node('talker')\nrospy.Publisher(\n    name='/chatter', data_class=String)\n"
         "from rospy import Subscriber\nSubscriber('~scan', LaserScan)\nrospy.Publisher(TOPIC, String)\n"
         "x = rospy.wait_for_message('odom', Odometry)\n"
+        "class Echo:\n    def __init__(self, heard):\n"
+        "        self.sub = rospy.Subscriber(heard, Image, print)\n        rospy.Publisher(other, Image)\n"
+        "echo = Echo('camera')\n"
     )
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind != "undefined"]
     assert [(s.kind, s.line, s.message) for s in slips] == [
@@ -432,6 +435,9 @@ def test_where_names_of_the_graph_are_written_is_known(tmp_path):
         ("publisher-type", 6, "String"),
         ("subscriber", 7, "odom"),
         ("subscriber-type", 7, "Odometry"),
+        ("subscriber-type", 10, "Image"),
+        ("publisher-type", 11, "Image"),
+        ("subscriber", 12, "camera"),
     ]
 
 

@@ -15,6 +15,8 @@ from grader.untrusted_text import visible, without_colours
 from grader.wording import is_one_edit, plural, shorten
 
 SIMILARITY = 0.8
+IN_PLACE_OF_ALL = "in place of all of it"
+"""Of lines that are to be the whole file."""
 IN_OWN_WORDS = "in the handout's own words"
 OTHER_WORDS_SHARE = 0.5
 """Of the points, for what is said at the right place in other words than the handout's."""

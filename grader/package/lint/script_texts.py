@@ -181,9 +181,9 @@ def graph_names(tree):
         names, name = argument(node, 0, "name"), published_type(node)
         if names and text_of(names[0]):
             yield slip(names[0].lineno, kind, text_of(names[0]), name=owner)
-        elif names and kind == "node-name":
+        elif names and kind != "sets-parameter":
             for text, written in text_behind(names[0], tree):
-                yield slip(text.lineno, kind, text_of(text), written, owner)
+                yield slip(text.lineno, kind, text_of(text), written if kind == "node-name" else "", owner)
         # a variable holds a type that is not known here
         if names and name.isidentifier() and name not in variables and kind in ("publisher", "subscriber"):
             yield slip(names[0].lineno, kind + "-type", name)
