@@ -405,14 +405,16 @@ def _twins(file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
         first = seen.setdefault(node.full_name, node)
         wanted = [name for name in params.nodes if name.endswith(f"/{node.name}")]
         lacking = [name for name in wanted if name not in {one.full_name for one in file.brings}]
-        # Only with a single namespace around it is it clear which line is wrong.
-        spaces = [line for line in node.renaming if line.tag not in RENAMES]
+        spaces = [line for line in node.renaming if line.tag not in RENAMES]  # of several, any may be wrong
         if first is node or not is_exact(node) or len(lacking) != 1 or len(spaces) != 1:
             continue
-        lines = (spaces[0].line, first.line)
+        lines, space = (spaces[0].line, first.line), lacking[0].rpartition("/")[0].strip("/")
         cited = tuple(FileCitation(file=node.file or file.path, line=line) for line in lines)
         message = f"two nodes are called {node.full_name} (lines {first.line} and {node.line} of {file.path})"
-        hint = f'on line {lines[0]}, write ns="{lacking[0].rpartition("/")[0].strip("/")}"'
+        hint = f'on line {lines[0]}, write ns="{space}"'
+        if first.line == node.line and node.file != file.path:
+            message = f"{file.path} includes {node.file} twice, and both make a node {node.full_name}"
+            hint = f"in {file.path}, give one <include> of {node.file} the value for {space} in its <arg>"
         return failed(f"{message}, and {NOTHING_STARTS}", hint=hint, citations=cited)
     return None
 

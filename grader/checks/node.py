@@ -285,6 +285,8 @@ def _asleep(one: Life, package: PackageFacts) -> Verdict | None:
         who, pause = f"line {slow.line} lets", seconds(round(1e9 / float(slow.message)))
     elif turn_s >= LONG_TURN_S:  # by the computer's clock, none of them ends sooner
         who, pause = f"{on_lines(sorted(s.line for s in pauses))} let", seconds(round(turn_s * 1e9))
+    elif swapped := [s for s in package.slips if s.kind == "rate-as-time" and s.file == one.start.script]:
+        who, pause = f"line {swapped[0].line} lets", "too long"
     else:
         return None
     slept = f"{who} it sleep for {pause} at a time, also after Ctrl-C, so its end is not counted"

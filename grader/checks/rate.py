@@ -47,8 +47,7 @@ from grader.wording import hertz, join_words, plural, seconds, significant
 FLOOD_FACTOR = 5
 FLOOD_HZ = 500.0
 """No lab asks for so much: what is slower and even comes from a loop that sleeps, by a wrong number."""
-RATE_NAME = re.compile(r"rate|hz|freq", re.IGNORECASE)
-"""Names of parameters that are rates."""
+RATE_NAME = re.compile(r"rate|hz|freq", re.IGNORECASE)  # of parameters
 PAUSES_WAITED = 1.5
 """A silence of at most so many of the pauses that a script asks for is one of them."""
 NUMBER_SHARE = 0.1
@@ -58,8 +57,7 @@ NEAR_SHARE = 0.25
 SLEEPLESS = ("not-called", "sleep-outside", "undefined", "misspelt")
 """Slips that keep a loop from sleeping."""
 LATE_P95_SHARE, LATE_MAX_SHARE = 0.2, 0.5
-SILENT_PERIODS = 1.5
-STALLS_SHARE = 0.1
+SILENT_PERIODS, STALLS_SHARE = 1.5, 0.1
 """Of the gaps: who is kept waiting by a full machine is so now and then, and keeps its rate otherwise."""
 
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -335,6 +333,7 @@ def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) 
     # What a line of the script, or the shape of the stream, explains goes before the bare numbers.
     return (
         _at_random(found, run, package, params)
+        or (_by_slip(wrong, "rate-as-time", run, package, params) if mean_hz * params.rate_hz < 4 else None)
         or _fell_silent(found, run, package, params)
         or _published_twice(found, run, package, params)
         or (_by_slip(wrong, "publish-twice", run, package, params) if mean_hz > params.high_hz else None)
@@ -431,8 +430,9 @@ def _by_slip(
 
 
 def _named(verdict: Verdict, slip: PythonSlip | None) -> Verdict | None:
-    told = (f"{slip.file}: {slip.message}", f"in {slip.file}, {slip.fix}", (slip.place,)) if slip else None
-    return verdict.explained(*told) if told else None
+    if slip is None:
+        return None
+    return verdict.explained(f"{slip.file}: {slip.message}", f"in {slip.file}, {slip.fix}", (slip.place,))
 
 
 def _left_out(
@@ -487,8 +487,8 @@ def _slips(run: Run, package: PackageFacts, params: RateParams, *kinds: SlipKind
 
 def _asked_number(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> PythonSlip | None:
     """Return where a script asks for the rate that was measured, which is not the right one."""
-    asked = _slips(run, package, params, "rate-number")
-    wrong = [s for s in asked if not params.low_hz <= float(s.message) <= params.high_hz]
+    wrong = _slips(run, package, params, "rate-number")
+    wrong = [s for s in wrong if not params.low_hz <= float(s.message) <= params.high_hz]
     seen_hz = (found.mean_hz, found.between_hz)
     return next((s for s in wrong for hz in seen_hz if abs(float(s.message) - hz) < NUMBER_SHARE * hz), None)
 
@@ -502,11 +502,12 @@ def _by_parameter(
         pause = f"with {params.cause.words}, wait {significant(1 / params.rate_hz)} s between two messages"
         return verdict.model_copy(update={"hint": f"look at how the loop changes its rate: {pause}"})
     for channel in run.student_channels(params.topic):
-        slip = next(iter(slips_of(package, run, channel.callerid, "rate-parameter")), None)
+        slip, own = (
+            next(iter(slips_of(package, run, channel.callerid, "rate-parameter")), None),
+            channel.callerid,
+        )
         if slip is None:
-            read = {
-                e.topic or "" for _, e in run.actors if e.action == "read" and e.actor == channel.callerid
-            }
+            read = {e.topic or "" for _, e in run.actors if e.action == "read" and e.actor == own}
             there = params_on_server(run)
             explained = _by_read_parameter(
                 verdict, {n: v for n, v in there.items() if n in read}, package, params, mean_hz

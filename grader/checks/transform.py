@@ -178,7 +178,7 @@ def _not_sent(
     hint = f"header.frame_id = '{params.parent}', child_frame_id = '{params.child}'"
     if wanted[::-1] in edges:
         message = f"{params.name} is sent the other way round: {params.child} is the parent, {params.parent} the child"
-        return failed(message, hint=hint)
+        return _swapped_there(package, failed(message, hint=hint), wanted)
     slashed = [edge for edge in edges if tuple(name.lstrip("/") for name in edge) == wanted]
     if slashed:
         message = f"the frames are {_edge_words(slashed)}: tf2 takes no frame names that start with a slash"
@@ -200,6 +200,21 @@ def _not_sent(
     other = f" ({shown(join_words(near))})" if near else ""
     verdict = failed(f"{params.name} is not sent; there is {_edge_words(edges)}{other}", hint=hint)
     return ended or verdict.seeking("quoted", *_frames_instead(edges, wanted))
+
+
+def _swapped_there(package: PackageFacts, verdict: Verdict, wanted: tuple[str, str]) -> Verdict:
+    """Return the verdict with the line on which a frame is given for the other one, if there is only one such line."""
+    fields = [s for s in package.slips if s.kind == "wrong-value" and s.name == "frames"]
+    named = [s for s in package.slips if s.kind == "frames" and (s.name, s.message) == wanted]
+    if len(fields) == 1:
+        one = fields[0]
+        why = f"line {one.line} of {one.file}: {one.message}"
+        return verdict.explained(why, f"in {one.file}, {one.fix}", (one.place,), cause=one.message)
+    if len(named) != 1:
+        return verdict
+    one = named[0]
+    hint = f"on line {one.line} of {one.file}, swap '{wanted[0]}' and '{wanted[1]}'"
+    return verdict.explained(f"see line {one.line} of {one.file}", hint, (one.place,))
 
 
 def _frames_instead(edges: Sequence[tuple[str, str]], wanted: tuple[str, str]) -> list[str]:

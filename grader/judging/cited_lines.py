@@ -92,6 +92,12 @@ def _read(build: Run, paths: Iterable[str]) -> Iterator[SourceLine]:
 
 def _lines_to_blame(verdict: Verdict, criterion: Criterion, lines: list[SourceLine]) -> list[SourceLine]:
     """Return the lines that do what the criterion judges; none where a check is of something else."""
+    if misfit := ADVERTISED.search(verdict.message):
+        return _that_advertise(lines, misfit["topic"], misfit["type"])
+    return _lines_that_do(verdict, criterion, lines)
+
+
+def _lines_that_do(verdict: Verdict, criterion: Criterion, lines: list[SourceLine]) -> list[SourceLine]:
     given = criterion.parameters
     match criterion.check:
         case "calls":
@@ -125,6 +131,16 @@ def _lines_to_blame(verdict: Verdict, criterion: Criterion, lines: list[SourceLi
         case _:
             found = []
     return found
+
+
+ADVERTISED = re.compile(r"(?P<topic>/[\w/]+) is advertised as \w+/(?P<type>\w+), and \S+ hears it")
+
+
+def _that_advertise(lines: list[SourceLine], topic: str, kind: str) -> list[SourceLine]:
+    """Return the lines that advertise a topic with this type."""
+    name = re.escape(topic.rpartition("/")[2])
+    call = re.compile(rf"""\b(?:advertise|Publisher)\b.*["'](?:/?\w+/)*/?{name}["']""")
+    return [one for one in lines if call.search(one.text) and re.search(rf"\b{kind}\b", one.text)]
 
 
 def _that_say(verdict: Verdict, criterion: Criterion, lines: list[SourceLine]) -> list[SourceLine]:

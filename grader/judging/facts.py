@@ -18,7 +18,14 @@ from grader.checks.support.build_errors import unreadable_file
 from grader.checks.support.exit_causes import syntax_hint
 from grader.checks.support.launch_slips import own_script, read_launch, refusals, refusals_unrun
 from grader.checks.support.processes import ended_programs, failed_program, plain_type
-from grader.checks.support.scripts import CPP_SUFFIXES, SYNTAX, find_script, programs, syntax_fault
+from grader.checks.support.scripts import (
+    CPP_SUFFIXES,
+    SYNTAX,
+    find_script,
+    programs,
+    sources_made,
+    syntax_fault,
+)
 from grader.checks.support.text import Language, near_names, texts_in
 from grader.checks.support.topics import unheard_programs
 from grader.evidence.events import PACKAGE_RUN, RECORDING_MISSING, RECORDING_PROBLEM
@@ -361,7 +368,7 @@ def sources_of(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> s
     made = [
         one for one in programs(package) if every or one.target in names or any(map(one.is_called, names))
     ]
-    words = {word.rpartition("/")[2] for one in made for word in one.call.args}
+    words = {word.rpartition("/")[2] for one in made for word in sources_made(package, one.call)}
     paths = [PurePosixPath(file.path) for file in package.files]
     return {str(path) for path in paths if path.suffix in CPP_SUFFIXES and path.name in words}
 

@@ -94,19 +94,13 @@ def add_later_faults(
     """Return the verdicts; where there was nothing to judge of a node, the hint goes on with what its source shows of
     the criteria that were not reached. `facts` may be those of a copy with these `repairs` of `handed_in`."""
     later: dict[str, list[Fix]] = {}
-    moved = {
-        v.basis.meant: v.mistake.name
-        for v in verdicts.values()
-        if v.mistake and v.basis.meant.endswith(".py")
-    }
+    missing = [(v.basis.meant, v.mistake) for v in verdicts.values()]
+    moved = {meant: of.name for meant, of in missing if of and meant.endswith(".py")}
     for criterion in rubric.criteria:
         verdict = verdicts[criterion.id]
         package = facts.package_of(criterion)
-        if (
-            package is None
-            or criterion.visibility != "visible"
-            or not (verdict.status.is_lost or verdict.basis.of_machine)
-        ):
+        is_lost = verdict.status.is_lost or verdict.basis.of_machine
+        if package is None or criterion.visibility != "visible" or not is_lost:
             continue
         told = later.setdefault(verdict.blocked_by or criterion.id, [])
         if verdict.blocked_by and criterion.check == "launch-xml":

@@ -19,7 +19,7 @@ SlipKind = Literal[
     "ranges-read", "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed",
     "printed-in-part", "published-in-part", "never-published", "takes-number", "typed-text", "goes-on",
     "no-argument", "read-late", "debugger", "drops-result", "returns-list", "fills", "catches", "no-result",
-    "stuck", "runs-out", "base-unmade",
+    "stuck", "runs-out", "base-unmade", "rate-as-time", "frames",
 ]  # fmt: skip
 
 
@@ -88,20 +88,22 @@ class PythonSlip(Placed, Record):
     - `takes-number`: a loop that computes with what a topic's callback keeps of its message, or publishes it as a
       number: a slip only if that message has to be a text.
     - `goes-on`: an `if`, or a loop's first turn, that ends an action's goal by the call `name`, and goes on.
-    - `wrong-value`: a value that is none: a comparison with NaN, the sine of an angle in degrees, a service's answer
-      that is made and not returned, or of which no field is set, a message that is filled in and not sent, a speed
-      that a Twist keeps from the turn before, nanoseconds in place of seconds, a condition that all numbers fulfil,
-      or none, or what each turn of a loop adds or sets again (`name`: `nan`, `degrees`, `return`, `empty`, `unsent`,
-      `kept`, `nanoseconds`, `bounds`, `added`); a grid's index that steps by its height, a cell that `int(…)` works
-      out of a number below 0, a quaternion of a whole angle, a float for the seconds of a time, the mean of a scan's
-      ranges, a distance without its square root, a parameter that is read where it is not set, or before the node has
-      its name (`early`), what nothing sets back, a cell that is compared with a grid's side as if it had one more,
-      `atan2(x, y)`, two values of a call in each other's place, degrees beside radians, and a distance that is to be
-      exactly 0 (`step`, `cut`, `half`, `secs`, `mean`, `rootless`, `unset`, `stuck`, `edge`, `swapped`, `mixed`,
-      `exact`), a cell that is a product (`times`), letters of a key (`letters`), a timer's period of 0
-      (`zero`), a file that each call empties (`emptied`), or of a scan an inf that is made 0, the first one
-      alone, an index that is an angle, and a condition that drives where a wall is near (`inf`, `first`,
-      `angle`, `turned`).
+    - `wrong-value`: a value that is none: a comparison with NaN, the sine of an angle in degrees, a service's
+      answer that is made and not returned, or of which no field is set, a message that is filled in and not
+      sent, a speed that a Twist keeps from the turn before, nanoseconds in place of seconds, a condition that
+      all numbers fulfil, or none, or what each turn of a loop adds or sets again (`name`: `nan`, `degrees`,
+      `return`, `empty`, `unsent`, `kept`, `nanoseconds`, `bounds`, `added`); a grid's index that steps by its
+      height, a cell that `int(…)` works out of a number below 0, a quaternion of a whole angle, a float for the
+      seconds of a time, the mean of a scan's ranges, a distance without its square root, a parameter that is
+      read where it is not set, or before the node has its name (`early`), what nothing sets back, a cell that
+      is compared with a grid's side as if it had one more, `atan2(x, y)`, two values of a call in each other's
+      place, degrees beside radians, and a distance that is to be exactly 0 (`step`, `cut`, `half`, `secs`,
+      `mean`, `rootless`, `unset`, `stuck`, `edge`, `swapped`, `mixed`, `exact`), a cell that is a product
+      (`times`), letters of a key (`letters`), a timer's period of 0 (`zero`), a file that each call empties
+      (`emptied`), or of a scan an inf that is made 0, the first one alone, an index that is an angle, a
+      condition that drives where a wall is near, and ranges that are named after the other side (`inf`,
+      `first`, `angle`, `turned`, `side`), metres that are centimetres (`metres`), or a parent's frame that is
+      given for the child's (`frames`).
 
     No slips, but what a line says, for checks that compare it with what the lab asks; `message` is a name, a number or
     a text:
@@ -114,6 +116,9 @@ class PythonSlip(Placed, Record):
       in it and `{data}` for that of a message. `fix` says where to move what an `if` or a `spin()` holds up.
     - `rate-number`, `rate-parameter`, `rate-random`: a loop or a timer whose rate is a number, in Hz, a parameter, or
       drawn at random by the call that `message` names.
+    - `rate-as-time`: a time that is given a rate, or the other way round, by its name: a slip only where what it times
+      comes far too seldom.
+    - `frames`: two texts that are given next to each other, `message` and `name`, in a script that sends transforms.
     - `start-value`, `added-first`: where a counter, `name`, gets its first number, `message`, and where a loop adds one
       to it before it publishes (`fix`: which lines to move).
     - `reset-value`, `reset-limit`: where a counter goes back, to the number `message`, or when it reaches it (`name`:
@@ -145,7 +150,10 @@ class PythonSlip(Placed, Record):
     @property
     def is_endless(self) -> bool:
         """Whether a callback never ends, or is never called, or what it needs is made again and again: not a sleep."""
-        told = re.search(r"never (?:ends|calls)|subscribes again|makes another publisher", self.message)
+        told = re.search(
+            r"never (?:ends|calls)|is ever called|calls spinOnce|subscribes again|makes another publisher",
+            self.message,
+        )
         return self.is_lock or (self.kind == "callback-waits" and bool(told))
 
     @property

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from grader.model.file_fault import Fault
 from grader.model.python_slip import PythonSlip
 from grader.package.reading import SOURCE_LIMIT_BYTES, printable, read_markup
+from grader.wording import join_words
 
 SUFFIXES = frozenset({".cpp", ".cc", ".cxx"})
 FILES_MAX = 50
@@ -30,8 +31,10 @@ _ENDLESS = re.compile(
     r"\bwhile\s*\(\s*(?:(?:ros::|\w+(?:\.|->))ok\s*\(\s*\)|true|1)\s*\)|\bfor\s*\(\s*;\s*;\s*\)"
 )
 _REPEATS = re.compile(r"\bwhile\s*\([^;{}]{0,200}\)\s*{|\bfor\s*\([^{}]{0,200}\)\s*{")
+_REPEATS_ONE = re.compile(r"\bwhile\s*\([^;{}]{0,200}\)\s*(?:ros::)?")
 _LEAVES = re.compile(r"\b(?:break|return|throw|goto|spinOnce)\b")
 _SPIN = re.compile(r"\bros::spin\s*\(")
+_SPIN_ONCE = re.compile(r"\bspinOnce\s*\(|\bcall(?:Available|One)\s*\(")
 _SPINS = re.compile(r"spin(?!Once\s*;)|Spinner|call(?:Available|One)\b")
 _MAIN = re.compile(r"\bmain\s*\(")
 _DEFINES_MAIN = re.compile(r"\b(?:int|void)\s+main\s*\([^;{}()]*\)\s*{")
@@ -56,6 +59,21 @@ _OF_ANGLE = re.compile(
 _DEAF = re.compile(r"\bwhile\s*\(\s*(?:(?P<ok>(?:ros::|\w+(?:\.|->))ok)|true|1)\s*\)|\bfor\s*\(\s*;\s*;\s*\)")
 """A loop that asks nothing; `ok` without brackets is a function, which is always true."""
 _ENDS = re.compile(r"\b(?:break|return|throw|goto|exit)\b|\bok\s*\(")
+_SPINNER = re.compile(r"\bAsyncSpinner\s*(?P<star>[*>]+)?\s*(?P<name>[A-Za-z_]\w*)\s*[({=]")
+_CHANGES = (
+    r"\s*(?:\.\s*(?:push_(?:back|front)|pop_(?:back|front)|push|pop|insert|erase|emplace\w*|clear|resize|append)\s*\("
+    r"|[-+*/]=|=(?!=)|\+\+|--)"
+)
+_HANDLE = re.compile(r"\bNodeHandle\s*&?\s*(?P<name>[A-Za-z_]\w*)\s*[;,)({]")
+_PRIVATE = re.compile(r"\b(?P<name>[A-Za-z_]\w*)\s*[({=]\s*(?:ros::NodeHandle\s*[({]\s*)?\"~\"\s*[)}]")
+_PLAIN_HANDLE = re.compile(r"\bNodeHandle\s+(?P<name>[A-Za-z_]\w*)\s*;")
+_PRIVATE_NAME = re.compile(
+    r"p_?n(?:h|ode)?_?|(?:priv(?:ate)?|local)_?(?:nh|n|node|node_handle|handle)_?|(?:nh|node|n)_?(?:p|priv|private|local)_?"
+)
+_BY_HANDLE = re.compile(
+    r"\b(?P<handle>[A-Za-z_]\w*)\s*(?:\.|->)\s*(?:advertise|subscribe|advertiseService)\s*(?:<[^;()]*?>)?\s*\(\s*\"(?P<topic>[A-Za-z]\w*)\""
+)
+_BY_VALUE = re.compile(r"(?!const\b)(?P<type>[\w:]+(?:<[\w:<>, ]*>)?)\s+(?P<name>[A-Za-z_]\w*)")
 _SWITCH = re.compile(r"\bswitch\s*\([^;{}]{0,200}\)\s*{")
 SWITCHES_MAX = 50
 _LONG = re.compile(
@@ -122,6 +140,9 @@ def slips_of(path: str, text: str) -> Iterator[PythonSlip]:
     code = _TEXT.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), text)
     yield from _waiting(path, code)
     yield from _unspun(path, code)
+    yield from _unstarted_spinner(path, code)
+    yield from _copied_values(path, code)
+    yield from _private_handles(path, code, without_comments(text))
     yield from _made_again(path, code)
     yield from _prints_another(path, code)
     yield from _without_main(path, text, code)
@@ -132,6 +153,11 @@ def slips_of(path: str, text: str) -> Iterator[PythonSlip]:
         yield from _typed(path, code)
     yield from _unasked_argument(path, code)
     yield from _whole_numbers(path, text, code)
+
+
+def without_comments(text: str) -> str:
+    """Return a source with blanks in place of its comments."""
+    return _TEXT.sub(lambda match: match[0] if match[0][0] == '"' else re.sub(r"[^\n]", " ", match[0]), text)
 
 
 def _whole_numbers(path: str, text: str, code: str) -> Iterator[PythonSlip]:
@@ -183,6 +209,68 @@ def _unspun(path: str, code: str) -> Iterator[PythonSlip]:
     message = f"the loop on line {line} never calls ros::spinOnce(), so that no callback is ever called"
     fix = f"write `ros::spinOnce();` in the loop on line {line}"
     yield PythonSlip(file=path, line=line, kind="callback-waits", message=message, fix=fix)
+
+
+def _unstarted_spinner(path: str, code: str) -> Iterator[PythonSlip]:
+    """Yield the `AsyncSpinner` that nothing starts, where nothing else lets ROS call anything."""
+    made = _SPINNER.search(code)
+    if made is None or re.search(rf"\b{made['name']}\s*(?:\.|->)\s*start\s*\(", code):
+        return
+    others = _SPINS.sub("", code[: made.start()]) + code[made.end() :]
+    if not re.search(r"\bspin(?:Once)?\s*\(", others):
+        line, name = _line(code, made.start()), made["name"]
+        dot = "->" if made["star"] else "."
+        message = f"the spinner of line {line} is never started, so that no callback is ever called"
+        fix = f"below line {line}, write `{name}{dot}start();`"
+        yield PythonSlip(file=path, line=line, kind="callback-waits", message=message, fix=fix)
+
+
+def _copied_values(path: str, code: str) -> Iterator[PythonSlip]:
+    """Yield what a function that `bind` is given changes of a value of which each call gets a copy."""
+    for bound in islice(_BOUND.finditer(code), SWITCHES_MAX):
+        body = _body(bound["name"].rpartition("::")[2], code)
+        head = code.rfind("(", 0, body.start) if body else -1
+        given = [
+            code[start:end].strip() for start, end in _arguments(code, code.index("(", bound.start()) + 1)
+        ]
+        for place, (start, end) in enumerate(_arguments(code, head + 1)) if body and head >= 0 else ():
+            parameter = _BY_VALUE.fullmatch(code[start:end].strip())
+            value = given[place + 1] if place + 1 < len(given) else ""
+            if body is None or parameter is None or not value or value.startswith("_") or "ref(" in value:
+                continue
+            name, kind = parameter["name"], parameter["type"]
+            if found := re.compile(rf"(?<![\w.>]){name}{_CHANGES}").search(code, body.start, body.end):
+                line = _line(code, end - len(code[start:end].lstrip()))
+                message = f"each call of `{body.name}` gets a copy of its own of `{name}`, so that what line "
+                message += f"{_line(code, found.start())} changes is lost"
+                fix = f"on line {line}, write `{kind}& {name}`, and on line {_line(code, bound.start())}, "
+                fix += f"`boost::ref({value})` in place of `{value}`"
+                yield PythonSlip(
+                    file=path, line=line, kind="wrong-value", message=message, fix=fix, name="copied"
+                )
+
+
+def _private_handles(path: str, code: str, text: str) -> Iterator[PythonSlip]:
+    """Yield the topics and services that are made with a private NodeHandle; `name` is `private` and the topic's
+    name. Whether they should be, a run shows."""
+    private = {match["name"] for match in _PRIVATE.finditer(text)}
+    plain = {match["name"] for match in _PLAIN_HANDLE.finditer(text)}
+    others = [match["name"] for match in _HANDLE.finditer(code)]
+    others = [one for one in others if one not in private and not _PRIVATE_NAME.fullmatch(one)]
+    found: dict[str, list[re.Match[str]]] = {}
+    for match in _BY_HANDLE.finditer(text):
+        handle = match["handle"]
+        if handle in private or (handle not in plain and _PRIVATE_NAME.fullmatch(handle)):
+            found.setdefault(handle, []).append(match)
+    for handle, every in found.items():
+        lines, topics = [_line(text, match.start()) for match in every], [match["topic"] for match in every]
+        where = f"line {lines[0]}" if len(lines) == 1 else f"lines {join_words(map(str, lines))}"
+        message = (
+            f"`{handle}` is a private NodeHandle: `{topics[0]}` of it is a name in the node's own namespace"
+        )
+        right = f"`{others[0]}` in place of `{handle}`" if others else f'`"/{topics[0]}"`, with the slash'
+        fix, name = f"on {where}, write {right}", " ".join(("private", *topics))
+        yield PythonSlip(file=path, line=lines[0], kind="wrong-value", message=message, fix=fix, name=name)
 
 
 def _endless(path: str, code: str) -> Iterator[PythonSlip]:
@@ -389,13 +477,26 @@ def _waits_in(body: _Body, code: str, pauses_s: dict[str, float]) -> Iterator[tu
     for match in _SLEEP.finditer(code, body.start, body.end):
         if _seconds(match, pauses_s) < SHORT_S:
             continue
-        loops = _REPEATS.finditer(code, body.start, match.start())
-        loop = next((one for one in loops if match.start() < end_of_block(code, one.end())), None)
+        loop = _loop_around(match.start(), body, code)
         if loop is None:
             yield match.start(), "the callback {name} sleeps on line {line}", "delete line {line}"
             continue
         fix = "keep in it only what came, and go through the loop of line {line} in the main program"
         yield loop.start(), "the loop in the callback {name}, line {line}, sleeps in each turn", fix
+    for match in _SPIN_ONCE.finditer(code, body.start, body.end):
+        message = "the callback {name} calls spinOnce() on line {line}, and so is called again before it ends"
+        fix = "delete line {line}"
+        if loop := _loop_around(match.start(), body, code):
+            fix = f"take the loop of line {_line(code, loop.start())} out of it, and keep in variables what has to last"
+        yield match.start(), message, fix
+
+
+def _loop_around(at: int, body: _Body, code: str) -> re.Match[str] | None:
+    """Return the outermost loop of a body in whose braces, or in whose one statement, a place is."""
+    for loop in _REPEATS.finditer(code, body.start, at):
+        if at < end_of_block(code, loop.end()):
+            return loop
+    return next((one for one in _REPEATS_ONE.finditer(code, body.start, at) if one.end() == at), None)
 
 
 def _seconds(match: re.Match[str], pauses_s: dict[str, float]) -> float:

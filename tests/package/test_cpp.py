@@ -345,3 +345,130 @@ def test_what_a_callback_prints_in_place_of_its_message(body: str, told: str) ->
     code = f"void hear(const std_msgs::String::ConstPtr& msg)\n{{\n{body}\n}}\nint main() {{ {HEARS} ros::spin(); }}"
     found = [(one.message, one.fix) for one in slips_of("src/node.cpp", code) if one.kind == "not-printed"]
     assert found == [(f"line 3 prints {told}", "on line 3, print `msg->data` itself")] * bool(told)
+
+
+BOUND = """\
+#include <ros/ros.h>
+void mean(const std_msgs::Float32::ConstPtr& in, %s, ros::Publisher* out)
+{
+  %s
+}
+
+int main(int argc, char** argv)
+{
+  ros::NodeHandle n;
+  ros::Subscriber in = n.subscribe<std_msgs::Float32>("/in", 5, boost::bind(mean, _1, %s, &out));
+  %s
+}
+"""
+SPIN = "ros::spin();"
+
+
+@pytest.mark.parametrize(
+    ("parameter", "line", "given", "end", "fix"),
+    [
+        (
+            "Buffer buffer",
+            "buffer.push_back(in->data);",
+            "buffer",
+            SPIN,
+            "on line 2, write `Buffer& buffer`, and on line 10, `boost::ref(buffer)` in place of `buffer`",
+        ),
+        (
+            "std::vector<float> last",
+            "last.clear();",
+            "last",
+            SPIN,
+            "on line 2, write `std::vector<float>& last`, and on line 10, `boost::ref(last)` in place of `last`",
+        ),
+        ("int count", "count++;", "n_seen", SPIN, "on line 2, write `int& count`, and on line 10"),
+        ("Buffer& buffer", "buffer.push_back(in->data);", "boost::ref(buffer)", SPIN, ""),
+        ("Buffer* buffer", "buffer->push_back(in->data);", "&buffer", SPIN, ""),
+        ("double limit", "if (in->data == limit) out->publish(in);", "0.5", SPIN, ""),
+        ("const Buffer buffer", "out->publish(buffer.size());", "buffer", SPIN, ""),
+        (
+            "Buffer& buffer",
+            "buffer.clear();",
+            "boost::ref(buffer)",
+            "ros::AsyncSpinner spinner(1);\n  ros::waitForShutdown();",
+            "below line 11, write `spinner.start();`",
+        ),
+        (
+            "Buffer& buffer",
+            "buffer.clear();",
+            "boost::ref(buffer)",
+            "ros::AsyncSpinner s(1);\n  s.start();\n  ros::waitForShutdown();",
+            "",
+        ),
+        (
+            "Buffer& buffer",
+            "buffer.clear();",
+            "boost::ref(buffer)",
+            "ros::AsyncSpinner s(1);\n  ros::spin();",
+            "",
+        ),
+        (
+            "Buffer& buffer",
+            "while (!buffer.full()) ros::spinOnce();",
+            "boost::ref(buffer)",
+            SPIN,
+            "take the loop of line 4 out of it, and keep in variables what has to last",
+        ),
+        (
+            "Buffer& buffer",
+            "while (!buffer.full())\n  {\n    ros::spinOnce();\n  }",
+            "boost::ref(buffer)",
+            SPIN,
+            "take the loop of line 4 out of it, and keep in variables what has to last",
+        ),
+        ("Buffer& buffer", "ros::spinOnce();", "boost::ref(buffer)", SPIN, "delete line 4"),
+    ],
+)
+def test_what_a_bound_callback_is_given(parameter: str, line: str, given: str, end: str, fix: str) -> None:
+    found = [*slips_of("src/node.cpp", BOUND % (parameter, line, given, end))]
+    assert [one.fix.startswith(fix) for one in found] == ([True] if fix else [])
+
+
+HANDLES = """\
+#include <ros/ros.h>
+Node::Node(%s)
+{
+  pub_ = %s.advertise<std_msgs::Float32>("mean", 10); // pnh.advertise<X>("other", 1)
+  sub_ = %s.subscribe("%s", 10, &Node::hear, this);
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("taken", "handle", "topic", "fix"),
+    [
+        (
+            "ros::NodeHandle& nh, ros::NodeHandle& pnh",
+            "pnh",
+            "in",
+            "on lines 4 and 5, write `nh` in place of `pnh`",
+        ),
+        (
+            "ros::NodeHandle private_nh",
+            "private_nh",
+            "in",
+            'on lines 4 and 5, write `"/mean"`, with the slash',
+        ),
+        (
+            "ros::NodeHandle& nh, ros::NodeHandle& pnh",
+            "pnh",
+            "/in",
+            "on line 4, write `nh` in place of `pnh`",
+        ),
+        ("ros::NodeHandle& nh, ros::NodeHandle& pnh", "nh", "in", ""),
+        ("ros::NodeHandle n", "n", "in", ""),
+    ],
+)
+def test_topics_of_a_private_handle(taken: str, handle: str, topic: str, fix: str) -> None:
+    found = [*slips_of("src/node.cpp", HANDLES % (taken, handle, handle, topic))]
+    assert [one.fix for one in found if one.name.startswith("private ")] == ([fix] if fix else [])
+
+
+def test_topics_of_a_handle_that_is_made_private() -> None:
+    text = HANDLES % ("", "handle", "handle", "/in") + '\nros::NodeHandle handle("~");\n'
+    assert [one.name for one in slips_of("src/node.cpp", text)] == ["private mean"]

@@ -117,3 +117,80 @@ def test_a_parameter_that_is_read_before_the_node_has_a_name(case: str, tmp_path
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "early"]
     assert len(slips) == bool(fix)
     assert all(fix in s.fix for s in slips)
+
+
+TRANSFORM = "def stamped(parent, child):\n    t = TransformStamped()\n    {}\n    {}\n"
+FRAMES = {
+    ("t.header.frame_id = child", "t.child_frame_id = parent"): "swap the values of lines 3 and 4",
+    (
+        "t.child_frame_id = parent_frame",
+        "t.header.frame_id = child_frame",
+    ): "swap the values of lines 3 and 4",
+    ("t.header.frame_id = parent", "t.child_frame_id = child"): "",
+    ("t.header.frame_id = child", "t.child_frame_id = 'laser'"): "",
+}
+
+
+@pytest.mark.parametrize("lines", FRAMES)
+def test_frames_that_are_given_to_each_other(lines: tuple[str, str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(TRANSFORM.format(*lines))
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "frames"]
+    assert [s.fix for s in slips] == ([FRAMES[lines]] if FRAMES[lines] else [])
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("b.sendTransform(stamped('odom', 'base'))", [(1, "odom", "base")]),
+        ("b.sendTransform(t)\nt.child_frame_id = 'base'\nt.header.frame_id = 'odom'", [(2, "odom", "base")]),
+        ("b.sendTransform(t)\nx = buffer.lookup_transform('odom', 'base', t)", []),
+        ("say('odom', 'base')", []),
+    ],
+)
+def test_two_frames_beside_each_other(text: str, found: list[tuple[int, str, str]], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(text + "\n")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "frames"]
+    assert [(s.line, s.message, s.name) for s in slips] == found
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("ask(float(argv[1]), float(argv[3]), float(argv[2]))", "`argv[3]` is given before `argv[2]`"),
+        ("client(int(sys.argv[2]), int(sys.argv[1]))", "`sys.argv[2]` is given before `sys.argv[1]`"),
+        ("ask(float(argv[1]), float(argv[2]))", ""),
+        ("ask(float(argv[2]), 1.0, float(argv[1]))", ""),
+        ("ask(cells[2], cells[1])", ""),
+    ],
+)
+def test_arguments_of_the_command_line_in_another_order(line: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"{line}\n")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert [s.message for s in slips] == ([message] if message else [])
+
+
+DECORATOR = """\
+def once(function):
+    def wrapper(*args):
+        function(*args)
+{}
+
+@once{}
+def report():
+    pass
+"""
+
+
+@pytest.mark.parametrize(
+    ("end", "given", "fixes"),
+    [
+        ("", "", ["below line 3, write `return wrapper` at the end of `once`"]),
+        ("    return wrapper", "", []),
+        ("    return functools.wraps(function)(wrapper)", "", []),
+        ("    wrapper(function)", "", ["below line 3, write `return wrapper` at the end of `once`"]),
+    ],
+)
+def test_a_decorator_that_returns_nothing(end: str, given: str, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(DECORATOR.format(end, given))
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name.startswith("decorator")]
+    assert [s.fix for s in slips] == fixes

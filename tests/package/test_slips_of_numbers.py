@@ -51,6 +51,32 @@ def test_a_wait_of_which_nothing_is_left_is_known(tmp_path, code, found):
 @pytest.mark.parametrize(
     ("code", "found"),
     [
+        ("rospy.Timer(rospy.Duration(self.hz), tell)", ["write `rospy.Duration(1.0 / self.hz)`"]),
+        ("period = rospy.Duration(PUBLISH_RATE)", ["write `rospy.Duration(1.0 / PUBLISH_RATE)`"]),
+        ("time.sleep(publishRate)", ["write `time.sleep(1.0 / publishRate)`"]),
+        (
+            "rospy.Timer(rospy.Duration(rospy.get_param('~rate', 5)), tell)",
+            ["write `rospy.Duration(1.0 / …)`"],
+        ),
+        ("r = rospy.Rate(self.period)", ["write `rospy.Rate(1.0 / self.period)`"]),
+        ("dt = 0.1\nr = rospy.Rate(dt)", ["write `rospy.Rate(1.0 / dt)`"]),
+        ("hz = 10\nrospy.sleep(hz)", ["write `rospy.sleep(1.0 / hz)`"]),
+        ("rate = 0.1\nrospy.sleep(rate)", []),
+        ("period = 10\nr = rospy.Rate(period)", []),
+        ("rospy.sleep(1.0 / self.hz)", []),
+        ("rospy.sleep(self.moderate)", []),
+        ("rospy.Rate(self.hz)", []),
+    ],
+)
+def test_a_rate_that_is_taken_for_a_time_is_known_by_its_name(tmp_path, code, found):
+    (tmp_path / "a.py").write_text(f"import rospy\n{code}\n")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.fix.partition(", ")[2] for s in slips if s.kind == "rate-as-time"] == found
+
+
+@pytest.mark.parametrize(
+    ("code", "found"),
+    [
         ("r = rospy.Rate(5)", [("5", 2)]),
         ("r = rospy.Rate(hz=1 / 10)", [("0.1", 2)]),
         ("rospy.Timer(callback=tell, period=rospy.Duration(2))", [("0.5", 2)]),

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from grader.checks.support.scripts import CPP_SUFFIXES, cmake_calls, path_in_package
+from grader.checks.support.scripts import CPP_SUFFIXES, cmake_calls, part_not_linked, path_in_package
 from grader.checks.support.text import near_names, shown
 from grader.installable import noetic_messages
 from grader.model.package import CMAKE, PackageFacts
@@ -418,6 +418,8 @@ def _explain_unlinked(found: re.Match[str], package: PackageFacts, lines: Sequen
     if name.startswith("ros::") and catkin and not alone and not any("roscpp" in c.args for c in catkin):
         words = "roscpp" if "COMPONENTS" in catkin[0].args else "COMPONENTS roscpp"
         return Explained(why, f"in the find_package(…) on line {catkin[0].line}, add {words}")
+    if not name.startswith("ros::") and (part := part_not_linked(package)):
+        return Explained(why, part)
     return Explained(why, f"write {call_below(program, 'target_link_libraries', '${catkin_LIBRARIES}')}{own}")
 
 

@@ -33,7 +33,7 @@ from grader.checks.support.missing_names import (
     unmade,
     unused_import,
 )
-from grader.checks.support.operands import explain_operand
+from grader.checks.support.operands import bare_decorator, explain_operand
 from grader.checks.support.processes import Life, early_end, lives, nodes_of, signal_name
 from grader.checks.support.rospy_calls import (
     explain_formatting,
@@ -171,14 +171,10 @@ class Ending(NamedTuple):
         `inconclusive` where the machine is at fault."""
         if self.of_machine:
             verdict = machine_lacks(message, expected=verdict.expected, measured=verdict.measured)
-        update = {
-            "message": message,
-            "hint": self.hint,
-            "citations": (*self.citations, *verdict.citations),
-        }
-        told = verdict.model_copy(update=update)
+        cited = (*self.citations, *verdict.citations)
+        told = verdict.model_copy(update={"message": message, "hint": self.hint, "citations": cited})
         told = told.based_on(cause=self.cause, charged_once=self.raised, unbuilt=self.unbuilt)
-        return told.seeking("uncalled", *(OF_INTERFACES if self.unbuilt else ()))
+        return told.seeking("uncalled", *OF_INTERFACES) if self.unbuilt else told
 
 
 def explain_early_end(package: PackageFacts, run: Run) -> Ending | None:
@@ -286,8 +282,7 @@ def explain_by_exception(check: Check, package: PackageFacts, run: Run, verdict:
     was due need not be why."""
     if not check.of_callbacks or verdict.basis.cause or early_end(run):
         return verdict
-    end = explain_error(package, run, during=verdict.basis.due)
-    if end is None:
+    if (end := explain_error(package, run, during=verdict.basis.due)) is None:
         if not (verdict.basis.due and (other := explain_error(package, run))):
             return verdict
         why, hint = f"at another time, a callback fails: {other.cause}", f"{verdict.hint}; {other.hint}"
@@ -343,8 +338,7 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
         hint = (not of_own and unused_import(place, package)) or hint
     where = f" ({place.file}, line {place.line})" if place else ""
     text = f"{shown(_said(found, cause).rstrip('.'))}{where}" + (f": {cause}" if cause else "")
-    raised = place is not None
-    return Ending(text, hint, (place,) if place else (), unbuilt=unbuilt is not None, raised=raised)
+    return Ending(text, hint, (place,) if place else (), unbuilt=unbuilt is not None, raised=bool(place))
 
 
 def _known_meaning(found: Traceback, place: FileCitation | None, package: PackageFacts) -> tuple[str, str]:
@@ -366,7 +360,8 @@ def _misplaced(found: Traceback) -> tuple[str, str] | None:
 
 def _by_script(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
     """Return what the sides of a sum are, or what other lines of the script are to blame for."""
-    sum_ = explain_operand(found, package) if found.kind == "TypeError" else None
+    of_sum = explain_operand(found, package) if found.kind == "TypeError" else None
+    sum_ = bare_decorator(found, package) or of_sum
     sum_ = of_typed_text(found, place.file, package) or sum_ or without_base(found.message, package.slips)
     spent = (s for s in package.slips if (s.file, s.kind, s.line) == (place.file, "runs-out", place.line))
     sum_ = sum_ or next(((s.message, s.fix) for s in spent if found.kind == "StopIteration"), None)

@@ -312,13 +312,9 @@ def explain_by_refused_launch(_check: Check, package: PackageFacts, run: Run, ve
     """Return a lost mark with why roslaunch started nothing, where it ended and that is all that is said."""
     ended = early_end(run)
     refused = refusal(run, package) if ended is not None and ended.start.argv[:1] == ("roslaunch",) else None
-    is_told = NOTHING_STARTS in verdict.message or (refused is not None and refused.why in verdict.message)
-    if (
-        refused is None
-        or is_told
-        or not verdict.basis.cause
-        or (refused.hint and refused.hint in verdict.hint)
-    ):
+    if refused is None or not verdict.basis.cause or NOTHING_STARTS in verdict.message:
+        return verdict
+    if refused.why in verdict.message or (refused.hint and refused.hint in verdict.hint):
         return verdict
     update = {"message": f"{verdict.message_without_cause}: {refused.why}", "hint": refused.hint}
     citations = tuple(dict.fromkeys((*refused.citations, *verdict.citations)))

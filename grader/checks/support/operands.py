@@ -60,3 +60,13 @@ def _other_side(frame: Frame, *, is_right: bool) -> str:
         if more is not None:
             return shown(ast.unparse(more.value if is_right else more.target))
     return ""
+
+
+def bare_decorator(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
+    """Return why a function that is decorated is None where it is called."""
+    if "'NoneType' object is not callable" not in found.message or not found.own_frames:
+        return None
+    source = found.own_frames[-1].source
+    slips = (s for s in package.slips if s.kind == "wrong-value" and s.name.startswith("decorator "))
+    told = (s for s in slips if re.search(rf"\b{re.escape(s.name.split()[1])}\s*\(", source))
+    return next(((one.message, one.fix) for one in told), None)

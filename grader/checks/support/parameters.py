@@ -24,7 +24,7 @@ from grader.evidence.run import Run
 from grader.line_slips.yaml import YAML_LINES_MAX, slip_of_yaml
 from grader.model.launch_file import LaunchNode, LaunchParam
 from grader.model.package import PackageFacts
-from grader.model.verdict import EvidenceCitation, Verdict, cited_lines
+from grader.model.verdict import EvidenceCitation, FileCitation, Verdict, cited_lines
 from grader.wording import join_words, plural, there_is
 
 UNNAMED = "/unnamed"
@@ -236,8 +236,10 @@ def explain_by_unread_parameter(check: Check, package: PackageFacts, run: Run, v
         # To read a map is to read what is in it, and a name below another one asks for a part of it.
         if not any(f"{name}/".startswith(f"{n}/") or f"{n}/".startswith(f"{name}/") for n in names)
     ]
-    if not asked or not unread or (verdict.basis.unjudged and not published_topics(run)):
+    if verdict.basis.unjudged and not published_topics(run):
         return verdict  # what no node publishes at all, no parameter explains
+    if not asked or not unread:
+        return _not_private(run, verdict)
     name = unread[0].name
     above, _, last = name.rpartition("/")
     own = [(node, n) for node, n in asked if last in n.split("/") or near_names(last, n.split("/"))]
@@ -252,6 +254,19 @@ def explain_by_unread_parameter(check: Check, package: PackageFacts, run: Run, v
     them = "it" if len(unread) == 1 else "them"
     why = f"the run sets {sets}, and no node reads {them}{seen}"
     return verdict.explained(why, hint, cause=name).about(citations=(cite(run, "/grader/actor"),))
+
+
+def _not_private(run: Run, verdict: Verdict) -> Verdict:
+    """Return a lost mark with the private parameter of a node which it has, and asks for without the `~`."""
+    reads = [(e.actor, absolute_name(e.topic or ""), e.detail) for _, e in run.actors if e.action == "read"]
+    there, got = params_on_server(run), {name for _, name, lacks in reads if not lacks}
+    for node, name, lacks in reads if run.student_nodes() else ():
+        last = name.rpartition("/")[2]
+        own = f"{node}/{last}"
+        if lacks and own in there and own not in got and node in _publishing(verdict, run) and name != own:
+            why = f"{node} is given {own}, and asks for {name}"
+            return verdict.explained(why, f"read it with {get_param(f'~{last}')}", cause=own)
+    return verdict
 
 
 def _is_misread(package: PackageFacts, run: Run, verdict: Verdict) -> bool:
@@ -317,9 +332,28 @@ def _without_colon(package: PackageFacts, run: Run, verdict: Verdict) -> Verdict
             return verdict.explained(why, hint, (node.place,), cause=why)
         if (own := _given_to_another(package, run, node)) and not verdict.basis.cause:
             why = f"nothing sets {node.full_name}/{own}, which other nodes of {node.type} are given"
+            if other := _nearly_given(run, node.full_name, own):
+                why += f"; {node.full_name}/{other} is set, and nothing reads it"
+                loads = [one for file in package.launch_files for one in file.loads]
+                loads = [one for one in loads if one.namespace.rstrip("/") == node.full_name and one.source]
+                where = (
+                    f" in {loads[0].source}, which line {loads[0].line} of {loads[0].file} loads"
+                    if loads
+                    else ""
+                )
+                places = tuple(FileCitation(file=one.file, line=one.line) for one in loads[:1]) or (
+                    node.place,
+                )
+                return verdict.explained(why, f"write {own} in place of {other}{where}", places, cause=why)
             hint = f'add <param name="{own}" value="…"/> to the <node> on line {node.line} of {node.file}'
             return verdict.explained(why, f"{hint}: {verdict.hint}", (node.place,), cause=why)
     return verdict
+
+
+def _nearly_given(run: Run, node: str, own: str) -> str:
+    """Return the parameter of a node that is nearly called so; "" where none is."""
+    names = [one.rpartition("/")[2] for one in params_on_server(run) if one.rpartition("/")[0] == node]
+    return next(iter(near_names(own, names)), "") if own not in names else ""
 
 
 def _given_to_another(package: PackageFacts, run: Run, node: LaunchNode) -> str:

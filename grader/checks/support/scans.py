@@ -41,6 +41,12 @@ def has_angles(scan: Mapping[str, Any]) -> bool:
     return _angles(scan)[1] != 0
 
 
+def begins_ahead(run: Run) -> bool:
+    """Return whether a laser has a range for each degree, of which the first one is straight ahead."""
+    scans = [c.values[0] for c in run.channels if c.type.endswith("LaserScan") and c.messages]
+    return bool(scans) and all(len(one["ranges"]) == 360 and abs(_degrees(one, 0)) < 1 for one in scans)
+
+
 def _degrees(scan: Mapping[str, Any], index: int) -> float:
     """Return where a range of a LaserScan is, 0 being straight ahead, and the left positive."""
     first, step = _angles(scan)

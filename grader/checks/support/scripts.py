@@ -184,11 +184,45 @@ def programs(package: PackageFacts) -> tuple[Executable, ...]:
     return package.cmake.executables if package.cmake else ()
 
 
+LIBRARIES_DEEP = 3
+
+
+def sources_made(package: PackageFacts, call: CMakeCall) -> set[str]:
+    """Return what an `add_executable(…)` is made of, with the sources of the package's libraries that it is linked
+    with."""
+    linked = [one.args for one in cmake_calls(package, "target_link_libraries") if one.args]
+    libraries = {one.args[0]: one for one in cmake_calls(package, "add_library") if one.args}
+    targets, sources = set(call.args[:1]), set(call.args[1:])
+    for _ in range(LIBRARIES_DEEP):
+        targets |= {name for args in linked if args[0] in targets for name in args[1:] if name in libraries}
+    return sources.union(*(libraries[name].args[1:] for name in targets & libraries.keys()))
+
+
+def part_not_linked(package: PackageFacts) -> str:
+    """Return how to link what of the package's own C++ is in no program: a library, or a source; "" where it is not
+    plain which."""
+    made = [call for call in cmake_calls(package, "add_executable") if call.args]
+    libraries = [call for call in cmake_calls(package, "add_library") if call.args]
+    linked = [call for call in cmake_calls(package, "target_link_libraries") if call.args]
+    listed = {posixpath.basename(word) for call in made + libraries for word in call.args}
+    paths = [PurePosixPath(file.path) for file in package.files]
+    spare = [path for path in paths if path.suffix in CPP_SUFFIXES and path.name not in listed]
+    if len(spare) == 1 and len(libraries or made) == 1:
+        call = (libraries or made)[0]
+        return f"add {spare[0]} to the {call.name}(…) on line {call.line} of {call.file}"
+    for program in made:
+        own = [call for call in linked if call.args[0] == program.args[0]]
+        lacks = [lib.args[0] for lib in libraries if not any(lib.args[0] in call.args for call in linked)]
+        if len(lacks) == 1 and len(own) == 1:
+            return f"add {lacks[0]} to the target_link_libraries(…) on line {own[0].line} of {own[0].file}"
+    return ""
+
+
 def slips_of_program(argv: Sequence[str], package: PackageFacts, kind: SlipKind) -> list[PythonSlip]:
     """Return the slips of this kind in the sources of the program of this command line."""
     program = posixpath.basename(argv[0]) if argv else ""
     calls = [call for call in cmake_calls(package, "add_executable") if call.args[:1] == (program,)]
-    sources = {file for call in calls for file in call.args[1:]}
+    sources = {file for call in calls for file in sources_made(package, call)}
     return [slip for slip in package.slips if slip.kind == kind and slip.file in sources]
 
 

@@ -23,7 +23,7 @@ from grader.checks.support.processes import (
     taken_off,
 )
 from grader.checks.support.recorder_losses import all_lost
-from grader.checks.support.scripts import programs
+from grader.checks.support.scripts import programs, sources_made
 from grader.checks.support.text import (
     INIT,
     LOOP,
@@ -252,7 +252,7 @@ def _judge_advertised(
     message = f"{what}, although it is advertised"
     if end := explain_error(package, run):
         return end.verdict(of_node, f"{message}: an error comes first: {end.cause}", measured="no message")
-    if slip := why_unreached(package, run) or run_slip(package, run, "queue-size"):
+    if slip := why_unreached(package, run) or run_slip(package, run, "queue-size", "rate-as-time"):
         verdict = of_node(f"{message}: {slip.message}", measured="no message", hint=reach_hint(slip))
         return verdict.about(citations=(slip.place,))
     if deaf := unheard(run, package):
@@ -456,8 +456,17 @@ def files_that_run(package: PackageFacts, run: Run) -> set[str | None]:
     nodes = [node for file in package.launch_files for node in file.brings]
     types = {node.type for node in nodes if node.full_name in run.student_nodes()}
     launched = {file.path for file in package.files if PurePosixPath(file.path).name in types}
-    made = (one.call.args[1:] for one in programs(package) if one.name in scripts | types)
-    return scripts.union(launched, *made)
+    made = (sources_made(package, one.call) for one in programs(package) if one.name in scripts | types)
+    return scripts.union(launched, _helpers(package, scripts | launched), *made)
+
+
+def _helpers(package: PackageFacts, scripts: Collection[str | None]) -> set[str]:
+    """Return the files beside these scripts, or in the package's own module, that name no node: others import them."""
+    nodes = {s.file for s in package.slips if s.kind in ("node-name", "no-init")}
+    folders = {PurePosixPath(one).parent for one in scripts if one and one.endswith(".py")}
+    own = {PurePosixPath("src", package.name), *folders} if folders else set()
+    files = (f.path for f in package.files if f.python and f.path not in nodes)
+    return {path for path in files if path.endswith(".py") and PurePosixPath(path).parent in own}
 
 
 def reads_keys(package: PackageFacts, run: Run) -> PythonSlip | None:

@@ -4,24 +4,64 @@ from __future__ import annotations
 
 from grader.checks.registry import Check
 from grader.checks.support.processes import ends_twice
+from grader.checks.support.scans import begins_ahead
 from grader.checks.support.topics import files_that_run, reach_hint, why_unreached
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
+from grader.model.python_slip import PythonSlip
 from grader.model.verdict import Status, Verdict
 
 SEEN_AS = {
     "nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": "", "added": "",
     "step": "order", "cut": "place", "half": "value", "secs": "never", "mean": "", "unset": "value",
     "stuck": "stuck", "edge": "place", "times": "order", "early": "value",
+    "frames": "frames",
 }  # fmt: skip
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so; others always show."""
 
-STEERING = ("swapped", "mixed", "rootless", "inf", "angle", "turned", "negative", "ungiven", "first")
+STEERING = (
+    "swapped",
+    "mixed",
+    "rootless",
+    "inf",
+    "angle",
+    "turned",
+    "negative",
+    "ungiven",
+    "first",
+    "side",
+    "metres",
+)
 OF_STEERING = ("ends-at", "stays-within", "path", "reacts")
 """What leads a robot astray wherever its script computes so, and the checks of what a robot does."""
 
+PRIVATE, COPIES = "private ", ("copied", "argv")
+OF_ARGUMENTS = ("prints", "calls")
+"""Checks of what a node makes of its command line."""
+OF_CONNECTIONS = ("launch-connects", "connected", "topic-type", "rate", "latched")
+"""Checks that a topic of the node's own namespace fails."""
 OF_TURNS = ("orientation", "rotation", "transform")
 """What a quaternion can be wrong in."""
+
+
+def is_private_there(slip: PythonSlip, run: Run) -> bool:
+    """Return whether a node of the student's has the topic or the service of its own namespace that a line makes."""
+    names, nodes = slip.name.removeprefix(PRIVATE).split(), run.student_nodes()
+    ends = [
+        getattr(event, end) for _, event in run.graph for end in ("publishers", "subscribers", "services")
+    ]
+    return any(f"{node}/{name}" in end for node in nodes for name in names for end in ends)
+
+
+def _may_show(slip: PythonSlip, check: Check, run: Run, *, of_values: bool) -> bool:
+    """Return whether a check may see what a line makes wrong."""
+    if slip.name.startswith(PRIVATE):
+        return is_private_there(slip, run)
+    if slip.name == "argv":
+        return check.name in OF_ARGUMENTS
+    if slip.name == "side" and not begins_ahead(run):
+        return False
+    return of_values and not slip.name.startswith("decorator ")  # of these an exception tells
 
 
 def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
@@ -41,9 +81,12 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
         check.of_callbacks or check.name in OF_VALUES or (check.name == "prints" and verdict.basis.silent)
     )
     kinds = ["wrong-value", "compared"] if of_values and not verdict.basis.cause else []
+    if check.name in (*OF_CONNECTIONS, *OF_ARGUMENTS) and not verdict.basis.cause and not kinds:
+        kinds = ["wrong-value"]
     if check.name == "action-result" and verdict.basis.wrong != "nothing" and ends_twice(run):
         kinds.append("goes-on")
     found = [s for s in package.slips if s.kind in kinds and s.file in files]
+    found = [s for s in found if _may_show(s, check, run, of_values=of_values)]
     # feedback that is not sent explains only what is missing of it
     found = [s for s in found if "publish_feedback" not in s.fix or "feedback" in verdict.message]
     wrong = verdict.basis.wrong
@@ -51,7 +94,10 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
     sure = [
         s
         for s in found
-        if s.kind in ("goes-on", "compared") or s.name in steers or (wrong and SEEN_AS.get(s.name) == wrong)
+        if s.kind in ("goes-on", "compared")
+        or s.name in steers
+        or s.name.startswith((*COPIES, PRIVATE))
+        or (wrong and SEEN_AS.get(s.name) == wrong)
     ]
     turns = any(word in verdict.message for word in OF_TURNS)
     sure = [s for s in sure if s.name != "half" or turns]

@@ -201,6 +201,10 @@ COMPASS = re.compile(r"bearing|compass|azimuth|north", re.IGNORECASE)
 def is_compass(call, tree):
     """Whether an angle is meant from the north, clockwise: by its name, or since it is taken from a quarter turn."""
     parents, node = parents_of(tree), call
+    around = parents[call]
+    # a pose's own angle is counted from x to the left
+    if is_difference(around) and dotted(around.right).rpartition(".")[2].lower() in HEADINGS[:2]:
+        return False
     while not isinstance(node, ast.stmt):
         node = parents[node]
     names = {dotted(one) for one in getattr(node, "targets", ())}
@@ -243,6 +247,12 @@ def is_point(node):
     return isinstance(node, ast.Attribute) and node.attr in ("x", "y")
 
 
+OF_DEGREES, OF_SCANS = (
+    re.compile(r"(?:^|_)deg(?:rees?)?$", re.IGNORECASE),
+    ("angle_min", "angle_max", "angle_increment"),
+)
+
+
 def mixed_units(tree):
     """`math.degrees(math.atan2(dy, dx)) - pose.theta`, of which one is in degrees, and the other in radians."""
     # A name of the script's own may be in degrees.
@@ -261,6 +271,12 @@ def mixed_units(tree):
             name = called_name(degrees[0])
             message = "this mixes an angle in degrees with one in radians"
             fix = "on line %d, leave out `%s(…)`, so that you have both in radians" % (node.lineno, name)
+            yield slip(node.lineno, "wrong-value", message, fix, "mixed")
+        named = [dotted(n) for n in sides if OF_DEGREES.search(dotted(n).rpartition(".")[2])]
+        of_scan = [dotted(n) for n in sides if getattr(n, "attr", "") in OF_SCANS]
+        if isinstance(node.op, (ast.Add, ast.Sub, ast.Div, ast.FloorDiv)) and len(named) == len(of_scan) == 1:
+            message = "this mixes degrees, `%s`, with the radians of `%s`" % (named[0], of_scan[0])
+            fix = "on line %d, write `math.radians(%s)` in place of `%s`" % (node.lineno, named[0], named[0])
             yield slip(node.lineno, "wrong-value", message, fix, "mixed")
 
 

@@ -5,6 +5,7 @@ Nothing is executed. Python 3.8, standard library only.
 """
 
 import ast
+import re
 
 from script_tree import (
     FUNCTIONS,
@@ -202,3 +203,57 @@ def statement_of(node, tree):
     while not isinstance(node, ast.stmt):
         node = parents_of(tree)[node]
     return node
+
+
+def arguments_out_of_order(tree):
+    """`ask(float(argv[1]), float(argv[3]), float(argv[2]))`: a call that is given the command line's words in another
+    order than they come in."""
+    for call in all_of(tree, ast.Call):
+        found = [[n for n in ast.walk(one) if isinstance(n, ast.Subscript)] for one in call.args]
+        words = [inner[0] for inner in found if len(inner) == 1]
+        names = {dotted(n.value) for n in words}
+        keys = [getattr(n.slice, "value", n.slice) for n in words]
+        numbers = [getattr(key, "value", key) for key in keys]
+        if len(words) < 2 or len(words) != len(found) or len(names) != 1 or not ARGUMENTS.search(min(names)):
+            continue
+        if all(type(n) is int and n > 0 for n in numbers) and sorted(numbers) != numbers:
+            late = next(n for at, n in enumerate(numbers) if n != sorted(numbers)[at])
+            name = min(names)
+            message = "`%s[%d]` is given before `%s[%d]`" % (
+                name,
+                late,
+                name,
+                min(n for n in numbers[1:] if n < late),
+            )
+            fix = "on line %d, give them in the order of the command line, if that is theirs" % call.lineno
+            yield slip(call.lineno, "wrong-value", message, fix, "argv")
+
+
+ARGUMENTS = re.compile(r"(?:^|\.)arg(?:v|s|uments)$")
+
+
+def bare_decorators(tree):
+    """Functions that decorate another one and return nothing, so that its name stands for nothing."""
+    functions = {n.name: n for n in all_of(tree, ast.FunctionDef)}
+    for own in functions.values():
+        for mark in own.decorator_list:
+            maker = functions.get(called_name(mark) or dotted(mark))
+            inner = [n for n in statements_of(maker) if isinstance(n, ast.FunctionDef)] if maker else []
+            is_made = (
+                any(isinstance(n, ast.Return) and n.value for n in statements_of(maker)) if maker else True
+            )
+            returns = [n for n in ast.walk(maker) if isinstance(n, ast.Return) and n.value] if maker else []
+            if (
+                maker
+                and len(inner) == 1
+                and not is_made
+                and not any(dotted(n.value) == inner[0].name for n in returns)
+            ):
+                message = "`%s(…)`, which decorates `%s` on line %d, returns nothing, and `%s` is None then"
+                message %= (maker.name, own.name, mark.lineno, own.name)
+                fix = "below line %d, write `return %s` at the end of `%s`" % (
+                    inner[0].end_lineno,
+                    inner[0].name,
+                    maker.name,
+                )
+                yield slip(maker.lineno, "wrong-value", message, fix, "decorator " + own.name)

@@ -5,6 +5,7 @@ Nothing is executed. Python 3.8, standard library only.
 """
 
 import ast
+import re
 
 from script_tree import (
     LOOPS,
@@ -35,6 +36,40 @@ def nanoseconds(tree):
             message = "`%s(…)` takes seconds, and gets nanoseconds" % what
             fix = "on line %d, write `%s(0, ` in place of `%s(`" % (node.lineno, what, what)
             yield slip(node.lineno, "wrong-value", message, fix, "nanoseconds")
+
+
+OF_RATES = re.compile(r"(?i:(?:^|_)(?:hz|rate|freq|frequency|fps))$|[a-z](?:Hz|Rate|Freq|Frequency)$")
+OF_PERIODS = re.compile(
+    r"(?i:(?:^|_)(?:dt|period|interval|pause|delay|seconds|secs))$|[a-z](?:Period|Interval|Delay)$"
+)
+SECONDS_TAKEN = ("Duration", "WallDuration", "sleep")
+
+
+def rates_for_times(tree):
+    """`rospy.Duration(self.hz)`, and `rospy.Rate(period)`, by the name of what each is given: a run shows whether it
+    is one."""
+    values = {}
+    for node in all_of(tree, ast.Assign):
+        for target in node.targets:
+            values.setdefault(dotted(target), []).append(node.value)
+    for node in all_of(tree, ast.Call):
+        what = dotted(node.func)
+        of_seconds, given = called_name(node) in SECONDS_TAKEN, node.args[0] if len(node.args) == 1 else None
+        if given is None or not (of_seconds or what == "rospy.Rate"):
+            continue
+        name = read_parameter(given) or dotted(given)
+        names = OF_RATES if of_seconds else OF_PERIODS
+        numbers = [getattr(one, "value", None) for one in values.get(name, ())]
+        # `rate = 0.1` is no rate, whatever it is called
+        if not names.search(re.split(r"[.~/]", name)[-1]) or any(
+            type(n) in (int, float) and (n < 1) is of_seconds for n in numbers
+        ):
+            continue
+        given, taken = ("a rate in Hz", "seconds") if of_seconds else ("a time in seconds", "a rate in Hz")
+        inside = dotted(node.args[0])
+        right = "`%s(1.0 / %s)`" % (what, inside if "..." not in inside else "…")
+        message = "`%s(…)` takes %s, and gets %s, `%s`" % (what, taken, given, name)
+        yield slip(node.lineno, "rate-as-time", message, "on line %d, write %s" % (node.lineno, right))
 
 
 def loop_rates(tree):

@@ -32,6 +32,7 @@ def scan_slips(tree):
     yield from not_the_smallest(tree)
     yield from nothing_taken_for_near(tree)
     yield from drives_where_near(tree)
+    yield from not_in_metres(tree)
     yield from angles_for_indexes(tree)
     yield from ranges_read(tree)
 
@@ -201,6 +202,42 @@ def drives_where_near(tree):
             yield slip(node.lineno, "wrong-value", message, fix, "turned")
 
 
+FARTHEST = (10, 1000)
+"""No laser of a lab looks farther, in metres: a larger number that a range is compared with is one of centimetres."""
+
+
+def not_in_metres(tree):
+    """`min(scan.ranges) < 50`, also where the 50 is the value of a name."""
+    given = {}
+    for n in all_of(tree, ast.Assign, ast.AnnAssign):
+        for target in getattr(n, "targets", None) or [n.target]:
+            given.setdefault(dotted(target).rpartition(".")[2], []).append(n.value)
+    held = names_of_ranges(tree)
+    near = {dotted(n.targets[0]) for n in all_of(tree, ast.Assign) if held and smallest_in(n.value, held)}
+    for node in all_of(tree, ast.Compare) if held else ():
+        sides = [node.left, node.comparators[0]] if len(node.ops) == 1 else []
+        bounds = [n for n in sides if not (smallest_in(n, held) or dotted(n) in near)]
+        if len(bounds) != 1 or len(sides) != 2 or type(node.ops[0]) not in (ast.Lt, ast.LtE, *FAR):
+            continue
+        values = [bounds[0]] if is_number(bounds[0]) else given.get(dotted(bounds[0]).rpartition(".")[2], ())
+        value = values[0] if len(values) == 1 and is_number(values[0]) else None
+        if value is not None and FARTHEST[0] <= value.value <= FARTHEST[1]:
+            name = "" if value is bounds[0] else ", `%s`" % dotted(bounds[0])
+            message = "a range is in metres, and is compared with %g%s on line %d" % (
+                value.value,
+                name,
+                node.lineno,
+            )
+            fix = "on line %d, write the distance in metres, as in `%g`" % (value.lineno, value.value / 100)
+            yield slip(value.lineno, "wrong-value", message, fix, "metres")
+
+
+def smallest_in(node, held):
+    """Whether a value is the smallest of ranges, or one of them."""
+    node = node.body if isinstance(node, ast.IfExp) else node
+    return is_smallest(node, held) or (isinstance(node, ast.Subscript) and dotted(node.value) in held)
+
+
 FULL = 6.3
 """More than any angle in radians."""
 
@@ -221,6 +258,25 @@ def angles_for_indexes(tree):
             message = "this takes an angle in radians for an index, which counts the ranges"
             fix = "on line %d, write `int((angle - msg.angle_min) / msg.angle_increment)`, with your angle and message"
             yield slip(node.lineno, "wrong-value", message, fix % node.lineno, "angle")
+    yield from whole_radians(tree)
+
+
+def whole_radians(tree):
+    """`SECTOR = int(math.radians(45))`, which is 0, in a script whose slices of ranges have that name."""
+    slices = [n for n in all_of(tree, ast.Subscript) if is_ranges(n.value)]
+    names = {name.rpartition(".")[2] for one in slices for name in names_in(key_of(one))} if slices else ()
+    for node in all_of(tree, ast.Assign) if names else ():
+        whole = node.value if called_name(node.value) in ("int", "round") else None
+        angle = whole.args[0] if whole is not None and len(whole.args) == 1 else None
+        if (
+            called_name(angle) in ("radians", "deg2rad")
+            and dotted(node.targets[0]).rpartition(".")[2] in names
+        ):
+            name, given = dotted(node.targets[0]), angle.args[0] if angle.args else None
+            number = repr(given.value) if is_number(given) else "the number of degrees"
+            message = "`%s` is a whole number of radians, of which hardly anything is left, and an index counts ranges"
+            fix = "on line %d, write `%s = %s` where the scan has a range for each degree"
+            yield slip(node.lineno, "wrong-value", message % name, fix % (node.lineno, name, number), "angle")
 
 
 def is_smallest(node, held):

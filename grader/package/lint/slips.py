@@ -4,9 +4,9 @@ What nothing calls, statements without an effect, imports. Names are for `script
 `script_texts.py`, objects for `script_objects.py`, callbacks for `script_callbacks.py`, what these print for
 `script_prints.py`, base classes for `script_bases.py`, threads and generators for `script_waits.py`, ends of
 goals for `script_goals.py`, loops for `script_loops.py`, their rates for `script_rates.py`, values for
-`script_values.py`, arithmetic for `script_arithmetic.py`, scans for `script_scans.py`, counters and clocks for
-`script_counters.py`, what functions return for `script_results.py`, calls that cannot work for `script_calls.py`,
-publishers and messages that nothing uses for `script_unsent.py`.
+`script_values.py`, arithmetic for `script_arithmetic.py`, scans for `script_scans.py`, sides and frames for
+`script_sides.py`, counters and clocks for `script_counters.py`, what functions return for `script_results.py`,
+calls that cannot work for `script_calls.py`, publishers and messages that nothing uses for `script_unsent.py`.
 
 Nothing is executed. A file has to be parsed by ROS's own Python, which is to run it: Python 3.8, standard library only.
 """
@@ -28,6 +28,7 @@ import script_prints
 import script_rates as rates
 import script_results
 import script_scans as scans
+import script_sides as sides
 import script_unsent as unsent
 import script_values as values
 import script_waits
@@ -57,6 +58,7 @@ def slips(tree):
     call_by_methods(tree)
     finders = (
         uncalled_and_asked, objects.names_of_objects, names.misspelt, rates.loop_rates, rates.nanoseconds,
+        rates.rates_for_times,
         counters.resets, never_run, loops.never_reached, loops.loops_that_never_go_round,
         loops.stopped_loops, loops.lacking_loops, loops.published_before,
         loops.sleepless_loops, loops.sleeps_twice, loops.publishes_twice, callbacks.callbacks,
@@ -72,7 +74,9 @@ def slips(tree):
         unsent.unused_publishers, unsent.unsent_messages, unsent.lost_objects, rates.loops_of_numbers,
         goals.finished_goals, goals.finished_in_loops, goals.ended_without_result, counters.sends_no_time, without_node,
         debuggers, script_results.results, rates.turns_taken_off, script_bases.unmade_bases, script_waits.waits,
-        calls.locks_taken_twice, calls.values_out_of_order, calls.params_read_early, scans.first_scans,
+        calls.locks_taken_twice, calls.values_out_of_order, calls.params_read_early, calls.arguments_out_of_order,
+        calls.bare_decorators, scans.first_scans,
+        sides.named_sides, sides.frames_swapped, sides.frames_named,
     )  # fmt: skip
     found = [one for find in finders for one in find(tree)]
     # of two that say why a name is not there, the first is about the class that it belongs to
