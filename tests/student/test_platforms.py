@@ -33,6 +33,7 @@ LOADED = (
         "cli/checking",
         "cli/commands",
         "cli/declare",
+        "cli/judging",
         "cli/results",
         "cli/explanation",
         "cli/main",
