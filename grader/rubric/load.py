@@ -108,21 +108,27 @@ def load_rubric(name_or_path: str) -> LoadedRubric:
     return loaded.model_copy(update={"origin": "pinned"})
 
 
+_FAULTLESS: set[tuple[str, Path]] = set()
+"""What this process has looked through already, by digest and folder: to look takes most of the time of loading."""
+
+
 def _load_file(path: Path, name: str) -> LoadedRubric:
     source = read_source(path, name)
     # First: an unknown key of a newer format would be told as a slip.
     refuse_newer(source, RUBRIC)
     samples = sample_data(source.data)
     beside = read_instructor(samples[0], path.parent)
-    faults = _faults(source, samples, beside, path.parent)
-    if faults:
-        raise RubricError(faults)
+    digest = _digest(source.raw, beside)
+    seen = (digest, path.parent)
+    if seen not in _FAULTLESS or beside.faults or beside.own.faults:
+        if faults := _faults(source, samples, beside, path.parent):
+            raise RubricError(faults)
+        _FAULTLESS.add(seen)
     # As JSON and strictly: text is no number then, and a list may still become a tuple.
     rubric = share_points(Rubric.model_validate_json(json.dumps(samples[0]), strict=True))
     if rubric.made_up:
         rubric.remember(as_map(source.data), {})
     own = beside.files[rubric.checks] if rubric.checks is not None else None
-    digest = _digest(source.raw, beside)
     return LoadedRubric(
         rubric=rubric,
         path=path,

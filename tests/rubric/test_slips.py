@@ -26,6 +26,7 @@ from grader.rubric.simulators import PROGRAMS as PROGRAMS_KNOWN
 from grader.rubric.step_faults import step_faults
 from tests.rubric.samples import faults
 
+LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 SLIPS = Path(__file__).with_name("slips.yaml")
 
 
@@ -77,7 +78,7 @@ NAMES = [
 """Names that one line alone has, and that are a letter off."""
 
 
-LISTED = yaml.load(SLIPS.read_text(encoding="utf-8"), Loader=yaml.CSafeLoader)
+LISTED = LOADER(SLIPS.read_text(encoding="utf-8")).get_single_data()
 
 
 @pytest.mark.parametrize("slip", [slip for slip in LISTED if "fault" in slip], ids=lambda slip: slip["fault"])

@@ -36,6 +36,7 @@ EPOCH_NS = 1_700_000_000_000_000_000
 """Where second 0 of every timeline lies: 2023-11-14 22:13:20 UTC."""
 
 PACKAGE_RUN = "package"
+RUNS = TypeAdapter(dict[str, dict[str, Any] | None])
 Event = tuple[int, str, Record]
 
 
@@ -74,7 +75,7 @@ def parse_timeline(timeline: Mapping[str, Any]) -> dict[str, TimelineRun]:
     if "runs" in top:
         if unknown := top.keys() - {"runs"}:
             raise ValueError(f"unknown beside `runs`: {', '.join(sorted(map(str, unknown)))}")
-        runs = TypeAdapter(dict[str, dict[str, Any] | None]).validate_python(top["runs"])
+        runs = RUNS.validate_python(top["runs"])
         given = {name: dict(keys or {}) for name, keys in runs.items()}
     else:
         given = {str(top.get("scenario", "run")): top} if top else {}

@@ -85,21 +85,21 @@ def test_all_killed(judge, capsys):
 
 def test_a_survivor_is_shown_with_its_diff_and_its_evidence(judge, capsys):
     judge.instead = {"talker-not-executable": {}}
-    assert run(["rubric", "test", LAB]) == 1
+    assert run(["rubric", "test", LAB, "--only", "talker-not-executable", "talker-crlf"]) == 1
     out, _ = capsys.readouterr()
     text = " ".join(out.split())
     assert "survived: talker-not-executable" in text
     assert "numeric_talker.py was never made executable." in text
     assert "should cost, and does not: talker-executable" in text
     assert "old mode 100755" in text
-    assert f"{COUNT - 1} of {COUNT} mutants killed" in text
+    assert "1 of 2 mutants killed" in text
     (folder,) = left(judge)
     assert [path.name for path in folder.iterdir()] == ["talker-not-executable"]
 
 
 def test_what_costs_too_much_is_shown_with_the_reports_words(judge, capsys):
     judge.instead = {"counter-dies-at-128": {"counter-wrap": "blocked", "launch": "fail"}}
-    assert run(["rubric", "test", LAB]) == 1
+    assert run(["rubric", "test", LAB, "--only", "counter-dies-at-128"]) == 1
     out, _ = capsys.readouterr()
     text = " ".join(out.split())
     assert "should not cost, and does: launch" in text
@@ -156,7 +156,7 @@ def test_a_criterion_taken_out_fails_the_test(judge, capsys, tmp_path):
 
 def test_the_reference_solution_has_to_get_everything(judge, capsys):
     judge.instead = {"reference": {"launch": "fail", "talker-name": "fail"}}
-    assert run(["rubric", "test", LAB]) == 1
+    assert run(["rubric", "test", LAB, "--only", "talker-crlf"]) == 1
     text = " ".join(capsys.readouterr().out.split())
     assert "The reference solution does not get everything" in text
     assert "launch fail: about launch" in text
