@@ -26,6 +26,7 @@ from grader import (
     load_rubric,
 )
 from grader.errors import Busy
+from tests.faulty import RUBRIC, VICTIM
 
 ROOT = Path(__file__).resolve().parents[2]
 LAB = "leeds-comp3631-lab1"
@@ -226,13 +227,13 @@ def test_a_real_grading_where_an_event_loop_runs(tmp_path: Path) -> None:
         threads.add(threading.current_thread().name)
 
     async def cell() -> object:
-        return grade(SOLUTION, LAB, tmp_path, submission_id="ada", progress=told)
+        return grade(VICTIM, RUBRIC, tmp_path, submission_id="ada", progress=told)
 
     result = asyncio.run(cell())
     assert result == load_result(tmp_path / "ada")
-    assert judge(tmp_path / "ada", LAB).criteria == result.criteria
+    assert judge(tmp_path / "ada", RUBRIC).criteria == result.criteria
     assert not [c for c in result.criteria if c.status in {Status.FAIL, Status.BLOCKED, Status.ERROR}]
-    assert {"intake", "package", "build", "talker", "launch"} <= steps
+    assert {"intake", "package", "build", "talker", "listener"} <= steps
     assert "MainThread" not in threads
 
 
@@ -261,7 +262,7 @@ except KeyboardInterrupt:
 @pytest.mark.parametrize("where", ["script", "notebook"])
 def test_ctrl_c_ends_it_in_order_where_a_loop_runs(where: str, tmp_path: Path) -> None:
     """asyncio.run takes Ctrl-C for itself, a notebook does not."""
-    command = [sys.executable, "-c", CELL, str(SOLUTION), LAB, str(tmp_path), where]
+    command = [sys.executable, "-c", CELL, str(VICTIM), str(RUBRIC), str(tmp_path), where]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "built\n"
