@@ -62,10 +62,12 @@ def test_every_shebang_runs(tmp_path: Path, shebang: str, sandbox: str) -> None:
 
 
 @pytest.mark.parametrize("sandbox", ["auto", "none"])
-@pytest.mark.parametrize("browser", ["firefox", "/usr/bin/firefox", "/snap/bin/firefox"])
-def test_a_browser_is_found_by_its_path_too(tmp_path: Path, browser: str, sandbox: str) -> None:
+def test_a_browser_is_found_by_its_path_too(tmp_path: Path, sandbox: str) -> None:
+    browsers = ("firefox", "/usr/bin/firefox", "/snap/bin/firefox")
+    pages = [f"http://wiki.ros.org/bin/firefox/{number}" for number, _ in enumerate(browsers)]
+    lines = [f"{browser} {page}\n" for browser, page in zip(browsers, pages, strict=True)]
     files = {
-        "launch/open.sh": f"#!/bin/sh\n{browser} http://wiki.ros.org/bin/firefox\n",
+        "launch/open.sh": "#!/bin/sh\n" + "".join(lines),
         "src/node.py": SCRIPT
         + "import os\nos.chdir(os.path.dirname(__file__))\nos.system('sh ../launch/open.sh')\n",
     }
@@ -73,7 +75,7 @@ def test_a_browser_is_found_by_its_path_too(tmp_path: Path, browser: str, sandbo
     with make_place(files, sandbox=sandbox) as place:
         seen = run(place, scenario, tmp_path / "run.mcap")
     opened = [(e.actor, e.value) for _, e in seen.actors if e.action == "open"]
-    assert opened == [("firefox", ["http://wiki.ros.org/bin/firefox"])]
+    assert opened == [("firefox", [page]) for page in pages]
 
 
 def test_links_are_copied_as_links(tmp_path: Path) -> None:
