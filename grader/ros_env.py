@@ -257,7 +257,9 @@ class RosPackages:
         if "-" in package or package in COMMON:
             return ""
         known = {*known_packages(), *noetic_messages(), *COMMON}
-        near = closest(package, known, cutoff=NEAR_WITHOUT_ROS)
+        # letters that are swapped make a short name look less alike
+        swapped = next((name for name in sorted(known) if sorted(name) == sorted(package)), "")
+        near = swapped or closest(package, known, cutoff=NEAR_WITHOUT_ROS)
         is_slip = near and near[0] == package[0] and package not in known and package not in self.folders
         return f'there is no ROS package "{package}" (did you mean "{near}"?)' if is_slip else ""
 

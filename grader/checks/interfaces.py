@@ -73,6 +73,8 @@ class DefinitionParams(Record):
             if part not in PARTS[suffix]:
                 parts = join_words((f"{part}.{bare}" for part in PARTS[suffix]), "or")
                 raise ValueError(f'name it {parts.removeprefix(".")}, not "{name}"')
+            if name in {*BUILT_IN, *FULL_NAMES} and type_ not in {*BUILT_IN, *FULL_NAMES} and type_.islower():
+                raise ValueError(f"the name comes first, and then the type: write {type_}: {name}")
             refuse_unknown(type_)
             found.append(InterfaceField(part=part, type=type_, name=bare, value=value, line=0))
         return found

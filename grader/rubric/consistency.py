@@ -202,17 +202,31 @@ def _points(rubric: WrittenRubric) -> Iterator[Fault]:
             fault = f"give one of points, bonus and penalty, not {' and '.join(given)}"
             yield (*criterion.place, given[1]), fault
     given_points = [criterion.data.get("points", 0) for criterion in rubric.criteria]
-    if not all(is_number(points) for points in given_points):
-        return
+    ids = {criterion.id for criterion in rubric.criteria}
+    if not all(is_number(points) and points >= 0 for points in given_points) or len(ids) < len(given_points):
+        return  # what is wrong there is said, and the sum would be wrong only for that
     total = _total(rubric)
     # Thirds in floats do not add up exactly.
     if abs(total - TOTAL_POINTS) > 1e-6:
-        yield ("criteria",), f"the points add up to {total:g}, not to {TOTAL_POINTS}"
+        yield (
+            ("criteria",),
+            f"the points add up to {total:.9g}, not to {TOTAL_POINTS}{_left_out(rubric, total)}",
+        )
     mark = rubric.data.get("pass_mark")
     if is_number(mark) and 0 < mark < 1:
         yield ("pass_mark",), f"is in points, not a share: write {mark * TOTAL_POINTS:g}"
     if isinstance(mark, int | float) and mark > total:
         yield ("pass_mark",), f"{mark:g} is more than all the points, {total:g}"
+
+
+def _left_out(rubric: WrittenRubric, total: float) -> str:
+    """Return which criterion's points are too much, since no group counts them; "" where that is none, or not clear."""
+    groups = as_map(rubric.data.get("groups")).values()
+    grouped = {name for group in groups for _, name in as_texts(as_map(group).get("criteria"))}
+    runs = {c.data.get("scenario") for c in rubric.criteria if c.id in grouped} - {None}
+    left = [c for c in rubric.criteria if c.id not in grouped and c.data.get("scenario") in runs]
+    over = [c.id for c in left if c.data.get("points", 0) == total - TOTAL_POINTS]
+    return f': "{over[0]}" is in no group' if len(over) == 1 else ""
 
 
 def _total(rubric: WrittenRubric) -> float:

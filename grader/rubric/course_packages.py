@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Mapping
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from grader.model.package import MANIFEST
 from grader.rubric.scenario import FOLDER_PATTERN, ROSTEST_ENDING
@@ -68,6 +68,12 @@ def read_packages(rubric: WrittenRubric, folder: Path) -> tuple[dict[str, bytes]
             faults.append((("packages", index), f"{name}/{MANIFEST} does not say <name>{name}</name>"))
         else:
             faults += _programs(rubric, name, files)
+    listed = {PurePosixPath(name).name for name in rubric.own_packages}
+    for path, start in rubric.starts():
+        name = str(start.get("program")).partition("/")[0]
+        is_here = re.fullmatch(r"[A-Za-z]\w*", name) and (folder / name / MANIFEST).is_file()
+        if is_here and name not in listed:
+            faults.append(((*path, "program"), f"{name} lies beside the rubric: write packages: [{name}]"))
     return read, faults
 
 

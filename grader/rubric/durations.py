@@ -90,7 +90,7 @@ def steps_s(scenario: dict[str, Any]) -> float | None:
     return sum(step.lasts_s for step in steps if step is not None)
 
 
-def _probed_s(scenario: dict[str, Any]) -> float:
+def probed_s(scenario: dict[str, Any]) -> float:
     """Return how many seconds the probes take."""
     lasting_s = 0.0
     for _, probe in as_maps(scenario.get("probes")):
@@ -119,7 +119,7 @@ def longest_s(scenario: dict[str, Any], played_s: float | None = None) -> float 
     if "until" in scenario or "steps" not in scenario:
         waits_s += limit_s
     if "probes" in scenario:
-        waits_s += first_s + SUBSCRIBE_S + _probed_s(scenario)
+        waits_s += first_s + SUBSCRIBE_S + probed_s(scenario)
     for step in steps:
         if step.play and played_s is None:
             return None

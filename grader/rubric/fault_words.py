@@ -32,11 +32,19 @@ SIZES: dict[str, dict[str, float]] = {
 }
 """By these endings, units that are written behind a number, and how large they are."""
 USUAL_ELSEWHERE = {
-    "description": "title", "name": "title", "depends": "requires", "depends_on": "requires", "weight": "points",
+    "description": "title", "name": "title", "depends": "requires", "depends_on": "requires", "needs": "requires",
+    "weight": "points",
     "params": "with", "parameters": "with", "hidden": "visibility: hidden", "visible": "visibility: hidden",
     "msg": "type", "data": "value, or values", "timeout": "limit_s", "sleep": "wait: {seconds: …}",
+    "exited": "ended", "finished": "ended", "frequency": "rate_hz",
+    "pattern": "text: {number} in it stands for a number", "regex": "text: {number} in it stands for a number",
 }  # fmt: skip
 """Words that other tools have for a key."""
+ALONE: dict[str, dict[type, str]] = {
+    "until": {int: "limit_s", float: "limit_s"}, "wait": {int: "seconds", float: "seconds", str: "topic"},
+    "needs": {list: "ros"}, "play": {str: "bag"},
+}  # fmt: skip
+"""By a key whose value is a map, the key in it that is meant if something of another type is written there."""
 PATTERN_RULES = {
     NAME_PATTERN: "must be lower-case letters, digits and hyphens, beginning with a letter",
     TYPE_PATTERN: "must be a type like std_msgs/String",
@@ -73,6 +81,7 @@ MUST_BE = {
     "datetime_parsing": TIME,
     "timezone_aware": TIME,
 }
+TRUE_FALSE = {"true": "true", "yes": "true", "on": "true", "false": "false", "no": "false", "off": "false"}
 BOUNDS = {
     "greater_than_equal": ("ge", "at least"),
     "greater_than": ("gt", "more than"),
@@ -141,6 +150,14 @@ def _elsewhere(model: type[BaseModel], data: Any, path: KeyPath, base: KeyPath) 
             return f": it belongs beside {path[end]}, and not into it"
     if base[-1:] == ("with",) and key in {"scenario", "requires", "points", "title", "hint", "reproduce"}:
         return ": it belongs beside with, and not into it"
+    if len(path) == 1 and not base:
+        parts: dict[str, KeyPath] = {
+            "one of the criteria": ("criteria", 0),
+            "a scenario": ("scenarios", "any"),
+        }
+        return next(
+            (f": it belongs into {name}" for name, at in parts.items() if key in _keys(model, at)), ""
+        )
     inside = {name for name, one in _fields(model, path[:-1]) if key in dict(_fields(one.annotation))}
     return f": it belongs into {inside.pop()}" if len(inside) == 1 else ""
 
@@ -152,12 +169,27 @@ def _unknown(key: str, value: object, keys: Collection[str]) -> str:
         return f": write {usual}"
     if key.startswith("/") and {"name", "value"} <= {*keys}:
         return f": write {{name: {key}, value: …}}"
+    if other := _of_other_unit(key, value, keys):
+        return other
     glued = re.match(r"(\w+)(?:\s*[:=]\s*|\s+)(?=\S)", key)
     if glued and glued[1] in keys:
         return f": write {glued[1]}, a colon and a blank before its value"
     cut = value is None and " " in key
     there = f": there is {join_words(sorted(keys))}" if len(keys) <= KEYS_LISTED else ""
     return ": between { and }, text with a comma needs quotes" if cut else did_you_mean(key, keys) or there
+
+
+def _of_other_unit(key: str, value: object, keys: Collection[str]) -> str:
+    """Return how a key is written that has its value in another unit: `window_ms`, `period_s`."""
+    name, _, unit = key.rpartition("_")
+    known = {one.rpartition("_")[2]: one for one in keys if one.rpartition("_")[0] == name}
+    for ending, one in known.items():
+        if size := SIZES.get(ending, {}).get(unit):
+            number = f": {value * size:g}" if isinstance(value, int | float) else ""
+            return f": write {one}{number}, in {UNITS[ending]}"
+    if name == "period" and "rate_hz" in keys and isinstance(value, int | float) and value > 0:
+        return f": write rate_hz: {1 / value:.4g}, in messages a second"
+    return ""
 
 
 def _message(model: type[BaseModel], path: KeyPath, detail: ErrorDetails) -> str:
@@ -171,7 +203,7 @@ def _message(model: type[BaseModel], path: KeyPath, detail: ErrorDetails) -> str
         ),
         "literal_error": lambda: _literal(value, context["expected"]),
         "string_too_long": lambda: f"has at most {context['max_length']} characters, not {len(value)}",
-        "too_long": lambda: f"has at most {context['max_length']}, not {context['actual_length']}",
+        "too_long": lambda: f"has at most {context['max_length']} items, not {context['actual_length']}",
         "too_short": lambda: f"needs at least {context['min_length']}, has {context['actual_length']}",
     }
     if kind in words:
@@ -220,17 +252,53 @@ def _plain_number(key: str, text: str) -> str:
 
 def _other_shape(path: KeyPath, kind: str, value: object) -> str:
     """Return what is missing, or too much, where a list is a map, a map is a text, and the like."""
+    if MUST_BE[kind] == "a list":
+        return _list_of(value)
+    if MUST_BE[kind] == "a whole number" and isinstance(value, list):
+        return f": write how many there are, {len(value)}"
+    if MUST_BE[kind] == "true or false" and (meant := TRUE_FALSE.get(str(value).lower())):
+        return f": write {meant}, without quotes"
     is_map = kind in {"dict_type", "model_type"}
-    if kind in {"tuple_type", "list_type"} and isinstance(value, dict | str):
-        if isinstance(value, dict) and value and all(str(key).startswith("/") for key in value):
+    return (_map_of(str(path[-1]), value) if is_map and path else "") or _glued(path, value, is_map=is_map)
+
+
+def _list_of(value: object) -> str:
+    """Return how a list is written that is a map, a text or a number."""
+    if isinstance(value, dict):
+        if value and not value.keys() - {"x", "y", "z"}:
+            return f": write [{', '.join(str(value[key]) for key in sorted(value))}]"
+        if value and all(str(key).startswith("/") for key in value):
             return f": each is written {{name: {next(iter(value))}, value: …}}"
-        return ": write a dash and a blank before each item, or [ and ] around them all"
+    elif isinstance(value, str) and value.startswith("("):
+        return ": a list is in [ and ], and not in ( and )"
+    elif type(value) in {str, int, float} and not re.search(r"[\s,]", str(value)):
+        return f": write [{value}]"
+    is_known = isinstance(value, dict | str)
+    return ": write a dash and a blank before each item, or [ and ] around them all" if is_known else ""
+
+
+def _glued(path: KeyPath, value: object, *, is_map: bool) -> str:
+    """Return that a key and its value are not apart, or a map's keys have dashes."""
     if is_map and isinstance(value, list) and all(isinstance(one, dict) for one in value):
         return ": its keys have no dash before them"
-    is_glued = isinstance(value, str) and is_map and re.match(r"\w+\s*[:=]?\s*\S", value)
-    if is_glued or (value is None and path and re.search(r"[:\s]", str(path[-1]))):
+    is_text = isinstance(value, str) and is_map and re.match(r"\w+\s*[:=]?\s*\S", value)
+    if is_text or (value is None and path and re.search(r"[:\s]", str(path[-1]))):
         return ": between a key and its value are a colon and a blank"
     return ""
+
+
+def _map_of(key: str, value: object) -> str:
+    """Return how a map is written that is a number, a text, or a list of texts."""
+    alone = ALONE.get(key, {}).get(type(value), "")
+    if alone and not isinstance(value, list) and not re.search(r"[\s,]", str(value)):
+        return f": write {{{alone}: {value}}}"
+    if not isinstance(value, list) or not value or not all(isinstance(one, str) for one in value):
+        return ""
+    if alone:
+        return f": write {{{alone}: [{', '.join(value[:KEYS_LISTED])}]}}"
+    pairs = [re.fullmatch(r"([\w/~-]+)(?:\s*[:=]\s*(\S+))?", one) for one in value[:KEYS_LISTED]]
+    written = [f"{pair[1]}: {pair[2] or '…'}" for pair in pairs if pair]
+    return f": write {{{', '.join(written)}}}" if len(written) == len(pairs) else ""
 
 
 def _as_named(pattern: str, text: str) -> str:

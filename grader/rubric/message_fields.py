@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from pathlib import PurePosixPath
 from typing import Any
@@ -118,8 +119,35 @@ def field_faults(rubric: WrittenRubric, known: Definitions) -> Iterator[Fault]:
         yield from _reported(criterion, known)
         yield from _other_size(criterion, rubric)
         yield from _other_definitions(criterion, known, rubric)
+    yield from _other_depths(rubric)
     for name, scenario in rubric.scenarios.items():
         yield from ((("scenarios", name, *at), fault) for at, fault in _sent_fields(scenario, known))
+
+
+def _other_depths(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield fields of a topic that are elsewhere in the rubric without what is before them, where no type is known:
+    `twist.linear.x` and `linear.x`."""
+    found: dict[str, list[tuple[KeyPath, str]]] = defaultdict(list)
+    for criterion in rubric.criteria:
+        for path, given in _maps_in(criterion.at, criterion.given):
+            topic, field = given.get("topic"), given.get("field")
+            if not isinstance(topic, str) or not isinstance(field, str):
+                continue
+            if next(types_of(topic, rubric, criterion.scenario), None) is None:
+                found[topic].append(((*path, "field"), field))
+    for topic, fields in found.items():
+        counts = Counter(field for _, field in fields)
+        for path, field in fields:
+            near = [other for other in counts if other.endswith(f".{field}") or field.endswith(f".{other}")]
+            if near and counts[near[0]] > counts[field]:
+                yield path, f"elsewhere in the rubric this field of {topic} is {near[0]}"
+
+
+def _maps_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
+    if isinstance(value, dict):
+        yield path, value
+    for key, inner in items_in(value):
+        yield from _maps_in((*path, key), inner)
 
 
 def _other_size(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:

@@ -13,6 +13,7 @@ import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache, partial
+from itertools import islice
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Literal, NamedTuple
 
@@ -26,7 +27,7 @@ from grader.files import temporary_folder
 from grader.model.verdict import Status
 from grader.portable import own_session
 from grader.rubric.yaml_lines import Fault, WrittenRubric
-from grader.wording import closest, join_words, plural
+from grader.wording import closest, did_you_mean, join_words, plural
 
 HINTS = 4
 SHOWN_TESTS = 20
@@ -416,6 +417,17 @@ PYTHON = Kind("Python file", frozenset({".py"}), "my_checks.py", MAX_BYTES)
 BAG = Kind("recording", frozenset({".bag", ".mcap"}), "bags/corridor.bag", 20 * MAX_BYTES)
 
 
+FILES_MAX = 1000
+"""So many files beside the rubric are looked at for one with a similar name."""
+
+
+def _like(wanted: PurePosixPath, there: list[str]) -> str:
+    """Return which of these files is meant: one of the same name, or of the same words in it, else one like it."""
+    words = sorted(re.split(r"[_-]", wanted.stem))
+    same = [one for one in there if sorted(re.split(r"[_-]", PurePosixPath(one).stem)) == words]
+    return f' (did you mean "{min(same)}"?)' if same else did_you_mean(str(wanted), there)
+
+
 def read_beside(folder: Path, name: str, kind: Kind = PYTHON) -> tuple[Path, bytes]:
     """Return the file of that name in the rubric's folder, or below it. Raises FileFault."""
     plain = PurePosixPath(name)
@@ -426,7 +438,9 @@ def read_beside(folder: Path, name: str, kind: Kind = PYTHON) -> tuple[Path, byt
         with path.open("rb") as file:
             raw = file.read(kind.bytes_max + 1)
     except OSError as error:
-        raise FileFault(f"{name} cannot be read beside the rubric: {error.strerror}") from error
+        there = (one.relative_to(folder).as_posix() for one in islice(folder.rglob("*"), FILES_MAX))
+        near = _like(plain, [one for one in there if one.endswith(tuple(kind.suffixes))])
+        raise FileFault(f"{name} cannot be read beside the rubric: {error.strerror}{near}") from error
     if len(raw) > kind.bytes_max:
         raise FileFault(f"{name} is larger than {kind.bytes_max // 1_000_000} MB")
     return path, raw

@@ -352,7 +352,7 @@ def _goal_faults(
 ) -> Iterator[Fault]:
     given, goal, tolerance_m = about.given, _spot(about.given.get("goal")), about.given["tolerance_m"]
     number = given.get("number", 1)
-    if goal is None or given.get("relative") is True:
+    if goal is None or given.get("relative") is True or tolerance_m < 0:
         return
     at = (*about.at, "goal")
     asked = _asked_spots(given.get("asked_on"), about.scenario)

@@ -117,6 +117,9 @@ def _launch_fault(launch: str) -> str:
         return f"is the file alone, without its package: {launch.rsplit(maxsplit=1)[-1]}"
     if "/" in launch:
         return _in_any_folder(launch)
+    stem, _, ending = launch.rpartition(".")
+    if stem and not launch.endswith(LAUNCH_ENDINGS) and closest(ending, ("launch",)):
+        return f'is this "{stem}.launch"?'
     if not launch.endswith(LAUNCH_ENDINGS):
         return f'roslaunch takes the file\'s whole name: "{launch}.launch"'
     return ""
@@ -188,7 +191,7 @@ def _of_machine(path: KeyPath, to: str, value: object, rubric: WrittenRubric) ->
         fault += "; programs of the students' own go under scripts" if path[-2:-1] == ("programs",) else ""
     elif to == "program" and value.partition("/")[0] not in own:
         fault = ros_packages().program_fault(value)
-    elif to == "dependency" and len(names := re.split(r"[.,]?\s+|,", value.strip())) > 1:
+    elif to == "dependency" and len(names := re.split(r"[.,;]?\s+|[,;]", value.strip())) > 1:
         fault = f"is one name: write {', '.join(names)}"
     elif to == "dependency":
         meant = "" if value in own else closest(value, own, cutoff=SURE)
@@ -230,7 +233,9 @@ def _misfits(one: Reference, check: Check, criterion: WrittenCriterion) -> Itera
     elif one.to in LISTED:
         words, listed = LISTED[one.to]
         value = PurePosixPath(value).name if one.to == "launch" else value
-        if value not in (there := sorted(listed(scenario))):
+        there = sorted(listed(scenario))
+        is_told = one.to == "launch" and any(_launch_fault(file).endswith("?") for file in there)
+        if value not in there and not is_told:
             yield words.format(name=name, value=value, instead=_instead(value, there))
     elif one.to == "kept":
         yield from _not_kept(name, value, [kept for _, kept in as_texts(scenario.get("keeps")) if kept])

@@ -14,6 +14,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.support.fields import is_number
+from grader.rubric.durations import probed_s
 from grader.rubric.message_fields import range_warnings
 from grader.rubric.prose_warnings import prose_warnings
 from grader.rubric.simulators import TRUE_POSE, robot_of, topics_of_programs
@@ -35,7 +36,7 @@ from grader.rubric.yaml_lines import (
     starts_of,
     texts_in,
 )
-from grader.wording import plural
+from grader.wording import plural, significant
 
 SHORT = {"limit_s": 3.0, "first_message_s": 3.0, "quiet_s": 1.0, "alive_s": 0.5, "window_s": 2.0}
 """Conditions of `until` that a correct package may miss on a busy machine if they are shorter."""
@@ -61,6 +62,7 @@ EMPTY = "std_srvs/Empty"
 def warnings(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield what may be a slip."""
     yield from _short_times(rubric)
+    yield from _long_probes(rubric)
     yield from _misnamed_processes(rubric)
     yield from _first_packages(rubric)
     yield from _lone_quotes(rubric)
@@ -121,6 +123,14 @@ def _short_times(rubric: WrittenRubric) -> Iterator[Fault]:
             if is_number(given_s) and given_s > LONG_S and at[0] == "until":
                 fault = f"{given_s:g} s are {given_s / 60:.0f} minutes, which a package that never gets there takes"
                 yield ("scenarios", name, *at), fault
+
+
+def _long_probes(rubric: WrittenRubric) -> Iterator[Fault]:
+    for name, scenario in rubric.scenarios.items():
+        limit_s, probes_s = as_map(scenario.get("until")).get("limit_s"), probed_s(scenario)
+        if is_number(limit_s) and "steps" not in scenario and 0 < limit_s <= probes_s:
+            over = f"the run is over after {limit_s:g} s, and the probes take {significant(probes_s)} s"
+            yield ("scenarios", name, "until", "limit_s"), f"{over}: give it longer"
 
 
 def _lone_quotes(rubric: WrittenRubric) -> Iterator[Fault]:

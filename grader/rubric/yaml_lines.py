@@ -51,6 +51,9 @@ YAML_PROBLEMS = {
     "expected ',' or '}'": "the {{ of line {line} is not closed, or a comma is missing between its keys",
     "expected ',' or ']'": "the [ of line {line} is not closed, or a comma is missing between its items",
     "unexpected end of stream": "^a quotation mark that is not closed",
+    "expected alphabetic or numeric character": (
+        "between & or * and the name behind it is no blank: text that begins with one of them needs quotes"
+    ),
     "undefined alias": "nothing above has this name, with &: text that begins with * needs quotes",
     "the node content": "a comma, or a bracket, too many",
 }

@@ -85,7 +85,7 @@ SLASH = 'a name of the graph begins with a slash: "/x"'
             "path",
             {"topic": "/x", "points": [[0, 1, 2]], "tolerance_m": 1},
             ("points", 0),
-            "has at most 2, not 3",
+            "has at most 2 items, not 3",
         ),
         (
             "path",

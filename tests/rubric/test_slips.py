@@ -340,7 +340,6 @@ def test_a_name_that_is_a_letter_off_is_refused(examples: Path, slip: tuple[str,
     [
         ("own-message", "field: temperature", "field: humidity"),
         ("two-packages", "{temperature: 29}", "{temperature: 29, wind: 3}"),
-        ("scan-to-cmd-vel", "field: linear.x, value: 0.2", "field: twist.linear.x, value: 0.2"),
         ("tf-broadcaster", "transforms[*].header", "transforms[*].header.stamp"),
         ("action-server", "result: {total: 5}", "result: {total: 5, seconds: 1}"),
         ("own-message", "temperature: float64", "temperature: thermometer/Pose"),
