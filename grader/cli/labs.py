@@ -28,6 +28,7 @@ from grader.authoring.mutation.faulty_packages import (
     plan_declared,
     refuse_unfit,
     select_mutants,
+    why_not_killed,
 )
 from grader.authoring.mutation.rubric_test import Plan, run_test
 from grader.authoring.mutation.solution import (
@@ -169,6 +170,8 @@ def _open(mutant: MutantResult) -> Iterator[Text]:
     yield Text(f"{mutant.state}: {visible(mutant.label)}", "bold red")
     if mutant.mistake:
         yield Text(f"  {visible(mutant.mistake)}")
+    if mutant.expected is None and not mutant.error:
+        yield Text(f"  {why_not_killed(mutant)}", "yellow")
     if mutant.error:
         yield Text(f"  not graded: {line(mutant.error, TEXT_CHARS)}")
     for words, names in (

@@ -34,7 +34,7 @@ from grader.rubric.find import rubrics_folder, short_path
 from grader.rubric.load import LoadedRubric, refuse_newer
 from grader.rubric.model import Rubric
 from grader.rubric.yaml_lines import Fault, KeyPath, Source, as_map, as_maps, read_source
-from grader.wording import did_you_mean, first_few
+from grader.wording import did_you_mean, first_few, join_words
 
 FILES_SHOWN = 8
 HEADER = """\
@@ -130,9 +130,17 @@ def mutants_text(rubric: str, mutants: dict[str, Mutant], results: Sequence[Muta
         costs = {criterion.id: criterion.status for criterion in result.lost}
         text = _mutant_text(result.name, mutants[result.name], costs)
         if result.state in NOT_KILLED:
-            text = "".join(f"  # {line.strip()}\n" for line in [NOT_KILLED[result.state], *text.splitlines()])
+            text = "".join(f"  # {line.strip()}\n" for line in [why_not_killed(result), *text.splitlines()])
         parts.append(text)
     return "\n".join(parts)
+
+
+def why_not_killed(result: MutantResult) -> str:
+    """Return why a mutant of which nothing is declared was not killed."""
+    if result.state == "survived" and result.lost:
+        ids = join_words([criterion.id for criterion in result.lost])
+        return f"costs no points: the rubric notices it in {ids}, which is advice"
+    return NOT_KILLED.get(result.state, "")
 
 
 def _mutant_text(name: str, mutant: Mutant, costs: dict[str, str]) -> str:

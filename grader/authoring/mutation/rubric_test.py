@@ -245,7 +245,7 @@ def find_lost(
 def compare(
     expected: dict[str, Cost] | None, criteria: Sequence[CriterionResult], ignored: Collection[str] = ()
 ) -> Comparison:
-    """Compare a mutant's verdicts with what it must lose; without a declaration, anything lost kills it.
+    """Compare a mutant's verdicts with what it must lose; without a declaration, any points that are lost kill it.
 
     `ignored` are criteria that the reference solution does not reach either.
     """
@@ -254,7 +254,7 @@ def compare(
         return Comparison(state="inconclusive")
     lost = {name: status.value for name, status in found.items() if status.is_lost}
     if expected is None:
-        return Comparison(state="killed" if lost else "survived")
+        return Comparison(state="killed" if any(c.id in lost and c.counts for c in criteria) else "survived")
     known = {c.id for c in criteria}
     missing = tuple(
         name if name in known else f"{name} (the rubric has no such criterion)"

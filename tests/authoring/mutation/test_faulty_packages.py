@@ -171,7 +171,11 @@ def test_a_written_file_declares_what_was_lost(tmp_path):
             mistake="",
             state=("survived", "killed", "inconclusive")[index % 3],
             expected=None,
-            lost=(lost("chatter-rate", "fail"), lost("talker-node", "blocked")) if index % 3 == 1 else (),
+            lost=(
+                (lost("chatter-rate", "fail"), lost("talker-node", "blocked"))
+                if index % 3 == 1
+                else (lost("dependencies", "fail"),) * (index % 6 == 3)
+            ),
             diff="",
             wall_s=1,
         )
@@ -188,7 +192,9 @@ def test_a_written_file_declares_what_was_lost(tmp_path):
     assert all(
         m.expect == {"chatter-rate": "fail", "talker-node": "blocked"} for m in loaded.mutants.values()
     )
-    assert text.count("# costs nothing: the rubric does not notice this mistake") == len(planned[::3])
+    assert text.count("# costs nothing: the rubric does not notice this mistake") == len(planned[::6])
+    noticed = "# costs no points: the rubric notices it in dependencies, which is advice"
+    assert text.count(noticed) == len(planned[3::6]) > 0
 
 
 def test_the_example_is_sound(tmp_path):

@@ -240,6 +240,12 @@ def test_advice_that_the_reference_gets_too_is_no_loss():
     assert [c.id for c in find_lost(found, {"advice"})] == ["a"]
 
 
+def test_advice_alone_kills_no_mutant():
+    found = [*criteria(a="pass"), criterion("advice", "fail", 0, 0, message="about advice")]
+    assert compare(None, found).state == "survived"
+    assert compare(None, [*found, *criteria(b="blocked")]).state == "killed"
+
+
 def test_a_person_gives_no_points_away():
     assert find_lost(criteria(a="pass", b="manual")) == ()
 
