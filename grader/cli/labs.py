@@ -78,7 +78,7 @@ def plan_test(
     loaded = load_rubric(rubric)
     reference = reference_at(solution) if solution else find_reference(loaded)
     correct = load_solution(reference, loaded.rubric.package)
-    mutants, unfit = _plan_mutants(
+    correct, mutants, unfit = _plan_mutants(
         loaded, correct, own=solution is not None, everything=everything is not None
     )
     picked = select_mutants(mutants, only)
@@ -102,15 +102,23 @@ def plan_test(
 
 def _plan_mutants(
     loaded: LoadedRubric, solution: Solution, *, own: bool, everything: bool
-) -> tuple[list[Planned], list[str]]:
-    """Return the mutants, and the declared ones that do not fit a solution of the user's `own`."""
+) -> tuple[Solution, list[Planned], list[str]]:
+    """Return the solution with its mutants, and the declared ones that do not fit one of the user's `own`. Raises
+    RubricError where none of them fits."""
     file = None if everything else mutants_file(loaded)
     if file is None:
-        return plan_all(solution), []
-    mutants, unfit = plan_declared(load_mutants(file, loaded.rubric), solution)
-    if not own:
+        return solution, plan_all(solution), []
+    declared = load_mutants(file, loaded.rubric)
+    mutants, unfit = plan_declared(declared, solution)
+    if own and unfit and not solution.folder:
+        # the package's own folder was given, and the file may have its paths from the folder around that
+        around = solution.in_folder()
+        there, more = plan_declared(declared, around)
+        if len(more) < len(unfit):
+            solution, mutants, unfit = around, there, more
+    if not own or not mutants:
         refuse_unfit(unfit)
-    return mutants, unfit
+    return solution, mutants, unfit
 
 
 def run_plan(plan: Plan, *, temporary: bool) -> RubricTest:
@@ -202,7 +210,8 @@ def _summary(test: RubricTest) -> Iterator[Text]:
         yield Text(f"not tried: {visible(fault)}", "yellow")
     if test.uncosted:
         names = ", ".join(test.uncosted)
-        yield Text(f"No mutant costs {names}: add mutants that do, to show that these criteria work", "red")
+        which = "No mutant that was tried" if test.unfit else "No mutant"
+        yield Text(f"{which} costs {names}: add mutants that do, to show that these criteria work", "red")
     killed = sum(mutant.state == "killed" for mutant in test.mutants)
     text = f"{test.rubric.id}: {killed} of {len(test.mutants)} mutants killed, {test.wall_s:.0f} s"
     yield Text(text, "bold green" if test.passed else "bold red")
@@ -285,7 +294,7 @@ def _correct(lab: str) -> tuple[LoadedRubric, Solution]:
 
 
 def _mistakes(loaded: LoadedRubric, correct: Solution) -> list[Planned]:
-    return _plan_mutants(loaded, correct, own=True, everything=False)[0]
+    return _plan_mutants(loaded, correct, own=True, everything=False)[1]
 
 
 def _find_mistake(planned: list[Planned], name: str) -> Planned:

@@ -269,6 +269,13 @@ class Solution:
     def then(self, tree: Tree) -> Solution:
         return replace(self, tree=tree)
 
+    def in_folder(self) -> Solution:
+        """Return the same, with all files in a folder of the package's name."""
+        folder = f"{self.name}/"
+        return replace(
+            self, tree={folder + name: file for name, file in self.tree.items()}, folder=folder + self.folder
+        )
+
 
 # ---- where a lab's correct package is
 

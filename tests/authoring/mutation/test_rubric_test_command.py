@@ -187,6 +187,26 @@ def test_a_solution_of_ones_own_may_lack_places(judge, capsys, tmp_path):
     assert "listener-numeric" in data["uncosted"]
 
 
+def test_the_folder_of_the_package_alone_is_a_solution_too(judge, capsys):
+    package = ROOT / "reference_solutions" / LAB / "lab1"
+    assert run(["rubric", "test", LAB, "--solution", str(package)]) == 0
+    assert f"{COUNT} of {COUNT} mutants killed" in capsys.readouterr().out
+
+
+def test_where_no_mutant_fits_nothing_is_graded(judge, capsys, tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "package.xml").write_text("<package><name>lab1</name></package>")
+    (tmp_path / "mutants").mkdir()
+    rubric = tmp_path / f"{LAB}.yaml"
+    rubric.write_bytes((ROOT / "rubrics" / f"{LAB}.yaml").read_bytes())
+    mutant = "  a:\n    expect: {build: fail}\n    edits: [{delete: {file: lab1/no.py}}]\n"
+    head = f"schema: grader.mutants/1\nrubric: {LAB}\nmutants:\n"
+    (tmp_path / "mutants" / f"{LAB}.yaml").write_text(head + mutant)
+    assert run(["rubric", "test", str(rubric), "--solution", str(tmp_path / "mine")]) == 2
+    assert "mutants.a: delete: there is no file 'lab1/no.py'" in capsys.readouterr().err
+    assert left(judge) == []
+
+
 @pytest.mark.parametrize(
     ("argv", "message"),
     [
