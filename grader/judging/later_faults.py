@@ -446,12 +446,11 @@ class Later:
             yield from self._retype("subscribe with", sent[0], types[0])
         elif other and told:
             yield from self._fields(own, types[0])
-        # else ROS has called it, and the verdict says what happened
-        unheard = elsewhere or other or not self._ran
+        unheard = elsewhere or other or not self._ran  # else ROS has called it, and the verdict says it
         for slip in self._of(*OF_CALLBACKS) if unheard and len(heard) <= 1 else ():
             if self._is_given(slip.name):
-                placed = slip.fix.startswith("on line ")
-                yield Fix(slip.fix if placed else f"on {_line(slip)}, {slip.fix}", (slip.fix,))
+                at = "" if slip.fix.startswith("on line ") else f"on {_line(slip)}, "
+                yield Fix(f"{at}{slip.fix}", (slip.fix,))
         other_type = types[0].message if other else ""
         yield from self._printed(heard, other_type, of_text=own == "String")
         for slip in self._of("takes-number") if other and own == "String" else ():
@@ -483,11 +482,12 @@ class Later:
             yield Fix(f"{wanted} {there}", general=f"{wanted}, {IN_OWN_WORDS}")
         elif self._lacks_words(template.partition(VALUE)[0]):
             yield Fix(f"{wanted}{' first in the callback' if other_type else ''}")
-        elif other_type and not said and len(self._of("prints")) == 1:
-            only = self._of("prints")[0]  # it prints a field that the right type does not have
-            says_it = " ".join(template.partition(VALUE)[0].split()) in " ".join(only.message.split())
-            what = "the `data` of the message" if says_it else f"'{in_words(template)}'"
-            yield Fix(f"print {what} on {_line(only)}", general=f"print {what}, {IN_OWN_WORDS}")
+        elif other_type and not said and len(prints := self._of("prints")) == 1:  # of a field it lacks
+            says_it = " ".join(template.partition(VALUE)[0].split()) in " ".join(prints[0].message.split())
+            what, at = "the `data` of the message" if says_it else f"'{in_words(template)}'", _line(prints[0])
+            types = self._of("subscriber-type") if says_it else ()
+            if not any(at in fix.text for one in types for fix in self._fields("String", one)):
+                yield Fix(f"print {what} on {at}", general=f"print {what}, {IN_OWN_WORDS}")
 
     def _made_elsewhere(self, wanted: str, types: Iterable[PythonSlip]) -> Iterator[Fix]:
         """Yield the other lines that make messages of the wrong type, and the fields that only these have."""

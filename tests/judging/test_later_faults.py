@@ -321,6 +321,21 @@ def test_a_text_that_another_function_prints_is_not_the_messages() -> None:
     assert hint.endswith(f"not Colour{IMPORTED} and print 'I heard <message>' first in the callback")
 
 
+def test_a_field_that_is_told_with_its_line_is_not_told_as_the_messages_data_too() -> None:
+    heard = [NODE | ROOT, HEARS | {"requires": ["node"]}]
+    slips = [
+        slip("subscriber", "chatter", 3),
+        slip("subscriber-type", "Twist", 3),
+        slip("prints", "I heard {}", 2),
+    ]
+    source = "def show(msg):\n    print('I heard', msg.linear)\nrospy.Subscriber('chatter', Twist, show)\n"
+    hint = hint_of("node", DIES, heard, *slips, source=source)
+    assert f"in place of `linear` on line 2 of {FILE}" in hint
+    assert "print the `data`" not in hint
+    whole = source.replace("msg.linear", "msg")
+    assert "print the `data` of the message on line 2" in hint_of("node", DIES, heard, *slips, source=whole)
+
+
 @pytest.mark.parametrize(
     ("callback", "told"),
     [
