@@ -61,9 +61,9 @@ def cite_source(
     paths |= {one.before for one in renamed if PurePosixPath(one.after).name in started}
     lines = [one for one in _read(build, paths) if not one.text.lstrip().startswith(("#", "//"))]
     found = _lines_to_blame(verdict, criterion, lines)
-    if len(found) != 1 and not (found and _field_of(verdict, criterion)):
-        return verdict
     is_sent = criterion.check == "message" or _field_of(verdict, criterion)
+    if not found or (len(found) > 1 and not is_sent):
+        return verdict
     made = line_that_makes(lines, found[0]) if is_sent and len(found) == 1 else None
     places = (FileCitation(file=one.file, line=one.number) for one in (made, *found) if one is not None)
     return verdict.model_copy(update={"citations": (*places, *verdict.citations)})
@@ -116,8 +116,9 @@ def _lines_that_do(verdict: Verdict, criterion: Criterion, lines: list[SourceLin
         case "prints" | "topic-type" | "node-name":
             found = _that_name(verdict.basis.said, criterion, lines)
         case "message":
-            found = lines_that_say(lines, verdict.basis.said or verdict.measured)
-            found = _published_of(found, lines, criterion)
+            saying = lines_that_say(lines, verdict.basis.said or verdict.measured)
+            found = _published_of(saying, lines, criterion)
+            found = found if len(found) == 1 else _alike(saying)
         case "stamps":
             found = _published_of(lines_that_set(lines, "stamp"), lines, criterion)
         case _ if field := _field_of(verdict, criterion):
@@ -141,6 +142,11 @@ def _that_advertise(lines: list[SourceLine], topic: str, kind: str) -> list[Sour
     name = re.escape(topic.rpartition("/")[2])
     call = re.compile(rf"""\b(?:advertise|Publisher)\b.*["'](?:/?\w+/)*/?{name}["']""")
     return [one for one in lines if call.search(one.text) and re.search(rf"\b{kind}\b", one.text)]
+
+
+def _alike(saying: list[SourceLine]) -> list[SourceLine]:
+    """Return a few lines of one file that say the same; none where they are more, or of several files."""
+    return saying if len(saying) <= SAME_MAX and len({one.file for one in saying}) == 1 else []
 
 
 def _that_say(verdict: Verdict, criterion: Criterion, lines: list[SourceLine]) -> list[SourceLine]:

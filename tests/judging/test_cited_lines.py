@@ -145,6 +145,17 @@ def test_what_is_wrong_in_a_message_is_shown_where_it_is_set_or_published(
     assert found.citations == ((FileCitation(file=SCRIPT["path"], line=line + 1),) if line else ())
 
 
+@pytest.mark.parametrize(("count", "lines"), [(2, [2, 3]), (3, [2, 3, 4]), (4, [])])
+def test_a_text_that_several_lines_may_have_given_is_shown_at_each(count: int, lines: list[int]) -> None:
+    lab = rubric({"id": "sent", "scenario": "talker", **SENT})
+    source = "#!\n" + "pub.publish(rospy.get_param(name, 'hello world'))\n" * count
+    package = {"package": {"files": [SCRIPT]}, "attachments": {SCRIPT["path"]: source}}
+    runs = build_runs({"runs": {"package": package}})
+    verdict = failed("a message reads 'hello world', not 'hello world <seconds>'").about(said="hello world")
+    found = cite_source(verdict, lab.criteria[0], try_facts(lab, runs), runs["package"])
+    assert [one.line for one in found.citations] == lines
+
+
 @pytest.mark.parametrize(
     ("source", "line"),
     [
