@@ -78,6 +78,9 @@ class LaunchNode(Placed, Record):
     """Attributes that roslaunch does not know."""
     renaming: tuple[LaunchLine, ...] = ()
     """The `<remap>`s and `ns` in force, in the file's order."""
+    by_args: tuple[LaunchLine, ...] = Field(default=(), exclude_if=lambda value: not value)
+    """Where `pkg`, `type` or `name`, which is the `tag`, is only a `$(arg …)`: the `<arg>` that gives it, by its
+    `default` or `value`, which is the `value`."""
 
     @property
     def full_name(self) -> str:

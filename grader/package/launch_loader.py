@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import PurePosixPath
@@ -110,9 +110,17 @@ def node_of(element: etree._Element, scope: Scope, remapping: Sequence[etree._El
         file=scope.file,
         namespace=below.namespace,
         renaming=renaming,
+        by_args=tuple(_by_args(element, scope)),
         uncertain=scope.uncertain,
         unknown=(*unknown_attributes(element), *scope.unknown),
     )
+
+
+def _by_args(element: etree._Element, scope: Scope) -> Iterator[LaunchLine]:
+    """Yield the `<arg>`s that give the node's names, where they are nothing else."""
+    for name in ("pkg", "type", "name"):
+        if place := scope.place_of(element.get(name)):
+            yield place.model_copy(update={"tag": name})
 
 
 class _Loader:
@@ -313,10 +321,11 @@ def _included(element: etree._Element, scope: Scope, path: str) -> Scope:
     for child in element.iterchildren("arg"):
         if wanted(child, scope):
             value = scope.get(child, "value") or scope.get(child, "default") or ""
-            given = given.model_copy(update={"args": {**given.args, child.get("name") or "": value}})
+            given = given.model_copy(update=_given(child, scope, given, child.get("name") or "", value))
     args = {**scope.args, **given.args} if passed else given.args
+    places = {**scope.places, **given.places} if passed else given.places
     inside = scope.below(scope.get(element, "ns"), element)
-    return inside.model_copy(update={"file": path, "args": args})
+    return inside.model_copy(update={"file": path, "args": args, "places": places})
 
 
 _TOLD_APART = re.compile(r"\d|[xyz]\b|[xyz](?=_)|(?<=_)[xyz]|(?<![^\W_])[a-z](?![^\W_])")
@@ -337,7 +346,16 @@ def _with_arg(element: etree._Element, scope: Scope) -> Scope:
     # What is given from outside goes before the file's own default.
     if value is None and (default is None or name in scope.args):
         return scope
-    return scope.model_copy(update={"args": {**scope.args, name: value if value is not None else default}})
+    return scope.model_copy(
+        update=_given(element, scope, scope, name, value if value is not None else default)
+    )
+
+
+def _given(element: etree._Element, scope: Scope, to: Scope, name: str, value: str | None) -> dict[str, Any]:
+    """Return the arguments of `to` with one more, that the `<arg>` gives, and where each stands."""
+    attribute = "default" if element.get("value") is None else "value"
+    place = scope.place_of(element.get(attribute)) or _line(element, scope, attribute)
+    return {"args": {**to.args, name: value}, "places": {**to.places, name: place}}
 
 
 def _line(element: etree._Element, scope: Scope, value: str | None) -> LaunchLine:
@@ -378,6 +396,7 @@ class Scope(Record):
     own: tuple[str, ...]
     namespace: str = "/"
     args: Mapping[str, str] = Field(default_factory=dict)
+    places: Mapping[str, LaunchLine] = Field(default_factory=dict)
     remaps: Remaps = ()
     renaming: tuple[LaunchLine, ...] = ()
     private: tuple[LaunchParam, ...] = ()
@@ -394,6 +413,12 @@ class Scope(Record):
         """Return an attribute resolved, None where it is not there."""
         written = element.get(name)
         return None if written is None else self.text(written)
+
+    def place_of(self, written: str | None) -> LaunchLine | None:
+        """Return the `<arg>` that gives a text that is nothing but a `$(arg …)`."""
+        found = _SUBSTITUTION.fullmatch((written or "").strip()[:_VALUE_CHARS_MAX])
+        words = found[1].split() if found else []
+        return self.places.get(words[1]) if len(words) == 2 and words[0] == "arg" else None
 
     def of(self, element: etree._Element) -> Scope:
         """Return the scope in the element, as far as its own conditions go."""

@@ -212,10 +212,21 @@ def program_of_source(package: PackageFacts, name: str) -> str:
 
 
 def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip | None:
-    """Return why a node cannot start by what the file says of it. Names with `$(…)` are roslaunch's to resolve.
+    """Return why a node cannot start by what the file says of it, at the `<arg>` that gives its wrong name, if one
+    does. Names with `$(…)` are roslaunch's to resolve.
 
     `said` is what roslaunch said: a package that it does not find is a slip, any other is not this package's.
     """
+    slip = _slip_of_node(package, node, said)
+    named = re.compile(r'(pkg|type|name)="([^"$]+)"')
+    found = named.fullmatch(slip.fix.removeprefix("write ")) if slip is not None else None
+    place = next((one for one in node.by_args if found and one.tag == found[1]), None)
+    if slip is None or found is None or place is None:
+        return slip
+    return slip._replace(file=place.file, line=place.line, fix=f'write {place.value}="{found[2]}"')
+
+
+def _slip_of_node(package: PackageFacts, node: LaunchNode, said: str) -> Slip | None:
     if missing := [a for a in ATTRIBUTES if not (getattr(node, a) or "").strip()]:
         return _lacking(package, node, missing)
     pkg, name = str(node.pkg), str(node.type)
