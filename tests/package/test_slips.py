@@ -133,6 +133,8 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
     ("text", "found"),
     [
         (node(LOOP + "        p.publish(1)\n") + CALLED, []),
+        (OF_A + "class S(ActionServer):\n    def go(self):\n        self.__init__(auto_start=False)\nS()\n",
+         [("not-started", 7, "the action server of line 7 is never started")]),
         (node(LOOP + "        p.publish(1)\n"), [("never-called", 2, "nothing calls `main()`")]),
         (node("    rospy.spin()\n") + "if __name__ == 'main':\n    main()\n",
          [("main-guard", 5, "`__name__` is never 'main'")]),

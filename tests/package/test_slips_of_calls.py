@@ -194,3 +194,22 @@ def test_a_decorator_that_returns_nothing(end: str, given: str, fixes: list[str]
     (tmp_path / "a.py").write_text(DECORATOR.format(end, given))
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name.startswith("decorator")]
     assert [s.fix for s in slips] == fixes
+
+
+CANCELLED = {
+    "s = ActionServer('/c', A, self.go, auto_start=False)": "on line 1, write `self.on_cancel` behind `self.go`",
+    "s = actionlib.ActionServer('/c', A, begin)": "on line 1, write `on_cancel` behind `begin`",
+    "s = ActionServer('/c', A, self.on_goal, self.stop, auto_start=False)": "",
+    "s = ActionServer('/c', A, begin, cancel_cb=stop)": "",
+    "s = SimpleActionServer('/c', A, begin)": "",
+    "class J(Thread):\n    pass\njob = J(1)\njob.run()": "on line 4, write `job.start()`",
+    "class J(threading.Thread):\n    pass\njob = J(1)\njob.start()": "",
+    "class J:\n    pass\njob = J(1)\njob.run()": "",
+}
+
+
+@pytest.mark.parametrize("text", CANCELLED)
+def test_goals_that_are_never_cancelled(text: str, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"{text}\n")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "uncancelled"]
+    assert [s.fix for s in slips] == ([CANCELLED[text]] if CANCELLED[text] else [])

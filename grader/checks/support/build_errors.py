@@ -21,7 +21,14 @@ from grader.checks.support.cpp_errors import (
     told,
 )
 from grader.checks.support.missing_packages import is_declared, missing_package
-from grader.checks.support.scripts import CPP_SUFFIXES, OF_FILES, OF_INTERFACES, cmake_calls, installed
+from grader.checks.support.scripts import (
+    CPP_SUFFIXES,
+    OF_FILES,
+    OF_INTERFACES,
+    cmake_calls,
+    installed,
+    own_header,
+)
 from grader.checks.support.text import in_one_line, near_names, shown
 from grader.installable import (
     LIBRARIES,
@@ -371,7 +378,9 @@ def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[st
             why = f"{text}: the build makes {found[2]}.h in {package.name}/, the package's name"
             why += lacks and f", once CMakeLists.txt calls {lacks}(…)"
             return Explained(why, f'write `#include "{package.name}/{found[2]}.h"`', uncalled=lacks)
-        return Explained(f"{text}: there is no such header", "check the #include and find_package(…)")
+        hint = own_header(package, f"{found[1]}/{found[2]}.h")
+        why = "the compiler does not look into its folder" if hint else "there is no such header"
+        return Explained(f"{text}: {why}", hint or "check the #include and find_package(…)")
     return _unwaited(package, text, "its message", OWN_TARGETS, lines)
 
 

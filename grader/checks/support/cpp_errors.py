@@ -7,7 +7,13 @@ import re
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from grader.checks.support.scripts import CPP_SUFFIXES, cmake_calls, part_not_linked, path_in_package
+from grader.checks.support.scripts import (
+    CPP_SUFFIXES,
+    cmake_calls,
+    own_header,
+    part_not_linked,
+    path_in_package,
+)
 from grader.checks.support.text import near_names, shown
 from grader.installable import noetic_messages
 from grader.model.package import CMAKE, PackageFacts
@@ -418,9 +424,9 @@ def _explain_unlinked(found: re.Match[str], package: PackageFacts, lines: Sequen
     if name.startswith("ros::") and catkin and not alone and not any("roscpp" in c.args for c in catkin):
         words = "roscpp" if "COMPONENTS" in catkin[0].args else "COMPONENTS roscpp"
         return Explained(why, f"in the find_package(…) on line {catkin[0].line}, add {words}")
-    if not name.startswith("ros::") and (part := part_not_linked(package)):
-        return Explained(why, part)
-    return Explained(why, f"write {call_below(program, 'target_link_libraries', '${catkin_LIBRARIES}')}{own}")
+    part = "" if name.startswith("ros::") else part_not_linked(package)
+    hint = f"write {call_below(program, 'target_link_libraries', '${catkin_LIBRARIES}')}{own}"
+    return Explained(why, part or hint)
 
 
 def programs_without(package: PackageFacts, command: str) -> list[str]:
@@ -570,10 +576,7 @@ CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
     (r'dependencies to non-existent target "([^"]+)"', _missing_target),
     (r'link libraries for target "([^"]+)" which is not built', _missing_target),
     (r'install TARGETS given target "([^"]+)" which does not exist', _missing_target),
-    (
-        _UNKNOWN_KEYWORD,
-        _unknown_keyword,
-    ),
+    (_UNKNOWN_KEYWORD, _unknown_keyword),
 )
 
 
@@ -583,14 +586,17 @@ def missing_header(found: re.Match[str], package: PackageFacts, _lines: Sequence
     near = near_names(posixpath.basename(header), [posixpath.basename(f.path) for f in package.files])
     if near or "/" not in header or header.partition("/")[0] == package.name:
         fix = f"write {near[0]} in the #include" if near else f"push {header}, or correct the #include"
-        return Explained(f"there is no header {header}", fix)
+        there = own_header(package, header)
+        return Explained(
+            f"there is no header {header}{' where one is looked for' * bool(there)}", there or fix
+        )
     why = f"it needs the header {header} of a library that this grading machine lacks"
-    own = "a header of the student's own has to be pushed"
-    hint = f"{ON_THE_MACHINE}install the library of {header}, then grade again; {own}"
-    return Explained(why, hint, of_machine=True)
+    hint = f"{ON_THE_MACHINE}install the library of {header}, then grade again; "
+    return Explained(why, f"{hint}a header of the student's own has to be pushed", of_machine=True)
 
 
 def missing_link(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     why = f"it is linked with the library {found[1]}, which this grading machine lacks"
-    hint = f"{ON_THE_MACHINE}install the library {found[1]}, then grade again"
-    return Explained(why, hint, of_machine=True)
+    return Explained(
+        why, f"{ON_THE_MACHINE}install the library {found[1]}, then grade again", of_machine=True
+    )

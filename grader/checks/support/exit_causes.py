@@ -395,12 +395,8 @@ OF_OTHER_LINES = {
 
 
 EXPLAINED_ELSEWHERE = {
-    "TypeError",
-    "UnboundLocalError",
-    "ValueError",
-    "KeyError",
-    "ROSSerializationException",
-}
+    "TypeError", "UnboundLocalError", "ValueError", "KeyError", "IndexError", "ROSSerializationException",
+}  # fmt: skip
 
 
 def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
@@ -412,6 +408,7 @@ def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts
     if found.kind == "TypeError":
         hidden += [s for s in own if (s.kind, s.line) == ("defined-twice", place.line)]
     hidden += [s for s in own if (s.name, s.line) == ("letters", place.line)]
+    hidden += [s for s in own if (s.name, found.kind) == ("edge", "IndexError")]
     if hidden and found.kind in EXPLAINED_ELSEWHERE:
         return hidden[0].message, hidden[0].fix
     if found.kind in {"NameError", "UnboundLocalError"}:

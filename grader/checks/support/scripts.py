@@ -198,6 +198,18 @@ def sources_made(package: PackageFacts, call: CMakeCall) -> set[str]:
     return sources.union(*(libraries[name].args[1:] for name in targets & libraries.keys()))
 
 
+def own_header(package: PackageFacts, header: str) -> str:
+    """Return how to have a header of the package's own found; "" where there is none of that name."""
+    path = next((f.path for f in package.files if f"/{f.path}".endswith(f"/{header}")), "")
+    folder = path.removesuffix(header).rstrip("/")
+    if not folder or folder == "src":
+        return ""
+    given = next(iter(cmake_calls(package, "include_directories")), None)
+    if given is None:
+        return f"write include_directories({folder} ${{catkin_INCLUDE_DIRS}}) above add_executable(…) in CMakeLists.txt"
+    return f"add {folder} to the include_directories(…) on line {given.line} of {given.file}"
+
+
 def part_not_linked(package: PackageFacts) -> str:
     """Return how to link what of the package's own C++ is in no program: a library, or a source; "" where it is not
     plain which."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from grader.checks.registry import Check
 from grader.checks.support.processes import ends_twice
 from grader.checks.support.scans import begins_ahead
@@ -15,7 +17,7 @@ SEEN_AS = {
     "nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": "", "added": "",
     "step": "order", "cut": "place", "half": "value", "secs": "never", "mean": "", "unset": "value",
     "stuck": "stuck", "edge": "place", "times": "order", "early": "value",
-    "frames": "frames",
+    "frames": "frames", "shared": "value", "rows": "order",
 }  # fmt: skip
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so; others always show."""
 
@@ -35,7 +37,7 @@ STEERING = (
 OF_STEERING = ("ends-at", "stays-within", "path", "reacts")
 """What leads a robot astray wherever its script computes so, and the checks of what a robot does."""
 
-PRIVATE, COPIES = "private ", ("copied", "argv")
+PRIVATE, COPIES = "private ", ("copied", "argv", "uncancelled")
 OF_ARGUMENTS = ("prints", "calls")
 """Checks of what a node makes of its command line."""
 OF_CONNECTIONS = ("launch-connects", "connected", "topic-type", "rate", "latched")
@@ -53,7 +55,7 @@ def is_private_there(slip: PythonSlip, run: Run) -> bool:
     return any(f"{node}/{name}" in end for node in nodes for name in names for end in ends)
 
 
-def _may_show(slip: PythonSlip, check: Check, run: Run, *, of_values: bool) -> bool:
+def _may_show(slip: PythonSlip, check: Check, run: Run, verdict: Verdict, *, of_values: bool) -> bool:
     """Return whether a check may see what a line makes wrong."""
     if slip.name.startswith(PRIVATE):
         return is_private_there(slip, run)
@@ -61,7 +63,25 @@ def _may_show(slip: PythonSlip, check: Check, run: Run, *, of_values: bool) -> b
         return check.name in OF_ARGUMENTS
     if slip.name == "side" and not begins_ahead(run):
         return False
+    if slip.name == "uncancelled":
+        return "cancelled" in verdict.message
     return of_values and not slip.name.startswith("decorator ")  # of these an exception tells
+
+
+SLOW_HZ = 2.0
+"""A robot that steers so seldom has turned too far before the next velocity comes."""
+
+
+def _by_slow_loop(package: PackageFacts, files: Collection[str | None], verdict: Verdict) -> Verdict:
+    """Return a robot's lost mark with the loop of its script that goes round too seldom to steer."""
+    rates = [s for s in package.slips if s.kind == "rate-number" and s.file in files]
+    slow = [s for s in rates if float(s.message) <= SLOW_HZ]
+    if len(rates) != 1 or not slow:
+        return verdict
+    one = slow[0]
+    why = f"line {one.line} of {one.file} lets it steer at {one.message} Hz, and each velocity lasts until the next one"
+    hint = f"on line {one.line} of {one.file}, let it come round more often, as 10 or 20 times a second"
+    return verdict.explained(why, hint, (one.place,), cause=why)
 
 
 def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
@@ -86,7 +106,7 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
     if check.name == "action-result" and verdict.basis.wrong != "nothing" and ends_twice(run):
         kinds.append("goes-on")
     found = [s for s in package.slips if s.kind in kinds and s.file in files]
-    found = [s for s in found if _may_show(s, check, run, of_values=of_values)]
+    found = [s for s in found if _may_show(s, check, run, verdict, of_values=of_values)]
     # feedback that is not sent explains only what is missing of it
     found = [s for s in found if "publish_feedback" not in s.fix or "feedback" in verdict.message]
     wrong = verdict.basis.wrong
@@ -102,6 +122,8 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
     turns = any(word in verdict.message for word in OF_TURNS)
     sure = [s for s in sure if s.name != "half" or turns]
     maybe = [s for s in found if not (SEEN_AS.get(s.name) or (wrong and s.name in SEEN_AS))]
+    if not sure and not maybe and check.name in OF_STEERING and not verdict.cause and not silent:
+        return _by_slow_loop(package, files, verdict)
     for slip in sure[:1] or maybe[:4]:
         why = f"line {slip.line} of {slip.file}: {slip.message}"
         fix = f"on line {slip.line}, {slip.fix}" if slip.kind == "compared" else slip.fix

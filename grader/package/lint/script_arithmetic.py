@@ -440,7 +440,7 @@ def axes_of(tree):
     """Return the names that are made of an x alone, or of a y alone, each with the line, and whether they are whole."""
     found, twice = {}, set()
     for node in all_of(tree, ast.Assign):
-        read = {n.attr for n in ast.walk(node.value) if isinstance(n, ast.Attribute)} & {"x", "y"}
+        read = {getattr(n, "attr", getattr(n, "id", "")) for n in ast.walk(node.value)} & {"x", "y"}
         name = dotted(node.targets[0])
         twice |= {name} if name in found else set()
         if len(read) == 1:

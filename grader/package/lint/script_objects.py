@@ -382,14 +382,20 @@ def unstarted_servers(tree):
     """Yield each `SimpleActionServer(…, auto_start=False)` where nothing in the script calls or names a `start`."""
     started = any(isinstance(n, ast.Attribute) and n.attr == "start" for n in walk(tree))
     given = targets_of(tree)
+    own = {
+        n.name for n in all_of(tree, ast.ClassDef) if any("ActionServer" in dotted(one) for one in n.bases)
+    }
     for node in () if started else walk(tree):
         waits = [k.value for k in getattr(node, "keywords", ()) if k.arg == "auto_start"]
-        if called_name(node) == "SimpleActionServer" and any(
-            getattr(v, "value", None) is False for v in waits
-        ):
+        is_left = any(getattr(v, "value", None) is False for v in waits)
+        if is_left and (called_name(node) in SERVERS or (own and called_name(node) == "__init__")):
+            made = next((n for n in all_of(tree, ast.Call) if called_name(n) in own), node)
             message = "the action server of line %d is never started" % node.lineno
-            fix = "below line %d, write `%s.start()`" % (node.end_lineno, given.get(id(node), "server"))
+            fix = "below line %d, write `%s.start()`" % (made.end_lineno, given.get(id(made), "server"))
             yield slip(node.lineno, "not-started", message, fix)
+
+
+SERVERS = ("SimpleActionServer", "ActionServer")
 
 
 def hidden_names(tree):

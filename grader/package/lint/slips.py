@@ -2,11 +2,12 @@
 
 What nothing calls, statements without an effect, imports. Names are for `script_names.py`, texts for
 `script_texts.py`, objects for `script_objects.py`, callbacks for `script_callbacks.py`, what these print for
-`script_prints.py`, base classes for `script_bases.py`, threads and generators for `script_waits.py`, ends of
-goals for `script_goals.py`, loops for `script_loops.py`, their rates for `script_rates.py`, values for
-`script_values.py`, arithmetic for `script_arithmetic.py`, scans for `script_scans.py`, sides and frames for
-`script_sides.py`, counters and clocks for `script_counters.py`, what functions return for `script_results.py`,
-calls that cannot work for `script_calls.py`, publishers and messages that nothing uses for `script_unsent.py`.
+`script_prints.py`, base classes for `script_bases.py`, threads and generators for `script_waits.py`, ends of goals
+for `script_goals.py`, loops for `script_loops.py`, their rates for `script_rates.py`, values for `script_values.py`,
+arithmetic for `script_arithmetic.py`, scans for `script_scans.py`, sides and frames for `script_sides.py`, rows of
+grids for `script_grids.py`, counters and clocks for `script_counters.py`, what functions return for
+`script_results.py`, calls that cannot work for `script_calls.py`, publishers and messages that nothing uses for
+`script_unsent.py`.
 
 Nothing is executed. A file has to be parsed by ROS's own Python, which is to run it: Python 3.8, standard library only.
 """
@@ -21,6 +22,7 @@ import script_callbacks as callbacks
 import script_calls as calls
 import script_counters as counters
 import script_goals as goals
+import script_grids as grids
 import script_loops as loops
 import script_names as names
 import script_objects as objects
@@ -77,6 +79,7 @@ def slips(tree):
         calls.locks_taken_twice, calls.values_out_of_order, calls.params_read_early, calls.arguments_out_of_order,
         calls.bare_decorators, scans.first_scans,
         sides.named_sides, sides.frames_swapped, sides.frames_named,
+        grids.rows_of_grids, grids.unreturned_answers, grids.never_cancelled,
     )  # fmt: skip
     found = [one for find in finders for one in find(tree)]
     # of two that say why a name is not there, the first is about the class that it belongs to
