@@ -122,7 +122,7 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
     turns = any(word in verdict.message for word in OF_TURNS)
     sure = [s for s in sure if s.name != "half" or turns]
     maybe = [s for s in found if not (SEEN_AS.get(s.name) or (wrong and s.name in SEEN_AS))]
-    if not sure and not maybe and check.name in OF_STEERING and not verdict.cause and not silent:
+    if not sure and not maybe and check.name in OF_STEERING and not verdict.basis.cause and not silent:
         return _by_slow_loop(package, files, verdict)
     for slip in sure[:1] or maybe[:4]:
         why = f"line {slip.line} of {slip.file}: {slip.message}"
