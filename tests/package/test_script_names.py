@@ -236,6 +236,9 @@ COUNTERS = {
                               ("sleep-twice", 6, "delete line 6")),
     "sleeps-in-a-function-too": (f"def turn():\n    p.publish(1)\n    r.sleep()\n{LOOP}    turn()\n    r.sleep()\n",
                                  ("sleep-twice", 7, "delete line 7")),
+    "sleeps-in-the-only-function": (
+        f"def turn():\n    p.publish(1)\n    r.sleep()\n    rospy.sleep(1)\n{LOOP}    turn()\n",
+        ("sleep-twice", 4, "delete line 4")),
     "sleeps-in-a-method-below": (
         "class A:\n def run(self):\n  while 1:\n   p.publish(1)\n   self.w()\n   r.sleep()\n def w(s):\n  r.sleep()\n",
         ("sleep-twice", 6, "delete line 6")),

@@ -92,6 +92,15 @@ def test_a_rate_that_is_taken_for_a_time_is_known_by_its_name(tmp_path, code, fo
         ("r = rospy.Rate(-3)", []),
         ("r = rospy.Rate(True)", []),
         ("r = rospy.Rate(a)", []),
+        ("def f(x, hz=4):\n    r = rospy.Rate(hz)\nf(1)", [("4", 3)]),
+        ("def f(hz):\n    r = rospy.Rate(hz)\nf(hz=8)", [("8", 3)]),
+        ("def f(hz):\n    r = rospy.Rate(hz)\nf(8)\nf(9)", []),
+        ("def f(hz):\n    r = rospy.Rate(hz)\nf(int(sys.argv[1]) if sys.argv[1:] else 1)", [("1", 3)]),
+        ("from rospy import Rate as Beat\nr = Beat(5)", [("5", 3)]),
+        ("import rospy as ros\nros.Timer(ros.Duration(2), tell)", [("0.5", 3)]),
+        ("Rate = rospy.Rate\nr = Rate(5)", [("5", 3)]),
+        ("class Rate:\n    pass\nr = Rate(5)", []),
+        ("from rospy import Rate\nclass Rate:\n    pass\nr = Rate(5)", []),
     ],
 )
 def test_a_rate_that_is_a_number_is_known(tmp_path, code, found):

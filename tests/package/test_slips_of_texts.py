@@ -53,6 +53,7 @@ def test_a_callback_that_shows_nothing(body: str, message: str, fix: str, tmp_pa
         ("    rospy.loginfo_once(m.data)", "`loginfo_once` on line 2 logs the first message only"),
         ("    rospy.loginfo_throttle(1, m.data)", "`loginfo_throttle` on line 2 logs some of the messages only"),
         ("    global last\n    print(last)\n    last = m.data", "which gets the message's value only on line 4"),
+        ("    if m.data in seen:\n        return\n    seen.add(m.data)\n    print(m.data)", "before line 5 prints"),
     ],
 )  # fmt: skip
 def test_a_callback_that_shows_some_or_something_else(body: str, message: str, tmp_path: Path) -> None:
@@ -249,6 +250,25 @@ def test_values_made_up_at_random_are_not_counted(value: str, random: bool, tmp_
     (tmp_path / "a.py").write_text(text, encoding="utf-8")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "clock-value"]
     assert [s.name for s in slips] == (["random"] if random else [])
+
+
+@pytest.mark.parametrize(
+    ("queue", "found"),
+    [
+        ("deque(maxlen=1)", ["`q` keeps only the last message (`maxlen` on line 1)"]),
+        ("collections.deque([], 3)", ["`q` keeps only the last 3 messages (`maxlen` on line 1)"]),
+        ("deque()", []),
+        ("deque(maxlen=None)", []),
+    ],
+)
+def test_a_queue_that_drops_messages(queue: str, found: list[str], tmp_path: Path) -> None:
+    text = f"q = {queue}\ndef cb(m):\n    q.append(m.data)\nwhile True:\n    print(q.popleft())\n"
+    assert [message for _, message, _ in said(text, tmp_path)] == found
+
+
+def test_what_is_printed_and_collected_may_be_printed_elsewhere(tmp_path: Path) -> None:
+    text = "def cb(m):\n    if m.data:\n        print(m.data)\n    q.append(m.data)\n"
+    assert said(text + "while True:\n    print(q)\n", tmp_path) == []
 
 
 def test_a_message_that_is_kept_and_printed_in_a_loop(tmp_path: Path) -> None:

@@ -190,14 +190,20 @@ def _value(message: str, source: str, _marked: tuple[int, int] | None) -> Meanin
         return f"{plural(int(found[2]), 'value')} are expected on the right of `=`{came}", hint
     if found := _NO_ITEMS.search(message):
         return no_items(found[1], source)
-    if (found := _NO_NUMBER.search(message)) and found[1].endswith(".py'"):
+    found = _NO_NUMBER.search(message)
+    return _of_text(message, found[1], source) if found else None
+
+
+def _of_text(message: str, text: str, source: str) -> Meaning | None:
+    """Explain a text that `int(…)` or `float(…)` is given, in its quotes."""
+    if text.endswith(".py'"):
         return _program(source)
-    if found:
-        whole = message.startswith("invalid literal for int") and DECIMAL.fullmatch(found[1])
-        hint = "convert only what is a number, and print text as it is"
-        told = (f"{shown(found[1])} is no whole number", "write `float(…)` in place of `int(…)`")
-        return told if whole else (f"{shown(found[1])} is text, not a number", hint)
-    return None
+    if ":=" in text:
+        why = f"{shown(text)} is for ROS: roslaunch and rosrun add it to what they give a program"
+        return why, "write `rospy.myargv()` in place of `sys.argv`: it has your own arguments only"
+    if message.startswith("invalid literal for int") and DECIMAL.fullmatch(text):
+        return f"{shown(text)} is no whole number", "write `float(…)` in place of `int(…)`"
+    return f"{shown(text)} is text, not a number", "convert only what is a number, and print text as it is"
 
 
 def _not_finite(message: str, source: str) -> Meaning | None:

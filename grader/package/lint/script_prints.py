@@ -32,6 +32,8 @@ HARMLESS = CHANGES | {
     "str", "repr", "int", "float", "format", "isinstance", "get_caller_id", "get_name", "get_time", "publish",
 }  # fmt: skip
 """Calls that may be given the message, and print nothing."""
+COLLECTS = {"add", "append", "appendleft", "put", "setdefault", "update"}
+"""Calls by which a set, a list, a queue or a map takes a message in."""
 WITH_DATA = {
     "String", "Bool", "Int8", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64", "Float32", "Float64",
 }  # fmt: skip
@@ -150,9 +152,9 @@ class Printing:
         """Return line, kind, message and fix of what is wrong; None where nothing is, or it cannot be told."""
         if logged := not self.prints and self.logged(tree):
             return logged
-        if self.is_elsewhere():
-            return None
         told = [n for n in self.prints if self.of_message(n)]
+        if self.is_elsewhere(tree, collects=bool(told)):
+            return None if self.prints else self.dropped(tree)
         if self.lost and told and told[0].lineno > self.lost:
             message = "line %d gives what holds the message another value before line %d prints it"
             message %= (self.lost, told[0].lineno)
@@ -182,11 +184,15 @@ class Printing:
     def of_message(self, call):
         return any(self.holds(one)[0] for one in [*call.args, *(k.value for k in call.keywords)])
 
-    def is_elsewhere(self):
-        """Whether something else than this function may print the message."""
+    def is_elsewhere(self, tree, *, collects):
+        """Whether something else than this function may print the message. One that prints it may collect it too, where
+        nothing else prints what it collects."""
         for n in self.nodes:
             name = called_name(n)
             known = is_print(n) or name.startswith("logdebug") or name in HARMLESS
+            if collects and name in COLLECTS and isinstance(n.func, ast.Attribute):
+                kept = dotted(n.func.value)
+                known = known or not any(kept in names for _, names in self.printed_in_loops(tree))
             if isinstance(n, (ast.For, ast.While)) and any(is_print(one) for one in ast.walk(n)):
                 return True
             if name in self.functions or isinstance(n, (ast.FunctionDef, ast.Lambda, ast.Yield)):
@@ -197,17 +203,35 @@ class Printing:
 
     def kept(self, tree):
         """What the callback keeps, and a loop elsewhere prints: what the variable holds by then."""
-        if not hasattr(tree, "prints_of_loops"):  # each callback asks for them
-            loops = all_of(tree, ast.While)
-            calls = {id(call): call for loop in loops for call in filter(is_print, ast.walk(loop))}
-            tree.prints_of_loops = [(call, names_in(call)) for call in calls.values()]
-        for call, names in tree.prints_of_loops:
+        for call, names in self.printed_in_loops(tree):
             kept = names.intersection(self.shared)
             if kept:
                 message = "line %d prints in a loop what `%s` holds by then" % (call.lineno, min(kept))
                 message += ", and not each message when it comes"
                 return call.lineno, "printed-in-part", message, "print `%s` in %s" % (self.value, self.name)
         return self.kept_for_another(tree)
+
+    def dropped(self, tree):
+        """What the callback puts into a queue that keeps a few messages only, for a loop to print."""
+        made = {dotted(n.targets[0]): n.value for n in all_of(tree, ast.Assign)}
+        for n in self.nodes:
+            kept = dotted(n.func.value) if is_call(n, *COLLECTS) and self.of_message(n) else ""
+            queue = made.get(kept)
+            least = argument(queue, 1, "maxlen") if called_name(queue) == "deque" else []
+            if least and getattr(least[0], "value", None) is not None:
+                count = least[0].value
+                last = "message" if count == 1 else "%s messages" % count
+                message = "`%s` keeps only the last %s (`maxlen` on line %d)" % (kept, last, queue.lineno)
+                return n.lineno, "printed-in-part", message, "print `%s` in %s" % (self.value, self.name)
+        return None
+
+    def printed_in_loops(self, tree):
+        """Return the calls that print in loops, each with the names in it."""
+        if not hasattr(tree, "prints_of_loops"):  # each callback asks for them
+            loops = all_of(tree, ast.While)
+            calls = {id(call): call for loop in loops for call in filter(is_print, ast.walk(loop))}
+            tree.prints_of_loops = [(call, names_in(call)) for call in calls.values()]
+        return tree.prints_of_loops
 
     def kept_for_another(self, tree):
         """What the callback keeps, and the callback of another topic prints, with what comes there."""

@@ -20,9 +20,9 @@ from script_tree import (
     published_type,
     slip,
     text_of,
-    walk,
 )
 
+WAYS_LIMIT = 4
 VALUES = {"Rate": "hz", "sleep": "duration", "Timer": "period"}
 """What says how often, by its name."""
 
@@ -77,13 +77,8 @@ def loop_rates(tree):
 
     Either may have been given to a name once.
     """
-    bound, looped = {}, set()
-    for node in walk(tree):
-        if isinstance(node, ast.Assign) and len(node.targets) == 1:
-            # A name is written down here in the form in which it is read later.
-            bound.setdefault(ast.dump(node.targets[0]).replace("Store()", "Load()"), []).append(node.value)
-        elif isinstance(node, LOOPS):
-            looped.update(map(id, calls_in(node, "sleep")))
+    bound = values_given(tree)
+    looped = {id(one) for loop in all_of(tree, *LOOPS) for one in calls_in(loop, "sleep")}
 
     def given(node):
         values = bound.get(ast.dump(node), [node])
@@ -108,7 +103,35 @@ def loop_rates(tree):
             fix = "on line %d, write the time as a fraction of a second, such as `0.1`" % value.lineno
             kind, name = ("sleep-outside", "sleep") if timed == "sleep" else ("wrong-value", "zero")
             yield slip(node.lineno, kind, message, fix, name)
-        yield from loop_rate(node, timed, value, whole or constant(value, given), pause)
+        for one in ways(value)[:WAYS_LIMIT]:
+            yield from loop_rate(node, timed, one, whole or constant(one, given), pause)
+
+
+def values_given(tree):
+    """Return the values that each name is given, by assignments and as an argument of a function that is called once:
+    its own, or the default. A name is in the form in which `ast.dump` writes it where it is read."""
+    bound, calls = {}, {}
+    for node in all_of(tree, ast.Assign):
+        if len(node.targets) == 1:
+            bound.setdefault(ast.dump(node.targets[0]).replace("Store()", "Load()"), []).append(node.value)
+    for node in all_of(tree, ast.Call):
+        calls.setdefault(dotted(node.func).rpartition(".")[2], []).append(node)
+    for name, function in functions_in(tree).items():
+        called = calls.get(name, [])
+        taken = [one for one in function.args.args if one.arg != "self"]
+        first_default = len(taken) - len(function.args.defaults)
+        for place, one in enumerate(taken if len(called) == 1 else ()):
+            given = argument(called[0], place, one.arg)
+            if not given and place >= first_default:
+                given = [function.args.defaults[place - first_default]]
+            if given:
+                bound.setdefault(ast.dump(ast.Name(id=one.arg, ctx=ast.Load())), []).append(given[0])
+    return bound
+
+
+def ways(node):
+    """Return the values of `a if … else b`, or the only one of another expression."""
+    return [*ways(node.body), *ways(node.orelse)] if isinstance(node, ast.IfExp) else [node]
 
 
 def loop_rate(call, timed, value, number, pause):

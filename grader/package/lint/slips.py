@@ -1,13 +1,13 @@
 """Finds what compiles in a student's Python and is not meant: `slips` of a syntax tree, for `syntax.py`.
 
-What nothing calls, statements without an effect, imports. Names are for `script_names.py`, texts for
-`script_texts.py`, objects for `script_objects.py`, callbacks for `script_callbacks.py`, what these print for
-`script_prints.py`, base classes for `script_bases.py`, threads and generators for `script_waits.py`, ends of goals
-for `script_goals.py`, loops for `script_loops.py`, their rates for `script_rates.py`, values for `script_values.py`,
-arithmetic for `script_arithmetic.py`, scans for `script_scans.py`, sides and frames for `script_sides.py`, rows of
-grids for `script_grids.py`, counters and clocks for `script_counters.py`, what functions return for
-`script_results.py`, calls that cannot work for `script_calls.py`, publishers and messages that nothing uses for
-`script_unsent.py`.
+What nothing calls, statements without an effect, imports. Names are for `script_names.py`, texts for `script_texts.py`,
+objects for `script_objects.py`, callbacks for `script_callbacks.py`, what these print for `script_prints.py`, base
+classes for `script_bases.py`, threads and generators for `script_waits.py`, ends of goals for `script_goals.py`, loops
+for `script_loops.py`, their sleeps for `script_sleeps.py`, their rates for `script_rates.py`, values for
+`script_values.py`, arithmetic for `script_arithmetic.py`, scans for `script_scans.py`, sides and frames for
+`script_sides.py`, rows of grids for `script_grids.py`, counters and clocks for `script_counters.py`, what functions
+return for `script_results.py`, calls that cannot work for `script_calls.py`, publishers and messages that nothing uses
+for `script_unsent.py`.
 
 Nothing is executed. A file has to be parsed by ROS's own Python, which is to run it: Python 3.8, standard library only.
 """
@@ -31,9 +31,11 @@ import script_rates as rates
 import script_results
 import script_scans as scans
 import script_sides as sides
+import script_sleeps as sleeps
 import script_unsent as unsent
 import script_values as values
 import script_waits
+from script_rospy import name_rospy
 from script_texts import graph_names, said_texts
 from script_tree import (
     LOOPS,
@@ -63,7 +65,7 @@ def slips(tree):
         rates.rates_for_times,
         counters.resets, never_run, loops.never_reached, loops.loops_that_never_go_round,
         loops.stopped_loops, loops.lacking_loops, loops.published_before,
-        loops.sleepless_loops, loops.sleeps_twice, loops.publishes_twice, callbacks.callbacks,
+        sleeps.sleepless_loops, sleeps.sleeps_twice, loops.publishes_twice, callbacks.callbacks,
         callbacks.waiting_callbacks, objects.queue_sizes, graph_names,
         objects.object_slips, said_texts, loops.deaf_loops, counters.clock_values, counters.counter_slips,
         counters.counter_starts, without_effect, values.assigned_late, objects.hidden_names, objects.subscribed_again,
@@ -81,7 +83,13 @@ def slips(tree):
         sides.named_sides, sides.frames_swapped, sides.frames_named,
         grids.rows_of_grids, grids.unreturned_answers, grids.never_cancelled,
     )  # fmt: skip
-    found = [one for find in finders for one in find(tree)]
+    as_written = {find: list(find(tree)) for find in OF_NAMES}
+    own_words = name_rospy(tree)
+    found = []
+    for find in finders:
+        for one in as_written[find] if find in as_written else find(tree):
+            texts = {key: own_words(one[key]) for key in ("message", "fix")}
+            found.append(one if find in as_written else {**one, **texts})
     # of two that say why a name is not there, the first is about the class that it belongs to
     # reversed: of several with the same key the last one stays in a dict, and the first is wanted
     first = {(one["line"], one["name"]): one for one in reversed(found) if one["kind"] == "undefined"}
@@ -370,3 +378,7 @@ def without_effect(tree):
                 fix = "write `%s = %s`" % (name, right)
                 fix = "write `%s =` in place of `%s ==`" % (name, name) if "..." in right else fix
                 yield slip(node.lineno, "compared", "`%s ==` compares and gives no value" % name, fix)
+
+
+OF_NAMES = (names.misspelt, objects.names_of_objects, objects.hidden_names, imports)
+"""Finders to which it matters under which name a script has what is rospy's."""

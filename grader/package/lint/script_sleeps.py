@@ -1,0 +1,116 @@
+"""Finds loops in a student's Python that publish and sleep nowhere, or twice in each of their turns, for `slips.py`.
+
+Nothing is executed. Python 3.8, standard library only.
+"""
+
+import ast
+
+from script_loops import WAITS, called_own, turns
+from script_names import set_in
+from script_tree import (
+    LOOPS,
+    all_of,
+    called_name,
+    calls_in,
+    dotted,
+    functions_in,
+    is_call,
+    loop_around,
+    names_in,
+    slip,
+)
+
+PAUSES = ("rospy.sleep", "time.sleep")
+
+
+def sleepless_loops(tree):
+    """Loops that publish and wait nowhere, where `rate.sleep()` stands outside of them or a Rate is made in them."""
+    loops, around = all_of(tree, *LOOPS), dict(turns(tree))
+    every = [(n, loop_around(n, tree)) for n in calls_in(tree, "sleep")]
+    waiting = {name for name, one in functions_in(tree).items() if calls_in(one, *WAITS)}
+    for loop in loops:
+        if waiting.intersection(called_name(n) for n in ast.walk(loop)) or is_of_publishers(loop):
+            continue
+        within = [n for n in ast.walk(loop) if isinstance(n, LOOPS) and calls_in(n, "publish")]
+        # a `sleep()` of another function or loop belongs to that one
+        function, outer = around[loop][0], loop_around(loop, tree)
+        sleeps = [n for n, own in every if own is outer and around[n][0] in (function, None)]
+        plain = [n for n in sleeps if dotted(n.func) not in PAUSES]
+        below = [n for n in sleeps if n.lineno > loop.lineno and (n in plain or around[n][0])]
+        outside = below or [n for n in plain if n.lineno < loop.lineno]
+        yield from sleeps_in_if(loop)
+        if calls_in(loop, *WAITS) or within != [loop]:
+            continue
+        if not outside:
+            yield from rates_in_loop(loop)
+            continue
+        name = dotted(outside[0].func) or "sleep"
+        message = "`%s()` is outside the loop on line %d" % (name, loop.lineno)
+        last = loop.body[-1]
+        fix = "move it into that loop, below line %d, with the same spaces or tabs before it as line %d has"
+        fix %= (last.end_lineno, last.lineno)
+        yield slip(outside[0].lineno, "sleep-outside", message, fix, name)
+
+
+def is_of_publishers(loop):
+    """Whether each turn publishes by another publisher, as in `for pub in pubs:`: such a loop need not wait."""
+    given = names_in(loop.target) if isinstance(loop, ast.For) else set()
+    return bool(given) and all(given & names_in(n.func) for n in calls_in(loop, "publish"))
+
+
+def rates_in_loop(loop):
+    """Yield the Rate that a loop makes in each of its turns, and nothing sleeps by."""
+    made = [n for n in loop.body if isinstance(n, ast.Assign) and is_call(n.value, "Rate")]
+    named = any(isinstance(n, ast.Attribute) and n.attr == "sleep" for n in ast.walk(loop))
+    name = dotted(made[0].targets[0]) if len(made) == 1 and len(loop.body) > 1 and not named else ""
+    own = names_in(made[0].value) & set_in(loop) if made else ()
+    skipped = any(isinstance(n, ast.Continue) for n in ast.walk(loop))
+    if name and not own and not skipped and not isinstance(made[0].targets[0], ast.Subscript):
+        message = "a Rate is made in each turn of the loop on line %d, and nothing sleeps" % loop.lineno
+        fix = "move line %d above that loop, and write `%s.sleep()` as the last line in the loop"
+        fix %= (made[0].lineno, name)
+        yield slip(made[0].lineno, "sleep-outside", message, fix, name + ".sleep")
+
+
+def sleeps_in_if(loop):
+    """Yield the only `sleep()` of a loop that publishes in each of its turns, where it stands in an `if`; or in one
+    that goes on with the next turn, before the others publish."""
+    plain = [one for one in loop.body if isinstance(one, ast.Expr) and is_call(one.value, "publish")]
+    sleeps = [n for one in loop.body for n in calls_in(one, *WAITS)]
+    for one in loop.body:
+        within = one.body if isinstance(one, ast.If) and not one.orelse else []
+        own = [n for n in within[:-1] if isinstance(n, ast.Expr) and is_call(n.value, "sleep")]
+        if plain and len(sleeps) == len(own) == 1 and isinstance(within[-1], ast.Continue):
+            name, last = dotted(own[0].value.func), loop.body[-1]
+            message = "`%s()` is called only where the `if` on line %d holds" % (name, one.lineno)
+            fix = "below line %d, write `%s()` too" % (last.end_lineno, name)
+            yield slip(own[0].lineno, "sleep-outside", message, fix, name)
+        own = [n for n in within if isinstance(n, ast.Expr) and is_call(n.value, "sleep")]
+        if plain and len(sleeps) == len(own) == 1 and own[0] is within[-1] and one is loop.body[-1]:
+            name, line = dotted(own[0].value.func), own[0].lineno
+            message = "`%s()` is inside the `if` on line %d" % (name, one.lineno)
+            fix = "write line %d with the same spaces or tabs before it as line %d has" % (line, one.lineno)
+            yield slip(line, "sleep-outside", message, fix, name)
+
+
+def sleeps_twice(tree):
+    """Loops that wait twice in each of their turns, once maybe in a function that they call, and publish once on each
+    topic."""
+    functions = functions_in(tree)
+    for loop in all_of(tree, *LOOPS):
+        body = loop.body
+        called = {n: called_own(getattr(n, "value", None), functions) for n in body}
+        helpers = [one for one in called.values() if one is not None]
+        if len(set(helpers)) < len(helpers):
+            continue
+        body = [one for n in body for one in (called[n].body if called[n] else [n])]
+        at = [i for i, n in enumerate(body) if isinstance(n, ast.Expr) and called_name(n.value) == "sleep"]
+        own = [body[i].lineno for i in at if body[i] in called or len(loop.body) == 1]
+        if len(at) != 2 or not own:
+            continue
+        parts = body[at[0] + 1 : at[1]], body[: at[0]] + body[at[1] + 1 :]
+        sent = [{ast.dump(n.func) for one in part for n in calls_in(one, "publish")} for part in parts]
+        if any(sent) and sent[0].isdisjoint(sent[1]):
+            lines = tuple(sorted(body[i].lineno for i in at))
+            message = "the loop sleeps on line %d and again on line %d" % lines
+            yield slip(own[-1], "sleep-twice", message, "delete line %d" % own[-1])
