@@ -86,7 +86,7 @@ REPLACED = {
 }
 MAKERS = {"Popen", "run", "call", "check_call", "check_output", "getoutput", "getstatusoutput"}
 STARTER = re.compile(
-    r"\b(os|subprocess|Popen|own_session|create_subprocess_\w+)\b"
+    r"\b(os\s*\.\s*(system|popen|fork|exec|spawn|posix_spawn|startfile)|subprocess|Popen|own_session|create_subprocess_\w)"
 )  # in each text that `is_start` finds one in
 SESSION = "own_session"
 """`grader/portable.py` gives a program that it starts no input."""
