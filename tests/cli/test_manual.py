@@ -85,3 +85,10 @@ def test_man_shows_it_without_warnings(tmp_path):
     )
     assert "GRADER(1)" in done.stdout
     assert done.stderr == ""
+
+
+def test_a_command_that_is_built_alone_is_the_same() -> None:
+    every = {one.prog: one.format_help() for one in commands(build_parser())}
+    firsts = {prog.split()[1] for prog in every}
+    alone = {one.prog: one.format_help() for first in firsts for one in commands(build_parser(first))}
+    assert alone == every
