@@ -73,7 +73,7 @@ def test_a_server_of_its_own_may_be_asked(visit, tmp_path) -> None:
             pass
 
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Quiet) as server:
-        thread = threading.Thread(target=server.serve_forever)
+        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
         thread.start()
         assert visit(f"http://127.0.0.1:{server.server_port}/").title() == "more"
         server.shutdown()

@@ -162,7 +162,7 @@ class Asks(BaseHTTPRequestHandler):
 @pytest.fixture
 def asking() -> Iterator[str]:
     with HTTPServer(("127.0.0.1", 0), Asks) as server:
-        thread = threading.Thread(target=server.serve_forever)
+        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
         thread.start()
         yield f"http://127.0.0.1:{server.server_port}"
         server.shutdown()

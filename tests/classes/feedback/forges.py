@@ -184,7 +184,7 @@ def gitlab(  # noqa: PLR0911 - as above
 def forge(answer: Callable[[Forge, str, str, dict[str, object], int], Answer]) -> Iterator[Forge]:
     """Run a stand-in."""
     with Forge(answer) as made:
-        thread = Thread(target=made.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True)
+        thread = Thread(target=made.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True)
         thread.start()
         yield made
         made.shutdown()

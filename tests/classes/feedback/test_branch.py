@@ -205,7 +205,7 @@ def server(tmp_path: Path) -> Iterator[GitServer]:
     for name in ("ada", "bob"):
         git(repository(folder / f"{name}.git"), "config", "http.receivepack", "true")
     with GitServer(folder, "teacher:s3cret") as made:
-        thread = Thread(target=made.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True)
+        thread = Thread(target=made.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True)
         thread.start()
         yield made
         made.shutdown()
