@@ -99,7 +99,7 @@ class GoalSender:
 
     async def _end(self, action: Action, name: str) -> tuple[tuple[Any, str] | None, float]:
         """Return the end of a goal that is not cancelled, and how long it was waited for (s)."""
-        begun_s, left_s = time.monotonic(), self._patience_s(action)
+        begun_s, lost_before_s, left_s = time.monotonic(), self._live.lost_s, self._patience_s(action)
         reports = self._live.topics[f"{action.name}/feedback"].count
         found = await self._result(action, name, left_s)
         if found is None and left_s < action.limit_s:
@@ -112,7 +112,8 @@ class GoalSender:
                 return feedback.count >= wanted or silent
 
             found = await self._result(action, name, action.limit_s - left_s, has_reported)
-            left_s = min(action.limit_s, max(left_s, time.monotonic() - begun_s))
+            waited_s = time.monotonic() - begun_s - (self._live.lost_s - lost_before_s)
+            left_s = min(action.limit_s, max(left_s, round(waited_s, 1)))
         return found, left_s
 
     def _judged_goal(self, action: Action) -> JudgedGoal:

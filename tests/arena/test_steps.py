@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 from pathlib import Path
 from statistics import median
@@ -307,6 +308,37 @@ def test_the_last_goal_that_is_cancelled_is_waited_for_no_longer_than_it_is_judg
         seen = run(place, scenario, tmp_path / "run.mcap", goals={("/count", goals): JudgedGoal(1.0)})
     assert _did(seen, "result")[0] == ("/count", None, f"no result within {since}")
     assert len(_did(seen, "result")) == goals
+
+
+@pytest.mark.parametrize(
+    ("goals", "looks", "judged", "within"),
+    [
+        (1, False, JudgedGoal(1.0), r"1(\.\d)? s"),
+        (2, False, JudgedGoal(1.0), "4 s"),
+        (2, True, JudgedGoal(1.0), r"1(\.\d)? s"),
+        (2, True, JudgedGoal(1.0, feedback=2), r"1(\.\d)? s"),  # none comes
+        (2, True, JudgedGoal(0.0, feedback=2), "4 s"),  # nothing says how soon it has to come
+        (2, True, None, "4 s"),
+    ],
+)
+def test_a_goal_is_waited_for_as_long_as_its_criteria_need_it(
+    tmp_path: Path, *, goals: int, looks: bool, judged: JudgedGoal | None, within: str
+) -> None:
+    """`looks` is whether the server ends a goal for a newer one."""
+    find = action_texts("lab/Count", COUNT).get
+    goal, result = (MessageType(f"lab/CountAction{part}", find).definition for part in ("Goal", "Result"))
+    server = SERVER.format(goal=goal, result=result) + "server.is_preempt_requested()\n" * looks
+    about = {"name": "/count", "type": "lab/Count", "limit_s": 4}
+    steps = [{"action": {**about, "goal": {"target": target}}} for target in (-1, 5)[:goals]]
+    seen = _run(
+        tmp_path,
+        {"scripts/server.py": server, "action/Count.action": COUNT},
+        steps,
+        goals={("/count", 1): judged} if judged else None,
+    )
+    results = [detail for _, _, detail in _did(seen, "result")]
+    assert re.fullmatch(f"no result within {within}", results[0])
+    assert results[1:] == ["SUCCEEDED"][: goals - 1]
 
 
 TELLS = """from actionlib_msgs.msg import GoalStatus, GoalStatusArray
