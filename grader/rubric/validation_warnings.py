@@ -63,6 +63,7 @@ def warnings(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield what may be a slip."""
     yield from _short_times(rubric)
     yield from _long_probes(rubric)
+    yield from _modules_for_packages(rubric)
     yield from _misnamed_processes(rubric)
     yield from _first_packages(rubric)
     yield from _lone_quotes(rubric)
@@ -123,6 +124,19 @@ def _short_times(rubric: WrittenRubric) -> Iterator[Fault]:
             if is_number(given_s) and given_s > LONG_S and at[0] == "until":
                 fault = f"{given_s:g} s are {given_s / 60:.0f} minutes, which a package that never gets there takes"
                 yield ("scenarios", name, *at), fault
+
+
+PIP_NAMES = {
+    "cv2": "opencv-python", "opencv": "opencv-python", "sklearn": "scikit-learn", "yaml": "PyYAML", "pil": "Pillow",
+    "serial": "pyserial", "usb": "pyusb",
+}  # fmt: skip
+"""By the name of a module, the package that pip installs for it, where that is called otherwise."""
+
+
+def _modules_for_packages(rubric: WrittenRubric) -> Iterator[Fault]:
+    for index, name in as_texts(as_map(rubric.data.get("needs")).get("pip")):
+        if package := PIP_NAMES.get(name.lower()):
+            yield ("needs", "pip", index), f"pip calls it {package}"
 
 
 def _long_probes(rubric: WrittenRubric) -> Iterator[Fault]:
