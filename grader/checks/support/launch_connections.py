@@ -169,10 +169,13 @@ def wrong_name(node: LaunchNode, name: str) -> Slip:
     lines = [line for line in node.renaming if line.tag not in RENAMES]
     spaces = [line.value.strip("/") for line in lines]
     spare = [n for n in range(len(lines)) if "/".join(spaces[:n] + spaces[n + 1 :]) == space.strip("/")]
-    at: LaunchLine | LaunchNode = node
-    fixes = [] if node.name == own else [f'on line {node.line}, write name="{own}"']
+    in_place = node.namespace == f"{space}/"
+    args = [a for a in node.by_args if a.tag == "name" and (in_place or a.file == node.file)]
+    at: LaunchLine | LaunchNode = args[0] if args and node.name != own else node
+    attribute = at.value if isinstance(at, LaunchLine) else "name"
+    fixes = [] if node.name == own else [f'on line {at.line}, write {attribute}="{own}"']
     adds = f'add ns="{space.strip("/")}" to the <node>'
-    if node.namespace == f"{space}/":
+    if in_place:
         pass
     elif spare:
         at = lines[spare[-1]]
