@@ -170,10 +170,12 @@ def numbers_text(numbers: Iterable[int]) -> str:
         else:
             runs.append([each])
     texts = [[f"{run[0]} to {run[-1]}"] if len(run) > PAIR else map(str, run) for run in runs]
-    return join_words(text for run in texts for text in run)
+    return join_words((text for run in texts for text in run), most=PLACES_LISTED_MAX)
 
 
 PAIR = 2
+PLACES_LISTED_MAX = 16
+"""Of the lines of a hint, which has to hold for each of them."""
 
 
 def on_lines(numbers: Iterable[int]) -> str:

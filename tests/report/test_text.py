@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from lxml import html as parser
 
 from grader.report.text import csv_text, html, markdown, markdown_code, visible
-from grader.wording import did_you_mean, number, significant
+from grader.wording import did_you_mean, number, on_lines, significant
 from tests.report.markdown_readers import FOUND_BY_FORGES, HARMLESS, MARKDOWN, QUICK_ACTION, prose
 from tests.report.nasty import STEERING, TEXTS
 
@@ -249,3 +249,17 @@ def test_numbers_carry_no_idle_zeros():
 def test_a_part_of_one_name_or_a_likeness_is_suggested(word, near):
     said = f' (did you mean "{near}"?)' if near else ""
     assert did_you_mean(word, ["leeds-lab1", "york-lab7", "--exchange", "--before"]) == said
+
+
+@pytest.mark.parametrize(
+    ("numbers", "text"),
+    [
+        ([3], "line 3"),
+        ([3, 4], "lines 3 and 4"),
+        ([3, 4, 5, 9], "lines 3 to 5 and 9"),
+        (range(1, 20, 2), "lines 1, 3, 5, 7, 9, 11, 13, 15, 17 and 19"),
+        (range(1, 99, 2), "lines 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31 and 33 more"),
+    ],
+)
+def test_each_line_of_a_hint_is_named_unless_they_are_too_many(numbers, text) -> None:
+    assert on_lines(numbers) == text
