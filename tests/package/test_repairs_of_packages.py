@@ -172,6 +172,13 @@ CASES = {
     "pkg-that-no-one-knows": Case(swapped(LAUNCHED, ('pkg="lab"', 'pkg="my_robot"')), ["package-name"],
                                   'pkg="my_robot" should be'),
     "pkg-of-another": Case(swapped(LAUNCHED, ('pkg="lab"', 'pkg="turtlesim"')), []),
+    "pkg-by-an-argument": Case(
+        {LAUNCHED: '<launch>\n  <arg name="from" default="laab"/>\n'
+                   '  <node pkg="$(arg from)" type="talker.py" name="talker"/>\n</launch>\n'},
+        ["package-name"], 'default="laab" should be default="lab"'),
+    "pkg-by-an-argument-of-another": Case(
+        {LAUNCHED: '<launch>\n  <arg name="from" default="turtlesim"/>\n'
+                   '  <node pkg="$(arg from)" type="talker.py" name="talker"/>\n</launch>\n'}, []),
     "pkg": Case(swapped(LAUNCHED, ('pkg="lab"', 'pkg="laab"')), ["package-name"], 'pkg="laab" should be'),
     "manifest-name": Case(swapped(XML, (">lab<", ">lab_<")), ["package-name"], "the package is called lab_"),
     "folder-launched": Case({XML: MANIFEST.replace(">lab<", ">our_lab<"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import PurePosixPath
 
 from grader.installable import known_packages, noetic_messages
@@ -50,17 +50,18 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
     for launch, node in nodes:
         _complete_node(files, launch.path, node, own, scripts)
     others = {*known_packages(), *noetic_messages(), *OF_ROS, *package.others, "", own}
-    for launch, node in nodes:
+    for launch, node, place in _with_places(package, "pkg"):
         pkg, kind = node.pkg or "", node.type or ""
         runs_own = bool({kind, f"{kind}.py"} & (scripts if pkg in ours else programs))
-        # Which package `$(arg …)` is, only the call of roslaunch decides.
+        # Which package another `$(…)` is, only the call of roslaunch decides.
         if (
             pkg != own
             and "$(" not in pkg
             and (pkg in ours or pkg not in others)
             and (is_near(pkg, own) or runs_own)
         ):
-            _set_attribute(files, launch.path, node.line, ("pkg", pkg, own), kind="package-name")
+            file, line, attribute = place or (launch.path, node.line, "pkg")
+            _set_attribute(files, file, line, (attribute, pkg, own), kind="package-name")
     for launch in package.launch_files:
         _repair_find(files, launch.path, own, others)
     for launch, node in nodes:
@@ -77,6 +78,22 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
         _rename_second_nodes(files, launch)
         _repair_params(files, launch, wanted)
         _repair_namespaces(files, launch, package, wanted)
+
+
+def _with_places(
+    package: PackageFacts, attribute: str
+) -> Iterator[tuple[LaunchFile, LaunchNode, Place | None]]:
+    """Yield the nodes of each file, and those that it brings up whose attribute is an `<arg>`'s, with its place."""
+    for launch in package.launch_files:
+        yield from ((launch, node, None) for node in launch.nodes)
+        for node in launch.brings:
+            given = next((one for one in node.by_args if one.tag == attribute), None)
+            if given is not None:
+                yield launch, node, (given.file, given.line, given.value)
+
+
+Place = tuple[str, int, str]
+"""A file, a line and the attribute on it that has a value."""
 
 
 def _complete_node(files: Files, file: str, node: LaunchNode, own: str, scripts: set[str]) -> None:
@@ -230,7 +247,7 @@ def _set_attribute(
             if kind == "package-name":
                 others = [n for n, one in enumerate(lines, 1) if pattern.search(one)]
                 lines = [pattern.sub(lambda m: m["head"] + new, one) for one in lines]
-                fix = f'write pkg="{new}" instead of pkg="{old}"{the_same_on(others)}'
+                fix = f'write {attribute}="{new}" instead of {attribute}="{old}"{the_same_on(others)}'
             message = f'line {number + 1} of {file}: {attribute}="{old}" should be {attribute}="{new}"'
             files.change(kind, file, "\n".join(lines), message, fix)
             return
