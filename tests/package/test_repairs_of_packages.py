@@ -176,6 +176,10 @@ CASES = {
         {LAUNCHED: '<launch>\n  <arg name="from" default="laab"/>\n'
                    '  <node pkg="$(arg from)" type="talker.py" name="talker"/>\n</launch>\n'},
         ["package-name"], 'default="laab" should be default="lab"'),
+    "type-by-an-argument": Case(
+        {LAUNCHED: '<launch>\n  <arg name="what" default="talker"/>\n'
+                   '  <node pkg="lab" type="$(arg what)" name="talker"/>\n</launch>\n'},
+        ["launch-type"], 'default="talker" should be default="talker.py"'),
     "pkg-by-an-argument-of-another": Case(
         {LAUNCHED: '<launch>\n  <arg name="from" default="turtlesim"/>\n'
                    '  <node pkg="$(arg from)" type="talker.py" name="talker"/>\n</launch>\n'}, []),

@@ -64,15 +64,21 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
             _set_attribute(files, file, line, (attribute, pkg, own), kind="package-name")
     for launch in package.launch_files:
         _repair_find(files, launch.path, own, others)
-    for launch, node in nodes:
+    for launch, node, place in _with_places(package, "type"):
         kind = node.type or ""
-        if kind and kind not in programs and (node.pkg in ours or is_near(node.pkg or "", own)):
+        if (
+            kind
+            and "$(" not in kind
+            and kind not in programs
+            and (node.pkg in ours or is_near(node.pkg or "", own))
+        ):
             plain = PurePosixPath(kind).name
             there = [one for one in (f"{kind}.py", plain, f"{plain}.py") if one in scripts]
             there = there or [one for one, sources in made.items() if _is_among(plain, sources)]
             near = there or [s for s in sorted(programs) if is_near(kind, s)]
             for right in near[:1]:
-                _set_attribute(files, launch.path, node.line, ("type", kind, right), kind="launch-type")
+                file, line, attribute = place or (launch.path, node.line, "type")
+                _set_attribute(files, file, line, (attribute, kind, right), kind="launch-type")
     _repair_nodes(files, package, wanted)
     for launch in package.launch_files:
         _rename_second_nodes(files, launch)
