@@ -213,3 +213,60 @@ def test_goals_that_are_never_cancelled(text: str, tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(f"{text}\n")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "uncancelled"]
     assert [s.fix for s in slips] == ([CANCELLED[text]] if CANCELLED[text] else [])
+
+
+STATES = """\
+import threading
+class Node:
+    def __init__(self):
+        self.lock = threading.{lock}()
+        self.states = {{'go': self.go, 'stay': self.stay}}
+    {mark}
+    def far(self):
+        with self.lock:
+            return 3
+    def go(self):
+        print({far})
+    def stay(self):
+        pass
+    def step(self):
+        with self.lock:
+            {step}
+"""
+
+
+HELD = {
+    ("Lock", "@property", "self.far", "self.go()"): "where `self.go()` takes it again on line 8",
+    ("Lock", "@property", "self.far", "x = self.far"): "where `self.far` takes it again on line 8",
+    ("Lock", "@property", "self.far", "self.states['go']()"): "where `self.states` takes it again on line 8",
+    ("Lock", "", "self.far()", "self.go()"): "where `self.go()` takes it again",
+    ("Lock", "", "1", "self.go()"): "",
+    ("Lock", "", "self.far()", "self.stay()"): "",
+    ("Lock", "@cached", "self.far", "self.go()"): "",
+    ("RLock", "@property", "self.far", "self.go()"): "",
+}
+
+
+@pytest.mark.parametrize("case", HELD)
+def test_a_lock_that_a_property_takes(case: tuple[str, str, str, str], tmp_path: Path) -> None:
+    lock, mark, far, step = case
+    (tmp_path / "a.py").write_text(STATES.format(lock=lock, mark=mark, far=far, step=step))
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "lock"]
+    assert [HELD[case] in s.message for s in slips] == ([True] if HELD[case] else [])
+
+
+@pytest.mark.parametrize(
+    ("end", "fix"),
+    [
+        ("return True", "on line 4, write `return False`"),
+        ("return False", ""),
+        ("self.close()", ""),
+        ("return kind is KeyError", ""),
+    ],
+)
+def test_exceptions_that_the_end_of_a_with_drops(end: str, fix: str, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(
+        f"class T:\n    def __exit__(self, *error):\n        pass\n        {end}\n"
+    )
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "swallowed"]
+    assert [s.fix.partition(":")[0] for s in slips] == ([fix] if fix else [])

@@ -586,10 +586,7 @@ def missing_header(found: re.Match[str], package: PackageFacts, _lines: Sequence
     near = near_names(posixpath.basename(header), [posixpath.basename(f.path) for f in package.files])
     if near or "/" not in header or header.partition("/")[0] == package.name:
         fix = f"write {near[0]} in the #include" if near else f"push {header}, or correct the #include"
-        there = own_header(package, header)
-        return Explained(
-            f"there is no header {header}{' where one is looked for' * bool(there)}", there or fix
-        )
+        return Explained(f"there is no header {header}", own_header(package, header) or fix)
     why = f"it needs the header {header} of a library that this grading machine lacks"
     hint = f"{ON_THE_MACHINE}install the library of {header}, then grade again; "
     return Explained(why, f"{hint}a header of the student's own has to be pushed", of_machine=True)

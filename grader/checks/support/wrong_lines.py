@@ -17,7 +17,7 @@ SEEN_AS = {
     "nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": "", "added": "",
     "step": "order", "cut": "place", "half": "value", "secs": "never", "mean": "", "unset": "value",
     "stuck": "stuck", "edge": "place", "times": "order", "early": "value",
-    "frames": "frames", "shared": "value", "rows": "order",
+    "frames": "frames", "rows": "order",
 }  # fmt: skip
 """How a verdict says that a value is `wrong`, by the name of the slip that makes it so; others always show."""
 
@@ -37,7 +37,7 @@ STEERING = (
 OF_STEERING = ("ends-at", "stays-within", "path", "reacts")
 """What leads a robot astray wherever its script computes so, and the checks of what a robot does."""
 
-PRIVATE, COPIES = "private ", ("copied", "argv", "uncancelled")
+PRIVATE, COPIES = "private ", ("copied", "argv", "uncancelled", "swallowed", "shared")
 OF_ARGUMENTS = ("prints", "calls")
 """Checks of what a node makes of its command line."""
 OF_CONNECTIONS = ("launch-connects", "connected", "topic-type", "rate", "latched")
@@ -55,12 +55,20 @@ def is_private_there(slip: PythonSlip, run: Run) -> bool:
     return any(f"{node}/{name}" in end for node in nodes for name in names for end in ends)
 
 
+SEEN_BY = {
+    "argv": OF_ARGUMENTS,
+    "swallowed": (*OF_ARGUMENTS, "service-answers", "action-result"),
+    "shared": ("field-equals", "rostest"),
+}
+"""The checks that see what some slips make wrong."""
+
+
 def _may_show(slip: PythonSlip, check: Check, run: Run, verdict: Verdict, *, of_values: bool) -> bool:
     """Return whether a check may see what a line makes wrong."""
     if slip.name.startswith(PRIVATE):
         return is_private_there(slip, run)
-    if slip.name == "argv":
-        return check.name in OF_ARGUMENTS
+    if slip.name in SEEN_BY:
+        return check.name in SEEN_BY[slip.name]
     if slip.name == "side" and not begins_ahead(run):
         return False
     if slip.name == "uncancelled":

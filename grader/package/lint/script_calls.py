@@ -34,8 +34,10 @@ def locks_taken_twice(tree):
         taking = {
             ".".join(filter(None, (prefix, own.name))): line
             for own in functions.values()
-            if not own.decorator_list and (line := first_taken(own, name))
+            if set(map(dotted, own.decorator_list)) <= {"property"} and (line := first_taken(own, name))
         }
+        taking.update(taken_within(functions, taking, prefix))
+        taking.update(tables_of(scope, taking))
         for block in all_of(tree, ast.With, ast.AsyncWith, ast.Expr):
             for node, line, called in taken_while_held(block, name, taking, tree):
                 if scope is tree or is_inside(node, scope, tree):
@@ -60,6 +62,43 @@ def locks(tree):
             scope = parents[scope]
         if isinstance(scope, ast.ClassDef if name.startswith("self.") else ast.Module):
             yield scope, name, call
+
+
+def called_of(call):
+    """Return the name of what is called: `self.states` of `self.states[key](…)`."""
+    return dotted(call.func.value if isinstance(call.func, ast.Subscript) else call.func)
+
+
+def properties_of(tree):
+    """Return the names of the properties of a module's classes, which are called without brackets."""
+    functions = all_of(tree, ast.FunctionDef)
+    return {n.name for n in functions if any(dotted(one) == "property" for one in n.decorator_list)}
+
+
+def taken_within(functions, taking, prefix):
+    """Return the methods that read a property, or call a method, which takes the lock, each with the line of that."""
+    found = {}
+    for own in functions.values():
+        name = ".".join(filter(None, (prefix, own.name)))
+        used = [
+            taking[dotted(n)]
+            for n in now_run(own.body)
+            if isinstance(n, ast.Attribute) and dotted(n) in taking
+        ]
+        if used and name not in taking and not own.decorator_list:
+            found[name] = used[0]
+    return found
+
+
+def tables_of(scope, taking):
+    """Return the dictionaries one of whose values is such a method."""
+    found = {}
+    for node in ast.walk(scope):
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Dict):
+            lines = [taking[dotted(one)] for one in node.value.values if dotted(one) in taking]
+            if lines and "..." not in dotted(node.targets[0]):
+                found[dotted(node.targets[0])] = lines[0]
+    return found
 
 
 def first_taken(function, name):
@@ -93,8 +132,11 @@ def taken_while_held(block, name, taking, tree):
             return
         if takes(node, name):
             yield node, node.lineno, ""
-        elif isinstance(node, ast.Call) and dotted(node.func) in taking:
-            yield node, taking[dotted(node.func)], dotted(node.func)
+        elif isinstance(node, ast.Call) and called_of(node) in taking:
+            brackets = "" if isinstance(node.func, ast.Subscript) else "()"
+            yield node, taking[called_of(node)], called_of(node) + brackets
+        elif isinstance(node, ast.Attribute) and dotted(node) in taking and node.attr in properties_of(tree):
+            yield node, taking[dotted(node)], dotted(node)
 
 
 def below(statement, tree):
@@ -121,7 +163,7 @@ def is_inside(node, scope, tree):
 
 def held_twice(name, made, lines, called):
     held, line, taken = lines
-    again = "`%s()` takes it again on line %d" % (called, taken) if called else "it is taken again"
+    again = "`%s` takes it again on line %d" % (called, taken) if called else "it is taken again"
     message = "`%s`, taken on line %d, is still held on line %d, where %s: a `Lock()` lets nobody in twice, "
     message += "and what waits for it never ends"
     bare = isinstance(made.func, ast.Name)

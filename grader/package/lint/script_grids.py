@@ -75,6 +75,16 @@ def unreturned_answers(tree):
             yield slip(made[0].lineno, "wrong-value", message, fix, "return")
 
 
+def swallowed_exceptions(tree):
+    """An `__exit__` that returns True whatever has happened: no exception leaves its `with`."""
+    for own in (n for n in all_of(tree, ast.FunctionDef) if n.name == "__exit__"):
+        last = own.body[-1]
+        if isinstance(last, ast.Return) and getattr(last.value, "value", None) is True:
+            message = "`__exit__` returns True, so that an exception that is raised in its `with` is dropped"
+            fix = "on line %d, write `return False`: then it goes on to where it is expected" % last.lineno
+            yield slip(last.lineno, "wrong-value", message, fix, "swallowed")
+
+
 CANCELS = 3
 """The place of an `ActionServer`'s function for goals that are cancelled."""
 
