@@ -424,6 +424,28 @@ def test_a_script_in_an_old_encoding_is_not_read_by_what_the_build_makes_of_it(t
     assert ("as UTF-8 in your editor" in end.hint) == (encoding != "utf-8")
 
 
+DECORATED = "def once(f):\n    def inner():\n        f()\n@once\ndef report():\n    pass\nreport()\n"
+PARTIAL = (
+    "def step(publisher, size, event):\n    publisher.publish(size)\nt = Timer(1, partial(step, size, pub))\n"
+)
+CLOSED = "with open('a') as f:\n    n = Node(f)\nrospy.spin()\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "error", "hint"),
+    [
+        (DECORATED, 7, "TypeError: 'NoneType' object is not callable", "below line 3, write `return inner` at the end"),
+        (PARTIAL, 2, "AttributeError: 'float' object has no attribute 'publish'", "on line 3, swap `size` and `pub`"),
+        (CLOSED, 2, "ValueError: I/O operation on closed file", "indent line 3 like line 2"),
+        ("def hear(msg):\n    file.write('a')\n", 2, "ValueError: I/O operation on closed file.",
+         "close the file when the node ends"),
+    ],
+)  # fmt: skip
+def test_an_error_that_another_line_brings_about_is_told_with_that_line(tmp_path, text, line, error, hint):
+    frame = ("node.py", line, text.splitlines()[line - 1].strip())
+    assert explained(tmp_path, {"node.py": text}, frame, error=error).hint.startswith(hint)
+
+
 def test_a_parameter_that_is_read_where_it_is_not_set_is_told_with_its_condition(tmp_path):
     text = "import rospy\nif not rospy.has_param('~a'):\n    a = rospy.get_param('~a')\n"
     frame = ("node.py", 3, "a = rospy.get_param('~a')")

@@ -270,3 +270,23 @@ def test_exceptions_that_the_end_of_a_with_drops(end: str, fix: str, tmp_path: P
     )
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "swallowed"]
     assert [s.fix.partition(":")[0] for s in slips] == ([fix] if fix else [])
+
+
+PARTIAL = "def step(publisher, length, event):\n    publisher.publish(length)\n"
+
+
+@pytest.mark.parametrize(
+    ("call", "fix"),
+    [
+        ("partial(step, length, pub)", "on line 3, swap `length` and `pub` in the brackets"),
+        ("functools.partial(step, event, 3, pub)", "on line 3, swap `event` and `pub` in the brackets"),
+        ("partial(step, pub, length)", ""),
+        ("partial(step, length)", ""),
+        ("partial(step, publisher, length)", ""),
+        ("partial(other, length, pub)", ""),
+    ],
+)
+def test_values_of_a_partial_in_the_place_of_each_other(call: str, fix: str, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"{PARTIAL}t = {call}\n")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "swapped"]
+    assert [s.fix for s in slips] == ([fix] if fix else [])

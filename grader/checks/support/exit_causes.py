@@ -33,7 +33,7 @@ from grader.checks.support.missing_names import (
     unmade,
     unused_import,
 )
-from grader.checks.support.operands import bare_decorator, explain_operand
+from grader.checks.support.operands import explain_by_definition, explain_operand
 from grader.checks.support.processes import Life, early_end, lives, nodes_of, signal_name
 from grader.checks.support.rospy_calls import (
     explain_formatting,
@@ -361,7 +361,7 @@ def _misplaced(found: Traceback) -> tuple[str, str] | None:
 def _by_script(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
     """Return what the sides of a sum are, or what other lines of the script are to blame for."""
     of_sum = explain_operand(found, package) if found.kind == "TypeError" else None
-    sum_ = bare_decorator(found, package) or of_sum
+    sum_ = explain_by_definition(found, package) or of_sum
     sum_ = of_typed_text(found, place.file, package) or sum_ or without_base(found.message, package.slips)
     spent = (s for s in package.slips if (s.file, s.kind, s.line) == (place.file, "runs-out", place.line))
     sum_ = sum_ or next(((s.message, s.fix) for s in spent if found.kind == "StopIteration"), None)

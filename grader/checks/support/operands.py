@@ -62,11 +62,20 @@ def _other_side(frame: Frame, *, is_right: bool) -> str:
     return ""
 
 
-def bare_decorator(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
-    """Return why a function that is decorated is None where it is called."""
-    if "'NoneType' object is not callable" not in found.message or not found.own_frames:
+def explain_by_definition(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
+    """Return why a decorated function is None where it is called, or why a parameter has the value of another one."""
+    source = found.own_frames[-1].source if found.own_frames else ""
+    if "on closed file" in found.message:
+        closed = next((s for s in package.slips if (s.kind, s.name) == ("wrong-value", "closed")), None)
+        hint = "close the file when the node ends: `rospy.spin()` stands within the `with` that opens it"
+        return ("the file is closed already", hint) if closed is None else (closed.message, closed.fix)
+    if found.kind == "AttributeError":
+        swapped = (s for s in package.slips if (s.kind, s.name) == ("wrong-value", "swapped"))
+        told = (s for s in swapped if "is given them the other way round" in s.message)
+        owner = re.search(r"([A-Za-z_]\w*)\.\w+", source)
+        return next(((s.message, s.fix) for s in told if owner and f"`{owner[1]}`" in s.message), None)
+    if "'NoneType' object is not callable" not in found.message:
         return None
-    source = found.own_frames[-1].source
     slips = (s for s in package.slips if s.kind == "wrong-value" and s.name.startswith("decorator "))
     told = (s for s in slips if re.search(rf"\b{re.escape(s.name.split()[1])}\s*\(", source))
     return next(((one.message, one.fix) for one in told), None)

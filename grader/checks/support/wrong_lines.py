@@ -73,7 +73,8 @@ def _may_show(slip: PythonSlip, check: Check, run: Run, verdict: Verdict, *, of_
         return False
     if slip.name == "uncancelled":
         return "cancelled" in verdict.message
-    return of_values and not slip.name.startswith("decorator ")  # of these an exception tells
+    # of these an exception tells
+    return of_values and slip.name != "closed" and not slip.name.startswith("decorator ")
 
 
 SLOW_HZ = 2.0

@@ -176,6 +176,7 @@ def values_out_of_order(tree):
     """Calls of the script's own functions and classes that give two values, named as parameters, in each other's
     place."""
     takers = own_takers(tree)
+    yield from partial_out_of_order(tree, takers)
     for call in all_of(tree, ast.Call):
         name = dotted(call.func)
         names = takers.get(name.removeprefix("self."))
@@ -195,6 +196,23 @@ def values_out_of_order(tree):
                     fix % place,
                     "swapped",
                 )
+                break
+
+
+def partial_out_of_order(tree, takers):
+    """`partial(step, length, pub)` of `def step(publisher, length, event)`, whose `length` comes second."""
+    for call in all_of(tree, ast.Call):
+        name = dotted(call.args[0]) if called_name(call) == "partial" and call.args else ""
+        names = takers.get(name.removeprefix("self."), ())
+        given = [dotted(one).rpartition(".")[2] for one in call.args[1:]]
+        for at, one in enumerate(given[: len(names)]):
+            place = names.index(one) if one in names else at
+            if place != at and place < len(given) and given[place] not in names[place:]:
+                message = "`%s(…)` takes `%s` before `%s`, and is given them the other way round"
+                message %= (name, *sorted((names[at], names[place]), key=names.index))
+                fix = "on line %d, swap `%s` and `%s` in the brackets"
+                fix %= (call.lineno, dotted(call.args[1 + at]), dotted(call.args[1 + place]))
+                yield slip(call.lineno, "wrong-value", message, fix, "swapped")
                 break
 
 

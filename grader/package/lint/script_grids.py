@@ -8,7 +8,7 @@ import ast
 import re
 
 from script_names import walk_own
-from script_tree import all_of, argument, called_name, dotted, is_call_alone, slip
+from script_tree import all_of, argument, called_name, calls_in, dotted, is_call_alone, slip
 
 WIDE, HIGH = re.compile(r"(?:^|_)(?:width|w|cols|columns)$"), re.compile(r"(?:^|_)(?:height|h|rows)$")
 
@@ -83,6 +83,19 @@ def swallowed_exceptions(tree):
             message = "`__exit__` returns True, so that an exception that is raised in its `with` is dropped"
             fix = "on line %d, write `return False`: then it goes on to where it is expected" % last.lineno
             yield slip(last.lineno, "wrong-value", message, fix, "swallowed")
+
+
+def closed_before(tree):
+    """`with open(…) as file: …` with the `rospy.spin()` below it: callbacks come when the file is closed."""
+    for around in all_of(tree, ast.Module, ast.If, ast.FunctionDef, ast.Try):
+        block = around.body
+        for at, one in enumerate(block):
+            spins = [n for later in block[at + 1 :] for n in calls_in(later, "spin", "is_shutdown")]
+            if isinstance(one, ast.With) and spins and not calls_in(one, "spin", "is_shutdown"):
+                message = "the `with` of line %d ends before line %d, and closes what it has opened"
+                fix = "indent line %d like line %d, so that it is within the `with`"
+                lines = (spins[0].lineno, one.body[0].lineno)
+                yield slip(one.lineno, "wrong-value", message % (one.lineno, lines[0]), fix % lines, "closed")
 
 
 CANCELS = 3

@@ -82,6 +82,7 @@ def slips(tree):
         calls.bare_decorators, scans.first_scans,
         sides.named_sides, sides.frames_swapped, sides.frames_named,
         grids.rows_of_grids, grids.unreturned_answers, grids.never_cancelled, grids.swallowed_exceptions,
+        grids.closed_before,
     )  # fmt: skip
     as_written = {find: list(find(tree)) for find in OF_NAMES}
     own_words = name_rospy(tree)
