@@ -356,7 +356,7 @@ class StepRunner:
         patience_s = self._scenario.until.first_message_s
         await self._come(lambda: bool(topics & self._live.subscribed), patience_s, self.is_over)
         if not topics & self._live.subscribed:
-            self._note("note", play.bag, "nothing was played: no node has subscribed")
+            self._note("note", play.bag, f"{UNHEARD} to {', '.join(sorted(topics))}")
             return
         self._note("play", play.bag, f"{plural(len(messages), 'message')} on {', '.join(sorted(topics))}")
         self._tell(f"playing {play.bag}")

@@ -584,3 +584,31 @@ def test_a_publisher_whose_name_another_one_gets_is_known(tmp_path: Path) -> Non
     found = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "never-published"]
     message = "line 2 gives `pub` another publisher, so nothing is sent by this one"
     assert [(s.line, s.name, s.message) for s in found] == [(1, "a", message)]
+
+
+INNER = "while not rospy.is_shutdown():\n    for talker in {}:\n        talker.say()\n{}rate.sleep()\n"
+
+
+@pytest.mark.parametrize(
+    ("each", "indent", "fixes"),
+    [
+        ("talkers", 8, ["indent line 4 like line 2"]),
+        ("talkers", 4, []),
+        ("range(20)", 8, []),
+    ],
+)
+def test_a_sleep_in_the_inner_loop(each: str, indent: int, fixes: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(INNER.format(each, indent * " "))
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "sleep-twice"]
+    assert [s.fix for s in slips] == fixes
+
+
+@pytest.mark.parametrize(
+    ("value", "lines"),
+    [("1 // 20", [1]), ("int(0.05)", [1]), ("1 / 20", []), ("20 // 4", []), ("period", [])],
+)
+def test_a_duration_of_which_nothing_is_left(value: str, lines: list[int], tmp_path: Path) -> None:
+    text = f"pause = rospy.Duration({value})\nwhile True:\n    pub.publish(1)\n    rospy.sleep(pause)\n"
+    (tmp_path / "a.py").write_text(text)
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if "whole part" in s.message]
+    assert [s.line for s in slips][:1] == lines

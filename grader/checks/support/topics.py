@@ -364,6 +364,7 @@ def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
         for _, e in run.actors
         if e.actor == "grader" and (e.action == "publish" or (e.action == "note" and e.detail == UNHEARD))
     ) | dict.fromkeys(offered := unheard_programs(run))
+    topics |= dict.fromkeys(_played(run))
     others = tuple(topic for topic in topics_with(run, "subscribers") if topic not in SYSTEM_TOPICS)
     missed = [topic for topic in topics if topic not in others]
     connected = {
@@ -397,6 +398,14 @@ def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
     if topic in offered:
         add = f"subscribe to {topic} in place of {join_words(found, 'or')}, on which nothing is published"
     return failed(message, hint=remapped or add).based_on(charged_once=True)
+
+
+def _played(run: Run) -> list[str]:
+    """Return the topics of the recordings that the run plays back."""
+    played = [e.detail.partition(" on ")[2] for _, e in run.actors if e.action == "play"]
+    nobody = f"{UNHEARD} to "  # of a recording, its topics follow
+    played += [e.detail.removeprefix(nobody) for _, e in run.actors if e.detail.startswith(nobody)]
+    return [topic for one in played for topic in one.split(", ") if topic.startswith("/")]
 
 
 def unheard_programs(run: Run) -> dict[str, tuple[str, ...]]:

@@ -38,6 +38,24 @@ def nanoseconds(tree):
             yield slip(node.lineno, "wrong-value", message, fix, "nanoseconds")
 
 
+def sleeps_within(tree):
+    """`for talker in talkers: talker.say(); rate.sleep()` in a loop, which waits once for each of them."""
+    for loop in all_of(tree, ast.While):
+        for inner in (n for n in loop.body if isinstance(n, ast.For)):
+            last = inner.body[-1]
+            is_pause = isinstance(last, ast.Expr) and is_call(last.value, "sleep")
+            if (
+                is_pause
+                and calls_in(loop.test, "is_shutdown")
+                and called_name(inner.iter) not in ("range", "linspace")
+            ):
+                message = (
+                    "the sleep() on line %d is in the `for` of line %d, and waits once for each of its turns"
+                )
+                fix = "indent line %d like line %d" % (last.lineno, inner.lineno)
+                yield slip(last.lineno, "sleep-twice", message % (last.lineno, inner.lineno), fix)
+
+
 OF_RATES = re.compile(r"(?i:(?:^|_)(?:hz|rate|freq|frequency|fps))$|[a-z](?:Hz|Rate|Freq|Frequency)$")
 OF_PERIODS = re.compile(
     r"(?i:(?:^|_)(?:dt|period|interval|pause|delay|seconds|secs))$|[a-z](?:Period|Interval|Delay)$"
@@ -85,6 +103,7 @@ def loop_rates(tree):
         # Which of several values counts, only a run can tell.
         return values[0] if len(values) == 1 else node
 
+    yield from vanished_pauses(tree, given) if looped else ()
     for node in calls_in(tree, *VALUES):
         timed = node.func.attr
         values = argument(node, 0, VALUES[timed])
@@ -132,6 +151,18 @@ def values_given(tree):
 def ways(node):
     """Return the values of `a if … else b`, or the only one of another expression."""
     return [*ways(node.body), *ways(node.orelse)] if isinstance(node, ast.IfExp) else [node]
+
+
+def vanished_pauses(tree, given):
+    """Names of durations of which nothing is left."""
+    for node in all_of(tree, ast.Assign):  # `period = rospy.Duration(1 // HZ)`
+        call = node.value if is_call(node.value, "Duration") and len(node.value.args) == 1 else None
+        if call is not None and loses_all(given(call.args[0]), given):
+            message = "`%s` is 0 seconds, since only the whole part of a fraction is left" % dotted(
+                node.targets[0]
+            )
+            fix = "on line %d, write `/` in place of `//`, or the time as `0.1`" % node.lineno
+            yield slip(node.lineno, "sleep-outside", message, fix, "sleep")
 
 
 def loop_rate(call, timed, value, number, pause):
