@@ -612,3 +612,19 @@ def test_a_duration_of_which_nothing_is_left(value: str, lines: list[int], tmp_p
     (tmp_path / "a.py").write_text(text)
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if "whole part" in s.message]
     assert [s.line for s in slips][:1] == lines
+
+
+@pytest.mark.parametrize(
+    ("given", "lines"),
+    [
+        ("rospy.Duration(1), tell, oneshot=True", [3]),
+        ("rospy.Duration(1), tell, True", [3]),
+        ("rospy.Duration(1), tell", []),
+        ("rospy.Duration(1), tell, oneshot=False", []),
+        ("rospy.Duration(1), other, oneshot=True", []),
+    ],
+)
+def test_a_timer_that_runs_once(given: str, lines: list[int], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"def tell(event):\n    pub.publish(1)\nrospy.Timer({given})\n")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "loop-left"]
+    assert [s.line for s in slips if "oneshot" in s.fix] == lines

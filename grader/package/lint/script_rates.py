@@ -56,6 +56,21 @@ def sleeps_within(tree):
                 yield slip(last.lineno, "sleep-twice", message % (last.lineno, inner.lineno), fix)
 
 
+def timers_once(tree):
+    """`rospy.Timer(period, callback, oneshot=True)`, where its callback publishes."""
+    functions = functions_in(tree)
+    for call in calls_in(tree, "Timer"):
+        once = [k.value for k in call.keywords if k.arg == "oneshot"] or call.args[2:3]
+        named = dotted(call.args[1]).rpartition(".")[2] if len(call.args) > 1 else ""
+        own = functions.get(named)
+        is_once = bool(once) and getattr(once[0], "value", None) is True
+        if is_once and own is not None and calls_in(own, "publish"):
+            message = "the timer of line %d calls `%s` once, by its `oneshot=True`" % (call.lineno, named)
+            yield slip(
+                call.lineno, "loop-left", message, "on line %d, leave `oneshot=True` out" % call.lineno, named
+            )
+
+
 OF_RATES = re.compile(r"(?i:(?:^|_)(?:hz|rate|freq|frequency|fps))$|[a-z](?:Hz|Rate|Freq|Frequency)$")
 OF_PERIODS = re.compile(
     r"(?i:(?:^|_)(?:dt|period|interval|pause|delay|seconds|secs))$|[a-z](?:Period|Interval|Delay)$"
