@@ -88,10 +88,11 @@ def swallowed_exceptions(tree):
 def closed_before(tree):
     """`with open(…) as file: …` with the `rospy.spin()` below it: callbacks come when the file is closed."""
     for around in all_of(tree, ast.Module, ast.If, ast.FunctionDef, ast.Try):
-        block = around.body
-        for at, one in enumerate(block):
-            spins = [n for later in block[at + 1 :] for n in calls_in(later, "spin", "is_shutdown")]
-            if isinstance(one, ast.With) and spins and not calls_in(one, "spin", "is_shutdown"):
+        opened = [at for at, one in enumerate(around.body) if isinstance(one, ast.With)][:1]
+        for at in opened:
+            one = around.body[at]
+            spins = [n for later in around.body[at + 1 :] for n in calls_in(later, "spin", "is_shutdown")]
+            if spins and not calls_in(one, "spin", "is_shutdown"):
                 message = "the `with` of line %d ends before line %d, and closes what it has opened"
                 fix = "indent line %d like line %d, so that it is within the `with`"
                 lines = (spins[0].lineno, one.body[0].lineno)
