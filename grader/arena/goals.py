@@ -101,8 +101,10 @@ class GoalSender:
         """Return the end of a goal that is not cancelled, and how long it was waited for (s)."""
         begun_s, lost_before_s, left_s = time.monotonic(), self._live.lost_s, self._patience_s(action)
         reports = self._live.topics[f"{action.name}/feedback"].count
-        found = await self._result(action, name, left_s)
-        if found is None and left_s < action.limit_s:
+        # On a full machine, too, a server at rest gets the processor when it wants it
+        is_short = left_s < action.limit_s
+        found = await self._result(action, name, left_s, lambda: is_short and self._is_older(name, left_s))
+        if found is None and is_short:
             # Feedback that comes late is another criterion's
             wanted = reports + self._judged_goal(action).feedback
             feedback = self._live.topics[f"{action.name}/feedback"]
