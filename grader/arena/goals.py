@@ -90,7 +90,7 @@ class GoalSender:
                 self._runner.send_message(cancel, {"id": name}, 0, 1, {"action": "cancel", **about})
                 self._asked[name] = time.monotonic(), self._live.lost_s
                 left_s, since = self._patience_s(action), " after it was cancelled"
-                found = await self._result(action, name, left_s)
+                found = await self._in_time(action, name, left_s)
         if found is None:
             self._note_unended(action, name)
         late = BEHIND if self._is_behind(action, name) else f"no result within {left_s:.3g} s{since}"
@@ -101,10 +101,8 @@ class GoalSender:
         """Return the end of a goal that is not cancelled, and how long it was waited for (s)."""
         begun_s, lost_before_s, left_s = time.monotonic(), self._live.lost_s, self._patience_s(action)
         reports = self._live.topics[f"{action.name}/feedback"].count
-        # On a full machine, too, a server at rest gets the processor when it wants it
-        is_short = left_s < action.limit_s
-        found = await self._result(action, name, left_s, lambda: is_short and self._is_older(name, left_s))
-        if found is None and is_short:
+        found = await self._in_time(action, name, left_s)
+        if found is None and left_s < action.limit_s:
             # Feedback that comes late is another criterion's
             wanted = reports + self._judged_goal(action).feedback
             feedback = self._live.topics[f"{action.name}/feedback"]
@@ -141,6 +139,12 @@ class GoalSender:
         if action is not last and (is_cancelled or not self._live.ends_for_newer):
             return action.limit_s
         return min(action.limit_s, matters_s if is_cancelled or matters_s else math.inf)
+
+    async def _in_time(self, action: Action, name: str, left_s: float) -> tuple[Any, str] | None:
+        """Return the end of a goal, if it comes within what criteria ask for. On a full machine, too, a server at rest
+        gets the processor when it wants it."""
+        is_short = left_s < action.limit_s
+        return await self._result(action, name, left_s, lambda: is_short and self._is_older(name, left_s))
 
     async def _result(
         self, action: Action, name: str, limit_s: float, is_enough: Callable[[], bool] = lambda: False
