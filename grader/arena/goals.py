@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from grader.arena.outcome import LATE_MOST, is_silent
+from grader.arena.run_end import LATE_MOST, is_silent
 from grader.arena.session import ArenaSession
 from grader.evidence.events import GOAL_STATUS, ActorEvent
 from grader.evidence.message_values import MessageType

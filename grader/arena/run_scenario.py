@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from grader.arena.admission import Admission, StartPermit
-from grader.arena.outcome import describe_wait, find_outcome, next_look_s, waits
 from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.recording_files import RunCost
+from grader.arena.run_end import describe_wait, find_outcome, next_look_s, waits
 from grader.arena.sandbox_files import FUNCTIONS, ROSTESTS
 from grader.arena.scenario_inputs import OVER, make_shots, settings
 from grader.arena.session import GRAPH_EVERY_S, ArenaSession

@@ -22,9 +22,9 @@ from typing_extensions import Self
 from grader.arena.admission import MEMINFO, read_numbers
 from grader.arena.arena_process import ArenaProcess
 from grader.arena.control_groups import remove_groups
-from grader.arena.outcome import all_compute
 from grader.arena.process_environment import LOOPBACK, ProcessEnvironment, search_path
 from grader.arena.ros.wire import Frame, FrameReader
+from grader.arena.run_end import all_compute
 from grader.arena.run_state import ROSOUT, RunState
 from grader.arena.sandbox_files import HOME
 from grader.errors import ArenaError

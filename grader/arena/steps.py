@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from typing_extensions import Self
 
 from grader.arena.goals import GoalSender
-from grader.arena.outcome import is_settled, is_silent, starting, starts_until_s
+from grader.arena.run_end import is_settled, is_silent, starting, starts_until_s
 from grader.arena.scenario_inputs import make_shots
 from grader.arena.served import ServedAction, ServedServices
 from grader.arena.session import NS, ArenaSession

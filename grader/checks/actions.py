@@ -13,7 +13,7 @@ from grader.checks.support.clocks import NEVER_LATE_S, excused, run_seconds, why
 from grader.checks.support.exit_causes import Ending, explain_early_end, explain_error
 from grader.checks.support.fields import differences, fields_text
 from grader.checks.support.processes import GlobalName, ends_twice, plain_type, run_slips
-from grader.checks.support.text import both, near_names, shown
+from grader.checks.support.text import near_names, python_or_cpp, shown
 from grader.checks.support.topics import cite, no_node, nodes_on, published_topics, run_slip, topics_with
 from grader.evidence.events import ActorEvent
 from grader.evidence.run import Run
@@ -31,12 +31,12 @@ SURELY = 10
 LONGER, LONGER_S = 1.5, 1.0
 """So many times `within_s`, and so much longer at least, a result is waited for: its loss says how late it comes."""
 ENDS = {
-    "SUCCEEDED": both("set_succeeded(result)", "setSucceeded(result)"),
-    "ABORTED": both("set_aborted(result)", "setAborted(result)"),
-    "PREEMPTED": both("set_preempted(result)", "setPreempted(result)"),
+    "SUCCEEDED": python_or_cpp("set_succeeded(result)", "setSucceeded(result)"),
+    "ABORTED": python_or_cpp("set_aborted(result)", "setAborted(result)"),
+    "PREEMPTED": python_or_cpp("set_preempted(result)", "setPreempted(result)"),
 }
 """The methods of an action server that end a goal."""
-ASKED_TO_STOP = both("is_preempt_requested()", "isPreemptRequested()")
+ASKED_TO_STOP = python_or_cpp("is_preempt_requested()", "isPreemptRequested()")
 HINTS = {
     "SUCCEEDED": f"at the end of the callback, call the action server's {ENDS['SUCCEEDED']}",
     "ABORTED": f"for such a goal, call the action server's {ENDS['ABORTED']}, and then return",
@@ -356,7 +356,7 @@ def _no_feedback(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | 
         return None
     count = plural(came, "feedback message")
     message = f"{count} came on {goal.name} of {params.action}, but {params.feedback} are expected"
-    publish = both("publish_feedback(feedback)", "publishFeedback(feedback)")
+    publish = python_or_cpp("publish_feedback(feedback)", "publishFeedback(feedback)")
     verdict = failed(message, hint=f"call the action server's {publish} each time around the loop")
     # That none came at all is no matter of time.
     nothing = verdict.based_on(wrong="nothing")

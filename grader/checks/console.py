@@ -42,8 +42,8 @@ from grader.checks.support.processes import (
 from grader.checks.support.text import (
     NUMBER,
     PLACE,
-    both,
     near_names,
+    python_or_cpp,
     refuse_others,
     shown,
     unfilled,
@@ -216,7 +216,7 @@ def _nothing_printed(package: PackageFacts, run: Run, params: PrintsParams, hint
     nothing = f"it prints nothing, not {params.words}"
     if keys := reads_keys(package, run):
         return failed_or_blocked(f"{nothing}: {keys.message}", hint=keys.fix)
-    verdict = failed_or_blocked(nothing, hint=both(f"{hint}, with flush=True", hint))
+    verdict = failed_or_blocked(nothing, hint=python_or_cpp(f"{hint}, with flush=True", hint))
     could = line_that_prints(package, run, lambda text: any(params.found_in(Line(0, text))))
     return not_reached(verdict, could) if could else verdict
 
@@ -296,7 +296,9 @@ def _called_early(one: Life, asked: Mapping[str, bool], run: Run) -> str:
 
 
 def _early_call(lost: str, service: str) -> Verdict:
-    wait = both(f"rospy.wait_for_service('{service}')", f'ros::service::waitForService("{service}");')
+    wait = python_or_cpp(
+        f"rospy.wait_for_service('{service}')", f'ros::service::waitForService("{service}");'
+    )
     verdict = failed(
         f"{lost}: it calls {service} before a node offers it", hint=f"wait for it before the call: `{wait}`"
     )

@@ -21,11 +21,11 @@ from grader.checks.support.driving import (
     Place,
     Stretch,
     answers_late,
+    commands_in,
     excuse_nearly,
     metres,
     spot,
     tell_end,
-    told_in,
     why_still,
     why_unreadable,
 )
@@ -236,7 +236,7 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
     speed_m_s, hold_s = _speed_m_s(judged), math.inf if params.hold_s is None else params.hold_s
     moves = speed_m_s > SLOW_M_S
     if moves or any(
-        one.speed > SLOW_M_S and asked.to_s - one.time_s <= hold_s for one in told_in(run, asked)[-1:]
+        one.speed > SLOW_M_S and asked.to_s - one.time_s <= hold_s for one in commands_in(run, asked)[-1:]
     ):
         still = f"on its way at {speed_m_s:.2f} m/s" if moves else "told to drive"
         message = f"{at}, and is still {still}"
@@ -250,7 +250,7 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtP
         strays = strays or around > 1
         verdict = failed(message, hint=turn if strays else FASTER if moves else IN_ITS_WAY)
         return _with_side(verdict, judged, asked, run, params) if strays else verdict
-    told = told_in(run, asked)
+    told = commands_in(run, asked)
     holds = bool(told) and asked.to_s - told[-1].time_s <= hold_s
     if turned_rad(judged, STILL_S) > TURNING_RAD or (holds and told[-1].turn):
         verdict = failed(f"{at}, and turns on the spot", hint=_steer(run, params))
@@ -267,7 +267,7 @@ def _with_side(
     verdict: Verdict, judged: Sequence[Pose], asked: Stretch, run: Run, params: EndsAtParams
 ) -> Verdict:
     """Return the loss with the side to which it turns, where the goal is nearly always on the other one."""
-    sides = turns_away([(pose, aside(pose, params.goal)) for pose in judged], told_in(run, asked))
+    sides = turns_away([(pose, aside(pose, params.goal)) for pose in judged], commands_in(run, asked))
     if sides is None:
         return verdict
     why = f"it turns to the {sides[0]} where the goal is on its {sides[1]}"
@@ -291,7 +291,7 @@ def _never_moves(
     if turned_rad(judged, STILL_S) > TURNING_RAD:
         verdict = failed_or_blocked(f"{message}, and turns on the spot", hint=_steer(run, params))
         return _with_side(verdict, judged, asked, run, params)
-    sent = told_in(run, asked)
+    sent = commands_in(run, asked)
     if any(command.forward for command in sent):
         return failed_or_blocked(f"{message}, though it is told to drive", hint=IN_ITS_WAY)
     if not sent or any(command.speed or command.turn for command in sent):

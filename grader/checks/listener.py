@@ -31,9 +31,9 @@ from grader.checks.support.text import (
     SPIN,
     TYPE_SLOT,
     VALUE,
-    both,
     in_words,
     near_names,
+    python_or_cpp,
     refuse_others,
     shown,
     subscriber,
@@ -144,7 +144,7 @@ def _other_words(
     elif said and (mark := _mark_between(said[0], missing[0], params.template)):
         hint = f"print '{wanted}', with ' ' in place of {mark!r} between the words and the message"
         if place := unfilled(mark):
-            hint = f"print '{wanted}': {place}{both(', in place of the + or the comma there', '')}"
+            hint = f"print '{wanted}': {place}{python_or_cpp(', in place of the + or the comma there', '')}"
     # What is printed right counts in full, the rest by the share of other words.
     share = 1 - (1 - OTHER_WORDS_SHARE) * len(missing) / len(probes)
     all_of = plural(len(probes), "message")
@@ -418,7 +418,7 @@ def _by_number(
             return failed(message, hint=gone.fix, citations=(gone.place,))
         return failed(message, hint=CALLBACK_HINT).about(said="".join(after[:1]))
     if len(missing) == len(probes) - 1 and missing[0] is not probes[0]:
-        waits = both("wait_for_message(…)", "waitForMessage(…)")
+        waits = python_or_cpp("wait_for_message(…)", "waitForMessage(…)")
         hint = f"subscribe with a callback and {SPIN}; {waits} waits for one message only"
         return failed("only the first message is printed", hint=hint)
     value = missing[0].value

@@ -31,8 +31,8 @@ from grader.checks.support.processes import (
 from grader.checks.support.text import (
     INIT,
     OTHER_WORDS_SHARE,
-    both,
     log,
+    python_or_cpp,
     shown,
     unfilled,
 )
@@ -147,7 +147,7 @@ def _only_printed(run: Run, params: LogsParams) -> Verdict | None:
     of_logger = next((log for log in map(split_log_line, (line.line for line in said)) if log), None)
     if of_logger is None:
         message = f"{shown(said[0].line)!r} is only printed, not logged"
-        hint = f"{_call(params)} instead of {both('print(…)', 'std::cout')}"
+        hint = f"{_call(params)} instead of {python_or_cpp('print(…)', 'std::cout')}"
         return failed(message, hint=hint).about(said=said[0].line)
     if of_logger[0] != params.level:
         message = f"{params.text!r} is logged at level {of_logger[0].upper()}, not {params.level.upper()}"

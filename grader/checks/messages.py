@@ -40,10 +40,10 @@ from grader.checks.support.text import (
     NUMBER,
     OTHER_WORDS_SHARE,
     SECONDS,
-    both,
     in_one_line,
     in_words,
     message_pattern,
+    python_or_cpp,
     refuse_others,
     shown,
 )
@@ -67,7 +67,7 @@ _HOURS = re.compile(r"\d:[0-5]\d:$")
 """Hours and minutes before the seconds: a time, and not one in seconds."""
 _LAST_NUMBER = re.compile(rf".*?({NUMBER})\D*", re.DOTALL)
 SECONDS_CHARS_MAX = 60
-TIMED = both(" % rospy.get_time()", " with ros::Time::now().toSec() for %s")
+TIMED = python_or_cpp(" % rospy.get_time()", " with ros::Time::now().toSec() for %s")
 UNFILLED = ("%s", "%d", "%f", "{}", "{0}")
 
 

@@ -34,7 +34,7 @@ from grader.checks.support.processes import (
     wrong_name,
 )
 from grader.checks.support.scripts import slips_of_program
-from grader.checks.support.text import ANONYMOUS, INIT, LOOP, both
+from grader.checks.support.text import ANONYMOUS, INIT, LOOP, python_or_cpp
 from grader.checks.support.topics import cite, run_slip
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
@@ -43,7 +43,7 @@ from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, failed_or_blocked, grade_again, passed
 from grader.wording import join_words, on_lines, plural, seconds
 
-IN_A_LOOP = f"loop with `{LOOP}`" + both(" and catch rospy.ROSInterruptException around it", "")
+IN_A_LOOP = f"loop with `{LOOP}`" + python_or_cpp(" and catch rospy.ROSInterruptException around it", "")
 
 
 class NodeLivesParams(Record):
@@ -249,7 +249,7 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
             return passed(f"{_script(one)} is one node and stayed alive; {slept}")
         if excuse := _locked_up(one, run) or _asleep(one, package) or _asking(one, run, package):
             return excuse
-        hint = IN_A_LOOP + both("; a bare `except:` in the loop swallows the Ctrl-C", "")
+        hint = IN_A_LOOP + python_or_cpp("; a bare `except:` in the loop swallows the Ctrl-C", "")
         return failed(message, hint=hint).if_repeated()  # no line of the script is known to be why
     found = process_tracebacks(run, one.name, after_ns=one.interrupt_ns)
     # By the computer's clock, which students have, no sleep of rospy's raises on Ctrl-C.

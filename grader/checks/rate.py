@@ -28,7 +28,7 @@ from grader.checks.support.processes import (
 )
 from grader.checks.support.recorder_losses import whole_until_ns
 from grader.checks.support.scripts import slips_of_program
-from grader.checks.support.text import LOOP, SPIN, both, loop_rate, rate_hint
+from grader.checks.support.text import LOOP, SPIN, loop_rate, python_or_cpp, rate_hint
 from grader.checks.support.topics import (
     SYSTEM_TOPICS,
     Sender,
@@ -277,7 +277,7 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     where = f" ({slips[0].file}, line {slips[0].line}: {slips[0].message})" if slips else ""
     hz = significant(params.rate_hz)
     about = f"{float(f'{found.mean_hz:.2g}'):,.0f}"
-    made = both(f"rate = rospy.Rate({hz})", f"ros::Rate rate({hz})")
+    made = python_or_cpp(f"rate = rospy.Rate({hz})", f"ros::Rate rate({hz})")
     hint = f"call rate.sleep(), with brackets, in every iteration; {made}"
     # There is a `sleep()` already, behind the loop or in a comment: the slip says what to do with it.
     if slips and slips[0].kind in {"sleep-outside", "commented-out"}:

@@ -13,7 +13,7 @@ from grader.checks.support.clocks import excused, run_seconds, why_late
 from grader.checks.support.exit_causes import explain_early_end, explain_error
 from grader.checks.support.fields import Difference, differences, fields_text
 from grader.checks.support.processes import LOGGERS, GlobalName, lives
-from grader.checks.support.text import action_client, both, near_names, service_client, shown
+from grader.checks.support.text import action_client, near_names, python_or_cpp, service_client, shown
 from grader.checks.support.topics import cite, no_node, nodes_on, topics_with
 from grader.evidence.events import MISFIT, OTHER_TYPE, ActorEvent
 from grader.evidence.run import Run
@@ -225,10 +225,10 @@ def _other_request(
 def _argument(number: int, value: object) -> str:
     """Return what reads an argument of the command line as a value of this kind."""
     if isinstance(value, bool):  # every text is true to Python and C++, also False
-        return both(f"sys.argv[{number}] == 'True'", f'std::string(argv[{number}]) == "True"')
+        return python_or_cpp(f"sys.argv[{number}] == 'True'", f'std::string(argv[{number}]) == "True"')
     python = f"{type(value).__name__}(sys.argv[{number}])"
     cpp = {int: "atoll({})", float: "atof({})"}.get(type(value), "{}").format(f"argv[{number}]")
-    return both(f"sys.argv[{number}]" if isinstance(value, str) else python, cpp)
+    return python_or_cpp(f"sys.argv[{number}]" if isinstance(value, str) else python, cpp)
 
 
 def _swapped(one: Request, wanted: dict[str, Any], params: CallsParams) -> list[str]:

@@ -30,7 +30,7 @@ from grader.checks.support.services import (
     offers,
     other_type,
 )
-from grader.checks.support.text import both, imports, service_call
+from grader.checks.support.text import imports, python_or_cpp, service_call
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
@@ -209,7 +209,7 @@ def _exchanged(pairs: Sequence[tuple[Exchange, dict[str, Any]]], params: Service
             for one, wanted in pairs
         ):
             kind = pairs[0][0].type.partition("/")[2]
-            by_name = both(
+            by_name = python_or_cpp(
                 f"{kind}Response({first}=…, {second}=…)", f"response.{first} = …; response.{second} = …;"
             )
             return f"{first} and {second} have each other's values: write each by its name, {by_name}"

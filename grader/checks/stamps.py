@@ -12,7 +12,7 @@ from grader.checks.registry import check
 from grader.checks.support.clocks import NEVER_LATE_S, clock_slack_s, excused, no_clock, ros_seconds
 from grader.checks.support.fields import FieldPath, no_field, readings
 from grader.checks.support.processes import PublishedTopic
-from grader.checks.support.text import NOW, both, shown
+from grader.checks.support.text import NOW, python_or_cpp, shown
 from grader.checks.support.topics import cite, no_message
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
@@ -193,7 +193,7 @@ def _other_clock(run: Run, found: Sequence[Stamp], params: StampsParams) -> Verd
     message = f"{_name(params)} of {params.topic} is the computer's time, and not that of /clock"
     hint = (
         f"take the time from {NOW}, which follows /clock where /use_sim_time is set; "
-        f"{both('time.time() and datetime', 'std::chrono and time(…)')} do not"
+        f"{python_or_cpp('time.time() and datetime', 'std::chrono and time(…)')} do not"
     )
     return failed(message, hint=hint)
 

@@ -19,12 +19,12 @@ from grader.checks.support.driving import (
     Place,
     Stretch,
     answers_late,
+    commands_in,
     excuse_nearly,
     metres,
     never_moves,
     spot,
     tell_end,
-    told_in,
     why_unreadable,
 )
 from grader.checks.support.geometry import (
@@ -248,7 +248,7 @@ def _turns_wrong(
     outside = [pose for pose, far in zip(path, out, strict=True) if far]
     if band.nearest_m(outside[0].point) < (band.min_m or 0.0):
         side, until_s = aside(outside[0], band.towards(outside[0])), outside[0].time_s
-        told = [one.turn * side for one in told_in(run, Stretch(until_s - TURNS_S, until_s)) if one.turn]
+        told = [one.turn * side for one in commands_in(run, Stretch(until_s - TURNS_S, until_s)) if one.turn]
         to_wall = min(told, default=0.0) > 0
         return ("left" if side > 0 else "right", "where the wall is", OTHER_SIDE) if to_wall else None
     too_far = [
@@ -258,7 +258,7 @@ def _turns_wrong(
         if band.nearest_m(pose.point) > (band.max_m or math.inf)
     ]
     away = [(pose, aside(pose, band.towards(pose))) for pose in too_far]
-    sides = turns_away(away, told_in(run, Stretch(-math.inf, math.inf)))
+    sides = turns_away(away, commands_in(run, Stretch(-math.inf, math.inf)))
     return (sides[0], f"where the wall is too far away, on its {sides[1]}", TOWARDS) if sides else None
 
 

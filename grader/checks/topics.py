@@ -20,7 +20,7 @@ from grader.checks.support.processes import (
     named_at,
     plain_type,
 )
-from grader.checks.support.text import INIT, both, imports, near_names, publisher, subscriber
+from grader.checks.support.text import INIT, imports, near_names, publisher, python_or_cpp, subscriber
 from grader.checks.support.topics import (
     End,
     cite,
@@ -109,7 +109,7 @@ def _wrong_type(package: PackageFacts, run: Run, channel: Channel, params: Topic
     call = publisher(params.topic, f"{name}, queue_size=10", type=f"{of_types}::{name}")
     hint = f"{imports(of_types, name, 'msg')}, then {call}"
     if name == "String" and re.fullmatch(r"std_msgs/(U?Int|Float)\d+", plain_type(channel.type)):
-        hint = f"{hint}, and publish the number as text: {both('str(…)', 'std::to_string(…)')}"
+        hint = f"{hint}, and publish the number as text: {python_or_cpp('str(…)', 'std::to_string(…)')}"
     message = f"{channel.publisher} publishes {plain_type(channel.type)} on {params.topic}, not {params.type}"
     cited = named_at(package, run, "publisher", params.topic)
     if mixed := by_copies(package, run, params.topic, failed):

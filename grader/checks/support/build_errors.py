@@ -17,8 +17,8 @@ from grader.checks.support.cpp_errors import (
     missing_header,
     missing_link,
     other_namespace,
+    plainly,
     programs_without,
-    told,
 )
 from grader.checks.support.missing_packages import is_declared, missing_package
 from grader.checks.support.scripts import (
@@ -451,7 +451,7 @@ _EXPLAINED: tuple[tuple[str, Explain], ...] = (
     (r"catkin_install_python\(\) called with non-existing file '([^']+)'", _missing_script),
     (
         r"catkin_package\(\)(?: absolute)? include dir '([^']+?)/*' does not exist",
-        told(
+        plainly(
             "catkin_package(…) names the folder {1}/, which is not in the package",
             "remove INCLUDE_DIRS {1}: it is for C++ header files, and git keeps no empty folder; "
             "or put them into {1}/ and push them",
@@ -465,11 +465,11 @@ _EXPLAINED: tuple[tuple[str, Explain], ...] = (
     (r"genaction\.py", _no_definition),
     (
         r"generate_messages\(\) must be called after (\w+)\(\)",
-        told("{1}(…) is called after generate_messages(…)", "move {1}(…) above generate_messages(…)"),
+        plainly("{1}(…) is called after generate_messages(…)", "move {1}(…) above generate_messages(…)"),
     ),
     (
         r"(generate_messages)\(\) must be called before catkin_package\(\)",
-        told("{1}() is called after catkin_package()", "move {1}(…) above catkin_package(…)"),
+        plainly("{1}() is called after catkin_package()", "move {1}(…) above catkin_package(…)"),
     ),
     (r"You must call project\(\) before calling (\w+)\(\)", _late_project),
     (r"does not match current PROJECT_NAME '([^']*)'", _other_project),
@@ -480,17 +480,20 @@ _EXPLAINED: tuple[tuple[str, Explain], ...] = (
     (NO_TARGET, _missing_dependency),
     (
         r"catkin package '([^']+)' has been find_package\(\)-ed but is not listed as a build",
-        told(
+        plainly(
             "find_package(…) names {1}, and package.xml does not declare it as a build dependency",
             "add <build_depend>{1}</build_depend> to package.xml",
         ),
     ),
     (r"(\w+)\(\) called with unused arguments: (\S+)", _unused_argument),
-    (r"(\w+)\(\) called without required DESTINATION", told("{1}(…) does not say where to install", _PLACE)),
+    (
+        r"(\w+)\(\) called without required DESTINATION",
+        plainly("{1}(…) does not say where to install", _PLACE),
+    ),
     (r"catkin_package\(\) DEPENDS on the catkin package '([^']+)' which must", _run_dependency),
     (
         r"catkin_package\(\) DEPENDS on (?:the catkin package )?'([^']+)'",
-        told(
+        plainly(
             "DEPENDS in catkin_package(…) names {1}, which is not a library that find_package(…) found",
             "take {1} out of DEPENDS; ROS packages go after CATKIN_DEPENDS",
         ),

@@ -65,7 +65,7 @@ Explain = Callable[[re.Match[str], PackageFacts, Sequence[str]], Explained]
 """From what was found in an error, the package and the build's lines to the error in a student's words."""
 
 
-def told(why: str, hint: str) -> Explain:
+def plainly(why: str, hint: str) -> Explain:
     """Return what explains an error in these words; {0} stands for all of it, {1} for the pattern's first group."""
 
     def explain(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -511,7 +511,10 @@ CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
     (r"expected '([()])' before '([^']+)'", _no_bracket),
     (r"unterminated argument list invoking macro \"(\w+)\"", _no_end_of_macro),
     (r"missing terminating ([\">]) character|#include expects", _no_quote),
-    (r"invalid preprocessing directive #\w+; did you mean (#\w+)\?", told("{0}", "write `{1}` there")),
+    (
+        r"invalid preprocessing directive #\w+; did you mean (#\w+)\?",
+        plainly("{0}", "write `{1}` there"),
+    ),
     (r"expected unqualified-id before '{'", _no_head),
     (r"'(ROS_(?:DEBUG|INFO|WARN|ERROR|FATAL)(?:_STREAM)?)' was not declared", _no_ros_h),
     (
@@ -526,14 +529,14 @@ CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
     (r"expected initializer before '([^']+)'", _no_semicolon_above),
     (
         r"a function-definition is not allowed here before '{'",
-        told(
+        plainly(
             "{0}: the function above it is not closed",
             "write the `}}` that ends the function above that line",
         ),
     ),
     (
         r"expected '}' at end of input",
-        told(
+        plainly(
             "{0}: a `}}` is missing", "write a `}}` for each `{{`; the indentation shows where one is missing"
         ),
     ),
@@ -547,20 +550,17 @@ CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
     (r"'__s_get\w+' is not a member of '([^']+)'", _no_message),
     (
         r"'__get\w+' in '\w+', which is of (non-class|pointer) type",
-        told(
-            "publish(…) is given what is no message, but of a {1} type",
-            "give it the message: `pub.publish(msg)`",
-        ),
+        plainly("publish(…) is given what is no message, but of a {1} type", "write `pub.publish(msg)`"),
     ),
     (
         r"could not convert '.*operator=\(",
-        told("a single `=` sets a value, and compares nothing", "write `==` on that line"),
+        plainly("a single `=` sets a value, and compares nothing", "write `==` on that line"),
     ),
     (r"'(\w+)' (?:has not been declared|is not a class, namespace, or enumeration)", other_namespace),
     (r"(?:ConstPtr|Ptr|shared_ptr).* has no member named '(\w+)'", _no_arrow),
     (
         r"base operand of '->' has non-pointer type",
-        told("`->` is for pointers, and this is none", "on that line, write a dot in place of `->`"),
+        plainly("`->` is for pointers, and this is none", "on that line, write a dot in place of `->`"),
     ),
     (
         r"(?:has no member named '([^']+)'|'([^']+)' is not a member of .*); did you mean '([^']+)'",
@@ -571,7 +571,7 @@ CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
     (r"undefined reference to '([^']+)", _explain_unlinked),
     (
         r"multiple definition of 'main",
-        told("two sources of one program have a `main`", "write an add_executable(…) for each program"),
+        plainly("two sources of one program have a `main`", "write an add_executable(…) for each program"),
     ),
     (r'dependencies to non-existent target "([^"]+)"', _missing_target),
     (r'link libraries for target "([^"]+)" which is not built', _missing_target),

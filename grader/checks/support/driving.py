@@ -105,7 +105,7 @@ def tell_end(verdict: Verdict, package: PackageFacts, run: Run) -> Verdict:
     return end.verdict(kind, f"{verdict.message}; the node ended: {end.cause}", verdict.measured)
 
 
-def told_in(run: Run, asked: Stretch) -> list[Command]:
+def commands_in(run: Run, asked: Stretch) -> list[Command]:
     """Return the velocities of the student's nodes in the time of a goal, but for those that no node hears."""
     to_s, heard = run_seconds(run), topics_with(run, "subscribers", lambda _: True)
     if to_s is None:
@@ -117,7 +117,7 @@ def told_in(run: Run, asked: Stretch) -> list[Command]:
 
 def answers_late(verdict: Verdict, run: Run) -> Verdict:
     """Mark the loss of a robot whose node lets long pass between two velocities: a callback of it may wait."""
-    told = told_in(run, Stretch(-math.inf, math.inf))
+    told = commands_in(run, Stretch(-math.inf, math.inf))
     seldom = any(b.time_s - a.time_s > SELDOM_S for a, b in pairwise(told) if a.speed or a.turn)
     return verdict.late() if seldom and verdict.status is Status.FAIL else verdict
 

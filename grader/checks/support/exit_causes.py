@@ -33,7 +33,7 @@ from grader.checks.support.missing_names import (
     unmade,
     unused_import,
 )
-from grader.checks.support.operands import explain_by_definition, explain_operand
+from grader.checks.support.operand_types import explain_by_definition, explain_operand
 from grader.checks.support.processes import Life, early_end, lives, nodes_of, signal_name
 from grader.checks.support.rospy_calls import (
     explain_formatting,

@@ -17,7 +17,7 @@ from grader.checks.support.console_output import Line
 from grader.checks.support.exit_causes import Ending, explain_end, explain_error
 from grader.checks.support.fields import value_text
 from grader.checks.support.processes import base_name, early_end
-from grader.checks.support.text import both, get_param, init, near_names, shown
+from grader.checks.support.text import get_param, init, near_names, python_or_cpp, shown
 from grader.checks.support.topics import cite, files_that_run, nodes_on, published_topics
 from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
@@ -279,14 +279,14 @@ def _is_misread(package: PackageFacts, run: Run, verdict: Verdict) -> bool:
 def _asked_before(run: Run, asked: str, right: str) -> str:
     """Return what else to write where a node asked whether the parameter is there, and so never read it."""
     events = (e for _, e in run.actors if e.action == "read" and absolute_name(e.topic or "") == asked)
-    has = both(f"`rospy.has_param('{shown(right)}')`", f'`nh.hasParam("{shown(right)}")`')
+    has = python_or_cpp(f"`rospy.has_param('{shown(right)}')`", f'`nh.hasParam("{shown(right)}")`')
     return f", and ask {has}, too" if any("has_param" in e.detail for e in events) else ""
 
 
 def _named(node: str, wanted: str) -> str:
     """Return what to do where the node's private parameters are not those of the node that the lab asks for."""
     if base_name(node) == wanted:
-        flag = both("`anonymous=True`", "`ros::init_options::AnonymousName`")
+        flag = python_or_cpp("`anonymous=True`", "`ros::init_options::AnonymousName`")
         return (
             f"take out {flag}: with it, the node has another name each time, and so have its own parameters"
         )

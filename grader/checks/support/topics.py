@@ -29,10 +29,10 @@ from grader.checks.support.text import (
     LOOP,
     PUBLISHER,
     TYPE_SLOT,
-    both,
     imports,
     near_names,
     publisher,
+    python_or_cpp,
     shown,
     subscriber,
 )
@@ -296,7 +296,7 @@ def _by_what_is_heard(run: Run, message: str, of_node: Callable[..., Verdict]) -
         return of_node(f"{message}: {why}", measured="no message", hint=hint)
     if heard:
         answering = f"publish in the callback of {join_words(heard)}, or in the loop"
-        hint = both(
+        hint = python_or_cpp(
             answering,
             f"{answering}, and call ros::spinOnce() in it, or ros::spin(): otherwise no callback is ever called",
         )

@@ -2,8 +2,8 @@
 
 What nothing calls, statements without an effect, imports. Names are for `script_names.py`, texts for `script_texts.py`,
 objects for `script_objects.py`, callbacks for `script_callbacks.py`, what these print for `script_prints.py`, base
-classes for `script_bases.py`, threads and generators for `script_waits.py`, ends of goals for `script_goals.py`, loops
-for `script_loops.py`, their sleeps for `script_sleeps.py`, their rates for `script_rates.py`, values for
+classes for `script_bases.py`, threads and generators for `script_threads.py`, ends of goals for `script_goals.py`,
+loops for `script_loops.py`, their sleeps for `script_sleeps.py`, their rates for `script_rates.py`, values for
 `script_values.py`, arithmetic for `script_arithmetic.py`, scans for `script_scans.py`, sides and frames for
 `script_sides.py`, rows of grids for `script_grids.py`, counters and clocks for `script_counters.py`, what functions
 return for `script_results.py`, calls that cannot work for `script_calls.py`, publishers and messages that nothing uses
@@ -32,9 +32,9 @@ import script_results
 import script_scans as scans
 import script_sides as sides
 import script_sleeps as sleeps
+import script_threads
 import script_unsent as unsent
 import script_values as values
-import script_waits
 from script_rospy import name_rospy
 from script_texts import graph_names, said_texts
 from script_tree import (
@@ -77,7 +77,7 @@ def slips(tree):
         script_prints.unprinted_messages, counters.values_left_out, counters.published_unchanged,
         unsent.unused_publishers, unsent.unsent_messages, unsent.lost_objects, rates.loops_of_numbers,
         goals.finished_goals, goals.finished_in_loops, goals.ended_without_result, counters.sends_no_time, without_node,
-        debuggers, script_results.results, rates.turns_taken_off, script_bases.unmade_bases, script_waits.waits,
+        debuggers, script_results.results, rates.turns_taken_off, script_bases.unmade_bases, script_threads.waits,
         calls.locks_taken_twice, calls.values_out_of_order, calls.params_read_early, calls.arguments_out_of_order,
         calls.bare_decorators, scans.first_scans,
         sides.named_sides, sides.frames_swapped, sides.frames_named,

@@ -6,7 +6,7 @@ from itertools import accumulate
 
 import pytest
 
-from grader.arena.outcome import (
+from grader.arena.run_end import (
     describe_wait,
     find_outcome,
     next_look_s,

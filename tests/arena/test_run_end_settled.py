@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from grader.arena.outcome import (
+from grader.arena.run_end import (
     all_compute,
     find_outcome,
     is_settled,

@@ -459,7 +459,7 @@ def is_unnamed(live: RunState, process: str) -> bool:
     return lone == {process} and rest is not None and rest.programs == 1 and absent != set()
 
 
-def _waits_in_vain(live: RunState, process: str) -> bool:
+def _waits_for_nothing(live: RunState, process: str) -> bool:
     """Return whether a process looks for a service or an action without end, and for none of those that are there."""
     nodes = {node for node in live.here if live.owners.get(node) == process}
     nodes |= {UNNAMED} if is_unnamed(live, process) else set[str]()
@@ -498,7 +498,7 @@ def _patience_s(live: RunState) -> float:
         own_s = patience.get(live.at_rest[process].kind, LOOPING_S)
         if own_s == SPINNING_S and _raised(live, [process]):
             own_s = ANSWERING_S
-        if _waits_in_vain(live, process):
+        if _waits_for_nothing(live, process):
             is_seen = live.serves and not live.naps and not live.polled.get(process)
             own_s = IN_VAIN_S if is_seen else SPINNING_S
         found.append(min(TALKING_S if process in talking else LOOPING_S, own_s))
@@ -531,4 +531,4 @@ def goes_on(live: RunState, process: str, now_s: float) -> bool:
     rest = live.at_rest.get(process)
     spins = rest is not None and rest.kind == "spins" and not live.naps
     endless = (spins or computes(live, process)) and not is_fed(live, now_s)
-    return endless or _waits_in_vain(live, process)
+    return endless or _waits_for_nothing(live, process)
