@@ -27,7 +27,7 @@ from grader.model.package import Interface, PackageFacts, Shebang, ShebangFault,
 from grader.model.python_slip import PythonSlip
 from grader.model.submission import SourcePackage, Submission
 from grader.package.cpp import SUFFIXES, cpp_slips
-from grader.package.own_modules import drop_slips_of_modules
+from grader.package.own_modules import drop_slips_of_modules, imported_files
 from grader.package.python import check_syntax
 from grader.package.reading import (
     LEFT_OUT,
@@ -263,6 +263,7 @@ def is_near_python(data: bytes) -> bool:
 
 INTERFACES_MAX = 200
 OTHERS_MAX = 1_000
+IMPORTS_MAX = 50
 """So many packages that were handed in beside one are named in its facts."""
 INTERFACE_LIMIT_BYTES = 64_000
 
@@ -304,7 +305,7 @@ def read_package(
         manifest=manifest,
         manifest_fault=manifest_fault,
         cmake=cmake,
-        files=_with_faults(files, report.faults),
+        files=_with_imports(_with_faults(files, report.faults), texts),
         launch_files=tuple(one for one in launch_files if not one.given),
         launched=tuple(one for one in launch_files if one.given),
         hints=hints,
@@ -397,6 +398,11 @@ def _readable(entries: Iterable[Entry]) -> Iterable[Entry]:
 
 def _with_faults(files: tuple[SourceFile, ...], faults: Mapping[str, Fault]) -> tuple[SourceFile, ...]:
     return tuple(file.model_copy(update={"python_fault": faults.get(file.path)}) for file in files)
+
+
+def _with_imports(files: Iterable[SourceFile], texts: Mapping[str, str]) -> tuple[SourceFile, ...]:
+    imported = {path: own[:IMPORTS_MAX] for path, own in imported_files(texts).items()}
+    return tuple(one.model_copy(update={"imports": imported.get(one.path, ())}) for one in files)
 
 
 def _read_git_ignores(package: SourcePackage, paths: Iterable[str]) -> tuple[IgnoreLine, ...]:

@@ -15,12 +15,27 @@ _OWNER = re.compile(r"(\w+)\.publish\(")
 def drop_slips_of_modules(slips: Iterable[PythonSlip], texts: Mapping[str, str]) -> tuple[PythonSlip, ...]:
     """Return the slips without those of a file alone, such as a function that nothing in it calls, where another one of
     the `texts` does it."""
-    named = {path: {*re.findall(r"\w+", " ".join(_IMPORT.findall(text)))} for path, text in texts.items()}
-    given = tuple(slips)
+    named, given = _words_of_imports(texts), tuple(slips)
     # of a script and its module, the script is told that it is no node
     without_init = {one.file for one in given if one.kind == "no-init"}
     kept = (one for one in given if not _is_done_elsewhere(one, texts, named, without_init))
     return tuple(filter(None, (_with_attributes(one, texts, named) for one in kept)))
+
+
+def imported_files(texts: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
+    """Return the package's own files that each of the `texts` names in its imports, by path."""
+    by_name: dict[str, list[str]] = {}
+    for path in texts:
+        by_name.setdefault(PurePosixPath(path).stem, []).append(path)
+    named = _words_of_imports(texts)
+    found = {
+        path: sorted(one for word in words for one in by_name.get(word, ())) for path, words in named.items()
+    }
+    return {path: tuple(one for one in others if one != path) for path, others in found.items()}
+
+
+def _words_of_imports(texts: Mapping[str, str]) -> dict[str, set[str]]:
+    return {path: {*re.findall(r"\w+", " ".join(_IMPORT.findall(text)))} for path, text in texts.items()}
 
 
 _CLASS = r"^class {}\b(?:(?!^\S).)*?^[ \t]+def __init__\(self(.*?)\)[^\n]*:(.*?)(?=^[ \t]+(?:def|@)|^\S|\Z)"

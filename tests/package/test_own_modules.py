@@ -61,3 +61,18 @@ def test_what_no_file_does_is_one(tmp_path: Path) -> None:
     found = [(one.file, one.kind) for one in facts.slips if one.kind in ALONE]
     of_pubs = [("src/pubs.py", "never-published"), ("src/pubs.py", "never-called")]
     assert found == [*of_pubs, (TALKER, "no-init")]
+
+
+def test_which_own_files_a_script_imports(tmp_path: Path) -> None:
+    """A spare file beside them is not one."""
+    files = {
+        TALKER: f"{START}from lab.helper import make\n{INIT}",
+        "src/lab/helper.py": "import numbers\nfrom .numbers import one\n",
+        "src/lab/numbers.py": "one = 1\n",
+        "src/old.py": "import rospy\n",
+    }
+    facts = facts_of(package(tmp_path, files))
+    assert {one.path: one.imports for one in facts.files if one.imports} == {
+        TALKER: ("src/lab/helper.py",),
+        "src/lab/helper.py": ("src/lab/numbers.py",),
+    }

@@ -460,22 +460,25 @@ def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | 
 
 
 def files_that_run(package: PackageFacts, run: Run) -> set[str | None]:
-    """Return the scripts that run, those that a launch file started, and the sources of programs of C++."""
+    """Return the scripts that run and those that a launch file started, with what they import of the package, and the
+    sources of programs of C++."""
     scripts = run_scripts(run)
     nodes = [node for file in package.launch_files for node in file.brings]
     types = {node.type for node in nodes if node.full_name in run.student_nodes()}
     launched = {file.path for file in package.files if PurePosixPath(file.path).name in types}
     made = (sources_made(package, one.call) for one in programs(package) if one.name in scripts | types)
-    return scripts.union(launched, _helpers(package, scripts | launched), *made)
+    return scripts.union(launched, _imported(package, scripts | launched), *made)
 
 
-def _helpers(package: PackageFacts, scripts: Collection[str | None]) -> set[str]:
-    """Return the files beside these scripts, or in the package's own module, that name no node: others import them."""
-    nodes = {s.file for s in package.slips if s.kind in ("node-name", "no-init")}
-    folders = {PurePosixPath(one).parent for one in scripts if one and one.endswith(".py")}
-    own = {PurePosixPath("src", package.name), *folders} if folders else set()
-    files = (f.path for f in package.files if f.python and f.path not in nodes)
-    return {path for path in files if path.endswith(".py") and PurePosixPath(path).parent in own}
+def _imported(package: PackageFacts, scripts: Collection[str | None]) -> set[str]:
+    """Return the package's own files that these scripts import, and those that these import."""
+    imports = {one.path: one.imports for one in package.files}
+    found, left = set[str](), [one for one in scripts if one]
+    while left:
+        new = {*imports.get(left.pop(), ())} - found
+        found |= new
+        left += new
+    return found
 
 
 def reads_keys(package: PackageFacts, run: Run) -> PythonSlip | None:
