@@ -45,14 +45,13 @@ STRING = "std_msgs/String"
 
 
 def cross_faults(
-    data: object, checks: Mapping[str, Check], *, complete: bool, files: Mapping[str, bytes]
+    rubric: WrittenRubric, checks: Mapping[str, Check], *, complete: bool, files: Mapping[str, bytes]
 ) -> list[Fault]:
     """Return every fault that shows only between one part of a rubric and another, or between it and the checks.
 
     Where `checks` are not complete, because the instructor's file of them is broken, a name that is near none is
     left alone: it may be one of theirs. `files` are those beside the rubric, of which the course's types are read.
     """
-    rubric = WrittenRubric(data)
     criteria, scenarios = rubric.criteria, rubric.scenarios
     faults = [f for name, s in scenarios.items() for f in scenario_faults(("scenarios", name), s)]
     if not isinstance(rubric.data.get("criteria"), list):

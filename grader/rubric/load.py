@@ -261,17 +261,19 @@ def _faults(source: Source, samples: Sequence[Value], beside: Beside, folder: Pa
         ]
     found = [*source.faults, *swallowed_keys(source.data), *made_up_faults(source.data), *beside.faults]
     # Faults of a later sample count only where the first has none: they would be the same with another number.
+    written = WrittenRubric(source.data)
     for sample in samples:
+        rubric = written if sample is source.data else WrittenRubric(sample)
         faults = [
             *model_faults(Rubric, sample),
-            *cross_faults(sample, beside.known, complete=beside.own.complete, files=beside.files),
+            *cross_faults(rubric, beside.known, complete=beside.own.complete, files=beside.files),
         ]
         known = {path for path, _ in found} if sample is not samples[0] else set()
-        found += [one for one in faults_of_sample(faults, source.data, as_map(sample)) if one[0] not in known]
+        found += [one for one in faults_of_sample(faults, source.data, rubric.data) if one[0] not in known]
     known = {path for path, _ in found}
     found += [
         (path, fault)
-        for path, fault in misspelt_names(WrittenRubric(source.data), folder)
+        for path, fault in misspelt_names(written, folder)
         if known.isdisjoint(path[:n] for n in range(1, len(path) + 1))
     ]
     unique: dict[tuple[KeyPath, str], Fault] = {}

@@ -24,10 +24,10 @@ from grader.model.record import Record
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
+    WrittenRubric,
     as_map,
     as_maps,
     as_texts,
-    criteria_of,
     dotted,
     give_one,
     items_in,
@@ -369,22 +369,23 @@ def made_up_faults(data: Mapping[str, Any]) -> Iterator[Fault]:
             other: made_up for other, made_up in _declared_values(data).items() if other in {*above, name}
         }
     used: set[str] = set()
-    for path, name in places({key: part for key, part in data.items() if key != KEY}):
-        used |= {name, *operands_of(name, declared)}
+    others = {key: part for key, part in data.items() if key != KEY}
+    criteria = {criterion.at: criterion for criterion in WrittenRubric(data).criteria}
+    for path, name in places(others):
+        names = {name, *operands_of(name, declared)}
+        used |= names
+        criterion = criteria.get(path[:3])
         if name not in declared:
             yield path, f'made_up declares no value "{name}"{did_you_mean(name, declared)}'
         elif not _PLACE.match(dotted(path)):
             yield path, "made-up values belong in scenarios, and in with, hint and reproduce of criteria"
-    yield from _no_names({key: part for key, part in data.items() if key != KEY}, ())
+        elif criterion and not inputs_with_values(criterion.scenario, names, {}):
+            run = criterion.data.get("scenario") or "a criterion without a scenario"
+            yield path, f'{run} gives programs no "{name}": they could not know it'
+    yield from _no_names(others, ())
     yield from (
         ((KEY, name), "is used nowhere: remove it, or use it") for name in declared if name not in used
     )
-    for criterion in criteria_of(data):
-        run = criterion.data.get("scenario") or "a criterion without a scenario"
-        for path, name in places(criterion.data.get("with"), criterion.at):
-            names = {name, *operands_of(name, declared)}
-            if name in declared and not inputs_with_values(criterion.scenario, names, {}):
-                yield path, f'{run} gives programs no "{name}": they could not know it'
 
 
 def _no_names(part: object, path: KeyPath) -> Iterator[Fault]:

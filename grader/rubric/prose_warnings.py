@@ -11,7 +11,7 @@ from grader.checks.support.fields import is_number
 from grader.model.message_definitions import BUILT_IN
 from grader.rubric.message_fields import said_types
 from grader.rubric.simulators import topics_of_programs
-from grader.rubric.spelling import is_slip, topics_in
+from grader.rubric.spelling import is_slip
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
@@ -226,9 +226,9 @@ def _unsaid_node(at: KeyPath, given: dict[str, Any], rubric: WrittenRubric) -> I
 
 def _of_another_topic(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield a topic that the title does not name, where it names another one of the rubric."""
-    own = {*topics_in(criterion.given)}
+    own = criterion.topics
     named = {*re.findall(r"(?<![\w/])/[\w/]*\w", str(criterion.data.get("title")))}
-    others = {topic for one in rubric.criteria for topic in topics_in(one.given)}
+    others = {topic for one in rubric.criteria for topic in one.topics}
     if isinstance(criterion.given.get("topic"), str) and named and named <= others and not named & own:
         yield (*criterion.at, "topic"), f"is not what the title has: {join_words(sorted(named))}"
 

@@ -22,7 +22,7 @@ from grader.rubric.message_fields import field_faults
 from grader.rubric.reachable import reach_faults
 from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Until
 from grader.rubric.simulators import PROGRAMS, asked_faults, only_publisher, parameter_faults
-from grader.rubric.spelling import SURE, topics_in, unknown_names, values_of, with_other_topics
+from grader.rubric.spelling import SURE, unknown_names, values_of, with_other_topics
 from grader.rubric.started import argument_faults, started_faults
 from grader.rubric.yaml_lines import (
     Fault,
@@ -36,6 +36,7 @@ from grader.rubric.yaml_lines import (
     parts_of,
     services_in,
     starts_of,
+    topics_in,
 )
 from grader.wording import closest, did_you_mean, join_words
 

@@ -26,6 +26,7 @@ from grader.rubric.yaml_lines import (
     parts_of,
     set_in,
     starts_of,
+    topics_in,
 )
 from grader.wording import closest, is_one_edit, join_words
 
@@ -124,13 +125,13 @@ def _named_once(rubric: WrittenRubric, folder: Path) -> Iterator[tuple[KeyPath, 
     """Yield each name that one line alone has, and the name that is meant by it, "" where none is known."""
     texts, handout = rubric.texts, rubric.handout
     programs = {text.rpartition("/")[2] for path, text in texts if path[-1] == "program"}
-    names = [(path, text, last) for path, text in texts if (last := _last_word(path, text, rubric))]
-    names = [one for one in names if not PROSE & {*one[0]}]
+    plain = [one for one in texts if PROSE.isdisjoint(one[0])]
+    names = [(path, text, last) for path, text in plain if (last := _last_word(path, text, rubric))]
     actions = {text for path, text in texts if path[-1] == "action"}
     frames = USUAL_FRAMES & {*re.findall(r"\w+", handout)} or USUAL_FRAMES
     poses = {POSES[program] for program in programs & POSES.keys()}
     known_ones = {*SYSTEM_TOPICS, *frames, *poses}
-    words = {word for path, text in texts if not PROSE & {*path} for word in re.findall(r"\w+", text)}
+    words = {word for _, text in plain for word in re.findall(r"\w+", text)}
     topics = sorted(other for _, other, _ in names if other.startswith("/"))
     for path, text, last in names:
         if text.rpartition("/")[0] in actions:  # `/dock/cancel`
@@ -244,7 +245,6 @@ def _is_own_field(path: KeyPath, rubric: WrittenRubric) -> bool:
 LIKELY, SURE = 0.6, 0.85
 """How alike two names have to be: to be suggested, and to be taken for one with a slip."""
 _DIGITS = re.compile(r"\d+")
-_TOPIC = re.compile(r"(?:^|:=)(/[\w/]*\w)")
 
 
 def unknown_names(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator[Fault]:
@@ -261,8 +261,7 @@ def _unknown_topics(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Itera
 
     Programs, launch files and checks of the instructor's own may know others: then only a near miss is a fault.
     """
-    named = {topic for criterion in rubric.criteria for topic in topics_in(criterion.given)}
-    named |= {topic for criterion in rubric.criteria for topic in READ_TOO.get(criterion.check, ())}
+    named = {t for one in rubric.criteria for t in (*one.topics, *READ_TOO.get(one.check, ()))}
     found = [checks.get(criterion.check) for criterion in rubric.criteria]
     # Such a check may look at any topic in ways that the rubric does not show.
     own = any(check is None or check.source or "evidence" in check.facts for check in found)
@@ -379,18 +378,8 @@ def _waited_for(until: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
 
 def with_other_topics(rubric: WrittenRubric) -> Iterator[tuple[WrittenCriterion, set[str]]]:
     """Yield each criterion, and the topics that the others name."""
-    named = [set(topics_in(criterion.given)) for criterion in rubric.criteria]
-    for place, criterion in enumerate(rubric.criteria):
-        yield criterion, set().union(*named[:place], *named[place + 1 :])
-
-
-def topics_in(value: object) -> Iterator[str]:
-    if isinstance(value, str):
-        yield from _TOPIC.findall(value)
-    elif isinstance(value, Mapping):
-        yield from (topic for key, item in value.items() for topic in (*topics_in(key), *topics_in(item)))
-    elif isinstance(value, list | tuple):
-        yield from (topic for item in value for topic in topics_in(item))
+    for criterion in rubric.criteria:
+        yield criterion, set().union(*(one.topics for one in rubric.criteria if one is not criterion))
 
 
 def _near(topic: str, named: Iterable[str], *, cutoff: float) -> str:

@@ -11,8 +11,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import date
+from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias, cast
+from typing import Any, TypeAlias, cast
 
 import yaml
 from yaml.composer import Composer
@@ -58,6 +59,8 @@ YAML_PROBLEMS = {
     "the node content": "a comma, or a bracket, too many",
 }
 """What PyYAML says, and what is told."""
+
+_TOPIC = re.compile(r"(?:^|:=)(/[\w/]*\w)")
 
 KeyPath = tuple[str | int, ...]
 Value: TypeAlias = "dict[str, Any] | list[Any] | str | int | float | None"
@@ -154,7 +157,8 @@ def source_of(raw: bytes, name: str, form: Form) -> Source:
     return Source(name=name, raw=raw, data=data, lines=reader.lines, faults=reader.faults)
 
 
-class WrittenCriterion(NamedTuple):
+@dataclass(frozen=True, kw_only=True)
+class WrittenCriterion:
     """A criterion as it is written, with all faults that it may have.
 
     `place` is where it is, `at` where its parameters are, which are `given`. `run` is the name of its scenario, and
@@ -173,6 +177,11 @@ class WrittenCriterion(NamedTuple):
     def at(self) -> KeyPath:
         return (*self.place, "with")
 
+    @cached_property
+    def topics(self) -> set[str]:
+        """The topics that its parameters name."""
+        return set(topics_in(self.given))
+
     @property
     def has_run(self) -> bool:
         return self.data.get("scenario") is not None
@@ -188,34 +197,32 @@ class WrittenCriterion(NamedTuple):
         return ((self.at, self.given), *parts)
 
 
-def criteria_of(rubric: Mapping[str, Any]) -> list[WrittenCriterion]:
-    """Return the criteria of a rubric in their order."""
-    scenarios = as_map(rubric.get("scenarios"))
-    return [
-        WrittenCriterion(
-            data=one,
-            place=("criteria", index),
-            id=str(one.get("id")),
-            check=str(one.get("check")),
-            given=as_map(one.get("with")),
-            run=str(one.get("scenario")),
-            scenario=as_map(scenarios.get(str(one.get("scenario")))),
-        )
-        for index, one in as_maps(rubric.get("criteria"))
-    ]
-
-
 class WrittenRubric:
     """A rubric as it is written, with all faults that it may have."""
 
     def __init__(self, data: object) -> None:
         self.data = as_map(data)
         self.scenarios = {name: as_map(one) for name, one in as_map(self.data.get("scenarios")).items()}
-        self.criteria = criteria_of(self.data)
+        self.criteria = [
+            WrittenCriterion(
+                data=one,
+                place=("criteria", index),
+                id=str(one.get("id")),
+                check=str(one.get("check")),
+                given=as_map(one.get("with")),
+                run=str(one.get("scenario")),
+                scenario=self.scenarios.get(str(one.get("scenario")), {}),
+            )
+            for index, one in as_maps(self.data.get("criteria"))
+        ]
         self.handout = str(self.data.get("handout") or "")
         self.packages = packages_in(self.data)
         self.own_packages = {*self.packages, *(name for _, name in as_texts(self.data.get("packages")))}
-        self.texts = list(texts_in((), self.data))
+
+    @cached_property
+    def texts(self) -> list[tuple[KeyPath, str]]:
+        """All texts, keys too, each with its place."""
+        return list(texts_in((), self.data))
 
     def starts(self) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
         """Yield what the scenarios start, each with its place."""
@@ -536,6 +543,11 @@ def numbers_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, float]]:
         yield path, float(value)
     for key, inner in items_in(value):
         yield from numbers_in((*path, key), inner)
+
+
+def topics_in(value: object) -> Iterator[str]:
+    """Yield the topics that a part of a rubric names, its keys too."""
+    yield from (topic for _, text in texts_in((), value) for topic in _TOPIC.findall(text))
 
 
 def starts_of(scenario: Mapping[str, Any]) -> list[dict[str, Any]]:
