@@ -19,7 +19,6 @@ from grader.rubric.yaml_lines import (
     given_steps,
     items_in,
     numbers_in,
-    parts_of,
 )
 
 FRAME_KEYS = frozenset({"frame_id", "child_frame_id"})
@@ -42,7 +41,7 @@ def frame_faults(rubric: WrittenRubric) -> Iterator[Fault]:
     for name, scenario in rubric.scenarios.items():
         yield from _in_values(("scenarios", name), scenario)
         yield from _two_parents(("scenarios", name), scenario)
-        yield from _sent_turns(("scenarios", name), scenario, rubric)
+    yield from _sent_turns(rubric)
     for criterion in rubric.criteria:
         yield from _in_values(criterion.at, criterion.given)
         for at, asked in criterion.conditions:
@@ -52,12 +51,12 @@ def frame_faults(rubric: WrittenRubric) -> Iterator[Fault]:
             yield from _no_pose(criterion, rubric)
 
 
-def _sent_turns(path: KeyPath, scenario: dict[str, Any], rubric: WrittenRubric) -> Iterator[Fault]:
-    """Yield angles in degrees in what a scenario sends, in messages and requests of ROS's own types."""
-    for at, kind, one in parts_of(scenario):
+def _sent_turns(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield angles in degrees in what scenarios send, in messages and requests of ROS's own types."""
+    for at, kind, one in rubric.parts():
         is_own = str(one.get("type")).partition("/")[0] in rubric.own_packages
         for key in ("value", "values", "request") if kind in {"publish", "call"} and not is_own else ():
-            yield from _turns((*path, *at, key), one.get(key))
+            yield from _turns((*at, key), one.get(key))
 
 
 def _turns(path: KeyPath, value: object, *, is_angle: bool = False) -> Iterator[Fault]:

@@ -43,7 +43,7 @@ from grader.rubric.yaml_lines import (
     as_maps,
     given_steps,
     items_in,
-    parts_of,
+    published_in,
     services_in,
 )
 from grader.wording import did_you_mean, join_words
@@ -183,14 +183,11 @@ def range_warnings(rubric: WrittenRubric) -> Iterator[Fault]:
             given += [
                 ((*at, "values", n), types, field, v) for n, v in enumerate(as_list(asked.get("values")))
             ]
-    for name, scenario in rubric.scenarios.items():
-        for at, kind, one in parts_of(scenario):
-            sent = [("value", one.get("value")), *(("values", v) for v in as_list(one.get("values")))]
-            for key, value in sent if kind == "publish" else ():
-                at_value = ("scenarios", name, *at, key)
-                given += [
-                    ((*at_value, f), {str(one.get("type"))}, str(f), v) for f, v in as_map(value).items()
-                ]
+    for at, kind, one in rubric.parts():
+        sent = [("value", one.get("value")), *(("values", v) for v in as_list(one.get("values")))]
+        for key, value in sent if kind == "publish" else ():
+            type_ = str(one.get("type"))
+            given += [((*at, key, field), {type_}, str(field), v) for field, v in as_map(value).items()]
     for path, types, field, value in given:
         limits = [RANGES.get((kind, field)) for kind in types]
         if not is_number(value) or len(limits) != 1 or limits[0] is None:
@@ -418,8 +415,7 @@ def types_of(topic: str, rubric: WrittenRubric, run: dict[str, Any] | None = Non
         yield from (left,) if left else ()
     yield from said_types(topic, rubric.handout)
     for scenario in rubric.scenarios.values():
-        sent = [one for _, kind, one in parts_of(scenario) if kind == "publish"]
-        yield from (one.get("type") for one in sent if one.get("topic") == topic)
+        yield from (one.get("type") for one in published_in(scenario) if one.get("topic") == topic)
 
 
 def said_types(topic: str, handout: str) -> Iterator[str]:

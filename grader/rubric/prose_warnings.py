@@ -20,7 +20,6 @@ from grader.rubric.yaml_lines import (
     as_map,
     as_texts,
     numbers_in,
-    parts_of,
     starts_of,
     texts_in,
 )
@@ -249,19 +248,17 @@ def _sent_otherwise(rubric: WrittenRubric) -> Iterator[Fault]:
     in another case."""
     handout = rubric.handout
     quoted = sorted({*re.findall(r"`([^`]+)`", handout)})
-    for name, scenario in rubric.scenarios.items():
-        for at, kind, one in parts_of(scenario):
-            path: KeyPath = ("scenarios", name, *at)
-            line = str(one.get("line")) if kind == "type" else ""
-            other = next((text for text in quoted if text.lower() == line.lower()), "")
-            if other and line not in quoted:
-                yield (*path, "line"), f"the handout has `{other}`"
-            if kind in {"call", "serve"}:
-                yield from _other_fields((*path, "definition"), one.get("definition"), handout)
-            said = set(said_types(str(one.get("topic")), handout)) if kind == "publish" else set()
-            if said and str(one.get("type")) not in said:
-                fault = f"the handout says that {one['topic']} carries {join_words(sorted(said))}"
-                yield (*path, "type"), fault
+    for path, kind, one in rubric.parts():
+        line = str(one.get("line")) if kind == "type" else ""
+        other = next((text for text in quoted if text.lower() == line.lower()), "")
+        if other and line not in quoted:
+            yield (*path, "line"), f"the handout has `{other}`"
+        if kind in {"call", "serve"}:
+            yield from _other_fields((*path, "definition"), one.get("definition"), handout)
+        said = set(said_types(str(one.get("topic")), handout)) if kind == "publish" else set()
+        if said and str(one.get("type")) not in said:
+            fault = f"the handout says that {one['topic']} carries {join_words(sorted(said))}"
+            yield (*path, "type"), fault
 
 
 def _other_types(at: KeyPath, given: dict[str, Any], handout: str) -> Iterator[Fault]:

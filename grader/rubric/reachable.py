@@ -44,6 +44,7 @@ from grader.rubric.yaml_lines import (
     as_map,
     given_steps,
     parts_of,
+    published_in,
     starts_of,
 )
 from grader.wording import plural
@@ -160,8 +161,7 @@ class TooShort(ValueError):
 
 def _sent_on(topic: str, scenario: dict[str, Any]) -> list[Any] | None:
     """Return all that is sent on a topic, or asked of a service; None where something else may be."""
-    parts = [one for _, kind, one in parts_of(scenario) if kind == "publish"]
-    sent = [one for one in parts if one.get("topic") == topic]
+    sent = [one for one in published_in(scenario) if one.get("topic") == topic]
     if "recording" in scenario or given_steps(scenario, "play"):
         return None
     # These are made up when the run begins.

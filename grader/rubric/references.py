@@ -33,7 +33,7 @@ from grader.rubric.yaml_lines import (
     as_maps,
     as_texts,
     given_steps,
-    parts_of,
+    published_in,
     services_in,
     starts_of,
     topics_in,
@@ -63,9 +63,9 @@ def reference_faults(
     """Yield a fault for everything that is named and not there."""
     for name, scenario in rubric.scenarios.items():
         yield from _outside_faults(("scenarios", name), scenario, rubric)
-        yield from _type_faults(("scenarios", name), scenario, rubric)
         found = (*parameter_faults(scenario), *argument_faults(scenario, rubric))
         yield from ((("scenarios", name, *at), fault) for at, fault in found)
+    yield from _type_faults(rubric)
     for criterion, others in with_other_topics(rubric):
         check, judged = checks.get(criterion.check), criterion.scenario
         if check is not None:
@@ -131,12 +131,12 @@ def _in_any_folder(launch: str) -> str:
     return f"write the file's name without its folder: {PurePosixPath(launch).name}"
 
 
-def _type_faults(path: KeyPath, scenario: dict[str, Any], rubric: WrittenRubric) -> Iterator[Fault]:
-    """Yield types that no machine has, of what a scenario sends, calls and offers."""
-    for at, kind, one in parts_of(scenario):
+def _type_faults(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield types that no machine has, of what scenarios send, call and offer."""
+    for at, kind, one in rubric.parts():
         to = "action" if one.get("action") is not None else TYPE_OF_PART.get(kind)
-        if to and at[0] != "probes":
-            yield from _of_machine((*path, *at, "type"), to, one.get("type"), rubric)
+        if to and at[2] != "probes":
+            yield from _of_machine((*at, "type"), to, one.get("type"), rubric)
 
 
 def _file_fault(file: str, rubric: WrittenRubric) -> str:
@@ -463,7 +463,7 @@ def _is_given_up(goal: dict[str, Any], scenario: dict[str, Any]) -> bool:
 
 
 def _sent_by_grader(scenario: dict[str, Any]) -> set[str]:
-    return {str(one.get("topic")) for _, kind, one in parts_of(scenario) if kind == "publish"}
+    return {str(one.get("topic")) for one in published_in(scenario)}
 
 
 def _sent_topics(scenario: dict[str, Any]) -> set[str]:

@@ -23,7 +23,6 @@ from grader.rubric.yaml_lines import (
     as_maps,
     as_texts,
     given_steps,
-    parts_of,
     set_in,
     starts_of,
     topics_in,
@@ -323,8 +322,7 @@ def _own_types(rubric: WrittenRubric) -> Iterator[Fault]:
     }
     names = {stem for _, stem in defined}
     typed = [(criterion.at, criterion.given) for criterion in rubric.criteria]
-    for scenario, one in rubric.scenarios.items():
-        typed += [(("scenarios", scenario, *at), given) for at, _, given in parts_of(one)]
+    typed += [(at, given) for at, _, given in rubric.parts()]
     for path, given in typed:
         kind = given.get("type")
         package, _, name = kind.partition("/") if isinstance(kind, str) else ("", "", "")

@@ -34,7 +34,7 @@ from grader.rubric.yaml_lines import (
     give_one,
     given_steps,
     items_in,
-    parts_of,
+    published_in,
     starts_of,
     texts_in,
 )
@@ -329,7 +329,7 @@ def wait_faults(rubric: WrittenRubric) -> Iterator[Fault]:
     for at, step in rubric.steps():
         topic, run = as_map(step.get("wait")).get("topic"), at[1]
         scenario = rubric.scenarios[str(run)]
-        sent = [one for _, kind, one in parts_of(scenario) if kind == "publish" and one.get("topic") == topic]
+        sent = [one for one in published_in(scenario) if one.get("topic") == topic]
         judged = [
             as_map(one.given.get(key))
             for one in rubric.criteria

@@ -32,6 +32,7 @@ from grader.rubric.yaml_lines import (
     as_texts,
     given_steps,
     parts_of,
+    published_in,
     services_in,
     starts_of,
     texts_in,
@@ -543,7 +544,7 @@ def _sent(scenario: dict[str, Any]) -> int:
     if not is_script or given_steps(scenario, "play"):
         return 0
     number = 0
-    for one in (one for _, kind, one in parts_of(scenario) if kind == "publish"):
+    for one in published_in(scenario):
         values = one.get("values")
         if {"count", "duration_s", "background", "times", "text", "integers", "among"} & one.keys():
             return 0

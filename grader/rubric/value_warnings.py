@@ -20,7 +20,7 @@ from grader.rubric.yaml_lines import (
     as_maps,
     given_steps,
     numbers_in,
-    parts_of,
+    published_in,
     services_in,
     set_in,
     starts_of,
@@ -106,11 +106,7 @@ def _left_out(criterion: WrittenCriterion) -> Iterator[Fault]:
     """Yield a cause's field that no message has which the run sends, while these have others: it is always zero."""
     cause = as_map(criterion.given.get("cause"))
     topic, field = cause.get("topic"), re.split(r"\W", str(cause.get("field") or ""))[0]
-    sent = [
-        one
-        for _, kind, one in parts_of(criterion.scenario)
-        if kind == "publish" and one.get("topic") == topic
-    ]
+    sent = [one for one in published_in(criterion.scenario) if one.get("topic") == topic]
     values = [
         value
         for one in sent

@@ -236,6 +236,11 @@ class WrittenRubric:
         for name, scenario in self.scenarios.items():
             yield from ((("scenarios", name, key, n), one) for n, one in as_maps(scenario.get(key)))
 
+    def parts(self) -> Iterator[tuple[KeyPath, str, dict[str, Any]]]:
+        """Yield what the scenarios send, call, offer and do, each with its place and its kind."""
+        for name, scenario in self.scenarios.items():
+            yield from ((("scenarios", name, *at), kind, one) for at, kind, one in parts_of(scenario))
+
     def params(self) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
         """Yield the parameters that the scenarios set, each with its place."""
         for name, scenario in self.scenarios.items():
@@ -575,6 +580,11 @@ def parts_of(scenario: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str, dict[s
         yield from (((key, n), kind, one) for n, one in as_maps(scenario.get(key)))
     for n, step in as_maps(scenario.get("steps")):
         yield from ((("steps", n, kind), kind, as_map(given)) for kind, given in step.items())
+
+
+def published_in(scenario: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return what a scenario sends in messages: its probes, and its steps that publish."""
+    return [one for _, kind, one in parts_of(scenario) if kind == "publish"]
 
 
 def services_in(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, str, dict[str, Any]]]:
