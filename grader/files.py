@@ -64,7 +64,7 @@ def whole_file(target: Path, *, public: bool = False) -> Iterator[Path]:
     target = target.resolve() if target.is_symlink() else target
     special = target.exists() and not target.is_file()
     folder = Path(tempfile.gettempdir()) if special else target.parent
-    try:
+    with writing(target):
         make_folder(folder, public=public)
         with _new_beside(target, folder, public=public) as (beside, file):
             yield beside
@@ -77,8 +77,6 @@ def whole_file(target: Path, *, public: bool = False) -> Iterator[Path]:
             if not HAS_LOCKS:  # on Windows, what is open cannot be renamed
                 file.close()
             beside.replace(target)
-    except OSError as error:
-        raise unwritable(target, error) from error
 
 
 @contextmanager
@@ -186,12 +184,19 @@ def read_given(path: Path, bytes_max: int = sys.maxsize, *, hint: str = "") -> b
 
 def check_writable(folder: Path) -> None:
     """Raise OutputError if `folder` (which need not exist yet) cannot be written. Leaves nothing behind."""
-    try:
+    with writing(folder):
         place = next(p for p in (folder, *folder.absolute().parents) if os.path.lexists(p))
         with tempfile.TemporaryFile(dir=place):  # without a name: a grader that is killed here leaves nothing
             pass
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Raise OutputError, or HostError, where the block cannot write `path`."""
+    try:
+        yield
     except OSError as error:
-        raise unwritable(folder, error) from error
+        raise unwritable(path, error) from error
 
 
 def unwritable(path: Path, error: OSError) -> GraderError:

@@ -13,15 +13,14 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 
 from pydantic import ValidationError
 from typing_extensions import Self
 
 from grader.errors import Busy, EvidenceError
-from grader.files import lock, make_folder, sync, sync_tree, try_lock, unwritable
+from grader.files import lock, make_folder, sync, sync_tree, try_lock, writing
 from grader.model.result import GradingResult
 from grader.model.version import RESULT as FORMAT
 from grader.model.version import UPDATE
@@ -51,10 +50,10 @@ class Results:
     def __enter__(self) -> Self:
         # before anything is made, to remove no more than that in the end
         self._made = [path for path in (self.folder, *self.folder.parents) if not path.exists()]
-        with self._writable():
+        with writing(self.folder):
             self._lock = _locked(self.folder)
         try:
-            with self._writable():
+            with writing(self.folder):
                 _recover(self.folder)
                 make_folder(self.evidence)
         except BaseException:  # without `__enter__`, `__exit__` is not called
@@ -80,7 +79,7 @@ class Results:
 
     def commit(self, *, keep: tuple[str, ...] = ()) -> None:
         """Replace what was there by what is in `new`, except for the parts to `keep`."""
-        with self._writable():
+        with writing(self.folder):
             if EVIDENCE in keep:
                 shutil.rmtree(self.evidence)
             names = sorted({*keep, *(path.name for path in self.new.iterdir())})
@@ -98,13 +97,6 @@ class Results:
             with suppress(OSError):  # not empty: it is in use
                 path.rmdir()
         close(self._lock)
-
-    @contextmanager
-    def _writable(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
-            raise unwritable(self.folder, error) from error
 
 
 def read_result(folder: Path) -> GradingResult | None:

@@ -12,7 +12,7 @@ from grader.evidence.events import RECORDING_MISSING, RECORDING_PROBLEM, Scenari
 from grader.evidence.reader import SUFFIXES, load_evidence
 from grader.evidence.run import LESS
 from grader.evidence.writer import EvidenceWriter
-from grader.files import unwritable
+from grader.files import writing
 from grader.intake.limits import IntakeLimits
 from grader.intake.names import safe_name
 from grader.intake.open import find_recordings
@@ -90,10 +90,8 @@ def _copy(path: Path, target: Path) -> None:
     limit_bytes = IntakeLimits().recording_bytes
     if path.stat().st_size > limit_bytes:
         raise EvidenceError(f"{path}: larger than {limit_bytes >> 20} MiB", hint=LESS)
-    try:
+    with writing(target):
         shutil.copyfile(path, target)
-    except OSError as error:
-        raise unwritable(target, error) from error
     try:
         _check(target)
     except (EvidenceError, SubmissionError) as error:

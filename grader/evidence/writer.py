@@ -19,7 +19,7 @@ from typing_extensions import Self
 
 from grader import __version__
 from grader.evidence.events import EVIDENCE_VERSION, METADATA_NAME, PACKAGE_TOPIC, TOPICS
-from grader.files import unwritable
+from grader.files import unwritable, writing
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 
@@ -166,15 +166,13 @@ class EvidenceWriter(EvidenceStream):
     def close(self) -> None:
         """Finish the file and give it its name."""
         try:
-            self.finish()
-            self._file.flush()
-            # On the disk before it has its name: a power cut leaves no half file under it.
-            os.fsync(self._file.fileno())
-            self._file.close()
-            self._part.replace(self._path)
-        except OSError as error:
-            self.abort()
-            raise unwritable(self._path, error) from error
+            with writing(self._path):
+                self.finish()
+                self._file.flush()
+                # On the disk before it has its name: a power cut leaves no half file under it.
+                os.fsync(self._file.fileno())
+                self._file.close()
+                self._part.replace(self._path)
         except BaseException:
             self.abort()
             raise
@@ -205,11 +203,9 @@ class _Guarded(BufferedIOBase):
 
 
 def _open(part: Path) -> BinaryIO:
-    try:
+    with writing(part):
         part.parent.mkdir(parents=True, exist_ok=True)
         return part.open("wb")
-    except OSError as error:
-        raise unwritable(part, error) from error
 
 
 def _text(text: str) -> str:

@@ -31,7 +31,7 @@ from grader.classes.batch.run import (
 from grader.classes.overrides import FILE as OVERRIDES
 from grader.classes.overrides import read_overrides
 from grader.errors import GraderError
-from grader.files import FILE, atomic_write, open_untrusted, unwritable
+from grader.files import FILE, atomic_write, open_untrusted, writing
 from grader.intake.names import safe_name
 from grader.judging.summary import overall_status, total_fields
 from grader.model import SandboxMode
@@ -265,12 +265,9 @@ def _keep(journal: Path, result: GradingResult) -> None:
     """Keep a result that is about to be replaced, until `changes.csv` is written. Raises OutputError."""
     line = result.model_dump_json(by_alias=True).encode()
     flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | CLOEXEC
-    try:
-        with os.fdopen(os.open(journal, flags, FILE), "ab") as file:
-            # a killed grader may have left half a line before it
-            file.write(b"\n" + line + b"\n")
-    except OSError as error:
-        raise unwritable(journal, error) from error
+    with writing(journal), os.fdopen(os.open(journal, flags, FILE), "ab") as file:
+        # a killed grader may have left half a line before it
+        file.write(b"\n" + line + b"\n")
 
 
 def write_changes(path: Path, regraded: Sequence[Regraded]) -> None:

@@ -16,7 +16,7 @@ from pathlib import Path
 from grader.errors import EvidenceError, GraderError, OutputError, UsageError
 from grader.evidence.reader import SUFFIXES, load_evidence
 from grader.evidence.run import Run
-from grader.files import new_file, unwritable
+from grader.files import new_file, writing
 from grader.judging import judge
 from grader.judging.settle import settle, unsettled
 from grader.model.figure import Figures
@@ -176,14 +176,12 @@ def write_one(folder: Path, rubric: LoadedRubric) -> GradingResult:
             load_figures=lambda: figures_in(folder, result, rubric.rubric),
         )
         made = render_files(shown)
-        try:
+        with writing(folder):
             for name, data in made.items():
                 with new_file(results.new / name) as file:
                     file.write(data)
             for name in made:
                 (results.new / name).replace(folder / name)
-        except OSError as error:
-            raise unwritable(folder, error) from error
     return result
 
 

@@ -25,7 +25,7 @@ from grader.classes.feedback.forms import Feedback, FeedbackForm, Sender, Unsure
 from grader.classes.feedback.publish import Published, StudentReports
 from grader.errors import NotSent, UsageError
 from grader.files import FILE as PRIVATE
-from grader.files import temporary_folder, unwritable
+from grader.files import temporary_folder, writing
 from grader.intake.names import safe_name
 from grader.model.batch import Publication, Sent, SentState
 from grader.model.version import SENT, UPDATE
@@ -81,10 +81,8 @@ class SentLog:
             for one in publications
         ]
         text = "".join(f"{line.model_dump_json(by_alias=True)}\n" for line in lines)
-        try:
+        with writing(self.path):
             self._append(text.encode())
-        except OSError as error:
-            raise unwritable(self.path, error) from error
         for line in lines:
             self._remember(line)
 

@@ -21,7 +21,7 @@ import yaml
 
 from grader.classes.overrides import SCHEMA_KEY, parse
 from grader.errors import Busy, RubricError, UsageError
-from grader.files import atomic_write, lock, open_lock, read_given, unwritable
+from grader.files import atomic_write, lock, open_lock, read_given, writing
 from grader.intake.names import folder_key
 from grader.model.result import BankComment, Override, WrittenOverride
 from grader.model.version import COMMENTS, OVERRIDES
@@ -65,11 +65,9 @@ def write_overrides(path: Path, changes: Iterable[OverrideChange]) -> None:
 @contextmanager
 def hold_lock(file: Path, path: Path, *, wait_s: float = math.inf) -> Iterator[None]:
     """Hold `file`, which all lock that write `path`. Raises OutputError, or Busy if another does for so long."""
-    try:
+    with writing(path):
         file.parent.mkdir(parents=True, exist_ok=True)
         descriptor = open_lock(file, public=True)
-    except OSError as error:
-        raise unwritable(path, error) from error
     try:
         with suppress(OSError):  # a file system without locks: its users must not write at the same time
             _wait(descriptor, path, wait_s)
