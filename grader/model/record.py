@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import json
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
@@ -28,6 +29,13 @@ class Record(BaseModel):
         """Read what a grader wrote. Keys that only a later grader knows are ignored: without a new version of the
         format, no status and no points depend on them (docs/reference/formats.md). Raises ValidationError."""
         return cls.model_validate_json(data, extra="ignore")
+
+    @classmethod
+    def from_data(cls, data: object) -> Self:
+        """Return the record that is written in a YAML file, whose data these are. Raises ValidationError.
+
+        As JSON and strictly: text is no number then, and a list may still be a tuple, and a text a date."""
+        return cls.model_validate_json(json.dumps(data), strict=True)
 
     @classmethod
     def read_all(cls, datas: Sequence[bytes]) -> list[Self]:

@@ -6,7 +6,6 @@ be named.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -122,7 +121,7 @@ def load_course(path: Path) -> CourseFile:
         raise RubricError(
             [source.fault(*fault) for fault in told], hint="grader schema course lists what it may contain"
         )
-    return CourseFile(Course.model_validate_json(json.dumps(source.data), strict=True), path)
+    return CourseFile(Course.from_data(source.data), path)
 
 
 def split_name(name: str) -> tuple[Path, str] | None:

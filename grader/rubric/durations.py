@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from typing import Any
 
@@ -66,7 +65,7 @@ def _until(scenario: dict[str, Any], key: str) -> Any:  # noqa: ANN401 - whateve
 
 def _read_step(written: dict[str, Any]) -> Step | None:
     try:
-        return Step.model_validate_json(json.dumps(written), strict=True)
+        return Step.from_data(written)
     except (ValidationError, TypeError):
         return None
 

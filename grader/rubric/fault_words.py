@@ -8,7 +8,7 @@ import types
 from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Annotated, Any, Union, get_args, get_origin
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
@@ -16,6 +16,7 @@ from grader.checks import CHECKS
 from grader.checks.interfaces import FILE_PATTERN
 from grader.checks.support.frames import FRAME_PATTERN
 from grader.installable import noetic_messages
+from grader.model.record import Record
 from grader.rubric.scenario import NAME_PATTERN, PACKAGE_PATTERN, PROGRAM_PATTERN, TYPE_PATTERN
 from grader.rubric.yaml_lines import Fault, KeyPath
 from grader.wording import did_you_mean, join_words, shorten
@@ -90,13 +91,13 @@ BOUNDS = {
 }
 
 
-def model_faults(model: type[BaseModel], data: object, base: KeyPath = ()) -> list[Fault]:
+def model_faults(model: type[Record], data: object, base: KeyPath = ()) -> list[Fault]:
     """Return every fault of `data` as a `model`, as the key's path (below `base`) and what is wrong there.
 
     `data` is read as JSON, strictly: text is not a number, and a number no text.
     """
     try:
-        model.model_validate_json(json.dumps(data), strict=True)
+        model.from_data(data)
     except ValidationError as error:
         found = _friendly(model, data, error.errors(include_url=False), base)
         return [((*base, *path), message) for path, message in found]
@@ -104,7 +105,7 @@ def model_faults(model: type[BaseModel], data: object, base: KeyPath = ()) -> li
 
 
 def _friendly(
-    model: type[BaseModel], data: object, details: Iterable[ErrorDetails], base: KeyPath
+    model: type[Record], data: object, details: Iterable[ErrorDetails], base: KeyPath
 ) -> list[Fault]:
     """Return one fault for each path: each member of a union complains, and these are joined by "or"."""
     by_path: dict[KeyPath, list[str]] = {}
@@ -139,7 +140,7 @@ def _holds(data: object, part: str | int) -> bool:
     return part in (data if isinstance(data, dict) else range(len(data)) if isinstance(data, list) else ())
 
 
-def _elsewhere(model: type[BaseModel], data: Any, path: KeyPath, base: KeyPath) -> str:  # noqa: ANN401 - as above
+def _elsewhere(model: type[Record], data: Any, path: KeyPath, base: KeyPath) -> str:  # noqa: ANN401 - as above
     """Return where a key belongs that is one level too deep, or not deep enough; "" where nothing there knows it."""
     key = str(path[-1])
     if not base and path[0] == "criteria" and len(path) == 3:
@@ -192,7 +193,7 @@ def _of_other_unit(key: str, value: object, keys: Collection[str]) -> str:
     return ""
 
 
-def _message(model: type[BaseModel], path: KeyPath, detail: ErrorDetails) -> str:
+def _message(model: type[Record], path: KeyPath, detail: ErrorDetails) -> str:
     kind, context, value = detail["type"], detail.get("ctx", {}), detail["input"]
     words: dict[str, Callable[[], str]] = {
         "missing": lambda: "is missing",
@@ -218,7 +219,7 @@ def _message(model: type[BaseModel], path: KeyPath, detail: ErrorDetails) -> str
     return str(context.get("error", detail["msg"])).removeprefix("Value error, ")
 
 
-def _remedy(model: type[BaseModel], path: KeyPath, kind: str, value: object) -> str:
+def _remedy(model: type[Record], path: KeyPath, kind: str, value: object) -> str:
     """Return how to write what was meant."""
     if shape := _other_shape(path, kind, value):
         return shape
@@ -336,7 +337,7 @@ def shown(value: object) -> str:
     return shorten(text, 60)
 
 
-def _keys(model: type[BaseModel], path: KeyPath) -> list[str]:
+def _keys(model: type[Record], path: KeyPath) -> list[str]:
     """Return the keys that the record at `path` knows."""
     return [name for name, _ in _fields(model, path)]
 
@@ -348,7 +349,7 @@ def _fields(model: object, path: KeyPath = ()) -> Iterator[tuple[str, FieldInfo]
     yield from ((f.alias or n, f) for m in _models(model) for n, f in m.model_fields.items())
 
 
-def _is_share(model: type[BaseModel], path: KeyPath) -> bool:
+def _is_share(model: type[Record], path: KeyPath) -> bool:
     """Return whether a field is between 0 and 1."""
     fields = [field for name, field in _fields(model, path[:-1]) if (name,) == path[-1:]]
     return any(getattr(one, "le", None) == 1 for field in fields for one in field.metadata)
@@ -367,11 +368,11 @@ def _inside(annotation: object, part: str | int) -> Iterator[object]:
         yield arguments[1]
 
 
-def _models(annotation: object) -> list[type[BaseModel]]:
+def _models(annotation: object) -> list[type[Record]]:
     annotation = _bare(annotation)
     if get_origin(annotation) in {Union, types.UnionType}:
         return [model for member in get_args(annotation) for model in _models(member)]
-    return [annotation] if isinstance(annotation, type) and issubclass(annotation, BaseModel) else []
+    return [annotation] if isinstance(annotation, type) and issubclass(annotation, Record) else []
 
 
 def _bare(annotation: object) -> object:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 import re
 from collections import defaultdict
@@ -124,8 +123,7 @@ def _load_file(path: Path, name: str) -> LoadedRubric:
         if faults := _faults(source, samples, beside, path.parent):
             raise RubricError(faults)
         _FAULTLESS.add(seen)
-    # As JSON and strictly: text is no number then, and a list may still become a tuple.
-    rubric = share_points(Rubric.model_validate_json(json.dumps(samples[0]), strict=True))
+    rubric = share_points(Rubric.from_data(samples[0]))
     if rubric.made_up:
         rubric.remember(as_map(source.data), {})
     own = beside.files[rubric.checks] if rubric.checks is not None else None

@@ -159,7 +159,7 @@ def with_values(rubric: Rubric, values: Mapping[str, Value]) -> Rubric:
     """Return the rubric with these values in their places. Raises ValidationError where one does not fit there."""
     if not rubric.made_up:
         return rubric
-    placed = type(rubric).model_validate_json(json.dumps(place_values(rubric.written, values)), strict=True)
+    placed = type(rubric).from_data(place_values(rubric.written, values))
     criteria = {c.id: c.model_dump(include={"parameters", "hint", "reproduce"}) for c in placed.criteria}
     update = {
         "scenarios": {name: placed.scenarios[name] for name in rubric.scenarios},
@@ -404,7 +404,7 @@ def _declared_values(data: Mapping[str, Any]) -> dict[str, MadeUp]:
     found: dict[str, MadeUp] = {}
     for name, one in as_map(data.get(KEY)).items():
         try:
-            made_up = MadeUp.model_validate_json(json.dumps(one), strict=True)
+            made_up = MadeUp.from_data(one)
         except ValidationError:
             continue
         if not any(_faults_of(as_map(one), found)):
@@ -449,7 +449,7 @@ def _division_faults(parts: list[Any], above: Mapping[str, MadeUp]) -> Iterator[
 
 def _range_faults(one: dict[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]:
     try:
-        made_up = MadeUp.model_validate_json(json.dumps(one), strict=True)
+        made_up = MadeUp.from_data(one)
     except ValidationError:
         return  # which says what is wrong
     low, high, step = one["from"], one["to"], made_up.step

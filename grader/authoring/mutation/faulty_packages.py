@@ -85,14 +85,13 @@ def load_mutants(path: Path, rubric: Rubric) -> LoadedMutants:
     if found:
         ordered = sorted(dict.fromkeys(found), key=lambda fault: source.line(fault[0]))
         raise RubricError([source.fault(*fault) for fault in ordered])
-    # through JSON: only there a list may stand for a tuple in strict mode
-    records = MutantsFile.model_validate_json(json.dumps(source.data), strict=True)
+    records = MutantsFile.from_data(source.data)
     return LoadedMutants(mutants=records.mutants, source=source)
 
 
 def parse_parameters(operator: str, given: dict[str, Any]) -> Record:
     """Return an operator's parameters as its own record."""
-    return OPERATORS[operator].params.model_validate_json(json.dumps(given), strict=True)
+    return OPERATORS[operator].params.from_data(given)
 
 
 def _cross_faults(data: dict[str, Any], rubric: Rubric) -> Iterator[Fault]:

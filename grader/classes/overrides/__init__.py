@@ -8,7 +8,6 @@ All faults are reported at once, as `file:line: submission.criterion: what is wr
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
@@ -130,8 +129,7 @@ class _Reading:
             faults = self._faults(key, criterion, given)
             self.faults += faults
             if not faults and name is not None:
-                # by JSON, in which a date may be a text although the model is strict
-                override = WrittenOverride.model_validate_json(json.dumps(_without_empty(given)), strict=True)
+                override = WrittenOverride.from_data(_without_empty(given))
                 self.found.setdefault(name, {})[criterion] = override
 
     def _faults(self, key: str, criterion: str, given: object) -> list[Fault]:
