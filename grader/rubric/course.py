@@ -117,10 +117,7 @@ def load_course(path: Path) -> CourseFile:
         raise RubricError([source.fault(("schema",), newer)])
     faults = [*source.faults, *model_faults(Course, source.data), *_cross_faults(source)]
     if faults:
-        told = sorted(dict.fromkeys(faults), key=lambda fault: source.line(fault[0]))
-        raise RubricError(
-            [source.fault(*fault) for fault in told], hint="grader schema course lists what it may contain"
-        )
+        raise RubricError(source.in_order(faults), hint="grader schema course lists what it may contain")
     return CourseFile(Course.from_data(source.data), path)
 
 

@@ -207,8 +207,7 @@ def warnings_of(loaded: LoadedRubric, name: str) -> list[str]:
     """Return what may be a slip in the rubric of that file, each as `name:line: key.path: why`."""
     source = read_source(loaded.path, name)
     rubric = WrittenRubric(source.data)
-    found = [*names_seen_once(rubric, loaded.path.parent), *warnings(rubric)]
-    return [source.fault(*one) for one in sorted(found, key=lambda one: source.line(one[0]))]
+    return source.in_order([*names_seen_once(rubric, loaded.path.parent), *warnings(rubric)])
 
 
 def refuse_newer(source: Source, known: Versioned) -> None:
@@ -278,9 +277,11 @@ def _faults(source: Source, samples: Sequence[Value], beside: Beside, folder: Pa
     for path, fault in found:  # where ROS is, its files and the known types both lack a field
         lacked = _NO_FIELD.search(fault)
         unique.setdefault((path, lacked[0] if lacked else fault), (path, fault))
-    told = [source.fault(*fault) for fault in sorted(unique.values(), key=lambda one: source.line(one[0]))]
     file = Path(source.name).parent / str(source.data.get("checks"))
-    return [*told, *(f"{file}:{line}: {message}" for line, message in beside.own.faults)]
+    return [
+        *source.in_order(unique.values()),
+        *(f"{file}:{line}: {message}" for line, message in beside.own.faults),
+    ]
 
 
 def select_started(rubric: Rubric, only: Collection[str] | None = None) -> Rubric:

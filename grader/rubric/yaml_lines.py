@@ -115,6 +115,11 @@ class Source:
         where = f"{self.name}:{self.line(path)}: "
         return where + (f"{dotted(path)}: {message}" if path else message)
 
+    def in_order(self, faults: Iterable[Fault]) -> list[str]:
+        """Return these faults, each once, in the order of the file's lines."""
+        found = sorted(dict.fromkeys(faults), key=lambda one: self.line(one[0]))
+        return [self.fault(*one) for one in found]
+
 
 def dotted(path: KeyPath) -> str:
     """Return a path as `criteria[2].with.rate_hz`."""

@@ -83,8 +83,7 @@ def load_mutants(path: Path, rubric: Rubric) -> LoadedMutants:
     refuse_newer(source, MUTANTS)
     found = [*source.faults, *model_faults(MutantsFile, source.data), *_cross_faults(source.data, rubric)]
     if found:
-        ordered = sorted(dict.fromkeys(found), key=lambda fault: source.line(fault[0]))
-        raise RubricError([source.fault(*fault) for fault in ordered])
+        raise RubricError(source.in_order(found))
     records = MutantsFile.from_data(source.data)
     return LoadedMutants(mutants=records.mutants, source=source)
 

@@ -32,6 +32,7 @@ from grader.classes.batch.job import GradingJob, SubmissionOutcome, grade_job, o
 from grader.errors import GraderError, HostError, UsageError, blame
 from grader.files import make_folder, temporary_folder
 from grader.intake.names import safe_name
+from grader.intake.tree import file_digest
 from grader.model.record import Record
 from grader.ros_env import find_ros
 from grader.workers import Worker, WorkerEnded, WorkerLimits
@@ -106,14 +107,11 @@ class Exchange:
 
     def put(self, local: Path, job_id: str) -> PackedFolder:
         """Upload a file under a name of its own: another attempt at the same job does not overwrite it."""
-        digest = hashlib.sha256()
-        with local.open("rb") as file:
-            while chunk := file.read(CHUNK_BYTES):
-                digest.update(chunk)
+        digest = file_digest(local).hexdigest()
         name = f"{job_id}.{secrets.token_hex(TOKEN_BYTES)}.tar.gz"
         with self._open("written") as (files, root):
             files.put_file(str(local), f"{root}/{name}")
-        return PackedFolder(name=name, size=local.stat().st_size, sha256=digest.hexdigest())
+        return PackedFolder(name=name, size=local.stat().st_size, sha256=digest)
 
     def open(self, packed: PackedFolder) -> BinaryIO:
         """Return a stream of the packed folder's bytes."""

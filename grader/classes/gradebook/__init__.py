@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
@@ -75,8 +76,7 @@ def write_gradebook(
         atomic_write(target, data)
     else:
         lines, more = new_import_file(platform, marks, wanted, book.columns)
-        with whole_file(target) as path, path.open("w", encoding="utf-8", newline="") as file:
-            file.writelines(lines)
+        _write_lines(target, lines)
     return (*remarks, *more)
 
 
@@ -88,15 +88,18 @@ OPTIONAL = {
 
 def write_csv(book: Book, rows: Iterable[GradebookRow], target: Path) -> None:
     """Write UTF-8 without a byte order mark, as programs read it; the workbook is for Excel."""
-    with whole_file(target) as path, path.open("w", encoding="utf-8", newline="") as file:
-        file.write(csv_line(header(book)))
-        file.writelines(csv_line(list(cells(book, row))) for row in rows)
+    below = (list(cells(book, row)) for row in rows)
+    _write_lines(target, map(csv_line, chain([header(book)], below)))
 
 
 def write_jsonl(_book: Book, rows: Iterable[GradebookRow], target: Path) -> None:
     """Write a line for each row: what `result.json` says (`grader.result/1`), and the roster under `roster`."""
+    _write_lines(target, map(json_line, rows))
+
+
+def _write_lines(target: Path, lines: Iterable[str]) -> None:
     with whole_file(target) as path, path.open("w", encoding="utf-8", newline="") as file:
-        file.writelines(json_line(row) for row in rows)
+        file.writelines(lines)
 
 
 def json_line(row: GradebookRow) -> str:

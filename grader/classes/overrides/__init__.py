@@ -73,9 +73,8 @@ def read_written(path: Path, rubric: Rubric, ids: Collection[str], bank: Bank) -
     reading = _Reading(source, rubric, ids, bank)
     reading.read()
     if reading.faults:
-        told = sorted(dict.fromkeys(reading.faults), key=lambda fault: source.line(fault[0]))
         # a submission that stands there twice brings each fault twice
-        raise RubricError([source.fault(*fault) for fault in told], hint=HINT)
+        raise RubricError(source.in_order(reading.faults), hint=HINT)
     return reading.found
 
 
