@@ -244,14 +244,14 @@ def own_texts(rubric: WrittenRubric) -> Iterator[tuple[KeyPath, str, str, OwnTex
             yield path, str(given.get("type")), ".msg", OwnText(given["definition"], whole=True)
         if criterion.check == "definition":
             file = PurePosixPath(str(given.get("file")))
-            package = criterion.data.get("package") or next(iter(rubric.packages), "")
+            package = rubric.package_of(criterion.data)
             text = given.get("text")
             own = OwnText(text, whole=True) if isinstance(text, str) and text else _of_fields(file, given)
             if file.suffix in PARTS:
                 path = (*criterion.at, "text" if own.whole else "fields")
                 yield path, f"{package}/{file.stem}", file.suffix, own
     for name, scenario in rubric.scenarios.items():
-        for at, _, one in services_in(as_map(scenario)):
+        for at, _, one in services_in(scenario):
             if isinstance(one.get("definition"), str):
                 path = ("scenarios", name, *at, "definition")
                 yield path, str(one.get("type")), ".srv", OwnText(one["definition"], whole=True)

@@ -40,7 +40,7 @@ LASTING = ("window_s", "alive_s")
 def late_faults(scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
     """Yield calls and answers of the grader's that come after the end of the run at its latest."""
     for name, scenario in scenarios.items():
-        limit_s = _until(scenario, "limit_s")
+        limit_s = until_of(scenario, "limit_s")
         if scenario.get("clock") == "warped" or not is_number(limit_s):
             continue
         path: KeyPath = ("scenarios", name)
@@ -59,8 +59,15 @@ def late_faults(scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
                 yield (*at, "delay_s"), longer if "steps" in at else over
 
 
-def _until(scenario: dict[str, Any], key: str) -> Any:  # noqa: ANN401 - whatever the rubric has
+def until_of(scenario: dict[str, Any], key: str) -> Any:  # noqa: ANN401 - whatever the rubric has
+    """Return what a scenario says for a key of `until`, or that key's default."""
     return as_map(scenario.get("until")).get(key, Until.model_fields[key].default)
+
+
+def warp_of(scenario: dict[str, Any]) -> Any:  # noqa: ANN401 - as above
+    """Return how many times as fast as the wall's the clock of a scenario runs."""
+    warp = scenario.get("warp", Scenario.model_fields["warp"].default)
+    return warp if scenario.get("clock") == "warped" else 1
 
 
 def _read_step(written: dict[str, Any]) -> Step | None:
@@ -104,10 +111,8 @@ def probed_s(scenario: dict[str, Any]) -> float:
 def longest_s(scenario: dict[str, Any], played_s: float | None = None) -> float | None:
     """Return how long a run lasts at most once its last process is started, in the time of its clock, if its recording
     lasts so long; None where that is not known."""
-    first_s, limit_s = _until(scenario, "first_message_s"), _until(scenario, "limit_s")
-    warp = scenario.get("warp", Scenario.model_fields["warp"].default)
-    warp = warp if scenario.get("clock") == "warped" else 1
-    steps, starts = _read_steps(scenario), starts_of(scenario)
+    first_s, limit_s = until_of(scenario, "first_message_s"), until_of(scenario, "limit_s")
+    warp, steps, starts = warp_of(scenario), _read_steps(scenario), starts_of(scenario)
     if steps is None or "recording" in scenario or not all(map(is_number, (first_s, limit_s, warp))):
         return None
     # Their own length is not in the rubric.

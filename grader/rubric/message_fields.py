@@ -546,8 +546,7 @@ def _other_definitions(
     file = PurePosixPath(str(criterion.given.get("file")))
     if criterion.check != "definition" or file.suffix not in PARTS:
         return
-    package = criterion.data.get("package") or next(iter(rubric.packages), "")
-    type_ = f"{package}/{file.stem}"
+    type_ = f"{rubric.package_of(criterion.data)}/{file.stem}"
     own = known.text(type_, file.suffix)
     if own is None or not own.whole or not all(known.shape(type_, part) for part in PARTS[file.suffix]):
         return

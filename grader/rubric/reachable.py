@@ -21,9 +21,10 @@ from grader.rubric.durations import (
     often_faults,
     stretch_faults,
     until_next_s,
+    until_of,
+    warp_of,
     within_faults,
 )
-from grader.rubric.scenario import Scenario, Until
 from grader.rubric.simulators import (
     FIELD_M,
     PROGRAMS,
@@ -101,11 +102,8 @@ def _too_many(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator[Fa
         if of_rate and isinstance(rate_hz, int | float) and rate_hz > 0:
             rates[str(topic)] = max(rates.get(str(topic), 0), float(rate_hz))
     for name, scenario in rubric.scenarios.items():
-        until = as_map(scenario.get("until"))
-        limit_s = until.get("limit_s", Until.model_fields["limit_s"].default)
-        warp = scenario.get("warp", Scenario.model_fields["warp"].default)
-        warp = warp if scenario.get("clock") == "warped" else 1
-        for topic, count in as_map(until.get("messages")).items():
+        limit_s, warp = until_of(scenario, "limit_s"), warp_of(scenario)
+        for topic, count in as_map(as_map(scenario.get("until")).get("messages")).items():
             if not all(map(is_number, (limit_s, warp, count))) or topic not in rates or warp <= 0:
                 continue
             takes_s = count / rates[topic] / warp

@@ -16,11 +16,11 @@ from grader.checks.support.scripts import NODE_FOLDERS
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.ros_env import TypeKind, ros_packages
 from grader.rubric.definitions import Definitions
-from grader.rubric.durations import longest_s, steps_s
+from grader.rubric.durations import longest_s, steps_s, until_of
 from grader.rubric.frames import frame_faults
 from grader.rubric.message_fields import field_faults
 from grader.rubric.reachable import reach_faults
-from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Until
+from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN
 from grader.rubric.simulators import PROGRAMS, asked_faults, only_publisher, parameter_faults
 from grader.rubric.spelling import SURE, unknown_names, values_of, with_other_topics
 from grader.rubric.started import argument_faults, started_faults
@@ -380,7 +380,7 @@ def _is_set(name: str, scenario: dict[str, Any]) -> bool:
 def _too_short(one: Reference, check: Check, scenario: dict[str, Any]) -> Iterator[str]:
     """Yield what a scenario lacks in length; how long one lasts that waits for something else, no one knows."""
     until = as_map(scenario.get("until"))
-    limit_s = until.get("limit_s", Until.model_fields["limit_s"].default)
+    limit_s = until_of(scenario, "limit_s")
     lasting = [until[key] for key in ("window_s", "alive_s") if key in until]
     # Fewer than there are: one of them is no number, which is said elsewhere.
     known = [s for s in (*lasting, limit_s) if isinstance(s, int | float)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -59,8 +60,9 @@ FREE_TEXTS = {*FIELDS, "line", "definition", "answers"}
 
 def _blank_ends(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield names with a blank before or after them, which no name has and nobody sees."""
+    free = {*PROSE, *WORDS, *FREE_TEXTS}
     for path, text in rubric.texts:
-        is_free = {*PROSE, *WORDS, *FREE_TEXTS} & {*path} or path[:1] == ("made_up",)
+        is_free = not free.isdisjoint(path) or path[:1] == ("made_up",)
         if text != text.strip() and text.strip() and not is_free and "\n" not in text:
             yield path, f'has a blank before or after it: write "{text.strip()}"'
 
@@ -167,8 +169,8 @@ def _count(word: str, name: str, texts: list[tuple[KeyPath, str]]) -> int:
     whole = re.compile(rf"(?<!\w){end}")
     # With its slash, or in backticks: the bare word in a sentence is no mention of the topic.
     in_prose = re.compile(rf"[/~`_]{end}") if name.startswith("/") and not word.startswith("/") else whole
-    there = [(at, one) for at, one in texts if word in one]
-    return sum(len((whole if PROSE.isdisjoint(at) else in_prose).findall(one)) for at, one in there)
+    there = ((whole if PROSE.isdisjoint(at) else in_prose, one) for at, one in texts if word in one)
+    return sum(len(pattern.findall(one)) for pattern, one in there)
 
 
 def is_slip(word: str, other: str) -> bool:
@@ -199,7 +201,7 @@ def _last_word(path: KeyPath, text: str, rubric: WrittenRubric) -> str:
     is_value = len(path) == 4 and path[-2:] == ("with", "value")
     if is_value and str(_judged(path, rubric).get("field")).endswith("frame_id"):
         return text
-    is_field = FIELDS & {*path[2:-1]} and text == path[-1] and not _is_known_field(path, rubric)
+    is_field = text == path[-1] and not FIELDS.isdisjoint(path[2:-1]) and not _is_known_field(path, rubric)
     return text.rpartition(".")[2].partition("[")[0] if is_field or _is_own_field(path, rubric) else ""
 
 
@@ -234,11 +236,15 @@ def _is_own_field(path: KeyPath, rubric: WrittenRubric) -> bool:
     given = _judged(path, rubric)
     kinds = [*types_of(str(given.get("topic")), rubric)]
     if not kinds:
-        of_ros = {
-            field for types in noetic_messages().values() for fields in types.values() for field in fields
-        }
-        return not of_ros.issuperset(re.findall(r"[^\W\d]\w*", str(given.get("field"))))
+        return not _fields_of_ros().issuperset(re.findall(r"[^\W\d]\w*", str(given.get("field"))))
     return any(str(kind).partition("/")[0] in rubric.own_packages for kind in kinds)
+
+
+@cache
+def _fields_of_ros() -> frozenset[str]:
+    return frozenset(
+        name for types in noetic_messages().values() for fields in types.values() for name in fields
+    )
 
 
 LIKELY, SURE = 0.6, 0.85
@@ -316,7 +322,7 @@ def _own_types(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield types of the student's package that are all but one whose file a criterion asks for."""
     own, told = rubric.packages, {*re.findall(r"\w+", rubric.handout)}
     defined = {
-        (str(c.data.get("package") or next(iter(own), "")), PurePosixPath(str(c.given.get("file"))).stem)
+        (rubric.package_of(c.data), PurePosixPath(str(c.given.get("file"))).stem)
         for c in rubric.criteria
         if c.check == "definition"
     }

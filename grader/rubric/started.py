@@ -67,21 +67,19 @@ def _tests_without_run(rubric: WrittenRubric) -> Iterator[Fault]:
 
 def _other_packages(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield files that are of another package elsewhere in the rubric, and names of packages that are not judged."""
-    packages = rubric.packages
-    first = packages[0] if packages else ""
     named: list[tuple[KeyPath, str, str, bool]] = []
     for at, start in rubric.starts():
-        owner, is_given = str(start.get("package") or first), start.get("package") is not None
+        owner, is_given = rubric.package_of(start), start.get("package") is not None
         files = [(key, start[key]) for key in KINDS_OF_FILES if isinstance(start.get(key), str)]
         named += [((*at, key), PurePosixPath(file).name, owner, is_given) for key, file in files]
     for criterion in rubric.criteria:
         given, package = criterion.given, criterion.data.get("package")
-        owner, asked = str(package or first), given.get("name")
+        owner, asked = rubric.package_of(criterion.data), given.get("name")
         if criterion.check == "executable" and isinstance(given.get("path"), str):
             named.append(
                 ((*criterion.at, "path"), PurePosixPath(given["path"]).name, owner, package is not None)
             )
-        if criterion.check in NAMED_AS_PACKAGE and asked in packages and asked != owner:
+        if criterion.check in NAMED_AS_PACKAGE and asked in rubric.packages and asked != owner:
             fault = (
                 f"this criterion judges {owner}: write name: {owner}, or package: {asked} beside its check"
             )

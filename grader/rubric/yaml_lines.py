@@ -229,6 +229,10 @@ class WrittenRubric:
         """All texts, keys too, each with its place."""
         return list(texts_in((), self.data))
 
+    def package_of(self, one: dict[str, Any]) -> str:
+        """Return the package that a criterion or a start is about: the first one where it names none."""
+        return str(one.get("package") or next(iter(self.packages), ""))
+
     def starts(self) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
         """Yield what the scenarios start, each with its place."""
         return self._listed("start")
