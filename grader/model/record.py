@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from functools import cache
 from itertools import pairwise
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from typing_extensions import Self
@@ -85,6 +85,14 @@ def field_docstrings(record: type) -> dict[str, str]:
                     )
                     texts[key] = inspect.cleandoc(words).replace("\n", " ")
     return texts
+
+
+def describe_fields(record: type, schema: dict[str, Any]) -> None:
+    """Write the docstrings of a class's fields beside their types in its JSON schema."""
+    texts = field_docstrings(record)
+    for key, found in schema.get("properties", {}).items():
+        if key in texts:
+            found.setdefault("description", texts[key])
 
 
 @cache

@@ -21,7 +21,7 @@ from grader.model import batch, result, verdict, version
 from grader.model.batch import BatchRun, Publication, Sent, Similarity
 from grader.model.mutants import MutantsFile, RubricTest
 from grader.model.package import PackageFacts
-from grader.model.record import Record, field_docstrings
+from grader.model.record import Record, describe_fields, field_docstrings
 from grader.model.result import BankComment, GradingResult, WrittenOverride
 from grader.model.version import Versioned
 from grader.rubric import course
@@ -166,10 +166,8 @@ def _describe(record: str, schema: Schema, about: Format) -> None:
     """Add each key's own text; what graders write may have more keys than a reader knows."""
     if about.by == "grader" and schema.get("additionalProperties") is False:
         del schema["additionalProperties"]
-    texts = field_docstrings(_RECORDS[record]) if record in _RECORDS else {}
-    for key, found in schema.get("properties", {}).items():
-        if key in texts:
-            found.setdefault("description", texts[key])
+    if record in _RECORDS:
+        describe_fields(_RECORDS[record], schema)
 
 
 def _of(record: type[Record]) -> Callable[[], Schema]:

@@ -19,7 +19,7 @@ from pydantic.fields import FieldInfo
 
 from grader.checks import HEADINGS, Check
 from grader.checks.registry import Refers
-from grader.model.record import Record, field_docstrings
+from grader.model.record import Record, describe_fields, field_docstrings
 from grader.rubric.consistency import MANUAL
 from grader.rubric.fault_words import UNITS
 from grader.rubric.model import Criterion, ManualParams, Rubric
@@ -163,9 +163,9 @@ def rubric_schema(checks: Mapping[str, Check] | None = None) -> dict[str, Any]:
     schema = model.model_json_schema(by_alias=True)
     # pydantic writes a pattern for the keys, and with it alone all other keys would pass.
     schema["properties"]["scenarios"]["additionalProperties"] = False
-    _describe(model, schema)
+    describe_fields(model, schema)
     for record in inner_records(model):
-        _describe(record, schema["$defs"].get(record.__name__, {}))
+        describe_fields(record, schema["$defs"].get(record.__name__, {}))
     for name, record_schema in schema["$defs"].items():
         # By prefix, since each check's criterion is a record of its own: `Criterion_rate`.
         if not name.startswith(WITHOUT_PLACES):
@@ -187,14 +187,6 @@ def _with_places(found: dict[str, Any]) -> dict[str, Any]:
     if any(kind.get("type", "array") not in {"array", "object", "null"} or "enum" in kind for kind in kinds):
         inner.append({"$ref": "#/$defs/Place"})
     return about | ({"anyOf": inner} if len(inner) > 1 else inner[0])
-
-
-def _describe(record: type[Record], schema: dict[str, Any]) -> None:
-    """Write the docstrings of a record's fields beside their types."""
-    texts = field_docstrings(record)
-    for key, found in schema.get("properties", {}).items():
-        if key in texts:
-            found.setdefault("description", texts[key])
 
 
 def _criterion(check: Check) -> type[Criterion]:

@@ -101,11 +101,15 @@ def robot_of(scenario: dict[str, Any]) -> dict[str, Any]:
     started, or under another name."""
     if "robot_world/robot_world" not in _plain_programs(scenario):
         return {}
-    values = {str(one.get("name")).strip("/"): one.get("value") for _, one in set_in(scenario)}
-    given = {
-        name.partition("/")[2]: value for name, value in values.items() if name.startswith("robot_world/")
-    }
+    given = _robot_world_params(scenario)
     return {"start": [0, 0, 0], **ROBOTS.get(str(given.get("robot", "turtlebot3")), {}), **given}
+
+
+def _robot_world_params(scenario: dict[str, Any]) -> dict[str, Any]:
+    names = (
+        (str(one.get("name")).strip("/").partition("/"), one.get("value")) for _, one in set_in(scenario)
+    )
+    return {name: value for (node, _, name), value in names if node == "robot_world"}
 
 
 def only_publisher(topic: str, scenario: dict[str, Any]) -> str:
@@ -216,10 +220,9 @@ def _near_topic(topic: str, scenario: dict[str, Any]) -> str:
             return f"/{last.rstrip('/')}"
         others = [one for one in topics if re.sub(r"\d+", "1", topic) != one]  # /turtle2/pose is another's
         return closest(topic, others, cutoff=SURE)
-    values = {str(one.get("name")).strip("/"): one.get("value") for _, one in set_in(scenario)}
-    robot = str(values.get("robot_world/robot", "turtlebot3"))
-    renamed = "robot_world/scan_topic" in values
-    return OTHERS_SCAN.get(topic, {}).get(robot, "") if not renamed else ""
+    given = _robot_world_params(scenario)
+    robot = str(given.get("robot", "turtlebot3"))
+    return OTHERS_SCAN.get(topic, {}).get(robot, "") if "scan_topic" not in given else ""
 
 
 def start_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
