@@ -458,6 +458,7 @@ def test_a_message_with_the_name_of_its_class(text: str, fixes: list[str], tmp_p
         ("from nosuch import rate\nrate = 10\nprint(rate)\n", ["unused-import", "lacking-import"]),
         ("import nosuch as n\nprint(n)\n", ["lacking-import"]),
         ("from json import dumps\n", ["unused-import"]),
+        ("from json import JSONDecoder\na: JSONDecoder = None\nprint(a)\n", []),
         ("from json import rate\nrate = 10\nprint(rate)\n", ["unused-import"]),
         ("from nosuch import *\n", ["lacking-import"]),
         ("from . import nosuch\nimport os\n", []),

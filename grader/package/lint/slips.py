@@ -7,7 +7,8 @@ loops for `script_loops.py`, their sleeps for `script_sleeps.py`, their rates fo
 `script_values.py`, arithmetic for `script_arithmetic.py`, scans for `script_scans.py`, sides and frames for
 `script_sides.py`, rows of grids for `script_grids.py`, counters and clocks for `script_counters.py`, what functions
 return for `script_results.py`, calls that cannot work for `script_calls.py`, publishers and messages that nothing uses
-for `script_unsent.py`.
+for `script_unsent.py`. What a script spells in another way, `script_rospy.py` and `script_spellings.py` write as
+finders look for it.
 
 Nothing is executed. A file has to be parsed by ROS's own Python, which is to run it: Python 3.8, standard library only.
 """
@@ -36,6 +37,7 @@ import script_threads
 import script_unsent as unsent
 import script_values as values
 from script_rospy import name_rospy
+from script_spellings import spell_plainly
 from script_texts import graph_names, said_texts
 from script_tree import (
     LOOPS,
@@ -59,7 +61,7 @@ SLIPS_LIMIT = 100
 
 def slips(tree):
     """What compiles and is not meant: names that are not called or not there, questions that wait for a keyboard."""
-    call_by_methods(tree)
+    spell_plainly(tree)
     finders = (
         uncalled_and_asked, objects.names_of_objects, names.misspelt, rates.loop_rates, rates.nanoseconds,
         rates.rates_for_times, rates.sleeps_within, rates.timers_once,
@@ -96,18 +98,6 @@ def slips(tree):
     first = {(one["line"], one["name"]): one for one in reversed(found) if one["kind"] == "undefined"}
     found = [one for one in found if one["kind"] != "undefined" or first[one["line"], one["name"]] is one]
     return sorted(found, key=lambda one: one["line"])[:SLIPS_LIMIT]
-
-
-def call_by_methods(tree):
-    """Write calls of `say = pub.publish` as calls of that method, `say.publish(…)`, which is what finders look for."""
-    nodes = list(ast.walk(tree))
-    given = [n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
-    made = [n for n in nodes if isinstance(n, ast.Assign) and isinstance(n.value, ast.Attribute)]
-    named = {dotted(n.targets[0]): n.value.attr for n in made if n.value.attr in ("publish", "sleep")}
-    for call in (n for n in nodes if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)):
-        if call.func.id in named and given.count(call.func.id) == 1:
-            method = ast.Attribute(value=call.func, attr=named[call.func.id], ctx=ast.Load())
-            call.func = ast.copy_location(method, call.func)
 
 
 def uncalled_and_asked(tree):

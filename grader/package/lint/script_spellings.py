@@ -1,0 +1,44 @@
+"""Writes what a student's Python spells in another way as the finders of `slips.py` look for it: assignments with a type,
+methods under names of their own. Names of rospy are for `script_rospy.py`.
+
+Nothing is executed. Python 3.8, standard library only.
+"""
+
+import ast
+
+from script_tree import dotted
+
+
+class TypedAssign(ast.Assign):
+    """`rate: Rate = Rate(10)`, which finders take for an assignment; its type is a use of a name all the same."""
+
+    _fields = ("targets", "annotation", "value", "type_comment")
+
+
+def spell_plainly(tree):
+    """Change the tree of a module, before any finder looks at it."""
+    for node in ast.walk(tree):
+        for block in (getattr(node, part, None) for part in ("body", "orelse", "finalbody")):
+            if isinstance(block, list):
+                block[:] = [plain_assignment(one) for one in block]
+    call_by_methods(tree)
+
+
+def plain_assignment(node):
+    """Return an assignment without its type in the way; each other statement as it is."""
+    if not isinstance(node, ast.AnnAssign) or node.value is None:
+        return node
+    plain = TypedAssign([node.target], node.annotation, node.value, None)
+    return ast.copy_location(plain, node)
+
+
+def call_by_methods(tree):
+    """Write calls of `say = pub.publish` as calls of that method, `say.publish(…)`, which is what finders look for."""
+    nodes = list(ast.walk(tree))
+    given = [n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+    made = [n for n in nodes if isinstance(n, ast.Assign) and isinstance(n.value, ast.Attribute)]
+    named = {dotted(n.targets[0]): n.value.attr for n in made if n.value.attr in ("publish", "sleep")}
+    for call in (n for n in nodes if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)):
+        if call.func.id in named and given.count(call.func.id) == 1:
+            method = ast.Attribute(value=call.func, attr=named[call.func.id], ctx=ast.Load())
+            call.func = ast.copy_location(method, call.func)
