@@ -34,6 +34,51 @@ while not rospy.is_shutdown():
         pub.publish(1)
     rate.sleep()
 """),
+    "ended-by-a-hook": ("deaf", """\
+class A:
+    def stop(self):
+        self.stopped = True
+
+    def run(self):
+        rospy.on_shutdown(self.stop)
+        while not self.stopped:
+            rate.sleep()
+"""),
+    "ended-by-an-event": ("deaf", "rospy.on_shutdown(stop.set)\nwhile not stop.wait(1.0):\n    pub.publish(1)\n"),
+    "iterator-until-the-end": ("loop-left", """\
+class Pace:
+    def __next__(self):
+        if rospy.is_shutdown():
+            raise StopIteration
+        rate.sleep()
+
+for _ in Pace():
+    pub.publish(1)
+"""),
+    "decorator-that-prints": ("not-printed", """\
+@printed
+def heard(msg):
+    return msg.data
+
+rospy.Subscriber('a', String, heard)
+"""),
+    "object-that-is-called": ("callback-missing", """\
+class A:
+    def __call__(self, msg):
+        print(msg.data)
+
+rospy.Subscriber('a', String, A())
+"""),
+    "count-of-the-function-around": ("undefined", """\
+import rospy
+def run(pub):
+    n = 0
+    def tick(event):
+        nonlocal n
+        pub.publish(n)
+        n = n + 1
+    rospy.Timer(rospy.Duration(0.1), tick)
+"""),
     "endless-generator": ("deaf", "def numbers():\n    while True:\n        yield from range(128)\n"),
     "asks-in-a-function": ("deaf", """\
 def ok():

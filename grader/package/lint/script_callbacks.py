@@ -127,10 +127,12 @@ def callbacks(tree):
             meant = one.func if called else one
             own = (plain if isinstance(meant, ast.Name) else functions).get(dotted(meant).rpartition(".")[2])
             least, most = takes(own, isinstance(meant, ast.Attribute)) if own else (values, values)
+            yield from filled_in_part(one, functions, values)
             if own and called and (least or not gives_value(own)) and not gives_function(own):
                 message, fix = "`%s()` is called here", "write `%s`, without brackets"
-                name = dotted(meant)
-                yield slip(one.lineno, "callback-called", message % name, fix % name, name)
+                at = called_inside(own) or one
+                name = dotted(at.func)
+                yield slip(at.lineno, "callback-called", message % name, fix % name, name)
             elif own and not called and not least <= values <= most:
                 what = OTHER_VALUES.get(name, "the %s" % VALUES.get(name, "message"))
                 what += " and its `callback_args`" if name == "Subscriber" and values > 1 else ""
@@ -168,7 +170,9 @@ def spare_callbacks(tree, functions):
     read = {getattr(n, "attr", getattr(n, "id", "")) for n in walk(tree)}
     data = {dotted(n.value) for n in all_of(tree, ast.Attribute) if n.attr == "data"}
     spare = [f for name, f in functions.items() if name not in read and takes(f, "self" in read) == (1, 1)]
-    spare = [f for f in spare if [a for a in f.args.args[-1:] if a.arg in data]]
+    spare = [
+        f for f in spare if [a for a in f.args.args[-1:] if a.arg in data] and not f.name.startswith("__")
+    ]
     if len(spare) != 1:
         return
     name = ("self." if len(spare[0].args.args) > 1 else "") + spare[0].name
@@ -224,6 +228,39 @@ def made_response(own, call, kept):
     if called_name(call) != "Service" or len(lost) != 1 or lost[0] not in used or len(call.args) < 2:
         return ""
     return ", and `%s = %sResponse()` as its first line" % (lost[0], dotted(call.args[1]))
+
+
+def filled_in_part(node, functions, values):
+    """Yield where `partial(f, …)` leaves a callback more or fewer values to take than ROS passes it."""
+    if called_name(node) != "partial" or not node.args or node.keywords:
+        return
+    own = functions.get(dotted(node.args[0]).rpartition(".")[2])
+    if own is None or any(isinstance(n, ast.Starred) for n in node.args):
+        return
+    bound = isinstance(node.args[0], ast.Attribute)
+    (least, most), count = takes(own, bound), len(node.args) - 1
+    if not least <= count + values <= most:
+        taken = [one.arg for one in own.args.args][bound:]
+        message = "`%s` takes %d values, and gets %d: %d of `partial(…)`, and what ROS passes"
+        message %= (own.name, least, count + values, count)
+        fix = "write `%s(%s)`" % (
+            dotted(node.func),
+            ", ".join([dotted(node.args[0]), *taken[: max(0, least - values)]]),
+        )
+        fix += ", with your values in place of these names" if least > values else ""
+        yield slip(node.lineno, "callback-values", message, fix, own.name)
+
+
+def called_inside(function):
+    """Return the call of its own inner function whose answer a function returns, where that inner one takes a value:
+    it is to be returned itself."""
+    inner = {n.name: n for n in function.body if isinstance(n, ast.FunctionDef)}
+    for n in function.body:
+        call = n.value if isinstance(n, ast.Return) else None
+        own = inner.get(getattr(getattr(call, "func", None), "id", None))
+        if own is not None and not call.args and not call.keywords and takes(own, False)[0]:
+            return call
+    return None
 
 
 def gives_value(function):

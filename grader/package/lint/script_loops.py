@@ -18,6 +18,7 @@ from script_tree import (
     FUNCTIONS,
     LOOPS,
     all_of,
+    argument,
     called_name,
     calls_in,
     dotted,
@@ -327,9 +328,18 @@ def is_counted(loop):
 def runs_out(loop, tree):
     """Whether it goes through an object of a class of the script whose `__next__` comes to its end."""
     name = called_name(loop.iter) if isinstance(loop, ast.For) else ""
-    owners = (n for n in all_of(tree, ast.ClassDef) if name and n.name == name)
-    ends = (n for owner in owners for n in ast.walk(owner) if isinstance(n, ast.Raise) and n.exc is not None)
+    owners = [n for n in all_of(tree, ast.ClassDef) if name and n.name == name]
+    inside = [n for owner in owners for n in ast.walk(owner)]
+    at_end = {id(part) for n in inside if is_about_the_end(n) for one in n.body for part in ast.walk(one)}
+    ends = (n for n in inside if isinstance(n, ast.Raise) and n.exc is not None and id(n) not in at_end)
     return any("StopIteration" in names_in(n.exc) for n in ends)
+
+
+def is_about_the_end(node):
+    """Whether what is in it runs only when the node should end: `if rospy.is_shutdown():`, or an `except` of that."""
+    if isinstance(node, ast.If):
+        return any(loop_ends(n) is not None for n in ast.walk(node.test))
+    return isinstance(node, ast.ExceptHandler) and any("Interrupt" in kind for kind in caught_by(node))
 
 
 def called_own(node, functions):
@@ -424,10 +434,12 @@ def deaf_loops(tree):
     """Why a node goes on after Ctrl-C: loops that do not ask for it, an `except` within them, signals put off."""
     endless, others, counted = [], [], []
     asking = {name for name, one in functions_in(tree).items() if any(map(is_shutdown, ast.walk(one)))}
+    ending = set_at_the_end(tree)
     for loop in all_of(tree, *LOOPS):
         is_while, inside = isinstance(loop, ast.While), list(ast.walk(loop))
+        is_ended = is_while and ending & names_in(loop.test)
         may_last = is_while or is_endless_for(loop) or calls_in(loop, "sleep")
-        if not may_last or any(map(is_shutdown, inside)) or counts_down(loop):
+        if is_ended or not may_last or any(map(is_shutdown, inside)) or counts_down(loop):
             continue
         # what calls a generator, or a function that asks, leaves the loop to it
         if any(isinstance(n, (ast.Yield, ast.YieldFrom)) or called_name(n) in asking for n in inside):
@@ -452,6 +464,21 @@ def deaf_loops(tree):
             message = "line %d replaces what rospy does on Ctrl-C" % node.lineno
             yield slip(node.lineno, "deaf", message, "delete it")
     yield from endless or others or counted
+
+
+def set_at_the_end(tree):
+    """Return the names of what the functions given to `on_shutdown(…)` set: `self.stopped = True`, `stop.set()`."""
+    functions, calls = functions_in(tree), calls_in(tree, "on_shutdown")
+    given = [one for call in calls for one in argument(call, 0, "h")]
+    names = {dotted(one.value) for one in given if isinstance(one, ast.Attribute) and one.attr == "set"}
+    run = {functions.get(dotted(one).rpartition(".")[2]) for one in given} - {None}
+    run.update(one for one in given if isinstance(one, ast.Lambda))
+    for n in (n for one in run for n in ast.walk(one)):
+        if isinstance(getattr(n, "ctx", None), ast.Store):
+            names.add(dotted(n))
+        elif is_call(n, "set"):
+            names.add(dotted(n.func.value))
+    return names
 
 
 def counts_down(loop):

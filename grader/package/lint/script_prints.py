@@ -55,7 +55,8 @@ def unprinted_messages(tree):
         taken = (
             [one.arg for one in own.args.args if one.arg not in ("self", "cls")] if own is not None else []
         )
-        if not taken:
+        # what a decorator makes of it may print what it returns
+        if not taken or getattr(own, "decorator_list", None):
             continue
         kinds, topics = argument(node, 1, "data_class"), argument(node, 0, "name")
         plain = any(dotted(kind).rpartition(".")[2] in WITH_DATA for kind in kinds[:1])

@@ -23,6 +23,8 @@ from script_tree import (
 )
 
 WAYS_LIMIT = 4
+STEPS_LIMIT = 3
+"""So many names are followed to a value: `self.rate = rate`, and what the class is called with."""
 VALUES = {"Rate": "hz", "sleep": "duration", "Timer": "period"}
 """What says how often, by its name."""
 
@@ -114,9 +116,13 @@ def loop_rates(tree):
     looped = {id(one) for loop in all_of(tree, *LOOPS) for one in calls_in(loop, "sleep")}
 
     def given(node):
-        values = bound.get(ast.dump(node), [node])
-        # Which of several values counts, only a run can tell.
-        return values[0] if len(values) == 1 else node
+        for _ in range(STEPS_LIMIT):
+            values = bound.get(ast.dump(node), ())
+            # Which of several values counts, only a run can tell.
+            if len(values) != 1:
+                break
+            node = values[0]
+        return node
 
     yield from vanished_pauses(tree, given) if looped else ()
     for node in calls_in(tree, *VALUES):
@@ -150,17 +156,56 @@ def values_given(tree):
             bound.setdefault(ast.dump(node.targets[0]).replace("Store()", "Load()"), []).append(node.value)
     for node in all_of(tree, ast.Call):
         calls.setdefault(dotted(node.func).rpartition(".")[2], []).append(node)
-    for name, function in functions_in(tree).items():
+    own = [(name, one) for name, one in functions_in(tree).items() if name != "__init__"]
+    classes = all_of(tree, ast.ClassDef)
+    own += [(n.name, one) for n in classes for one in n.body if getattr(one, "name", "") == "__init__"]
+    for name, function in own:
         called = calls.get(name, [])
+        # of a class of the script: `rospy.Publisher(…)` makes another one
+        called = (
+            [n for n in called if isinstance(n.func, ast.Name)] if function.name == "__init__" else called
+        )
         taken = [one for one in function.args.args if one.arg != "self"]
         first_default = len(taken) - len(function.args.defaults)
         for place, one in enumerate(taken if len(called) == 1 else ()):
             given = argument(called[0], place, one.arg)
             if not given and place >= first_default:
                 given = [function.args.defaults[place - first_default]]
-            if given:
+            if given and dotted(given[0]) != one.arg:
                 bound.setdefault(ast.dump(ast.Name(id=one.arg, ctx=ast.Load())), []).append(given[0])
+    for read, value in [*of_classes(classes), *options_read(tree)]:
+        bound.setdefault(ast.dump(read), []).append(value)
     return bound
+
+
+def of_classes(classes):
+    """Yield what a class itself gives a value, as its methods read it, with that value."""
+    for owner in classes:
+        for node in owner.body:
+            if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+                for name in ("self", "cls", owner.name):
+                    yield (
+                        ast.Attribute(ast.Name(name, ast.Load()), node.targets[0].id, ast.Load()),
+                        node.value,
+                    )
+
+
+def options_read(tree):
+    """Yield where an option of `argparse` is read, `options.rate`, with the default of its `add_argument(…)`."""
+    defaults = {}
+    for call in calls_in(tree, "add_argument"):
+        given = (
+            argument(call, 99, "dest") or [n for n in call.args if text_of(n).startswith("--")] or call.args
+        )
+        name = text_of(given[0]).lstrip("-").replace("-", "_") if given else ""
+        defaults.setdefault(name, []).extend(argument(call, 99, "default"))
+    seen = set()
+    for node in all_of(tree, ast.Attribute) if defaults else ():
+        values = defaults.get(node.attr, ())
+        name = dotted(node)
+        if len(values) == 1 and isinstance(node.value, ast.Name) and name not in seen:
+            seen.add(name)
+            yield node, values[0]
 
 
 def ways(node):
@@ -214,9 +259,21 @@ def nanoseconds_apart(call):
     return parts[0] + parts[1] * 1e-9
 
 
+ENVIRONMENT = ("os.environ.get", "environ.get", "os.getenv", "getenv")
+NUMBER = re.compile(r"[0-9]{1,9}(\.[0-9]{0,9})?$", re.ASCII)
+
+
 def constant(node, given, depth=4):
-    """Return the positive number that an expression of numbers comes to, None where it is something else."""
+    """Return the positive number that an expression of numbers comes to, None where it is something else. Of a variable
+    of the environment, its default."""
     node = given(node)
+    whole = node
+    if isinstance(node, ast.Call) and dotted(node.func) in ("int", "float") and len(node.args) == 1:
+        node = given(node.args[0])
+    if dotted(getattr(node, "func", None)) in ENVIRONMENT and len(node.args) == 2:
+        node = given(node.args[1])
+    if node is not whole and NUMBER.match(text_of(node)):
+        node = ast.Constant(float(text_of(node)))
     if isinstance(node, ast.Constant) and type(node.value) in (int, float) and 0 < node.value < 1e9:
         return float(node.value)
     if depth and isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Div, ast.Mult)):

@@ -188,7 +188,7 @@ def function_around(node, tree):
 
 def assigned_late(tree):
     """Names that a function reads above the line that first gives them a value, and that nothing outside of it has."""
-    outside = bound_names(tree) | {n for one in all_of(tree, ast.Global) for n in one.names}
+    outside = bound_names(tree) | {n for one in all_of(tree, ast.Global, ast.Nonlocal) for n in one.names}
     for function in all_of(tree, ast.FunctionDef):
         taken = {one.arg for one in ast.walk(function.args) if isinstance(one, ast.arg)} | outside
         inside = list(walk_own(function))
