@@ -416,6 +416,10 @@ CASES = {
     ),
     "topic": Case(swapped(TALKER, ("numeric_chatter", "numeric_chater")), ["topic-name"], "should be /numeric_chatter"),
     "node": Case(swapped(TALKER, ("'talker'", "'Talker'")), ["node-name"], "the node Talker should be talker"),
+    "node-of-another-script": Case(
+        {"src/relay.py": SCRIPT.replace("'talker'", "'talker3'").replace("numeric_chatter", "totals").replace("~", "")},
+        [], wanted=asking(scripts=("src/talker.py", "src/relay.py")),
+    ),
     "slash": Case(swapped(TALKER, ("'talker'", "'/talker'")), ["node-name"], "the node /talker should be talker"),
     "param": Case(swapped(TALKER, ("'~rate'", "'~rat'")), ["parameter-name"],
         "the parameter ~rat should be ~rate"),

@@ -113,7 +113,8 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     left = wanted.model_copy(update={"nodes": tuple(n for n in wanted.nodes if n.strip("/") not in taken)})
     for script in names:
         own = [name for name in names[script] if name not in links.get(script, ())]
-        repair_script_names(files, script, own, wanted if script in of_lab else left)
+        others = {n.value for other in names if other != script for n in names[other] if n.role == "node"}
+        repair_script_names(files, script, own, wanted if script in of_lab else left, others)
     repair_yaml_files(files, package, wanted)
     repair_yaml_names(files, package, names, wanted)
     for script in names:

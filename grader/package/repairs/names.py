@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import Any, Literal
 
@@ -222,8 +222,11 @@ def _called(name: Name, lines: Sequence[str]) -> str:
     return "action" if of_action else WORDS[kind]
 
 
-def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: Wanted) -> None:
-    """Find the literals of a script that are slips of what the lab asks for, where it asks for nothing else there."""
+def repair_script_names(
+    files: Files, file: str, names: Sequence[Name], wanted: Wanted, others: Collection[str] = ()
+) -> None:
+    """Find the literals of a script that are slips of what the lab asks for, where it asks for nothing else there. What
+    other scripts call their nodes (`others`) is not meant."""
     node = next((name.value.strip("/") for name in names if name.role == "node"), "") or _name_node(
         files, file, wanted
     )
@@ -245,6 +248,7 @@ def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: 
         used = {_resolve(name, node) for name in names if name.role in alike_roles}
         absent = [w for w in asked if _bare(w, role) not in used]
         absent = [w for w in absent if not _is_of_other_role(file, role, w, wanted)]
+        absent = [w for w in absent if role != "node" or w.strip("/") not in others]
         for name in dict.fromkeys(given):
             near = (w for w in absent if _is_slip(name, w, node) and _has_keys(w, name.keys, branches))
             right = next(near, "")
