@@ -231,7 +231,7 @@ def concerns(
     """
     if criterion.scenario is not None:
         sleeps = repair.before.endswith(".sleep") and repair.after == f"{repair.before}()"
-        words = repair.kind == "missing-call" and repair.before.replace("+", "%", 1) == repair.after
+        words = repair.kind == "missing-call" and _is_of_words(repair)
         of_others = AT_ANY_RATE if sleeps else OF_ANY_WORDS if words else set[str]()
         return criterion.check not in of_others and is_used_by(
             rubric.scenarios[criterion.scenario], repair, rubric, built=built, launched=launched
@@ -254,6 +254,13 @@ def concerns(
     return repair.kind not in repair_charges.OF_BUILDS and repair_charges.asks_for(
         found[criterion.id], repair
     )
+
+
+def _is_of_words(repair: Repair) -> bool:
+    """Return whether the repair changes no more than what a line prints: its `%`, or the `f` in front of its text."""
+    prints = re.search(r"\b(?:print|log\w+|write)\s*\(", repair.before) is not None
+    no_f = prints and re.sub(r"""\bf(?=["'])""", "", repair.after, count=1) == repair.before
+    return no_f or repair.before.replace("+", "%", 1) == repair.after
 
 
 def _only_installs(repair: Repair) -> bool:

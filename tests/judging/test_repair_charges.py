@@ -111,6 +111,22 @@ def test_a_sleep_without_brackets_is_charged_to_the_rate() -> None:
     assert found["node"].repaired.repairs == (TABS,)
 
 
+@pytest.mark.parametrize(
+    ("line", "costs"),
+    [
+        ("        rospy.loginfo('sent {count}')", False),
+        ('        print("sent {count}")', False),
+        ("        pub = rospy.Publisher('robot{count}', String, queue_size=10)", True),
+    ],
+)
+def test_a_text_without_its_f_costs_nothing_where_it_is_only_printed(line: str, costs: bool) -> None:
+    after = re.sub(r"(?=['\"])", "f", line, count=1)
+    text = TABS.model_copy(update={"kind": "missing-call", "line": 12, "before": line, "after": after})
+    found = judged(DIED, GOOD_RUN, TABS, text)
+    told = {one.id for one in found.values() if one.repaired and text in one.repaired.repairs}
+    assert bool(told) is costs
+
+
 def test_a_name_is_charged_where_the_rubric_asks_for_it() -> None:
     misspelt = {**GOOD_RUN, "topics": [{"topic": "/chater", "count": 61}]}
     found = judged(misspelt, GOOD_RUN, TOPIC)
