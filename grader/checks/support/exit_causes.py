@@ -51,6 +51,7 @@ from grader.checks.support.scripts import (
     SYNTAX,
     argument_not_given,
     in_comments,
+    input_not_given,
     move_hint,
     old_encoding,
     path_in_package,
@@ -251,7 +252,8 @@ def _not_run(life: Life, run: Run, package: PackageFacts) -> Ending | None:
         and (s.kind != "not-called" or s.name.rpartition(".")[2] not in ("sleep", "is_shutdown"))
     ]
     if not slips:
-        return None
+        typed = input_not_given(life.start.argv, package)
+        return Ending(*typed, by_itself=True) if typed else None
     slip = min(slips, key=lambda one: kinds.index(one.kind))
     of_script = [s for s in package.slips if s.file == life.start.script]
     if slip.kind == "commented-out" and (all_of_them := in_comments(of_script)):

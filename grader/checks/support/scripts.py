@@ -250,6 +250,17 @@ def argument_not_given(
     return None
 
 
+def input_not_given(
+    argv: Sequence[str], package: PackageFacts
+) -> tuple[str, str, tuple[FileCitation, ...]] | None:
+    """Return the cause, the hint and the place where the program of this command line reads what is typed, and has come
+    to its end."""
+    for slip in slips_of_program(argv, package, "input"):
+        loop = "; a node has to stay alive: do that in a loop `while (ros::ok())`"
+        return f"its program ran to the end: {slip.message}", f"{slip.fix}{loop}", (slip.place,)
+    return None
+
+
 def is_elsewhere(program: Executable, package: PackageFacts) -> bool:
     """Return whether it surely goes to a folder in which `rosrun` does not look."""
     folder = program.folder
