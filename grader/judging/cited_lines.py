@@ -66,7 +66,17 @@ def cite_source(
         return verdict
     made = line_that_makes(lines, found[0]) if is_sent and len(found) == 1 else None
     places = (FileCitation(file=one.file, line=one.number) for one in (made, *found) if one is not None)
-    return verdict.model_copy(update={"citations": (*places, *verdict.citations)})
+    hint = verdict.hint + _second_call(criterion, found[0], lines)
+    return verdict.model_copy(update={"citations": (*places, *verdict.citations), "hint": hint})
+
+
+def _second_call(criterion: Criterion, first: SourceLine, lines: Iterable[SourceLine]) -> str:
+    """Return where a program of C++ calls `ros::init` once more, which leaves its node's name as it is."""
+    of_file = (one for one in lines if one.file == first.file and one.number > first.number)
+    again = [one.number for one in of_file if "ros::init(" in one.text]
+    if criterion.check != "node-name" or not again:
+        return ""
+    return f" on line {first.number}: the node keeps the name of its first call, and {on_lines(again)} changes nothing"
 
 
 # More lines that give one field one value say nothing of which one was run.
@@ -114,7 +124,8 @@ def _lines_that_do(verdict: Verdict, criterion: Criterion, lines: list[SourceLin
             found = lines_that_say(lines, f"{verdict.measured} {verdict.basis.said}")
             found = found or _that_say(verdict, criterion, lines)
         case "prints" | "topic-type" | "node-name":
-            found = _that_name(verdict.basis.said, criterion, lines)
+            named = criterion.check == "node-name"
+            found = _that_name(verdict.measured if named else verdict.basis.said, criterion, lines)
         case "message":
             saying = lines_that_say(lines, verdict.basis.said or verdict.measured)
             found = _published_of(saying, lines, criterion)
@@ -170,7 +181,9 @@ def _that_name(said: str, criterion: Criterion, lines: list[SourceLine]) -> list
     if criterion.check == "prints":
         return lines_that_say(lines, said)
     if criterion.check == "node-name":
-        return [one for one in lines if "ros::init(" in one.text]
+        inits = [one for one in lines if "ros::init(" in one.text]
+        seen = [one for one in inits if any(f'"{name}"' in one.text for name in re.findall(r"/(\w+)", said))]
+        return seen or inits
     names = [one.strip("/") for one in (said, str(criterion.parameters["topic"]))]
     calls = [re.compile(rf'''\badvertise\b[^"]*"/?{re.escape(name)}"''') for name in names if name]
     return next((found for call in calls if (found := [one for one in lines if call.search(one.text)])), [])

@@ -145,6 +145,28 @@ def test_what_is_wrong_in_a_message_is_shown_where_it_is_set_or_published(
     assert found.citations == ((FileCitation(file=SCRIPT["path"], line=line + 1),) if line else ())
 
 
+@pytest.mark.parametrize(
+    ("others", "line", "added"),
+    [
+        ("", 2, ""),
+        ('ros::init(argc, argv, "hello");\n', 2,
+         " on line 2: the node keeps the name of its first call, and line 3 changes nothing"),
+        ('ros::init(argc, argv, "bye");\n', None, ""),
+    ],
+)  # fmt: skip
+def test_a_second_name_of_a_program_is_told_to_change_nothing(
+    others: str, line: int | None, added: str
+) -> None:
+    lab = rubric({"id": "sent", "scenario": "talker", **CALLED})
+    source = f'#!\nros::init(argc, argv, "bye");\n{others}'
+    package = {"package": {"files": [SCRIPT]}, "attachments": {SCRIPT["path"]: source}}
+    runs = build_runs({"runs": {"package": package}})
+    verdict = failed("the node is named /bye, not /hello", measured="/bye", hint="write it")
+    found = cite_source(verdict, lab.criteria[0], try_facts(lab, runs), runs["package"])
+    assert found.citations == ((FileCitation(file=SCRIPT["path"], line=line),) if line else ())
+    assert found.hint == f"write it{added}"
+
+
 @pytest.mark.parametrize(("count", "lines"), [(2, [2, 3]), (3, [2, 3, 4]), (4, [])])
 def test_a_text_that_several_lines_may_have_given_is_shown_at_each(count: int, lines: list[int]) -> None:
     lab = rubric({"id": "sent", "scenario": "talker", **SENT})
