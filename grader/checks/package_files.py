@@ -395,7 +395,7 @@ def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
     slip = f"; it declares {join_words(dict.fromkeys(d.name for d in misspelt))}" if slips else ""
     last = max((d.line for d in at_build), default=_last_line(found))
     lines = tuple(FileCitation(file=found.file, line=d.line) for d in misspelt or at_build)
-    if joined := _in_one_tag(found, missing):
+    if joined := _in_one_tag(found, missing, at_run):
         return joined
     hints = [_respell(n, d, deps) for n, deps in slips.items() for d in deps]
     names_too = {d.name for d in misspelt}
@@ -436,21 +436,25 @@ def _respell(name: str, one: Dependency, slips: Sequence[Dependency]) -> str:
     return f"write {name} instead of {one.name} on line {one.line}"
 
 
-def _in_one_tag(found: Manifest, missing: Sequence[str]) -> Verdict | None:
-    """Return the tags that name several packages at once, where these are all that is missing."""
-    apart = {
-        d: re.split(r"[\s,;]+", d.name.strip(" ,;")) for d in found.dependencies if d.kind in RUNTIME_KINDS
-    }
+def _in_one_tag(found: Manifest, missing: Sequence[str], at_run: str) -> Verdict | None:
+    """Return the tags that name several packages at once, with what else is missing."""
+    apart = {d: re.split(r"[\s,;]+", d.name.strip(" ,;")) for d in found.dependencies}
     joined = {d: names for d, names in apart.items() if len(names) > 1 and set(names) & set(missing)}
-    if not set(missing) <= {name for names in joined.values() for name in names}:
+    declared = {n for d, names in joined.items() for n in names if n in OF_BUILD or d.kind in RUNTIME_KINDS}
+    if not declared.intersection(missing):
         return None
-    lines = join_words(f"line {d.line} names {join_words(names)} in one tag" for d, names in joined.items())
-    tags = (
-        f"on line {d.line}, write {' '.join(f'<{d.kind}>{n}</{d.kind}>' for n in joined[d])}" for d in joined
-    )
-    message = f"{found.file} does not declare {join_words(missing)} as a run-time dependency: {lines}"
+    tags = {d: [f"<{d.kind}>{n}</{d.kind}>" for n in names] for d, names in joined.items()}
+    kinds = {n: "build_depend" if n in OF_BUILD else at_run for n in missing if n not in declared}
+    last = max(joined, key=lambda d: d.line)
+    tags[last] += [f"<{kind}>{n}</{kind}>" for n, kind in kinds.items()]
+    if len(joined) == 1:
+        said = f"line {last.line} names {join_words(joined[last])} in one tag"
+    else:
+        said = f"{on_lines(sorted(d.line for d in joined))} name several packages in one tag each"
+    message = f"{found.file} does not declare {_as_dependencies(missing)}: {said}"
+    hints = (f"on line {d.line}, write {' '.join(one)}" for d, one in tags.items())
     cited = tuple(FileCitation(file=found.file, line=d.line) for d in joined)
-    return failed(message, measured=_declared_text(found), hint=join_words(tags), citations=cited)
+    return failed(message, measured=_declared_text(found), hint=join_words(hints), citations=cited)
 
 
 def _last_line(found: Manifest) -> int:
