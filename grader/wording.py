@@ -155,6 +155,13 @@ def is_one_edit(one: str, other: str) -> bool:
     return swapped or one[1:] == other[1:] or one[1:] == other or one == other[1:]
 
 
+def is_another_number(one: str, other: str) -> bool:
+    """Return whether the two names differ in a number of as many digits alone, as `lab1` and `lab2` do."""
+    numbers = [re.findall(r"\d+", name) for name in (one, other)]
+    same_length = [len(number) for number in numbers[0]] == [len(number) for number in numbers[1]]
+    return one != other and same_length and re.sub(r"\d", "0", one) == re.sub(r"\d", "0", other)
+
+
 def is_word_of(given: str, name: str, names: Collection[str]) -> bool:
     """Return whether `given` is a word of `name`, all of whose words stand among `names` one by one (`std msgs`)."""
     words = name.split("_")

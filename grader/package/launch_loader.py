@@ -29,7 +29,7 @@ from grader.model.launch_file import (
 )
 from grader.model.record import Record
 from grader.package.xml import line_of
-from grader.wording import PAIR, is_one_edit
+from grader.wording import PAIR, is_another_number, is_one_edit
 
 INCLUDES_MAX = 50
 DEPTH_MAX = 10
@@ -226,7 +226,8 @@ class _Loader:
                     right = "find" if name in scope.own else next(near, "arg" if name else "find")
                     fault = f"roslaunch does not know $({word} …)", f"write $({right} {name or '…'})"
                 elif word == "find" and is_one_edit(name, own) and not self._is_known(name, scope):
-                    if element.tag == "include":  # `_include` notes it
+                    # `_include` notes its own, and what another lab is called is no slip.
+                    if element.tag == "include" or is_another_number(name, own):
                         continue
                     fault = f"there is no package {name}: this one is called {own}", f"write $(find {own})"
         if fault[0]:

@@ -143,6 +143,7 @@ def test_what_does_not_parse_is_told_before_anything_runs(tmp_path) -> None:
             'output="Screen" is neither',
         ),
         ('<rosparam file="$(find lab11)/a.yaml"/>', "there is no package lab11: this one is called lab1"),
+        ('<rosparam file="$(find lab2)/a.yaml"/>', ""),
         ('<include file="$(fnd lab1)/launch/b.launch"/>', "roslaunch does not know $(fnd …)"),
         ('<param name="a" value="$(args b)"/>', "roslaunch does not know $(args …)"),
         ('<param name="a" value="$(arg b)"/>', "no <arg> declares $(arg b)"),

@@ -19,6 +19,7 @@ from grader.checks.support.launch_slips import (
     program_of_source,
     programs_hint,
 )
+from grader.checks.support.missing_packages import is_of_another_lab
 from grader.checks.support.parameters import explain_yaml
 from grader.checks.support.processes import early_end, first_interrupt_ns, lives, observed_until_ns
 from grader.checks.support.scripts import (
@@ -77,10 +78,9 @@ _REFUSALS = (
     (r"cannot contain a namespace", "a node's name has a slash in it",
      'write name="…" without a slash; a namespace goes into ns="…"'),
     (r"missing required attribute: '?(\w+)", "a tag has no {0}", "add the attribute"),
-    (NO_FILE, "the file {0} that <rosparam> loads does not exist",
-     "write $(find <package>)/config/{0}, and push the file"),
+    (NO_FILE, "the file {0} that <rosparam> loads does not exist", "write $(find <package>)/config/{0}, and push it"),
     (NO_PACKAGE, "there is no package {0}",
-     "$(find …) and pkg need the package's exact name"),
+     "$(find …) and pkg need a package's exact name, and a package of your own is handed in too"),
     (_UNSET.pattern, 'its <arg name="{0}"> has no default',
      'write <arg name="{0}" default="…"/>'),
     (r"unknown machine \[([^\[\]\n]+)\]", "there is no <machine> of the name {0}",
@@ -263,7 +263,7 @@ def _known_refusal(
 
 def _lacks_package(name: str, said: str, text: str, package: PackageFacts) -> Absence | None:
     """Return what is known of a package that roslaunch does not find: a slip of this one's name, or ROS's own."""
-    if near_names(name, [package.name]):
+    if near_names(name, [package.name]) and not is_of_another_lab(name, package):
         return Absence(f"{said}: this one is called {package.name}", f"write $(find {package.name})")
     if name not in known_packages():
         return None

@@ -10,7 +10,7 @@ from grader.checks.support.cpp_errors import Explained
 from grader.checks.support.scripts import cmake_calls
 from grader.installable import ROS_2, exists_somewhere, install_hint, is_no_package, known_packages
 from grader.model.package import MANIFEST, PackageFacts
-from grader.wording import is_word_of, join_words
+from grader.wording import is_another_number, is_word_of, join_words
 
 ALWAYS_THERE = ("catkin", "rospy", "roscpp", "std_msgs")
 ONE_EDIT = 0.88
@@ -21,6 +21,15 @@ _SIGNS = re.compile(r"[,:]|[;.]$")
 PLACEHOLDER = "it is only a placeholder in the help text of catkin_create_pkg"
 SLIP = 0.8
 """How alike a name is that is written for one that every machine has: `pospy` for `rospy`."""
+
+
+def is_of_another_lab(name: str, package: PackageFacts) -> bool:
+    """Return whether a package that the launch files name and nobody has is one of another lab, `lab1` for `lab2`: this
+    one has none of the files that they find in it."""
+    sources = [source for file in package.launch_files for source in file.includes]
+    sources += [load.source or "" for file in package.launch_files for load in file.loads]
+    inside = [source.partition(f"$(find {name})/")[2] for source in sources]
+    return is_another_number(name, package.name) and not any(path and package.file(path) for path in inside)
 
 
 def _misspelt_components(package: PackageFacts) -> dict[str, str]:
