@@ -249,7 +249,9 @@ class Later:
             if f"write {slip.name}" not in meant:  # else what calls it has its name wrong
                 whole = slip.fix or f"call `{slip.name}()`, which nothing in {slip.file} calls"
                 yield Fix(renamed.get((slip.file, slip.line), whole))
-        yield from (Fix(f"{slip.fix} ({slip.file})", (slip.fix,)) for slip in self._of("float-index"))
+        for slip in self._of("float-index"):
+            if (slip.file, slip.line) not in cited_lines(self._verdict.citations):
+                yield Fix(f"{slip.fix} ({slip.file})", (slip.fix,))
         for slip in self._of("main-guard"):
             yield Fix(f"write {MAIN} on {_line(slip)}", (f"on {_line(slip)}, write {MAIN}",))
         for slip in self._of("loop-left"):

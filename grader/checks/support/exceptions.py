@@ -244,10 +244,13 @@ def _place_in_list(message: str, source: str) -> Meaning | None:
     if not re.match(r"(?:list|tuple|string) indices must be integers(?: or slices)?, not float", message):
         return None
     found = _subscript(source, None)
+    every = [n.slice for n in ast.walk(line_tree(source)) if isinstance(n, ast.Subscript)]
+    divided = [p for p in every if "/" in (text := ast.unparse(p)) and not set(":[") & set(text)]
     cause = "a place in a list is a whole number, and `/`, or `//` with a decimal number, gives none"
-    if found is None:
+    places = [found.slice] if found else divided
+    if not places:
         return cause, "make it one with `int(…)`"
-    return cause, rewritten(source, (found.slice, f"int({ast.unparse(found.slice)})"))
+    return cause, rewritten(source, *((place, f"int({ast.unparse(place)})") for place in places))
 
 
 def _type(message: str, source: str, marked: tuple[int, int] | None) -> Meaning | None:
