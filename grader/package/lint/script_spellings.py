@@ -1,5 +1,5 @@
-"""Writes what a student's Python spells in another way as the finders of `slips.py` look for it: assignments with a type,
-methods under names of their own. Names of rospy are for `script_rospy.py`.
+"""Writes what a student's Python spells in another way as the finders of `slips.py` look for it: assignments with a
+type, methods under names of their own. Names of rospy are for `script_rospy.py`.
 
 Nothing is executed. Python 3.8, standard library only.
 """
