@@ -265,7 +265,8 @@ def _not_private(run: Run, verdict: Verdict) -> Verdict:
         own = f"{node}/{last}"
         if lacks and own in there and own not in got and node in _publishing(verdict, run) and name != own:
             why = f"{node} is given {own}, and asks for {name}"
-            return verdict.explained(why, f"read it with {get_param(f'~{last}')}", cause=own)
+            hint = f"read it with {get_param(f'~{last}')}{_asked_before(run, name, f'~{last}')}"
+            return verdict.explained(why, hint, cause=own)
     return verdict
 
 
