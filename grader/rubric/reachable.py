@@ -143,14 +143,11 @@ def _too_few(criteria: Sequence[WrittenCriterion]) -> Iterator[Fault]:
             if isinstance(count, int) and isinstance(least, int) and least > MANY * count:
                 yield (*path, "topics", topic, "at_least"), f"{name} ends after {count} messages on {topic}"
         window_s, rate_hz = until.get("window_s"), given.get("rate_hz")
-        if criterion.check == "rate" and is_number(window_s) and is_number(rate_hz):
-            yield from (((*path, "rate_hz"), fault) for fault in _seldom(rate_hz, window_s))
-
-
-def _seldom(rate_hz: float, window_s: float) -> Iterator[str]:
-    if 0 < window_s * rate_hz < FEWEST:
-        each = f"at {rate_hz:g} Hz a message comes each {1 / rate_hz:g} s, and window_s is {window_s:g} s"
-        yield f"{each}: it is messages a second"
+        if criterion.check != "rate" or not is_number(window_s) or not is_number(rate_hz):
+            continue
+        if 0 < window_s * rate_hz < FEWEST:
+            each = f"at {rate_hz:g} Hz a message comes each {1 / rate_hz:g} s, and window_s is {window_s:g} s"
+            yield (*path, "rate_hz"), f"{each}: it is messages a second"
 
 
 class TooShort(ValueError):
@@ -208,8 +205,8 @@ def _never_sent(about: WrittenCriterion, others: Sequence[WrittenCriterion]) -> 
         parts = PATH_PARTS.findall(field)
         yield from (((*at, "field"), fault) for fault in _past_the_end(topic, parts, field, about.scenario))
         sent = _sent_on(topic, about.scenario)
-        # The student's node may send there as well, and then something else comes.
-        if not sent or any(_is_published(topic, one) for one in others):
+        # The student's node may send there as well, and then something else comes. What is heard, the grader sends.
+        if not sent or any(one.given.get("topic") == topic and one.check != "hears" for one in others):
             continue
         lengths = [_length(value, parts) for value in sent]
         found = [_values_at(one, parts) if n is None else [] for one, n in zip(sent, lengths, strict=True)]
@@ -222,11 +219,6 @@ def _never_sent(about: WrittenCriterion, others: Sequence[WrittenCriterion]) -> 
         plain = all(is_number(one) for values in found for one in values or ())
         if cause and plain and not any(cause.holds(Reading(0, tuple(values or ()), "")) for values in found):
             yield at, f"nothing that {about.run} sends on {topic} is so: {cause.words}"
-
-
-def _is_published(topic: str, criterion: WrittenCriterion) -> bool:
-    """Return whether a criterion may ask the student for messages on this topic: what is heard, the grader sends."""
-    return criterion.given.get("topic") == topic and criterion.check != "hears"
 
 
 def _length(value: object, parts: Sequence[str]) -> int | None:

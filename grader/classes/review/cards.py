@@ -114,7 +114,7 @@ class Card:
         if self.decided is None:
             return Draft()
         written = self.decided.written
-        points = "" if written.points is None else form_number(written.points)
+        points = "" if written.points is None else number(written.points, FORM_DIGITS)
         return Draft(points=points, comment=written.comment, comments=written.comments, answer=written.answer)
 
     @property
@@ -195,11 +195,7 @@ def verdict(status: Status, points: float, most: float) -> str:
     return f"{status.value}, {number(points)} of {number(most)}"
 
 
-def form_number(value: float) -> str:
-    """Return a number as a field of a form has it: no digit is lost."""
-    return f"{value:.10f}".rstrip("0").rstrip(".")
-
-
+FORM_DIGITS = 10  # in a field of a form no digit is lost
 POINTS = re.compile(r"-?(?:\d{1,9}(?:[.,]\d{0,9})?|[.,]\d{1,9})", re.ASCII)
 
 
@@ -282,7 +278,7 @@ def points_words(comment: BankComment) -> str:
     """Return `7`, `-2` or nothing."""
     if comment.change is not None:
         return f"{comment.change:+g}"
-    return "" if comment.points is None else form_number(comment.points)
+    return "" if comment.points is None else number(comment.points, FORM_DIGITS)
 
 
 def author_of(text: str) -> str:
