@@ -173,7 +173,7 @@ def _until_last_s(topic: object, number: object, scenario: dict[str, Any]) -> fl
 
 def often_faults(about: WrittenCriterion) -> Iterator[Fault]:
     """Yield rows and feedback of which more are asked for than come in that time, however fast a node is."""
-    goal, most_s = _goal(about), longest_s(about.scenario) if about.check == "file-left" else None
+    goal, most_s = goal_of(about), longest_s(about.scenario) if about.check == "file-left" else None
     times = {
         "rows_at_least": (most_s, f"{about.run} lasts at most"),
         "feedback": (None if goal is None else _limit_s(goal), "the step gives the goal"),
@@ -185,7 +185,7 @@ def often_faults(about: WrittenCriterion) -> Iterator[Fault]:
             yield (*about.at, key), fault
 
 
-def _goal(about: WrittenCriterion) -> dict[str, Any] | None:
+def goal_of(about: WrittenCriterion) -> dict[str, Any] | None:
     """Return the step that sends the goal of which an action-result speaks."""
     number = about.given.get("goal", 1)
     goals = [
@@ -214,7 +214,7 @@ def early_faults(about: WrittenCriterion) -> Iterator[Fault]:
 
 def within_faults(about: WrittenCriterion) -> Iterator[Fault]:
     """Yield times in which something has to come, and that are longer than the run waits for it."""
-    within_s, goal, most_s = about.given.get("within_s"), _goal(about), longest_s(about.scenario)
+    within_s, goal, most_s = about.given.get("within_s"), goal_of(about), longest_s(about.scenario)
     at = (*about.at, "within_s")
     if not is_number(within_s):
         return

@@ -14,7 +14,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.support.fields import is_number
-from grader.rubric.durations import probed_s
+from grader.rubric.durations import goal_of, probed_s
 from grader.rubric.message_fields import range_warnings
 from grader.rubric.prose_warnings import prose_warnings
 from grader.rubric.simulators import TRUE_POSE, robot_of, topics_of_programs
@@ -322,12 +322,7 @@ def _all_required(
 
 def _cancelled_goal(criterion: WrittenCriterion) -> Iterator[Fault]:
     """Yield goals that a step cancels and that should succeed."""
-    given, sent = criterion.given, given_steps(criterion.scenario, "action")
-    goals = [one for one in sent if one.get("name") == given.get("action")]
-    number = given.get("goal", 1)
-    if not isinstance(number, int) or not 0 < number <= len(goals):
-        return
-    after_s = goals[number - 1].get("cancel_after_s")
+    given, after_s = criterion.given, as_map(goal_of(criterion)).get("cancel_after_s")
     if is_number(after_s) and given.get("status", "SUCCEEDED") == "SUCCEEDED" and "feedback" not in given:
         fault = f"the step cancels this goal after {after_s:g} s: is its status PREEMPTED?"
         yield (*criterion.at, "status" if "status" in given else "goal"), fault
