@@ -12,9 +12,11 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+import yaml
+
 from grader.errors import RubricError, UsageError
 from grader.files import atomic_write, user_folder
-from grader.rubric.yaml_lines import texts_at
+from grader.rubric.yaml_lines import RUBRIC, read_bytes
 from grader.wording import did_you_mean
 
 PACKAGE = Path(__file__).resolve().parent.parent
@@ -167,6 +169,38 @@ def _texts(path: Path, key: str) -> tuple[str, ...]:
         return texts_at(path, path.name, key)
     except RubricError:  # named where the rubric is loaded
         return ()
+
+
+def texts_at(path: Path, name: str, key: str) -> tuple[str, ...]:
+    """Return the text, or the list of texts, that a file has at one key of its first level, read no further; none where
+    it has nothing there.
+
+    Raises RubricError where the file cannot be read up to there.
+    """
+    found, is_key, depth = "", False, 0
+    texts: list[str] | None = None
+    try:
+        # Events and not the whole: this is asked of every lab on the machine, also of files with faults further down.
+        for event in yaml.parse(read_bytes(path, name, RUBRIC), Loader=yaml.SafeLoader):
+            begins = isinstance(event, yaml.CollectionStartEvent)
+            if depth == 0 and isinstance(event, yaml.SequenceStartEvent):
+                break
+            if depth == 1 and isinstance(event, yaml.NodeEvent):
+                is_key = not is_key
+                value = str(event.value) if isinstance(event, yaml.ScalarEvent) else ""
+                if found == key and not is_key:
+                    if not isinstance(event, yaml.SequenceStartEvent):
+                        return (value,) if value else ()
+                    texts = []
+                found = value
+            elif texts is not None and isinstance(event, yaml.ScalarEvent):
+                texts.append(str(event.value))
+            depth += begins - isinstance(event, yaml.CollectionEndEvent)
+            if texts is not None and depth == 1:
+                break
+    except yaml.YAMLError as error:
+        raise RubricError([f"{name}: is not YAML"]) from error
+    return tuple(texts or ())
 
 
 def _written_down() -> tuple[Path, ...]:

@@ -6,9 +6,8 @@ import pytest
 
 from grader.errors import RubricError
 from grader.judging.judge import MANUAL
-from grader.rubric.find import rubric_ids
+from grader.rubric.find import rubric_ids, texts_at
 from grader.rubric.load import all_rubrics, find_rubric_for_package, load_rubric
-from grader.rubric.yaml_lines import texts_at
 from tests.rubric.samples import SOUND, faults, spoiled
 
 NAME = "must be lower-case letters, digits and hyphens, beginning with a letter"
