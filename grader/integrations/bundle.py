@@ -28,6 +28,7 @@ from grader.installable import PIP, known_packages
 from grader.model import SandboxMode
 from grader.model.record import Record
 from grader.model.result import GradingResult
+from grader.rubric.find import checkout
 from grader.rubric.load import LoadedRubric, read_beside_rubric
 from grader.rubric.model import Needs
 
@@ -160,26 +161,20 @@ def wheel() -> tuple[str, bytes]:
 
 def system_script() -> bytes:
     """Return the script that installs the system's packages."""
-    checkout = _checkout()
-    file = checkout / "scripts" / SYSTEM_SCRIPT if checkout else PACKAGE / "_data" / SYSTEM_SCRIPT
+    clone = checkout()
+    file = clone / "scripts" / SYSTEM_SCRIPT if clone else PACKAGE / "_data" / SYSTEM_SCRIPT
     return file.read_bytes()
-
-
-def _checkout() -> Path | None:
-    """Return the clone that the grader runs from, or None if it is installed."""
-    root = PACKAGE.parent
-    return root if (root / "pyproject.toml").is_file() and (root / "rubrics").is_dir() else None
 
 
 def _package_files() -> Iterator[tuple[str, Path]]:
     yield from _files(PACKAGE, PACKAGE.name)
-    checkout = _checkout()
-    if checkout is None:
+    clone = checkout()
+    if clone is None:
         return
-    project = tomllib.loads((checkout / "pyproject.toml").read_text(encoding="utf-8"))
+    project = tomllib.loads((clone / "pyproject.toml").read_text(encoding="utf-8"))
     included = project["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
     for source, target in sorted(included.items()):
-        yield from _files(checkout / source, target)
+        yield from _files(clone / source, target)
 
 
 def _files(source: Path, target: str) -> Iterator[tuple[str, Path]]:

@@ -23,7 +23,7 @@ from grader.integrations.bundle import (
 )
 from grader.model.result import CriterionResult, GradingResult
 from grader.report.hidden_criteria import hidden_ids
-from grader.report.platform_results import LIMIT, LOOK, render_gradescope
+from grader.report.platform_results import LIMIT, LOOK, detail_rows, render_gradescope
 from grader.report.sentences import STATES, score_words, without_sandbox
 from grader.report.text import html, line, text_limit
 from grader.rubric.load import LoadedRubric
@@ -196,18 +196,14 @@ def _message(result: GradingResult, shown: list[CriterionResult]) -> Iterator[st
 
 def _test(criterion: CriterionResult, limit: int) -> dict[str, Any]:
     name = f"{criterion.id}: {criterion.title}"
-    rows = {
-        "measured: ": criterion.measured,
-        "expected: ": criterion.expected,
-        "hint: ": criterion.hint,
-        "see it yourself: ": criterion.reproduce,
-    }
     return {
         "name": line(f"{LOOK}: {name}" if criterion.status.is_open else name, limit),
         "points": criterion.points,
         "max_points": criterion.max_points,
         "message": line(f"{STATES[criterion.status]}: {criterion.message}", limit),
-        "output": "\n".join(f"{label}{line(text, limit)}" for label, text in rows.items() if text),
+        "output": "\n".join(
+            f"{label}{line(text, limit)}" for label, text in detail_rows(criterion).items() if text
+        ),
     }
 
 

@@ -168,6 +168,16 @@ def render_gradescope(result: GradingResult, rubric: Rubric) -> str:
     return json_text(_Writer(result, rubric).document())
 
 
+def detail_rows(criterion: CriterionResult) -> dict[str, str]:
+    """Return what platforms show of a criterion below its message, by the words before each."""
+    return {
+        "measured: ": criterion.measured,
+        "expected: ": criterion.expected,
+        "hint: ": criterion.hint,
+        "see it yourself: ": criterion.reproduce,
+    }
+
+
 class _Writer:
     def __init__(self, result: GradingResult, rubric: Rubric) -> None:
         self._result, self._rubric = result, rubric
@@ -235,10 +245,7 @@ class _Writer:
             "": criterion.message,
             "decided ": sentences.decision(override) if override else "",
             "look again: ": sentences.look_again(override, criterion) if override else "",
-            "measured: ": criterion.measured,
-            "expected: ": criterion.expected,
-            "hint: ": criterion.hint,
-            "see it yourself: ": criterion.reproduce,
+            **detail_rows(criterion),
             "where: ": ", ".join(places(criterion)),
         }
         yield from (f"{name}{self._text(words)}" for name, words in rows.items() if words)

@@ -42,13 +42,16 @@ class LabFile(NamedTuple):
         return next(iter(self.packages), "")
 
 
+def checkout() -> Path | None:
+    """Return the clone that the grader runs from, or None if it is installed."""
+    root = PACKAGE.parent
+    # In site-packages lies no pyproject.toml, whatever else is called rubrics there.
+    return root if (root / "pyproject.toml").is_file() and (root / "rubrics").is_dir() else None
+
+
 def rubrics_folder() -> Path:
     """Return the folder of the rubrics that come with the grader."""
-    checkout = PACKAGE.parent
-    # In site-packages lies no pyproject.toml, whatever else is called rubrics there.
-    if (checkout / "pyproject.toml").is_file() and (checkout / "rubrics").is_dir():
-        return checkout / "rubrics"
-    return PACKAGE / "_data" / "rubrics"
+    return (checkout() or PACKAGE / "_data") / "rubrics"
 
 
 def rubric_ids() -> tuple[str, ...]:
