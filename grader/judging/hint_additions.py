@@ -38,7 +38,7 @@ from grader.model.python_slip import PythonSlip
 from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation, Status, Verdict, cited_lines
 from grader.rubric.model import Criterion, Rubric
-from grader.wording import on_lines, significant
+from grader.wording import join_words, on_lines, significant
 
 POINTS_MAX = 3
 _NO_FIELD = re.compile(r"has no attribute '(?P<field>\w+)'.*? \((?P<file>[\w./-]+), line (?P<line>\d+)\)")
@@ -219,6 +219,43 @@ def compile_command(verdict: Verdict, main: PackageFacts | None) -> str:
     cited = cited_lines(verdict.citations)
     file = next((one.file for one in faults if (one.file, one.line) in cited), "")
     return f"python3 -m py_compile {shlex.quote(file)}" if file else ""
+
+
+_OF_ROSPY = re.compile(r"\brospy\.([A-Za-z_]\w*)")
+_ROSPY = re.compile(r"\s*import\s+(?:[\w., ]*,\s*)?rospy(?:\s+as\s+(?P<name>\w+))?\b")
+_FROM_ROSPY = re.compile(r"\s*from\s+rospy\s+import\s+(?P<names>\w[\w ,]*?|\*)\s*(?:#.*)?")
+
+
+def name_rospy(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdict:
+    """Return the verdict; its hint has what is rospy's as the script imports it: `ros.Rate(10)`, `Rate(10)`."""
+    package, build = facts.package_of(criterion), facts.runs.get(PACKAGE_RUN)
+    is_import = "import rospy" in verdict.hint or "from rospy" in verdict.hint
+    if package is None or build is None or is_import or not _OF_ROSPY.search(verdict.hint):
+        return verdict
+    cited = {c.file for c in verdict.citations if isinstance(c, FileCitation)}
+    own = scripts_of(criterion, facts.rubric, package)
+    hints = {_in_words_of(build.file_lines(path), verdict.hint) for path in cited & own or own}
+    return verdict.model_copy(update={"hint": hints.pop()}) if len(hints) == 1 else verdict
+
+
+def _in_words_of(lines: Sequence[str], hint: str) -> str:
+    """Return the hint in the words of a script with these lines; as it is where that takes more than one import."""
+    lines = [line[:LINE_CHARS] for line in lines[:LINES_READ]]
+    whole = next(filter(None, map(_ROSPY.match, lines)), None)
+    if whole is not None:
+        return hint if whole["name"] is None else _OF_ROSPY.sub(rf"{whole['name']}.\1", hint)
+    found = {n: m["names"] for n, line in enumerate(lines, 1) if (m := _FROM_ROSPY.fullmatch(line))}
+    if len(found) != 1:
+        return hint
+    ((number, text),) = found.items()
+    given: dict[str, str] = {}
+    for one in re.split(r"\s*,\s*", text):
+        name, _, other = one.partition(" as ")
+        given[name] = other or name
+    asked = [] if text == "*" else [n for n in dict.fromkeys(_OF_ROSPY.findall(hint)) if n not in given]
+    told = _OF_ROSPY.sub(lambda m: given.get(str(m[1]), str(m[1])), hint)
+    names = join_words([f"`{name}`" for name in asked])
+    return f"{told}; add {names} to what line {number} imports" if asked else told
 
 
 def fill_slots(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdict:

@@ -54,6 +54,7 @@ from grader.judging.hint_additions import (
     fill_slots,
     lab_names,
     name_other_lines,
+    name_rospy,
     name_same_file,
     with_lab_names,
     with_own_name,
@@ -331,7 +332,7 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
                 found = _of_the_build(criterion, facts, run, found)
         found = fill_slots(choose_hint_language(found, criterion, facts), criterion, facts.rubric)
         found = _with_package_name(name_other_lines(found, facts), criterion, facts)
-        found = name_same_file(found, criterion, facts)
+        found = name_same_file(name_rospy(found, criterion, facts), criterion, facts)
         return _without_git(found, facts.package)
     except NotRecorded as missing:
         return missing.verdict

@@ -18,6 +18,7 @@ from grader.judging.hint_additions import (
     add_advice,
     choose_hint_language,
     fill_slots,
+    name_rospy,
     name_same_file,
     with_own_name,
 )
@@ -123,6 +124,41 @@ def test_a_node_that_asks_for_input_is_told_what_the_lab_wants_of_it(visibility:
     assert fill_slots(lost, chatter, lab).hint == hint
     other = failed("no message came", hint="publish in the loop")
     assert fill_slots(other, chatter, lab) == other
+
+
+LOOPED = "loop with `while not rospy.is_shutdown():` and `rospy.Rate(5)`"
+
+
+@pytest.mark.parametrize(
+    ("imports", "hint"),
+    [
+        ("import rospy", LOOPED),
+        ("import sys, rospy", LOOPED),
+        ("import sys", LOOPED),
+        ("import rospy as ros  # short", LOOPED.replace("rospy", "ros")),
+        ("from rospy import *", LOOPED.replace("rospy.", "")),
+        ("from rospy import is_shutdown, Rate", LOOPED.replace("rospy.", "")),
+        (
+            "from rospy import is_shutdown, Rate as Beat",
+            "loop with `while not is_shutdown():` and `Beat(5)`",
+        ),
+        (
+            "import sys\nfrom rospy import Publisher, Rate",
+            LOOPED.replace("rospy.", "") + "; add `is_shutdown` to what line 2 imports",
+        ),
+        ("from rospy import Rate\nimport rospy", LOOPED),
+        ("from rospy import (\n    Rate)", LOOPED),
+        ("from rospy import Rate\nfrom rospy import spin", LOOPED),
+    ],
+)
+def test_a_hint_has_what_is_rospys_as_the_script_imports_it(imports: str, hint: str, tmp_path: Path) -> None:
+    package = facts(tmp_path, **{"src/numeric_talker.py": f"{imports}\n"})
+    build = {"attachments": {"src/numeric_talker.py": f"{imports}\n"}}
+    known = Facts(rubric=rubric(*ALL), runs=build_runs({"runs": {"package": build}}), package=package)
+    lost = failed("the node ended", hint=LOOPED)
+    assert name_rospy(lost, known.rubric.criteria[0], known).hint == hint
+    other = failed("the node ended", hint=f"write `import rospy`, and {LOOPED}")
+    assert name_rospy(other, known.rubric.criteria[0], known) == other
 
 
 def test_what_does_not_start_is_told_where_nothing_is_lost(tmp_path) -> None:
