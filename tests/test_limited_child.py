@@ -31,6 +31,7 @@ OF_REPAIRS = {
     "package.lint.script_blocks",
     "package.lint.script_names",
     "package.lint.script_results",
+    "package.lint.script_spellings",
     "package.lint.script_tree",
     "package.python_repairs",
     "package.python_repairs.calls",

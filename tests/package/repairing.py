@@ -34,6 +34,18 @@ def main():
 
 main()
 """
+SPINS = """\
+#!/usr/bin/env python3
+import rospy
+from std_msgs.msg import Int8
+
+def listen():
+    rospy.init_node('talker')
+    rospy.Subscriber('numeric_chatter', Int8, print)
+
+if __name__ == '__main__':
+    listen()
+"""
 MANIFEST = """\
 <package format="2">
   <name>lab</name>

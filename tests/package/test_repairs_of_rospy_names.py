@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from grader.package.python_repairs.rospy_names import with_attributes, with_logger
-from tests.package.repairing import SCRIPT, TALKER, Case, check, swapped
+from tests.package.repairing import SCRIPT, SPINS, TALKER, Case, check, swapped
 
 pytestmark = pytest.mark.usefixtures("without_processes")
 
@@ -118,7 +118,36 @@ def test_another_logger_is_left_alone(swaps: list[tuple[str, str]], tmp_path: Pa
     assert "loginfo" not in "".join(one["text"] for one in with_logger(str(text)))
 
 
+FROM_ROSPY = SPINS.replace("rospy.", "").replace("import rospy", "from rospy import Subscriber, init_node")
 LACKING = {
+    "spin-of-rospy-as-ros": Case(
+        {TALKER: SPINS.replace("rospy.", "ros.").replace("import rospy", "import rospy as ros")},
+        ["missing-call"], after={TALKER: "Int8, print)\n    ros.spin()\n"},
+    ),
+    "spin-that-is-not-imported": Case(
+        {TALKER: FROM_ROSPY}, ["missing-call"], "write `spin` behind what line 2 imports, and spin() as the last line",
+        after={TALKER: FROM_ROSPY.replace("er, init_node", "er, init_node, spin")
+               .replace("print)\n", "print)\n    spin()\n")},
+    ),
+    "node-that-is-not-imported": Case(
+        {TALKER: FROM_ROSPY.replace("    init_node('talker')\n", "").replace("init_node", "spin")
+         .replace("print)\n", "print)\n    spin()\n")}, ["missing-call"],
+        after={TALKER: "er, spin, init_node\nfrom std_msgs.msg import Int8\n\ndef listen():\n"
+                       "    init_node('talker')\n"},
+    ),
+    "arguments-of-rospy-as-ros": Case(
+        {TALKER: SCRIPT.replace("rospy.", "ros.").replace("import rospy", "import rospy as ros")
+         .replace("queue_size=10", "queue_size='10'")}, ["missing-call"], "`queue_size` is a string",
+        after={TALKER: "Int8, queue_size=10)"},
+    ),
+    "arguments-of-what-has-a-type": Case(
+        swapped(TALKER, ("    rate = rospy", "    rate: rospy.Rate = rospy"), ("rate.sleep()", "rate.sleep(10)")),
+        ["missing-call"], "a Rate already knows how long to sleep", after={TALKER: "        rate.sleep()\n"},
+    ),
+    "spin-outside-of-a-function-with-tabs": Case(
+        {TALKER: SPINS.replace("    ", "\t").replace("print)\n", "print)\nrospy.spin()\n")}, ["missing-call"],
+        "start line 8 with 1 tab", after={TALKER: "print)\n\trospy.spin()\n"},
+    ),
     "fields-of-messages": Case(
         swapped(TALKER,
                 ("import rospy\n", "import rospy\nfrom geometry_msgs.msg import PoseArray, Twist\n"),

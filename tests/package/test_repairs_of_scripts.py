@@ -11,6 +11,7 @@ from tests.package.repairing import (
     LAUNCHED,
     MANIFEST,
     SCRIPT,
+    SPINS,
     TALKER,
     XML,
     Case,
@@ -21,18 +22,6 @@ from tests.package.repairing import (
 
 pytestmark = pytest.mark.usefixtures("without_processes")
 
-SPINS = """\
-#!/usr/bin/env python3
-import rospy
-from std_msgs.msg import Int8
-
-def listen():
-    rospy.init_node('talker')
-    rospy.Subscriber('numeric_chatter', Int8, print)
-
-if __name__ == '__main__':
-    listen()
-"""
 TWICE = "class A:\n    n = 1\n    def g(self, x): return x\n"
 DEEPER = "        if late:\n            wait()\n"
 OTHER = "rospy.Publisher('numeric_chatter2', Int8, queue_size=10)"

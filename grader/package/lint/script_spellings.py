@@ -9,26 +9,34 @@ import ast
 from script_tree import dotted
 
 
-class TypedAssign(ast.Assign):
-    """`rate: Rate = Rate(10)`, which finders take for an assignment; its type is a use of a name all the same."""
+class Assign(ast.Assign):
+    """`rate: Rate = Rate(10)`, which finders take for an assignment; its type is a use of a name all the same.
+
+    `ast.unparse` knows it by the name of its class.
+    """
 
     _fields = ("targets", "annotation", "value", "type_comment")
 
 
 def spell_plainly(tree):
     """Change the tree of a module, before any finder looks at it."""
+    without_types(tree)
+    call_by_methods(tree)
+
+
+def without_types(tree):
+    """Write each `rate: Rate = Rate(10)` in the tree as an assignment."""
     for node in ast.walk(tree):
         for block in (getattr(node, part, None) for part in ("body", "orelse", "finalbody")):
             if isinstance(block, list):
                 block[:] = [plain_assignment(one) for one in block]
-    call_by_methods(tree)
 
 
 def plain_assignment(node):
     """Return an assignment without its type in the way; each other statement as it is."""
     if not isinstance(node, ast.AnnAssign) or node.value is None:
         return node
-    plain = TypedAssign([node.target], node.annotation, node.value, None)
+    plain = Assign([node.target], node.annotation, node.value, None)
     return ast.copy_location(plain, node)
 
 

@@ -91,8 +91,8 @@ def slips(tree):
     found = []
     for find in finders:
         for one in as_written[find] if find in as_written else find(tree):
-            texts = {key: own_words(one[key]) for key in ("message", "fix")}
-            found.append(one if find in as_written else {**one, **texts})
+            told = ("fix",) if find in as_written else ("message", "fix")
+            found.append({**one, **{key: own_words(one[key]) for key in told}})
     # of two that say why a name is not there, the first is about the class that it belongs to
     # reversed: of several with the same key the last one stays in a dict, and the first is wanted
     first = {(one["line"], one["name"]): one for one in reversed(found) if one["kind"] == "undefined"}

@@ -17,7 +17,7 @@ from itertools import chain, pairwise
 from typing import NamedTuple, TypeGuard
 
 from grader.package.python_repairs.members import with_place
-from grader.package.python_repairs.names import bound_in, is_kept_by_self
+from grader.package.python_repairs.names import bound_in, is_kept_by_self, rospy_in
 from grader.package.python_repairs.syntax import (
     Step,
     edited,
@@ -181,7 +181,7 @@ LOGS = re.compile(r"log(debug|info|warn|err|fatal)")
 def _wrong_arguments(tree: ast.Module, kinds: list[str]) -> Iterator[Argument]:
     """Yield what calls of rospy's are given in another form than they take it."""
     known = bound_in(tree) | set(dir(builtins))
-    types, of_rospy = _imported(tree, "msg"), _imported(tree, "rospy")
+    types, of_rospy, rospy = _imported(tree, "msg"), _imported(tree, "rospy"), rospy_in(tree)
     functions = {one.name for one in tree.body if isinstance(one, ast.FunctionDef)}
     methods = {f"self.{n.name}" for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)}
     values = [(t, n.value) for n in nodes_in(tree) if isinstance(n, ast.Assign) for t in n.targets]
@@ -191,9 +191,9 @@ def _wrong_arguments(tree: ast.Module, kinds: list[str]) -> Iterator[Argument]:
     for call in (n for n in nodes_in(tree) if isinstance(n, ast.Call)):
         name = _called(call)
         owner = ast.unparse(call.func.value) if isinstance(call.func, ast.Attribute) else ""
-        if (owner, name) == ("rospy.Rate", "sleep") and call.args and _is_number(call.args[0]):
+        if (owner, name) == (f"{rospy}.Rate", "sleep") and call.args and _is_number(call.args[0]):
             why = "`Rate.sleep` needs a Rate that was made, as in `rate.sleep()`"
-            yield Argument([(call.func, "rospy.sleep")], why)
+            yield Argument([(call.func, f"{rospy}.sleep")], why)
         elif name == "sleep" and owner in rates:
             if call.args:
                 yield Argument([(call, f"{owner}.sleep()")], "a Rate already knows how long to sleep")
@@ -201,7 +201,7 @@ def _wrong_arguments(tree: ast.Module, kinds: list[str]) -> Iterator[Argument]:
             kind = published.get(owner, "")
             yield from _text_of_a_number(call) if NUMBERS.fullmatch(kind) else ()
             yield from _published_together(call, kind)
-        elif _is_rospys(call.func, of_rospy):
+        elif _is_rospys(call.func, of_rospy, rospy):
             yield from _logged(call) if LOGS.fullmatch(name) else ()
             yield from _in_quotes(call, name, known)
             yield from _of_topic(call, types, kinds) if name in {"Publisher", "Subscriber"} else ()
@@ -503,9 +503,9 @@ def _called(node: ast.AST | None) -> str:
     return last_name(node.func) if isinstance(node, ast.Call) else ""
 
 
-def _is_rospys(function: ast.expr, of_rospy: set[str]) -> bool:
+def _is_rospys(function: ast.expr, of_rospy: set[str], rospy: str) -> bool:
     if isinstance(function, ast.Attribute):
-        return isinstance(function.value, ast.Name) and function.value.id == "rospy"
+        return isinstance(function.value, ast.Name) and function.value.id == rospy
     return isinstance(function, ast.Name) and bool({function.id, "*"} & of_rospy)
 
 

@@ -49,6 +49,7 @@ from grader.package.python_repairs.python2 import as_python3
 from grader.package.python_repairs.rospy_names import (
     runs_of,
     with_attributes,
+    with_call_imported,
     with_init,
     with_logger,
     with_rospy,
@@ -336,11 +337,16 @@ def _with_lines_inside(text: str) -> Iterator[Step]:
         calls = {last_name(n.func) for n in nodes_in(function) if isinstance(n, ast.Call)}
         own = bound_in(function) - shared
         used = {n.id for n in nodes_in(below) if isinstance(n, ast.Name)}
-        spins = isinstance(below, ast.Expr) and ast.unparse(below.value) == "rospy.spin()"
+        called = (
+            below.value.func if isinstance(below, ast.Expr) and isinstance(below.value, ast.Call) else None
+        )
+        spins = called is not None and last_name(called) == "spin"
         loops = isinstance(below, ast.While) and bool(own & used)
         if "init_node" in calls and not calls & LOOPED and (spins or loops):
             first, end = below.lineno - 1, below.end_lineno or below.lineno
-            moved = [" " * function.body[-1].col_offset + line for line in lines[first:end]]
+            above = lines[function.body[-1].lineno - 1]
+            blanks = above[: function.body[-1].col_offset]  # tabs, or spaces
+            moved = [blanks + line for line in lines[first:end]]
             after = "\n".join([*lines[:first], *moved, *lines[end:]])
             yield from step_to("inside", below.lineno, text, after, function.name)
             return
@@ -406,25 +412,26 @@ def _with_spin(text: str) -> Iterator[Step]:
     tree = tree_of(text)
     calls = [n for n in nodes_in(tree) if isinstance(n, ast.Call)]
     waits = [c for c in calls if last_name(c.func) in WAITING]
-    rospy = next((a.asname or a.name for n in nodes_in(tree) if isinstance(n, ast.Import)
-                  for a in n.names if a.name == "rospy"), "")  # fmt: skip
+    spin, text_now = with_call_imported(text, "spin")
     loops = any(isinstance(n, ast.While) for n in nodes_in(tree))
     makes_node = any(last_name(c.func) == "init_node" for c in calls)
     own = {n.name for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)}
     runs = any(isinstance(n, ast.Call) for one in runs_of(tree) for n in nodes_in(one))
-    if not waits or loops or not rospy or not makes_node or not runs:
+    if not waits or loops or not spin or not makes_node or not runs:
         return
     if (LOOPED | (HOLDING - own)) & {last_name(c.func) for c in calls}:
         return
-    lines = text.split("\n")
+    lines = text_now.split("\n")
     block = _last_block(tree, waits)
     last = block[-1]
     before = isinstance(last, ast.Return) or (len(block) == 1 and isinstance(last, ast.Pass))
     first_line = lines[last.lineno - 1]
     indentation = first_line[: len(first_line) - len(first_line.lstrip())]
     at = last.lineno - 1 if before else last.end_lineno or last.lineno
-    after = "\n".join([*lines[:at], f"{indentation}{rospy}.spin()", *lines[at:]])
-    yield from step_to("spin", at + 1, text, after, f"{rospy}.spin()")
+    after = "\n".join([*lines[:at], f"{indentation}{spin}()", *lines[at:]])
+    changed = (n for n, pair in enumerate(zip(text.split("\n"), lines, strict=True), 1) if len({*pair}) > 1)
+    imported = f"`spin` behind what line {first} imports, and " if (first := next(changed, 0)) else ""
+    yield from step_to("spin", at + 1, text, after, f"{imported}{spin}()")
 
 
 def _last_block(tree: ast.Module, waits: list[ast.Call]) -> list[ast.stmt]:

@@ -85,6 +85,12 @@ SHORT_NAME_CHARS_MIN = 2
 """Names of one letter are different names."""
 
 
+def rospy_in(tree: ast.Module, without: str = "rospy") -> str:
+    """Return the name that a script imports rospy under; `without` one, the name that it would have."""
+    imported = (a for n in nodes_in(tree) if isinstance(n, ast.Import) for a in n.names)
+    return next((a.asname or a.name for a in imported if a.name == "rospy"), without)
+
+
 @lru_cache(maxsize=256)
 def bound_in(tree: ast.AST) -> frozenset[str]:
     """Return the names that anything in a tree that nobody changes, or in a part of one, gives a value."""

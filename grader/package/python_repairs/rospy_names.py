@@ -11,7 +11,7 @@ import ast
 from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
 
-from grader.package.python_repairs.names import ROSPY, bound_in
+from grader.package.python_repairs.names import ROSPY, bound_in, rospy_in
 from grader.package.python_repairs.syntax import (
     Step,
     edited,
@@ -194,14 +194,31 @@ def _of_call(
     return (of_name[0], of_name[2] - len(name), of_name[2], new)
 
 
+def with_call_imported(text: str, name: str) -> tuple[str, str]:
+    """Return how a script calls what rospy has under that name, and its text, which imports it: `rospy.spin`, `spin`;
+    "" where it does not import anything of rospy on a line that ends with it."""
+    tree, lines = tree_of(text), text.split("\n")
+    rospy = rospy_in(tree, "")
+    if rospy:
+        return f"{rospy}.{name}", text
+    for node in (n for n in tree.body if isinstance(n, ast.ImportFrom) and n.module == "rospy"):
+        given = {a.name: a.asname or a.name for a in node.names}
+        if name in given or "*" in given:
+            return given.get(name, name), text
+        line, _, end = span_of(lines, node) or (0, 0, 0)
+        if end and not lines[line][:end].endswith(")") and name not in bound_in(tree):
+            return name, edited(text, [(line, end, end, f", {name}")])
+    return "", text
+
+
 def with_init(text: str, name: str) -> Iterator[Step]:
     """A script that publishes or subscribes, and never makes its node: it gets the script's name."""
     tree, lines = tree_of(text), text.split("\n")
     makes = {"Publisher", "Subscriber"}
-    of_rospy = [n.func.value for n in nodes_in(tree) if isinstance(n, ast.Call)
-                and isinstance(n.func, ast.Attribute) and n.func.attr in makes]  # fmt: skip
-    rospy = next((a.asname or a.name for n in nodes_in(tree) if isinstance(n, ast.Import)
-                  for a in n.names if a.name == "rospy"), "")  # fmt: skip
+    calls = [n.func for n in nodes_in(tree) if isinstance(n, ast.Call)]
+    made = {ast.unparse(one) for one in calls if last_name(one) in makes}
+    written, text_now = with_call_imported(text, "init_node")
+    owner = written.removesuffix("init_node")
     # a module that others import makes no node
     makes |= {n.name for n in tree.body if isinstance(n, ast.FunctionDef | ast.ClassDef)}
     runs = [
@@ -209,7 +226,8 @@ def with_init(text: str, name: str) -> Iterator[Step]:
         for s in runs_of(tree)
         if any(isinstance(n, ast.Call) and last_name(n.func) in makes for n in nodes_in(s))
     ]
-    if "init_node" in text or not runs or rospy not in map(ast.unparse, of_rospy) or not name.isidentifier():
+    is_asked = bool(written) and not made.isdisjoint({owner + one for one in ("Publisher", "Subscriber")})
+    if "init_node" in text or not runs or not is_asked or not name.isidentifier():
         return
     first: ast.stmt = runs[0]
     while isinstance(first, ast.If | ast.Try):
@@ -221,7 +239,8 @@ def with_init(text: str, name: str) -> Iterator[Step]:
     )
     own = [n for n in tree.body if isinstance(n, ast.FunctionDef) and n.name == called]
     first = next((one for function in own for one in function.body if not _is_head(one)), first)
-    at, line = first.lineno - 1, f"{rospy}.init_node('{name}')"
+    at, line = first.lineno - 1, f"{written}('{name}')"
+    lines = text_now.split("\n")
     before = lines[at][: first.col_offset]
     if not before.strip():
         after = "\n".join([*lines[:at], before + line, *lines[at:]])

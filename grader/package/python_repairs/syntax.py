@@ -25,6 +25,7 @@ from grader.line_slips.python import (
     without_texts,
 )
 from grader.package.lint.script_blocks import first_version, lacks_body, lacks_head
+from grader.package.lint.script_spellings import without_types
 from grader.package.python_repairs.lost_heads import lost_head_at
 from grader.package.python_repairs.python2 import as_python3
 
@@ -553,8 +554,8 @@ def is_docstring(statement: ast.stmt) -> bool:
     return isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
 
 
-def span_of(lines: list[str], node: ast.expr) -> tuple[int, int, int] | None:
-    """Return line (from 0), start and end of an expression on one line, in characters."""
+def span_of(lines: list[str], node: ast.expr | ast.stmt) -> tuple[int, int, int] | None:
+    """Return line (from 0), start and end of a node on one line, in characters."""
     line = node.lineno - 1
     if node.end_lineno != node.lineno or line >= len(lines) or node.end_col_offset is None:
         return None
@@ -583,8 +584,11 @@ def last_name(node: ast.AST | None) -> str:
 
 @lru_cache(maxsize=2)
 def tree_of(text: str) -> ast.Module:
-    """Return the tree of a script, which all repairs share and nobody may change. Raises what `ast.parse` raises."""
-    return ast.parse(text)
+    """Return the tree of a script, which all repairs share and nobody may change; assignments with a type are plain
+    ones in it. Raises what `ast.parse` raises."""
+    tree = ast.parse(text)
+    without_types(tree)
+    return tree
 
 
 @lru_cache(maxsize=64)

@@ -358,12 +358,14 @@ def _required_indentation(before: str, after: str, first: str) -> str:
     pairs = enumerate(zip(before.split("\n"), after.split("\n"), strict=False), start=1)
     changed = [(number, new) for number, (old, new) in pairs if old != new and new.strip()]
     empty = {number for number, new in enumerate(after.split("\n"), start=1) if not new.strip()}
-    lines: dict[int, list[int]] = {}
+    lines: dict[str, list[int]] = {}
     for number, new in changed:
-        some = lines.setdefault(len(new) - len(new.lstrip()), [])
+        count = len(new) - len(new.lstrip())
+        kind = "tab" if set(new[:count]) == {"\t"} else "space"
+        some = lines.setdefault(plural(count, kind) if count else "no spaces", [])
         between = range(some[-1] + 1, number) if some else range(0)
         some += [*(between if empty.issuperset(between) else ()), number]
-    named = [f"{on_lines(some)} with {plural(n, 'space') if n else 'no spaces'}" for n, some in lines.items()]
+    named = [f"{on_lines(some)} with {begin}" for begin, some in lines.items()]
     if sum(len(re.findall(r"\d+ to \d+|\d+", one)) - 1 for one in named) > INDENTED_SHOWN:
         where = f"from line {changed[0][0]} to {changed[-1][0]}"
         if "\t" not in before:
