@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import islice
 from pathlib import PurePosixPath
 from typing import NamedTuple, TypeVar
 
@@ -42,6 +43,8 @@ from grader.wording import join_words, on_lines, significant
 
 POINTS_MAX = 3
 _NO_FIELD = re.compile(r"has no attribute '(?P<field>\w+)'.*? \((?P<file>[\w./-]+), line (?P<line>\d+)\)")
+_NO_PARAMETER = re.compile(r"\((?P<file>[\w./-]+), line (?P<line>\d+)\): the parameter '[^']+' is not set")
+_READS_PARAMETER = re.compile(r"""\bget_param\(\s*(['"])(?P<name>[\w~/]+)\1\s*\)""")
 USUAL_RATE_HZ = 10
 Told = TypeVar("Told", Verdict, CriterionResult)
 OF_FILES = ("build", "cmake", "manifest")
@@ -301,6 +304,32 @@ def name_same_file(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verd
             same = f"{path} holds the same code as {one.path}, as if one were saved under the other's name"
             return verdict.model_copy(update={"message": f"{verdict.message}; {same}"})
     return verdict
+
+
+def name_other_parameters(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdict:
+    """Return the verdict; where a parameter is not set that a script reads, its hint has those that it reads below and
+    that nothing sets either."""
+    found, build = _NO_PARAMETER.search(verdict.message), facts.runs.get(PACKAGE_RUN)
+    scenario, package = facts.rubric.scenarios.get(criterion.scenario or ""), facts.package_of(criterion)
+    if found is None or build is None or scenario is None or package is None or "default" not in verdict.hint:
+        return verdict
+    if any(one.launch or one.load for one in scenario.start) or any(one.file for one in scenario.params):
+        return verdict  # what files set is not known here
+    lines = [line.partition("#")[0][:LINE_CHARS] for line in build.file_lines(found["file"])[:LINES_READ]]
+    number = int(found["line"])
+    given = [str(param.name) for param in scenario.params]
+    given += (one["name"] for line in lines[number - 1 : number] for one in _READS_PARAMETER.finditer(line))
+    given += re.findall(r"""\b(?:set|has)_param\(\s*['"]([^'"]+)""", "\n".join(lines))
+    known = {name.rpartition("/")[2].lstrip("~") for name in given}
+    others: dict[str, int] = {}
+    for below, line in enumerate(lines[number:], number + 1):
+        for one in _READS_PARAMETER.finditer(line):
+            if one["name"].rpartition("/")[2].lstrip("~") not in known:
+                others.setdefault(one["name"], below)
+    if not others:
+        return verdict
+    told = join_words(f"'{name}' on line {line}" for name, line in islice(others.items(), POINTS_MAX))
+    return verdict.model_copy(update={"hint": f"{verdict.hint}, and one to {told}"})
 
 
 def name_other_lines(verdict: Verdict, facts: Facts) -> Verdict:

@@ -13,11 +13,12 @@ from grader.checks.support.exit_causes import CAUSES
 from grader.checks.support.text import LOOP, in_language, init, publisher, set_param
 from grader.integrations.bundle import Bundle, add_lab
 from grader.judging import judge
-from grader.judging.facts import Facts
+from grader.judging.facts import Facts, try_facts
 from grader.judging.hint_additions import (
     add_advice,
     choose_hint_language,
     fill_slots,
+    name_other_parameters,
     name_rospy,
     name_same_file,
     with_own_name,
@@ -410,3 +411,40 @@ def test_the_starter_belongs_to_the_rubric(tmp_path: Path) -> None:
 def test_a_starter_without_files_is_a_fault(tmp_path: Path, files: dict[str, str]) -> None:
     (fault,) = faults(with_starter(tmp_path, **files))
     assert fault == "lab.yaml:6: starter: there is no folder handed_out with files in it beside the rubric"
+
+
+@pytest.mark.parametrize(
+    ("below", "params", "added"),
+    [
+        ("n = rospy.get_param('/number')", [], ", and one to '/number' on line 3"),
+        ("n = rospy.get_param('~number')\nm = rospy.get_param( 'm' )  # get_param('x')", [],
+         ", and one to '~number' on line 3 and 'm' on line 4"),
+        ("n = rospy.get_param('/number', 2)", [], ""),
+        ("n = rospy.get_param('/hz')", [], ""),
+        ("n = rospy.get_param(name)", [], ""),
+        ("rospy.set_param('/number', 2)\nn = rospy.get_param('number')", [], ""),
+        ("n = rospy.get_param('~number')", [{"name": "/talker/number", "value": 2}], ""),
+    ],
+)  # fmt: skip
+def test_parameters_that_are_not_set_either_are_named(
+    below: str, params: list[dict[str, Any]], added: str
+) -> None:
+    lab = rubric(RATE, scenarios={"talker": {**SCENARIO, "params": params}})
+    source = f"#!\nrate = rospy.get_param('/hz')\n{below}\n"
+    package = {"package": {"files": [SCRIPT]}, "attachments": {SCRIPT["path"]: source}}
+    runs = build_runs({"runs": {"package": package}})
+    message = f"ended before (KeyError: '/hz' ({SCRIPT['path']}, line 2): the parameter '/hz' is not set)"
+    verdict = failed(message, hint="give it a default: `rospy.get_param('/hz', …)`")
+    found = name_other_parameters(verdict, lab.criteria[0], try_facts(lab, runs))
+    assert found.hint == f"{verdict.hint}{added}"
+
+
+def test_parameters_are_not_known_where_a_launch_file_may_set_them() -> None:
+    start = [{"name": "talker", "launch": "lab1.launch"}]
+    lab = rubric(RATE, scenarios={"talker": {**SCENARIO, "start": start}})
+    source = "#!\nrate = rospy.get_param('/hz')\nn = rospy.get_param('/number')\n"
+    package = {"package": {"files": [SCRIPT]}, "attachments": {SCRIPT["path"]: source}}
+    runs = build_runs({"runs": {"package": package}})
+    message = f"ended before (KeyError: '/hz' ({SCRIPT['path']}, line 2): the parameter '/hz' is not set)"
+    verdict = failed(message, hint="give it a default: `rospy.get_param('/hz', …)`")
+    assert name_other_parameters(verdict, lab.criteria[0], try_facts(lab, runs)) == verdict
