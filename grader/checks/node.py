@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import Field
@@ -242,8 +244,10 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
         own = [
             s for s in package.slips if s.kind in {"deaf", "stuck"} and s.file == one.start.script
         ] + in_cpp
-        if deaf := next((s for s in own if s.fix), None):
-            return failed(f"{message}: {deaf.message}", hint=deaf.fix, citations=(deaf.place,))
+        if deaf := [s for s in own if s.fix]:
+            why, told = _deaf_loops(deaf)
+            hint = "; ".join(dict.fromkeys(s.fix for s in told))
+            return failed(f"{message}: {why}", hint=hint, citations=tuple(s.place for s in told))
         if slow := max(in_cpp, key=lambda s: float(s.name), default=None):
             slept = f"{slow.message}, also after Ctrl-C, so its end is not counted"
             return passed(f"{_script(one)} is one node and stayed alive; {slept}")
@@ -266,10 +270,22 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
     return failed(message, hint=hint, citations=end.citations)
 
 
+_DEAF_LOOP = re.compile(r"the loop on line \d+ never checks whether the node should end")
+
+
+def _deaf_loops(slips: Sequence[PythonSlip]) -> tuple[str, Sequence[PythonSlip]]:
+    """Return why a script goes on after Ctrl-C, and what of it is told: any of its loops that never ask may be why."""
+    loops = [s for s in slips[:LOOPS_TOLD] if _DEAF_LOOP.fullmatch(s.message) and s.file == slips[0].file]
+    if slips[0] not in loops or len(loops) == 1:
+        return slips[0].message, slips[:1]
+    return f"the loops on {on_lines(s.line for s in loops)} never check whether the node should end", loops
+
+
 def _is_within(place: FileCitation, slip: PythonSlip) -> bool:
     return place.file == slip.file and slip.line <= (place.line or 0) <= int(slip.name)
 
 
+LOOPS_TOLD = 3
 LONG_TURN_S = 4.0
 LONG_SLEEP_HZ = 0.5
 """A loop of a lower rate can sleep for as long as Ctrl-C is waited for."""

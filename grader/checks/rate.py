@@ -27,7 +27,7 @@ from grader.checks.support.processes import (
     slips_of,
 )
 from grader.checks.support.recorder_losses import whole_until_ns
-from grader.checks.support.scripts import slips_of_program
+from grader.checks.support.scripts import fixes_of, slips_of_program
 from grader.checks.support.text import LOOP, SPIN, loop_rate, python_or_cpp, rate_hint
 from grader.checks.support.topics import (
     SYSTEM_TOPICS,
@@ -281,7 +281,7 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     hint = f"call rate.sleep(), with brackets, in every iteration; {made}"
     # There is a `sleep()` already, behind the loop or in a comment: the slip says what to do with it.
     if slips and slips[0].kind in {"sleep-outside", "commented-out"}:
-        hint = slips[0].fix
+        hint = fixes_of(slips)
     message = f"{params.topic} runs at about {about} Hz instead of {hz} Hz: the loop does not sleep{where}"
     return failed(message, hint=hint, citations=tuple(s.place for s in slips[:3]))
 

@@ -238,6 +238,12 @@ def slips_of_program(argv: Sequence[str], package: PackageFacts, kind: SlipKind)
     return [slip for slip in package.slips if slip.kind == kind and slip.file in sources]
 
 
+def fixes_of(slips: Sequence[PythonSlip]) -> str:
+    """Return what to do about the first of them, and about two more of its kind and file at most."""
+    same = [s for s in slips[1:] if (s.kind, s.file) == (slips[0].kind, slips[0].file)][:2]
+    return "; ".join([slips[0].fix, *(f"on line {s.line}, {s.message}: {s.fix}" for s in same)])
+
+
 def argument_not_given(
     ended: str, argv: Sequence[str], package: PackageFacts
 ) -> tuple[str, str, tuple[FileCitation, ...]] | None:
