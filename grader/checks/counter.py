@@ -122,12 +122,13 @@ def _cite_start(
         return verdict
     slip = wrong[0]
     where = f"line {slip.line} of {slip.file}"
-    why = f"{where} sets `{slip.name}` to {slip.message}"
+    name = "the first number of its range" if slip.name == "range" else f"`{slip.name}`"
+    why = f"{where} sets {name} to {slip.message}"
     start = params.start
     if slip.name in count_up:
         why += f", and line {count_up[slip.name]} adds one before it is published"
         start -= 1
-    return verdict.explained(why, f"on {where}, set `{slip.name}` to {start}", (slip.place,))
+    return verdict.explained(why, f"on {where}, set {name} to {start}", (slip.place,))
 
 
 def judge_start(first: Count, run: Run, params: StartParams) -> Verdict:

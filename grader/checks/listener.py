@@ -24,6 +24,7 @@ from grader.checks.support.processes import (
     lives,
     named_at,
     not_started,
+    run_slips,
 )
 from grader.checks.support.text import (
     IN_OWN_WORDS,
@@ -210,6 +211,10 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     slip = run_slip(package, run, "unregistered")
     if verdict is None and slip is not None:
         verdict = _taken_off(f"the node stops listening to {topic} before anything is sent", slip)
+    elif verdict is None and (
+        closed := [s for s in run_slips(package, run, "wrong-value") if s.name == "closed"]
+    ):
+        verdict = _taken_off(f"the node stops listening to {topic} before anything is sent", closed[0])
     # The grader sends once it sees the subscription, so this is not the node's fault.
     elif verdict is None and topic in subscribed:
         message = f"the node subscribed to {topic}, but the grader sent nothing"

@@ -276,6 +276,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (node(SERVER + "    s.start()\n    rospy.spin()\n") + CALLED, []),
         ("def f(p):\n    def g(m):\n        print(p)\n    return g()\nrospy.Subscriber('a', A, f('x'))\n",
          [("callback-called", 4, "write `g`, without brackets")]),
+        ("rospy.on_shutdown(stop.set())\n", [("callback-called", 1, "write `stop.set`, without brackets")]),
         ("def f(p, m):\n    pass\nrospy.Subscriber('a', A, partial(f))\n",
          [("callback-values", 3, "write `partial(f, p)`, with your values in place of these names")]),
         ("def f(m):\n    pass\nrospy.Subscriber('a', A, functools.partial(f, 1))\n",

@@ -29,6 +29,12 @@ pytestmark = pytest.mark.usefixtures("without_processes")
         ("if n > 127:\n    n = m", []),
         ("'%d' % n", []),
         ("n %= 128", [("128", "reset-limit", 1)]),
+        (
+            "def f():\n    while True:\n        yield from range(1, 129)",
+            [("129", "reset-limit", 3), ("1", "reset-value", 3)],
+        ),
+        ("n = itertools.cycle(range(100))", [("100", "reset-limit", 1)]),
+        ("n = itertools.cycle(words)", []),
         ("n = n + 1 if n < 127 else 0", [("127", "reset-limit", 1), ("0", "reset-value", 1)]),
     ],
 )

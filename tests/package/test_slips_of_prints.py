@@ -91,6 +91,26 @@ def test_nothing_is_said_of_a_callback_that_prints_or_hands_on(body: str, tmp_pa
     assert said(f"def cb2(m):\n    print(m)\ndef cb(m):\n{body}", tmp_path) == []
 
 
+@pytest.mark.parametrize(
+    ("text", "callback", "fix"),
+    [
+        ("", "print('got one')", "write `lambda msg: print(msg.data)` in its place"),
+        ("", "rospy.loginfo('got one')", "write `lambda msg: rospy.loginfo(msg.data)` in its place"),
+        ("def make(word):\n    return lambda m: print(word, m.data)\n", "make", "on line 4, write `make(…)`"),
+        ("def shown(f):\n    def g(m):\n        print(f(m))\n    return f\n@shown\ndef cb(m):\n    return m.data\n",
+         "cb", "on line 4, write `return g`"),
+        ("def shown(f):\n    def g(m):\n        print(f(m))\n    return g\n@shown\ndef cb(m):\n    return m.data\n",
+         "cb", None),
+        ("class A:\n  def cb(self, m):\n    last = m.data\n    self.tell()\n  def tell(self):\n    print(self.last)\n",
+         "A().cb", "on line 3, write `self.last` instead of `last`"),
+        ("class A:\n  def cb(self, m):\n    last = m.data\n    self.tell(last)\n  def tell(self, x):\n    print(x)\n",
+         "A().cb", None),
+    ],
+)  # fmt: skip
+def test_what_makes_a_callback_of_something_else(text, callback, fix, tmp_path: Path) -> None:
+    assert [what for _, _, what in said(text, tmp_path, callback)] == ([fix] if fix else [])
+
+
 def test_lambdas_and_methods_are_read_too(tmp_path: Path) -> None:
     assert [kind for kind, _, _ in said("", tmp_path, "lambda m: print('got one')")] == ["not-printed"]
     assert said("", tmp_path, "callback=lambda m: print(m.data)") == []

@@ -37,6 +37,11 @@ def test_a_rate_that_is_a_parameter_is_known(tmp_path, rate, found):
         ("rospy.Timer(rospy.Duration(1 // 10), tell)", [("wrong-value", "zero", 2)]),
         ("rospy.Timer(rospy.Duration(int(0.5)), tell)", [("wrong-value", "zero", 2)]),
         ("while True:\n    rospy.sleep(1 // 10)", [("sleep-outside", "sleep", 3)]),
+        (
+            "PERIOD = 1 // 10\nwhile True:\n    time.sleep(max(0, due - PERIOD))",
+            [("sleep-outside", "sleep", 2)],
+        ),
+        ("PERIOD = 1 / 10\nCOUNT = 1 // 10\nwhile True:\n    time.sleep(PERIOD)", []),
         ("rospy.Timer(rospy.Duration(1 / 10), tell)", []),
         ("rospy.Timer(rospy.Duration(10 // 4), tell)", []),
         ("while True:\n    rospy.sleep(0)", []),

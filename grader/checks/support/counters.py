@@ -417,7 +417,8 @@ def _judge_death(count: Count, run: Run, package: PackageFacts, params: WrapPara
             return failed(why, hint=fix, citations=(first.place, *end.citations))
         if high is not None and last == params.maximum:
             hint = _limit_hint(high, params)
-            return failed(f"{message}; line {high.line} sets its limit by {high.message}", hint=hint)
+            why = f"{message}; line {high.line} sets its limit by {high.message}"
+            return failed(why, hint=hint, citations=(high.place, *end.citations))
         own = "no more values" in end.cause or "the loop on line" in end.cause  # what comes to an end there
         return failed(message, hint=end.hint if own else params.reset_hint, citations=end.citations)
     came = f"after {plural(len(count.values), 'message')}, at {significant(last)}"

@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.registry import Check
-from grader.checks.support.exit_causes import explain_traceback, process_tracebacks, syntax_hint
+from grader.checks.support.exit_causes import RUN_IT, explain_traceback, process_tracebacks, syntax_hint
 from grader.checks.support.launch_slips import (
     PROGRAMS_OF,
     at_its_lines,
@@ -29,7 +29,7 @@ from grader.checks.support.scripts import (
     programs,
     shebang_obstacles,
 )
-from grader.checks.support.text import INIT, near_names, shown
+from grader.checks.support.text import INIT, near_names, refused_options, shown
 from grader.evidence.run import Run
 from grader.installable import install_hint, known_packages
 from grader.model.launch_file import SUBSTITUTION, LaunchFile, LaunchNode
@@ -493,15 +493,15 @@ def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | Non
         end = explain_traceback(found[-1], owner)
         cited = tuple(one.below(package.way_to(owner)) for one in end.citations)
         return Absence(f"it died: {end.cause}", end.hint, True, cited, end.of_machine, end.unbuilt)
-    if script is not None and script.python_fault is not None:
-        fault = script.python_fault
+    if script is not None and (fault := script.python_fault) is not None:
         why = f"it died: {fault.kind}: {fault.explanation}"
         return Absence(why, syntax_hint(fault), of_script=True, citations=(fault.place,))
     if script is not None and code in NOT_EXECUTED and any(shebang_obstacles(script)):
         return not_started(script)
-    hint = 'write output="screen" in the <node>, and read what it prints last'
-    unknown = Absence(f"it died with exit code {code}", hint, of_script=True)
-    return (_recorder_died(package, run, node) if node.pkg == "rosbag" else None) or unknown
+    hint = RUN_IT if node.output == "screen" else f'write output="screen" in the <node>: {RUN_IT}'
+    why = f"it died with exit code {code}{refused_options(one.line for _, one in run.console)}"
+    recorder = _recorder_died(package, run, node) if node.pkg == "rosbag" else None
+    return recorder or Absence(why, hint, of_script=True)
 
 
 def _recorder_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | None:

@@ -62,9 +62,45 @@ def _other_side(frame: Frame, *, is_right: bool) -> str:
     return ""
 
 
+def _method_in_text(message: str, source: str) -> tuple[str, str] | None:
+    """Of `'{:.1f}'.format(rospy.get_time)`: a function where its answer is meant."""
+    if not re.match(
+        r"unsupported format string passed to (?:builtin_function_or_)?(?:method|function)\.", message
+    ):
+        return None
+    names: list[str] = []
+    with suppress(SyntaxError, ValueError, RecursionError):
+        nodes = list(ast.walk(parsed(source)))
+        given = [n.value for n in nodes if isinstance(n, ast.FormattedValue)]
+        calls = (n for n in nodes if isinstance(n, ast.Call) and getattr(n.func, "attr", "") == "format")
+        given += [one for n in calls for one in (*n.args, *(keyword.value for keyword in n.keywords))]
+        names = [shown(ast.unparse(n)) for n in given if isinstance(n, ast.Attribute | ast.Name)]
+    if len(names) != 1:
+        return (
+            "a function is put into the text, and not what it returns",
+            "write `()` behind the function's name",
+        )
+    return f"`{names[0]}` is a function, which is not called here", f"write `{names[0]}()`"
+
+
+_EVENT_FIELDS = ("current_real", "current_expected", "last_real", "last_expected", "last_duration")
+
+
+def _of_timer(message: str) -> tuple[str, str] | None:
+    """Of a field that the event of a `rospy.Timer` has not."""
+    found = re.match(r"'TimerEvent' object has no attribute '(\w+)'", message)
+    if found is None:
+        return None
+    near = next((name for name in _EVENT_FIELDS if name.startswith(found[1])), "")
+    hint = f"write `.{near}`" if near else "take one of these"
+    return f"a timer's event has {', '.join(_EVENT_FIELDS)}", hint
+
+
 def explain_by_definition(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """Return why a decorated function is None where it is called, or why a parameter has the value of another one."""
     source = found.own_frames[-1].source if found.own_frames else ""
+    if meaning := _method_in_text(found.message, source) or _of_timer(found.message):
+        return meaning
     if "on closed file" in found.message:
         closed = next((s for s in package.slips if (s.kind, s.name) == ("wrong-value", "closed")), None)
         hint = "close the file when the node ends: `rospy.spin()` stands within the `with` that opens it"

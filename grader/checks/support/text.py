@@ -385,3 +385,15 @@ def as_number(kind: str, source: str) -> str:
     """Return how to make a number of this kind of a value on a line of source."""
     divided = kind == "int" and not re.search("['\"]", source)
     return f"`{kind}(…)`" + (", or write `//` in place of a `/`, which makes a float" if divided else "")
+
+
+REFUSED = re.compile(
+    r"^\S+: error: (.*(?:unrecognized arguments|invalid \w+ value|arguments are required|expected).*)$"
+)
+"""How `argparse` ends a program that is given other options than it knows."""
+
+
+def refused_options(lines: Iterable[str]) -> str:
+    """Return what a program says of the options that it is given and does not know, behind a colon; "" of none."""
+    said = next((found[1] for line in lines if (found := REFUSED.match(without_colours(line)))), "")
+    return f": {shorten(said, 200)}" if said else ""

@@ -128,6 +128,7 @@ def callbacks(tree):
             own = (plain if isinstance(meant, ast.Name) else functions).get(dotted(meant).rpartition(".")[2])
             least, most = takes(own, isinstance(meant, ast.Attribute)) if own else (values, values)
             yield from filled_in_part(one, functions, values)
+            yield from called_at_once(one, name)
             if own and called and (least or not gives_value(own)) and not gives_function(own):
                 message, fix = "`%s()` is called here", "write `%s`, without brackets"
                 at = called_inside(own) or one
@@ -228,6 +229,24 @@ def made_response(own, call, kept):
     if called_name(call) != "Service" or len(lost) != 1 or lost[0] not in used or len(call.args) < 2:
         return ""
     return ", and `%s = %sResponse()` as its first line" % (lost[0], dotted(call.args[1]))
+
+
+def called_at_once(node, taker):
+    """Yield where `on_shutdown(stop.set())` calls the method of an object that it should be given."""
+    is_bare = isinstance(node, ast.Call) and not node.args and not node.keywords
+    if (
+        taker == "on_shutdown"
+        and is_bare
+        and is_call(node, "set", "stop", "shutdown", "unregister", "close", "cancel")
+    ):
+        name = dotted(node.func)
+        yield slip(
+            node.lineno,
+            "callback-called",
+            "`%s()` is called here" % name,
+            "write `%s`, without brackets" % name,
+            name,
+        )
 
 
 def filled_in_part(node, functions, values):

@@ -87,6 +87,14 @@ def limits_of_ranges(tree):
         remainders = (n for n in ast.walk(node) if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Mod))
         if limit is not None and not any(counted in map(dotted, ast.walk(n.left)) for n in remainders):
             yield slip(node.lineno, "reset-limit", "%d" % limit, name="range")
+    for node in all_of(tree, ast.Call, ast.YieldFrom):  # what `next(…)` goes through, again and again
+        around = node.args[:1] if called_name(node) == "cycle" else [getattr(node, "value", None)]
+        bounds = around[0].args[:2] if around and called_name(around[0]) == "range" else []
+        if bounds and whole(bounds[-1]) is not None:
+            yield slip(node.lineno, "reset-limit", "%d" % whole(bounds[-1]), name="range")
+        if len(bounds) > 1 and whole(bounds[0]) is not None:
+            yield slip(node.lineno, "reset-value", "%d" % whole(bounds[0]))
+            yield slip(node.lineno, "start-value", "%d" % whole(bounds[0]), name="range")
 
 
 def whole(node):

@@ -171,6 +171,21 @@ def loops_that_never_go_round(tree):
             yield slip(block.lineno, "loop-left", message, fix, asks)
 
 
+def waits_without_not(tree):
+    """`while stop.wait(1):` around what is published: a loop until an event comes, which lacks its `not`."""
+    made = {dotted(t) for n in all_of(tree, ast.Assign) if called_name(n.value) == "Event" for t in n.targets}
+    for loop in all_of(tree, ast.While) if made else ():
+        name = dotted(loop.test.func.value) if is_call(loop.test, "wait", "is_set") else ""
+        if name in made and calls_in(loop, "publish"):
+            asked = "%s.%s(…)" % (name, loop.test.func.attr)
+            message = "the loop on line %d runs only once `%s` is set: a `not` is missing" % (
+                loop.lineno,
+                name,
+            )
+            fix = "on line %d, write `while not %s:`" % (loop.lineno, asked)
+            yield slip(loop.lineno, "loop-left", message, fix, asked)
+
+
 def lacking_loops(tree):
     """One `publish` and, below it, one `sleep` of a rate, in a script that has no loop and nothing else that waits."""
     waits = ("spin", "Subscriber", "Timer", "Service", "SimpleActionServer", "run", "start")

@@ -6,6 +6,7 @@ Nothing is executed. Python 3.8, standard library only.
 import ast
 import builtins
 import difflib
+from collections import Counter
 
 from script_tree import (
     FUNCTIONS,
@@ -289,6 +290,26 @@ def walk_own(function):
         if not isinstance(node, (ast.FunctionDef, ast.Lambda)):
             yield node
             left += ast.iter_child_nodes(node)
+
+
+def of_the_function_around(tree):
+    """`global n` in a function of a function that has `n`, where the module has none."""
+    module, named = bound_names(tree), Counter(n for one in all_of(tree, ast.Global) for n in one.names)
+    for outer in all_of(tree, ast.FunctionDef):
+        inner = [n for n in outer.body if isinstance(n, ast.FunctionDef)]
+        own = bound_names(outer) if inner else ()
+        for node, function in ((n, one) for one in inner for n in one.body if isinstance(n, ast.Global)):
+            for name in (n for n in node.names if n in own and n not in module and named[n] == 1):
+                read = (n for n in ast.walk(function) if isinstance(n, ast.Name) and n.id == name)
+                line = min((n.lineno for n in read), default=node.lineno)
+                message = "`global %s` on line %d is not the `%s` of `%s`" % (
+                    name,
+                    node.lineno,
+                    name,
+                    outer.name,
+                )
+                fix = "on line %d, write `nonlocal` instead of `global`" % node.lineno
+                yield slip(line, "undefined", message, fix, name)
 
 
 def outside_methods(tree):

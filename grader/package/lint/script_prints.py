@@ -14,6 +14,7 @@ from script_tree import (
     calls_in,
     dotted,
     functions_in,
+    gives_function,
     is_call,
     names_in,
     slip,
@@ -51,6 +52,9 @@ def unprinted_messages(tree):
     level = any(k.arg == "log_level" for n in walk(tree) if is_call(n, "init_node") for k in n.keywords)
     for node in walk(tree):
         given = argument(node, 2, "callback") if called_name(node) == "Subscriber" else []
+        topic = text_of((argument(node, 0, "name") or [None])[0]) if given else ""
+        for one in given[:1]:
+            yield from (slip(*found, topic) for found in given_wrong(one, functions, tree))
         own = given[0] if given and isinstance(given[0], ast.Lambda) else callback_of(node, functions)
         taken = (
             [one.arg for one in own.args.args if one.arg not in ("self", "cls")] if own is not None else []
@@ -65,6 +69,64 @@ def unprinted_messages(tree):
             looked_at[key] = Printing(own, taken[0], key[1], functions).found(tree, level)
         if looked_at[key]:
             yield slip(*looked_at[key], text_of(topics[0]) if topics else "")
+
+
+def given_wrong(given, functions, tree):
+    """Yield what makes a callback of something else than the function that is meant: a call of `print`, the maker of
+    the function, a decorator that returns what it is given; or a value that its method keeps under another name."""
+    if isinstance(given, ast.Call) and (is_print(given) or called_name(given).startswith("log")):
+        name = dotted(given.func)
+        message = "`%s(…)` is called once, on line %d, and gives the Subscriber nothing to call" % (
+            name,
+            given.lineno,
+        )
+        yield given.lineno, "not-printed", message, "write `lambda msg: %s(msg.data)` in its place" % name
+    own = (
+        functions.get(dotted(given).rpartition(".")[2])
+        if isinstance(given, (ast.Name, ast.Attribute))
+        else None
+    )
+    if own is None:
+        return
+    if gives_function(own):
+        message = "`%s` makes the callback, and is none itself: it has to be called" % own.name
+        yield (
+            given.lineno,
+            "not-printed",
+            message,
+            "on line %d, write `%s(…)`" % (given.lineno, dotted(given)),
+        )
+    for decorator in own.decorator_list:
+        maker = functions.get(dotted(decorator))
+        inner = [n for n in maker.body if isinstance(n, ast.FunctionDef)] if maker and maker.args.args else []
+        last = maker.body[-1] if inner else None
+        if isinstance(last, ast.Return) and len(inner) == 1 and dotted(last.value) == maker.args.args[0].arg:
+            message = "`%s`, around `%s`, returns on line %d what it is given, and `%s` is never called"
+            message %= (maker.name, own.name, last.lineno, inner[0].name)
+            yield (
+                last.lineno,
+                "not-printed",
+                message,
+                "on line %d, write `return %s`" % (last.lineno, inner[0].name),
+            )
+    yield from kept_elsewhere(own, tree)
+
+
+def kept_elsewhere(own, tree):
+    """Yield where a callback gives a value to `last`, which it never reads, and another method reads `self.last`."""
+    if [one.arg for one in own.args.args[:1]] != ["self"]:
+        return
+    if not hasattr(tree, "all_of_self"):  # each callback asks for them
+        read = (n for n in all_of(tree, ast.Attribute) if isinstance(n.ctx, ast.Load))
+        tree.all_of_self = {n.attr for n in read if dotted(n.value) == "self"}
+    names = [n for n in ast.walk(own) if isinstance(n, ast.Name)]
+    used = {n.id for n in names if isinstance(n.ctx, ast.Load)}
+    for n in own.body:
+        name = dotted(n.targets[0]) if isinstance(n, ast.Assign) else ""
+        if name.isidentifier() and name not in used and name in tree.all_of_self:
+            message = "line %d gives a value to `%s`, and not to `self.%s`" % (n.lineno, name, name)
+            fix = "on line %d, write `self.%s` instead of `%s`" % (n.lineno, name, name)
+            yield n.lineno, "not-printed", message, fix
 
 
 LEVELS = {

@@ -223,6 +223,13 @@ def vanished_pauses(tree, given):
             )
             fix = "on line %d, write `/` in place of `//`, or the time as `0.1`" % node.lineno
             yield slip(node.lineno, "sleep-outside", message, fix, "sleep")
+        elif OF_PERIODS.search(dotted(node.targets[0])) and loses_all(
+            node.value, given
+        ):  # `PERIOD = 1 // 10`
+            message = "`%s` is 0 on line %d, since `//` leaves only the whole part"
+            message %= (dotted(node.targets[0]), node.lineno)
+            fix = "on line %d, write `/` in place of `//`" % node.lineno
+            yield slip(node.lineno, "sleep-outside", message, fix, "sleep")
 
 
 def loop_rate(call, timed, value, number, pause):

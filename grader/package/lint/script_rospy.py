@@ -10,7 +10,7 @@ from collections import Counter
 
 from script_tree import all_of, dotted, parents_of, walk
 
-KEPT = ("all_nodes", "all_parents", "prints_of_loops", "all_callbacks")
+KEPT = ("all_nodes", "all_parents", "prints_of_loops", "all_callbacks", "all_of_self")
 """What finders keep of a module."""
 
 

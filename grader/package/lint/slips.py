@@ -65,7 +65,8 @@ def slips(tree):
     finders = (
         uncalled_and_asked, objects.names_of_objects, names.misspelt, rates.loop_rates, rates.nanoseconds,
         rates.rates_for_times, rates.sleeps_within, rates.timers_once,
-        counters.resets, never_run, loops.never_reached, loops.loops_that_never_go_round,
+        counters.resets, never_run, names.of_the_function_around,
+        loops.never_reached, loops.loops_that_never_go_round, loops.waits_without_not,
         loops.stopped_loops, loops.lacking_loops, loops.published_before,
         sleeps.sleepless_loops, sleeps.sleeps_twice, loops.publishes_twice, callbacks.callbacks,
         callbacks.waiting_callbacks, objects.queue_sizes, graph_names,
