@@ -396,8 +396,11 @@ def _no_shell(package: PackageFacts, file: LaunchFile, params: OpensParams) -> V
     lying = [f.path for f in package.files if f.path.endswith(".sh")]
     seen = f"; {there_is(lying)} in the package" if lying else ""
     name = PurePosixPath(lying[0]).name if lying else "<script>.sh"
-    hint = f"below <launch>, add {_node_tag(file, package.name, name)}"
-    return failed(f"{file.path} has no <node> that starts a shell script{seen}", hint=hint)
+    message = f"{file.path} has no <node> that starts a shell script"
+    for place, why, hint in _in_its_place(file, package.name, name):
+        cited = place if isinstance(place, FileCitation) else FileCitation(file=file.path, line=place)
+        return failed(f"{message}: {why}", hint=hint, citations=(cited,))
+    return failed(f"{message}{seen}", hint=f"below <launch>, add {_node_tag(file, package.name, name)}")
 
 
 def _page(

@@ -357,7 +357,7 @@ class Later:
             return
         if rate:
             yield Fix(f"call `{rate}.sleep()` each time around the loop of {path}")
-        elif self._lacks_words("Timer("):
+        elif self._lacks_words("Timer(") and self._lacks_words(".wait("):
             made = f"`rate = rospy.Rate({hz})`"
             yield Fix(
                 f"let the loop of {path} wait: {made} above it, `rate.sleep()` in it",

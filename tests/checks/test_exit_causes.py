@@ -152,6 +152,8 @@ pytestmark = pytest.mark.usefixtures("without_processes")
          "TypeError: unsupported format string passed to method.__format__", "write `self.now()`"),
         (6, "text = f'{rospy.get_time:.2f}'",
          "TypeError: unsupported format string passed to function.__format__", "write `rospy.get_time()`"),
+        (6, "Robot().greet().stay()", "AttributeError: 'NoneType' object has no attribute 'stay'",
+         "write `return self` at the end of `greet`"),
         (6, "now = event.current", "AttributeError: 'TimerEvent' object has no attribute 'current'",
          "write `.current_real`"),
         (6, "print('heard', msg.data())", "TypeError: 'str' object is not callable",

@@ -83,6 +83,22 @@ def _method_in_text(message: str, source: str) -> tuple[str, str] | None:
     return f"`{names[0]}` is a function, which is not called here", f"write `{names[0]}()`"
 
 
+def _in_a_chain(message: str, source: str) -> tuple[str, str] | None:
+    """Of `Robot().greet().stay()`, where `greet` has no `return`."""
+    found = re.match(r"'NoneType' object has no attribute '(\w+)'", message)
+    with suppress(SyntaxError, ValueError, RecursionError):
+        for n in ast.walk(parsed(source)) if found else ():
+            func = n.value.func if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Call) else None
+            owner = func.value if isinstance(func, ast.Attribute) else None
+            if found and func and isinstance(owner, ast.Call) and ast.unparse(n).endswith(f".{found[1]}"):
+                name = shown(ast.unparse(func).rpartition(".")[2])
+                return (
+                    f"`{name}(…)` returns nothing to go on with",
+                    f"write `return self` at the end of `{name}`",
+                )
+    return None
+
+
 _EVENT_FIELDS = ("current_real", "current_expected", "last_real", "last_expected", "last_duration")
 
 
@@ -99,7 +115,11 @@ def _of_timer(message: str) -> tuple[str, str] | None:
 def explain_by_definition(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """Return why a decorated function is None where it is called, or why a parameter has the value of another one."""
     source = found.own_frames[-1].source if found.own_frames else ""
-    if meaning := _method_in_text(found.message, source) or _of_timer(found.message):
+    if (
+        meaning := _method_in_text(found.message, source)
+        or _of_timer(found.message)
+        or _in_a_chain(found.message, source)
+    ):
         return meaning
     if "on closed file" in found.message:
         closed = next((s for s in package.slips if (s.kind, s.name) == ("wrong-value", "closed")), None)
