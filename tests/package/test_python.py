@@ -182,6 +182,12 @@ def assert_cases(report):
         ("def f(x):\n    if x:\n    if x:\n        return 1\n", "repeats the one above: delete this line"),
         ("while f():\n    if x:\n    rate.sleep()\n", "nothing in the block on line 2: below line 2, write"),
         ("if x:\nrospy.spin()\n", "nothing in the block on line 1: below line 1, write"),
+        ("try:\n    main()\nexcept A:  \n", "nothing in the block on line 3: below line 3, write"),
+        (
+            "try:\n    main()\nexcept A:\n    # to do\n",
+            "only comments in the block on line 3: below line 3, write",
+        ),
+        ("try:\r\n    main()\r\nexcept A:\r\n", "nothing in the block on line 3: below line 3, write"),
         ("while f():\nrate.sleep()\n", "must be indented"),
         ("if x:\nx = 0\n", "must be indented"),
         ("class A:\ndef f(self):\n    pass\n", "must be indented"),
@@ -189,7 +195,7 @@ def assert_cases(report):
     ],
 )
 def test_a_block_without_a_line_is_told_from_one_that_is_not_indented(tmp_path, text, cause):
-    (tmp_path / "x.py").write_text(text)
+    (tmp_path / "x.py").write_bytes(text.encode())
     fault = check_syntax(tmp_path, ["x.py"]).faults["x.py"]
     assert cause in fault.explanation
 

@@ -147,6 +147,8 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("never-reached", 4, "the loop on line 4 never ends")]),
         (node(LOOP + "        rate.sleep()\n    p.publish(1)\n") + CALLED,
          [("never-reached", 4, "the publish(…) on line 6")]),
+        (node("    while 1:\n        if r.is_shutdown():\n            break\n        rate.sleep()\n    p.publish(1)\n")
+         + CALLED, [("never-reached", 4, "the publish(…) on line 8")]),
         (node("    rospy.spin()\n    p.publish(1)\n") + CALLED, [("never-reached", 4, "the spin() on line 4")]),
         (node("    rospy.spin()\n") + CALLED + "    a = rospy.get_param('a')\n    b = a['b']\n",
          [("read-late", 7, "line 7 runs only once the node ends, below line 4")]),

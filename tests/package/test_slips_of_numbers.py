@@ -95,6 +95,8 @@ def test_what_is_added_too_early_is_added_after_the_line_that_publishes_it(tmp_p
         ("next(n)", "import itertools\nn = itertools.count()\n", True),
         ("n + 1", "import time\ntime.sleep(1)\n", True),
         ("n + rospy.get_time()", "", False),
+        ("n + 1", "import rospy as ros\n", True),
+        ("n + ros.get_time()", "import rospy as ros\n", False),
         ("n + 1", "from helper import n\n", False),
         ("n + 1", "import time as t\nn = t.time()\n", False),
         ("n + 1", "from time import time\nn = time()\n", False),

@@ -317,7 +317,8 @@ def knows_time(tree):
     """Whether a script may read a clock: by name, or in a module that is not the standard one."""
     for node in walk(tree):
         if isinstance(node, ast.Import):
-            if not all(is_plain(alias.name) and alias.asname is None for alias in node.names):
+            plain = [alias for alias in node.names if is_plain(alias.name)]
+            if len(plain) < len(node.names) or any(one.asname and one.name != "rospy" for one in plain):
                 return True
         elif isinstance(node, ast.ImportFrom):
             names = {alias.name for alias in node.names}

@@ -1,12 +1,13 @@
 """Writes what a student's Python spells in another way as the finders of `slips.py` look for it: assignments with a
-type, methods under names of their own. Names of rospy are for `script_rospy.py`.
+type, methods under names of their own, loops that a question at their top ends. Names of rospy are for
+`script_rospy.py`.
 
 Nothing is executed. Python 3.8, standard library only.
 """
 
 import ast
 
-from script_tree import dotted
+from script_tree import called_name, dotted
 
 
 class Assign(ast.Assign):
@@ -21,6 +22,7 @@ class Assign(ast.Assign):
 def spell_plainly(tree):
     """Change the tree of a module, before any finder looks at it."""
     without_types(tree)
+    ask_in_heads(tree)
     call_by_methods(tree)
 
 
@@ -38,6 +40,18 @@ def plain_assignment(node):
         return node
     plain = Assign([node.target], node.annotation, node.value, None)
     return ast.copy_location(plain, node)
+
+
+def ask_in_heads(tree):
+    """Write `while True:` with `if rospy.is_shutdown(): break` as its first statement as `while not
+    rospy.is_shutdown():`."""
+    for loop in (n for n in ast.walk(tree) if isinstance(n, ast.While) and len(n.body) > 1):
+        first = loop.body[0]
+        is_endless = isinstance(loop.test, ast.Constant) and loop.test.value in (True, 1)
+        leaves = isinstance(first, ast.If) and isinstance(first.body[0], ast.Break) and not first.orelse
+        if is_endless and leaves and called_name(first.test) == "is_shutdown":
+            loop.test = ast.copy_location(ast.UnaryOp(op=ast.Not(), operand=first.test), loop.test)
+            loop.body = loop.body[1:]
 
 
 def call_by_methods(tree):

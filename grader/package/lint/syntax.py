@@ -116,6 +116,7 @@ def check(root, name, with_slips=True):
     if problem:
         report["faults"].append(problem)
         return report
+    data = data.replace(b"\r\n", b"\n")  # Python counts one more line at the end of such a file
     try:
         compile(data, os.path.basename(name), "exec", dont_inherit=True)
     except (SyntaxError, ValueError, OverflowError, RecursionError, MemoryError) as error:
@@ -322,7 +323,8 @@ def syntax_fault(error, data):
         return fault("SyntaxError", first + 1, at, "invalid syntax", text=lines[first])
     if known and "invalid syntax" in str(error) and is_comment_below(lines, line):
         return fault("SyntaxError", line, 1, "comment goes on", text=lines[line - 1])
-    of_block = block_fault(lines, line, str(error)) if known else None
+    told = (lines, line, str(error))
+    of_block = empty_at_end(*told) or block_fault(*told) if known else None
     if of_block is not None:
         return of_block
     begins = {text[0] for text in lines if text[:1] in ("\t", " ") and text.strip()}
@@ -348,6 +350,19 @@ def is_comment_below(lines, line):
         return False
     used = re.compile(r"\b%s\s*[.(=\[]|import.*\b%s\b" % (re.escape(words[0]), re.escape(words[0])))
     return not any(used.search(text) for text in lines)
+
+
+def empty_at_end(lines, line, message):
+    """Return the fault of a block that the line begins, and that no code comes after; None else."""
+    is_head = is_code(lines[line - 1]) and lines[line - 1].rstrip().endswith(":")
+    if "expected an indented" in message and is_head and not any(map(is_code, lines[line:])):
+        own = len(blanks_of(lines[line - 1]))
+        inside = [text for text in lines[line:] if text.strip() and len(blanks_of(text)) > own]
+        told = "only comments" if inside else "nothing"
+        return fault(
+            "IndentationError", line, 1, "%s in the block on line %d" % (told, line), text=lines[line - 1]
+        )
+    return None
 
 
 def block_fault(lines, line, message):
