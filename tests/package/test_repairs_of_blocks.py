@@ -119,6 +119,10 @@ CASES = {
     "import-further-in": Case(
         {TALKER: FROM_ROSPY}, ["python-syntax"], "line 2 of src/talker.py: this line is indented further",
         after={TALKER: "\nfrom rospy import init_node, spin"}),
+    "except-within-its-try-with-tabs": Case(
+        {TALKER: SCRIPT.replace("    ", "\t").replace(
+            "\nmain()\n", "\ntry:\n\tmain()\n\texcept rospy.ROSInterruptException:\n\t\tpass\n")},
+        ["python-syntax"], after={TALKER: "\ntry:\n\tmain()\nexcept rospy.ROSInterruptException:\n\t\tpass\n"}),
     "what-an-if-does-is-missing": Case(
         swapped(TALKER, ("        rate.sleep()", "        if a:\n        rate.sleep()")), ["python-syntax"],
         "line 12 of src/talker.py: this block needs a line of its own",
@@ -139,10 +143,12 @@ CASES = {
 
 @pytest.mark.parametrize("head", LOST)
 @pytest.mark.parametrize("docstring", [DOCSTRING, ""])
+@pytest.mark.parametrize("blanks", ["    ", "\t"])
 def test_the_first_line_of_a_class_or_function_that_is_lost(
-    head: str, docstring: str, tmp_path: Path
+    head: str, docstring: str, blanks: str, tmp_path: Path
 ) -> None:
-    text = TICKER.replace(DOCSTRING, docstring)
+    text = TICKER.replace(DOCSTRING, docstring).replace("    ", blanks)
+    head = head.replace("    ", blanks)
     own = head.replace("(object)", "")
     missing = {TALKER: text.replace(f"{head}\n", "")}
     said = f"the line `{own.strip()}` is missing"

@@ -119,7 +119,7 @@ IMPORTED = re.compile(r"^\s*(?:from|import)\s+([\w.]+(?:\s+import\s+\w+)?)", re.
 def _steps(text: str, types: list[str], known: Known, node: str, *, is_run: bool = True) -> Iterator[Step]:
     """Yield what is wrong in a script that `is_run`, or in a module that others import. `node` is a name for the node
     that the script does not make; "" where another file may make it."""
-    for step in make_readable(text):
+    for step in _readable(text):
         text = step["text"]
         yield step
     seen = {text}
@@ -158,6 +158,22 @@ def _steps(text: str, types: list[str], known: Known, node: str, *, is_run: bool
                 text = step["text"]
                 seen.add(text)
                 yield step
+
+
+BLANKS = re.compile(r"^[ \t]+", re.MULTILINE)
+
+
+def _readable(text: str) -> list[Step]:
+    """Return the steps after which it parses. A text that begins its lines with tabs alone is read with four spaces in
+    place of each, and gets its tabs back."""
+    spaced = BLANKS.sub(lambda found: found[0].replace("\t", "    "), text)
+    if spaced == text or _with_tabs(spaced) != text:
+        return make_readable(text)
+    return [{**step, "text": _with_tabs(step["text"])} for step in make_readable(spaced)]
+
+
+def _with_tabs(text: str) -> str:
+    return BLANKS.sub(lambda found: found[0].replace("    ", "\t"), text)
 
 
 # ---- what parses, and is not meant
@@ -312,7 +328,7 @@ def _with_method(text: str, tree: ast.Module, lines: list[str]) -> Iterator[Step
                 head = lost_head(text, tree, rest)
             elif block in methods and apart and DOES_WORK.search(body) and not SETS_UP.search(body):
                 head = lost_method(text, tree, next(one for one in owners if block in one.body), rest)
-                head = f"{' ' * block.col_offset}{head}" if head else ""
+                head = f"{lines[block.lineno - 1][: block.col_offset]}{head}" if head else ""
             changed = "\n".join([*lines[:first], head, *lines[first:]])
             if head and kept.isdisjoint(re.findall(r"\w+", head)) and syntax_error(changed) is None:
                 yield from step_to("line", first + 1, text, changed, head.strip())
