@@ -167,6 +167,8 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (node(LOOP + "        p.publish(1)\n        rospy.spin()\n") + CALLED,
          [("spin-in-loop", 6, "stops at the spin()")]),
         (node(LOOP + "        p.publish(1)\n        break\n") + CALLED, [("loop-left", 6, "at the break on line 6")]),
+        (node("    e = threading.Event()\n    while e.wait(1):\n        p.publish(1)\n") + CALLED,
+         [("fills", 4, ""), ("loop-left", 5, "runs only once `e` is set: a `not` is missing: on line 5, write `while not e.wait(…):`")]),
         (node("    for i in range(4):\n        t.angular.z = i\n        p.publish(t)\n") + CALLED,
          [("loop-left", 4, "call rospy.spin() below line 6")]),
         ("def drive(x, y):\n    while on:\n        p.publish(x)\nmain()\n",
