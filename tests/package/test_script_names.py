@@ -66,7 +66,7 @@ UNDEFINED = {
     "argument without its value": ("p = rospy.Publisher('a', Int32, queue_size)\n",
                                    "`queue_size` is named here without its value: write `queue_size=10`"),
     "global": ("def a():\n    global total\n    total = 1\ndef b():\n    return total\n", ""),
-    "global-of-the-function-around": ("def a():\n    n = 0\n    def b(e):\n        global n\n        n += 1\n    b(1)\n",
+    "global-of-the-function-around": ("def a():\n    n = 0\n    def b(e):\n        global n\n        n += 1\n",
                                       "`global n` on line 5 is not the `n` of `a`: on line 5, write `nonlocal`"),
     "global-of-the-module": ("n = 0\ndef a():\n    n = 0\n    def b(e):\n        global n\n        n += 1\n", ""),
     "enclosing": ("def a(x):\n    def b():\n        return x\n    return [b, lambda y: x + y, [z for z in x]]\n", ""),

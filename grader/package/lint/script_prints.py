@@ -48,12 +48,13 @@ LEAVES, STORING = (ast.Return, ast.Raise), (ast.Assign, ast.AugAssign, ast.AnnAs
 def unprinted_messages(tree):
     """Callbacks of topics that print nothing of a message (`not-printed`), or of some messages only, or what they make
     of it (`printed-in-part`). Nothing of one that hands its message to another function, or keeps it for later."""
-    functions, looked_at = functions_in(tree), {}
+    functions, looked_at, told = functions_in(tree), {}, set()
     level = any(k.arg == "log_level" for n in walk(tree) if is_call(n, "init_node") for k in n.keywords)
     for node in walk(tree):
         given = argument(node, 2, "callback") if called_name(node) == "Subscriber" else []
         topic = text_of((argument(node, 0, "name") or [None])[0]) if given else ""
-        for one in given[:1]:
+        for one in (n for n in given[:1] if isinstance(n, ast.Call) or dotted(n) not in told):
+            told.add(dotted(one))  # one callback may be given many times
             yield from (slip(*found, topic) for found in given_wrong(one, functions, tree))
         own = given[0] if given and isinstance(given[0], ast.Lambda) else callback_of(node, functions)
         taken = (
