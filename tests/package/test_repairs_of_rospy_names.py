@@ -140,6 +140,16 @@ LACKING = {
          .replace("queue_size=10", "queue_size='10'")}, ["missing-call"], "`queue_size` is a string",
         after={TALKER: "Int8, queue_size=10)"},
     ),
+    "value-of-rospy-as-ros": Case(
+        {TALKER: SCRIPT.replace("rospy.", "ros.").replace("import rospy", "import rospy as ros")
+         .replace("ros.Rate(ros.get_param('~rate', 10))", "ros.rate = 10")}, ["missing-call"],
+        after={TALKER: "    rate = ros.Rate(10)\n"},
+    ),
+    "object-of-a-class-of-rospys": Case(
+        {TALKER: SCRIPT.replace("    publisher =", "    pub =").replace("rospy.", "").replace("import rospy",
+         "from rospy import Publisher, Rate, get_param, init_node, is_shutdown")}, ["missing-call"],
+        after={TALKER: "        pub.publish(1)\n"},
+    ),
     "arguments-of-what-has-a-type": Case(
         swapped(TALKER, ("    rate = rospy", "    rate: rospy.Rate = rospy"), ("rate.sleep()", "rate.sleep(10)")),
         ["missing-call"], "a Rate already knows how long to sleep", after={TALKER: "        rate.sleep()\n"},

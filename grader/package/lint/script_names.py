@@ -44,6 +44,14 @@ COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 # ---- names that are not there
 
 
+def unfit_for_methods(tree):
+    """Return what a script has from rospy by name, by the identity of names of which it calls a method that only the
+    objects of such classes have."""
+    imports = [n for n in all_of(tree, ast.ImportFrom) if n.module == "rospy"]
+    names = {a.asname or a.name for n in imports for a in n.names}
+    return {id(n.value): names for n in all_of(tree, ast.Attribute) if n.attr in ("publish", "sleep")}
+
+
 def misspelt(tree):
     """Names that are read where nothing has given them a value: `misspelt` where one that is bound is spelt alike, or
     `self` has one of that name, else `undefined`."""
@@ -55,7 +63,7 @@ def misspelt(tree):
     known = own | set(dir(builtins)) | MODULE_NAMES | imported_otherwise(tree, {n.id for n in names})
     outside = {id(n) for n in outside_methods(tree)}
     unbound = unbound_names(tree, known)
-    keys, texts = without_quotes(tree, known), where_texts_stand(tree)
+    keys, texts, unfit = without_quotes(tree, known), where_texts_stand(tree), unfit_for_methods(tree)
     stored = {n.id for n in names if isinstance(n.ctx, ast.Store)}
     functions = {n.name for n in all_of(tree, *FUNCTIONS[:2])} - stored
     odd = {*keys, *unbound, *outside}
@@ -65,6 +73,7 @@ def misspelt(tree):
     for node in unknown[:USES_LIMIT]:
         kind, line, message = "undefined", node.lineno, ""
         fitting = stored if id(node) in texts else own - functions if is_value(node, tree) else own
+        fitting = fitting - unfit.get(id(node), set())
         others = attributes if id(node) in of_classes else set()
         near = meant_for(node, tree, known, fitting, others)
         near = "" if made.get(near) == node.id else near  # `twist = Twist()` lacks an import

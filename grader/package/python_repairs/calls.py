@@ -43,18 +43,18 @@ class Argument(NamedTuple):
 
 def with_values_called(text: str) -> Iterator[Step]:
     """`rate = rospy.rate = 10`, for `rate = rospy.Rate(10)`: a value is given to what takes it as an argument."""
-    lines = text.split("\n")
+    lines, rospy = text.split("\n"), rospy_in(tree_of(text))
     for node in nodes_in(tree_of(text)):
         target = node.targets[-1] if isinstance(node, ast.Assign) else None
         if not isinstance(node, ast.Assign) or not isinstance(target, ast.Attribute):
             continue
-        names = {name.lower(): name for name in GIVEN_ONE} if last_name(target.value) == "rospy" else {}
+        names = {name.lower(): name for name in GIVEN_ONE} if last_name(target.value) == rospy else {}
         meant = names.get(target.attr.lower(), "")
         begin, value = span_of(lines, target), span_of(lines, node.value)
         if meant and begin is not None and value is not None and begin[0] == value[0]:
             line, start, end = value
-            after = edited(text, [(line, begin[1], end, f"rospy.{meant}({lines[line][start:end]})")])
-            yield from step_to("value", line + 1, text, after, f"rospy.{meant}")
+            after = edited(text, [(line, begin[1], end, f"{rospy}.{meant}({lines[line][start:end]})")])
+            yield from step_to("value", line + 1, text, after, f"{rospy}.{meant}")
             return
 
 

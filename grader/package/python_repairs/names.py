@@ -294,6 +294,13 @@ def _takes_only_the_message(tree: ast.Module, method: ast.FunctionDef) -> bool:
     )
 
 
+def _classes_of_rospy(tree: ast.Module, member: str) -> set[str]:
+    """Return what a script has from rospy by name, where `member` belongs to the objects of such classes alone."""
+    imports = (n for n in tree.body if isinstance(n, ast.ImportFrom) and n.module == "rospy")
+    names = {a.asname or a.name for n in imports for a in n.names}
+    return names if member in ("publish", "sleep") else set()
+
+
 def with_names(text: str) -> Iterator[Step]:
     """`true`, `rospu` and `Sting`: a name that nothing in the file has, and one alone is nearly the same."""
     tree, lines = tree_of(text), text.split("\n")
@@ -323,10 +330,10 @@ def with_names(text: str) -> Iterator[Step]:
         alone = {one: word for one in stated for word in ALONE if is_one_edit(one.lower(), word)}
         called = {getattr(n.func, "id", "") for n in nodes_in(block) if isinstance(n, ast.Call) and n.args}
         for name in dict.fromkeys(n.id for n in missing):
-            guards = name == "name" and _is_guard(block)
             of_python = next((one for one in OF_PYTHON if name in called and is_slip(name, one)), "")
-            meant = OBVIOUS_NAMES.get(name) or ("__name__" if guards else "")
-            near = own - functions if name in values else own
+            meant = OBVIOUS_NAMES.get(name) or ("__name__" if name == "name" and _is_guard(block) else "")
+            near = own - _classes_of_rospy(tree, member_of.get(name, ""))
+            near -= functions if name in values else set()
             near = {one for one in near if given.get(one) != name}  # `twist = Twist()` lacks an import
             # `reading.state = 0` lacks `reading = Reading()`
             lost = [one for one in near if one.lower() == name.lower() and name in objects.get(one, ())]
