@@ -14,7 +14,7 @@ from grader.rubric.scenario import Scenario, Start, Until
 from tests.arena.support import SCRIPT, make_place, run
 
 pytestmark = pytest.mark.ros
-FACTS = PackageFacts.model_construct(slips=(), python=(), launch=(), files=())
+FACTS = PackageFacts.model_construct(slips=(), cmake=None, launch_files=(), files=())
 SANDBOXES = ["auto", "none"]
 TALKER = """
 import rospy
@@ -69,9 +69,7 @@ time.sleep(60)
 """
 
 
-def python_or_cpp(
-    tmp_path: Path, talker: str, listener: str, *, sandbox: str = "auto", patience_s: float = 6
-) -> Run:
+def both(tmp_path: Path, talker: str, listener: str, *, sandbox: str = "auto", patience_s: float = 6) -> Run:
     """Two programs until they are connected over `/chatter`, or their graph has not changed for `patience_s`."""
     files = {"scripts/talker.py": SCRIPT + talker, "scripts/listener.py": SCRIPT + listener}
     starts = (Start(name="talker", script="talker.py"), Start(name="listener", script="listener.py"))
@@ -99,7 +97,7 @@ REFUSAL = ("talker", "said that /listener is connected to /talker over /chatter,
 
 @pytest.mark.parametrize("sandbox", SANDBOXES)
 def test_nodes_that_are_connected(tmp_path: Path, sandbox: str) -> None:
-    seen = python_or_cpp(tmp_path, TALKER, LISTENER.format(topic="chatter"), sandbox=sandbox, patience_s=60)
+    seen = both(tmp_path, TALKER, LISTENER.format(topic="chatter"), sandbox=sandbox, patience_s=60)
     assert seen.outcome.outcome == "complete"
     assert judged(seen) is Status.PASS
     assert pairs(seen) == {CHATTER}
@@ -109,7 +107,7 @@ def test_nodes_that_are_connected(tmp_path: Path, sandbox: str) -> None:
 @pytest.mark.parametrize("sandbox", SANDBOXES)
 def test_a_talker_that_says_it_is_connected(tmp_path: Path, sandbox: str) -> None:
     """The listener hears it over another topic, so that there is a connection between the two, but not this one."""
-    seen = python_or_cpp(tmp_path, CLAIMS + TALKER, LISTENER.format(topic="other"), sandbox=sandbox)
+    seen = both(tmp_path, CLAIMS + TALKER, LISTENER.format(topic="other"), sandbox=sandbox)
     assert seen.outcome.outcome != "complete"
     assert judged(seen) is Status.FAIL
     assert CHATTER not in pairs(seen)
@@ -119,7 +117,7 @@ def test_a_talker_that_says_it_is_connected(tmp_path: Path, sandbox: str) -> Non
 
 def test_a_listener_that_says_it_hears(tmp_path: Path) -> None:
     forged = FORGED.format(other=HEARS, direction="i", transport="TCPROS")
-    seen = python_or_cpp(tmp_path, TALKER, forged + LISTENER.format(topic="other"))
+    seen = both(tmp_path, TALKER, forged + LISTENER.format(topic="other"))
     assert judged(seen) is Status.FAIL
     assert pairs(seen) & {CHATTER, ("/other", "/talker", "/listener")} == {("/other", "/talker", "/listener")}
 
@@ -130,7 +128,7 @@ def test_a_talker_that_has_ended_when_its_word_is_checked(tmp_path: Path) -> Non
     claims = CLAIMS.replace("\n    code, message", ends, 1)
     waits = FORGED.format(other=HEARS, direction="i", transport="TCPROS")
     waits = waits.replace("\n    code, message", "\n    import time\n    time.sleep(1)\n    code, message", 1)
-    seen = python_or_cpp(tmp_path, claims + TALKER, waits + LISTENER.format(topic="apart"))
+    seen = both(tmp_path, claims + TALKER, waits + LISTENER.format(topic="apart"))
     assert judged(seen) is Status.FAIL
     assert CHATTER not in pairs(seen)
 
@@ -142,7 +140,7 @@ def test_two_that_say_what_the_kernel_does_not_know_of(tmp_path: Path, transport
     claims = FORGED.format(other="'/listener'", direction="o", transport=transport)
     hears = FORGED.format(other=HEARS, direction="i", transport=transport)
     calls = "caller = rosgraph.Master('/talker').lookupNode\n"
-    seen = python_or_cpp(tmp_path, claims + calls + TALKER, hears + LISTENER.format(topic="apart"))
+    seen = both(tmp_path, claims + calls + TALKER, hears + LISTENER.format(topic="apart"))
     assert judged(seen) is Status.FAIL
     assert CHATTER not in pairs(seen)
     assert refused(seen) == [REFUSAL]
@@ -150,7 +148,7 @@ def test_two_that_say_what_the_kernel_does_not_know_of(tmp_path: Path, transport
 
 def test_a_talker_that_makes_up_its_listener(tmp_path: Path) -> None:
     """One process is both nodes, by an XML-RPC server of its own, and is connected to itself."""
-    seen = python_or_cpp(tmp_path, MADE_UP, "import time\ntime.sleep(60)\n")
+    seen = both(tmp_path, MADE_UP, "import time\ntime.sleep(60)\n")
     assert judged(seen) is Status.FAIL
     assert {"/made", "/up"} <= set(seen.student_nodes())
     assert pairs(seen) == set()
@@ -190,7 +188,7 @@ rospy.Subscriber('rosout_agg', rospy.AnyMsg, lambda message: None)
 def test_a_node_that_publishes_and_subscribes(tmp_path: Path) -> None:
     """It hears itself, a second node, and everybody's log."""
     talker = TALKER.replace("rate =", BOTH_ENDS + "rate =")
-    seen = python_or_cpp(tmp_path, talker, LISTENER.format(topic="chatter"), patience_s=60)
+    seen = both(tmp_path, talker, LISTENER.format(topic="chatter"), patience_s=60)
     assert judged(seen) is Status.PASS
     assert {CHATTER, ("/chatter", "/talker", "/talker")} <= pairs(seen)
     assert refused(seen) == []

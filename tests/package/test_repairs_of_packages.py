@@ -58,7 +58,7 @@ Node::Node() : n_(1)
 """
 
 
-def python_or_cpp(old: str, new: str) -> tuple[str, str]:
+def both(old: str, new: str) -> tuple[str, str]:
     """The line, and another version of it, with git's merge markers."""
     return old, f"<<<<<<< HEAD\n{old}\n=======\n{new}\n>>>>>>> main"
 
@@ -67,7 +67,7 @@ NODE = '  <node pkg="lab" type="talker.py" name="talker"/>'
 
 CASES = {
     "merged-launch": Case(
-        swapped(LAUNCHED, python_or_cpp(NODE, NODE.replace("/>", ' output="screen"/>'))), ["launch-syntax"],
+        swapped(LAUNCHED, both(NODE, NODE.replace("/>", ' output="screen"/>'))), ["launch-syntax"],
         "line 2 of launch/lab.launch: git's merge markers (`<<<<<<<`) are still in the file",
     ),
     "merged-first-line-of-launch": Case(
@@ -75,11 +75,11 @@ CASES = {
         ["launch-syntax"], "for the first one, delete lines 1, 3 and 4",
     ),
     "merged-manifest": Case(
-        swapped(XML, python_or_cpp("  <license>MIT</license>", "  <license>BSD</license>")), ["manifest-line"],
+        swapped(XML, both("  <license>MIT</license>", "  <license>BSD</license>")), ["manifest-line"],
         "keep one of the two versions; for the first one, delete lines 6 and 8 to 10",
     ),
     "merged-cmake": Case(
-        swapped(CMAKELISTS, python_or_cpp("catkin_package()", "catkin_package(CATKIN_DEPENDS rospy)")), ["build-line"],
+        swapped(CMAKELISTS, both("catkin_package()", "catkin_package(CATKIN_DEPENDS rospy)")), ["build-line"],
         "line 4 of CMakeLists.txt: git's merge markers (`<<<<<<<`) are still in the file",
     ),
     "merged-yaml": Case(

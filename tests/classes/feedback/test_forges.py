@@ -62,12 +62,12 @@ def bodies(server: Forge, name: str = "ada") -> list[str]:
     return [comment["body"] for comment in server.repos[f"course/{name}"].comments]
 
 
-def python_or_cpp(out: Path, system: str, *options: str) -> int:
+def both(out: Path, system: str, *options: str) -> int:
     return feedback(out, system, "--only", *NAMES, *options)
 
 
 def test_a_comment_on_the_commit_that_was_graded(published: Path, system: str, server: Forge, capsys) -> None:
-    assert python_or_cpp(published, system) == 0
+    assert both(published, system) == 0
     (ada,), (bob,) = bodies(server), bodies(server, "bob")
     (frozen,) = (published / ".published" / "ada").iterdir()
     assert ada.startswith((frozen / "report.md").read_text().rstrip())
@@ -75,18 +75,18 @@ def test_a_comment_on_the_commit_that_was_graded(published: Path, system: str, s
     assert "bob" not in ada
     said = "".join(capsys.readouterr())
     assert TOKEN not in said + (published / "sent.jsonl").read_text()
-    assert python_or_cpp(published, system) == 0
+    assert both(published, system) == 0
     assert len(bodies(server)) == 1
 
 
 def test_issues_get_later_feedback_as_comments(published: Path, system: str, server: Forge) -> None:
     repo = server.repos["course/ada"]
-    assert python_or_cpp(published, system, "--issues") == 0
+    assert both(published, system, "--issues") == 0
     (issue,) = repo.issues
     assert str(issue["title"]).endswith("85 of 100 points")
     award(published, "ada", "style", 9, "clear names")
     publish(published)
-    assert python_or_cpp(published, system, "--issues") == 0
+    assert both(published, system, "--issues") == 0
     ((number, body),) = repo.notes
     assert (number, len(repo.issues)) == (1, 1)
     assert "85 → 89: override by ann, clear names (style)" in body
@@ -106,10 +106,10 @@ def test_a_failure_costs_one_student(published: Path, system: str, server: Forge
 
 def test_what_everybody_can_read_gets_nothing(published: Path, system: str, server: Forge, capsys) -> None:
     server.repos["course/ada"].private = False
-    assert python_or_cpp(published, system) == 3
+    assert both(published, system) == 3
     assert "ada: everybody can read this repository" in capsys.readouterr().err
     assert (bodies(server), len(bodies(server, "bob"))) == ([], 1)
-    assert python_or_cpp(published, system, "--public") == 0
+    assert both(published, system, "--public") == 0
     assert len(bodies(server)) == 1
 
 
@@ -127,7 +127,7 @@ def test_limits_are_waited_for(
 ) -> None:
     failure, waits = limited
     server.failures = [failure]
-    assert python_or_cpp(published, system) == 0
+    assert both(published, system) == 0
     assert f"too many requests: waiting {waits} s" in capsys.readouterr().err
     assert len(bodies(server)) == 1
 
@@ -138,17 +138,17 @@ def test_a_limit_that_says_when_it_ends(
 ) -> None:
     reset = {f"{prefix}-Remaining": "0", f"{prefix}-Reset": str(int(time.time()) + 300)}
     server.failures = [Failure(403, reset, "API rate limit exceeded")]
-    assert python_or_cpp(published, system) == 0
+    assert both(published, system) == 0
     assert any(295 <= wait_s <= 302 for wait_s in slept)
 
 
 def test_who_is_to_wait_for_hours_is_told_so(published: Path, system: str, server: Forge, capsys) -> None:
     server.failures = [Failure(429, {"Retry-After": "86400"})]
-    assert python_or_cpp(published, system) == 3
+    assert both(published, system) == 3
     said = capsys.readouterr().err
     assert "too many requests, for 1440 minutes" in said
     assert "0 of 2 sent; the same command continues" in said
-    assert python_or_cpp(published, system) == 0
+    assert both(published, system) == 0
     assert [len(bodies(server, name)) for name in NAMES] == [1, 1]
 
 
@@ -159,7 +159,7 @@ def test_an_answer_that_is_lost_makes_no_second_comment(
     failure: Failure, published: Path, system: str, server: Forge
 ) -> None:
     server.failures = [failure]
-    assert python_or_cpp(published, system) == 0
+    assert both(published, system) == 0
     assert [len(bodies(server, name)) for name in NAMES] == [1, 1]
 
 
@@ -167,12 +167,12 @@ def test_an_answer_that_is_lost_makes_no_second_comment(
 def test_what_was_interrupted_is_looked_for(
     options: tuple[str, ...], published: Path, system: str, server: Forge
 ) -> None:
-    python_or_cpp(published, system, *options)
+    both(published, system, *options)
     path = published / "sent.jsonl"
     lines = [json.loads(line) for line in path.read_text().splitlines()]
     kept = [line for line in lines if not (line["id"] == "ada" and line["state"] == "sent")]
     path.write_text("".join(f"{json.dumps(line)}\n" for line in kept))
-    assert python_or_cpp(published, system, *options) == 0
+    assert both(published, system, *options) == 0
     repo = server.repos["course/ada"]
     assert len(repo.comments) + len(repo.issues) == 1
     assert sent(published)[-1] == ("ada", system, "sent")
@@ -183,11 +183,11 @@ def test_a_renamed_repository_is_followed_on_its_own_server_alone(
 ) -> None:
     at = "/repos/course/ada" if system == "github" else "/api/v4/projects/course%2Fada"
     server.moved = {at: "https://elsewhere.example/x"}
-    assert python_or_cpp(published, system) == 3
+    assert both(published, system) == 3
     assert "it is on another server now" in capsys.readouterr().err
     assert len(bodies(server, "bob")) == 1
     server.moved = {at: "https://[elsewhere"}
-    assert python_or_cpp(published, system) == 3
+    assert both(published, system) == 3
     assert "it is on another server now" in capsys.readouterr().err
 
 
@@ -195,14 +195,14 @@ def test_a_token_that_is_not_taken_ends_the_run(
     published: Path, system: str, server: Forge, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:
     monkeypatch.setenv(f"{system.upper()}_TOKEN", "wrong")
-    assert python_or_cpp(published, system) == 3
+    assert both(published, system) == 3
     assert "does not take the token" in capsys.readouterr().err
     assert len(server.asked) == 1
 
 
 def test_a_token_goes_to_its_own_server_alone(published: Path, system: str, server: Forge, capsys) -> None:
     use(published, dict.fromkeys(NAMES, "https://elsewhere.example/course/ada.git"))
-    assert python_or_cpp(published, system) == 3
+    assert both(published, system) == 3
     assert "its repository is not on" in capsys.readouterr().err
     assert server.asked == []
 
@@ -212,7 +212,7 @@ def test_without_a_token_nothing_is_asked(
 ) -> None:
     for name in ("GITHUB_TOKEN", "GH_TOKEN", "GITLAB_TOKEN"):
         monkeypatch.delenv(name, raising=False)
-    assert python_or_cpp(published, system) == 2
+    assert both(published, system) == 2
     assert "there is no token for http" in capsys.readouterr().err
     assert server.asked == []
 
@@ -227,7 +227,7 @@ def test_a_token_of_gits_credential_helpers(
     helper = f'"!f() {{ test $1 = get && echo username=teacher && echo password={TOKEN}; }}; f"'
     (tmp_path / ".gitconfig").write_text(f'[credential "{place}"]\n\thelper = {helper}\n')
     monkeypatch.setenv("HOME", str(tmp_path))
-    assert python_or_cpp(tmp_path / "results", system) == 0
+    assert both(tmp_path / "results", system) == 0
     assert len(bodies(server)) == len(bodies(server, "bob")) == 1
     assert TOKEN not in "".join(capsys.readouterr())
 
@@ -237,15 +237,15 @@ def test_a_token_is_never_sent_in_the_clear(
 ) -> None:
     name = "GITHUB_API_URL" if system == "github" else "CI_API_V4_URL"
     monkeypatch.setenv(name, "http://forge.example")
-    assert python_or_cpp(published, system) == 2
+    assert both(published, system) == 2
     assert "a token is sent by https:// only" in capsys.readouterr().err
     monkeypatch.setenv(name, "https://[forge.example")
-    assert python_or_cpp(published, system) == 2
+    assert both(published, system) == 2
     assert "this is not the address of a server" in capsys.readouterr().err
 
 
 def test_a_dry_run_asks_no_server(published: Path, system: str, server: Forge, capsys) -> None:
-    assert python_or_cpp(published, system, "--dry-run") == 0
+    assert both(published, system, "--dry-run") == 0
     said = capsys.readouterr().out
     assert "ada → " in said
     assert f"commit {COMMIT[:12]}" in said
@@ -327,7 +327,7 @@ def test_only_issues_with_a_label(published: Path, system: str, server: Forge, c
 def test_answers_to_feedback_are_questions(
     options: tuple[str, ...], published: Path, system: str, server: Forge, capsys
 ) -> None:
-    python_or_cpp(published, system, *options)
+    both(published, system, *options)
     repo = server.repos["course/ada"]
     text = "Could you look at style once more?"
     if options:

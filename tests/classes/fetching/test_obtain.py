@@ -23,7 +23,7 @@ def told(submission) -> dict:
     return record
 
 
-def python_or_cpp(server, source, **fields):
+def both(server, source, **fields):
     direct = open_submission(source, package="lab1", workdir=server.base / "direct")
     return told(direct), told(server.opened(source, **fields))
 
@@ -42,7 +42,7 @@ def grown(server):
 @pytest.mark.full
 @pytest.mark.parametrize("ref", ["", "@main", "@feature/x", "@v1", "@refs/heads/feature/x", "@HEAD"])
 def test_the_same_submission_through_the_mirror_and_without_it(ref, grown, server):
-    direct, mirrored = python_or_cpp(server, f"{HOST}/student{ref}")
+    direct, mirrored = both(server, f"{HOST}/student{ref}")
     assert mirrored == direct
     assert mirrored["commit"]
 
@@ -51,7 +51,7 @@ def test_the_same_submission_through_the_mirror_and_without_it(ref, grown, serve
 def test_hashes_and_their_beginnings(grown, server):
     first = git(grown, "rev-parse", "v1^{commit}")
     for ref in (first, first[:8], first.upper()[:12]):
-        direct, mirrored = python_or_cpp(server, f"{HOST}/student@{ref}")
+        direct, mirrored = both(server, f"{HOST}/student@{ref}")
         assert mirrored == direct
         assert mirrored["commit"] == first
 
@@ -60,7 +60,7 @@ def test_hashes_and_their_beginnings(grown, server):
 def test_a_default_branch_that_is_not_there_is_hinted_at_as_without_a_mirror(server):
     repo = server.new()
     git(repo, "symbolic-ref", "HEAD", "refs/heads/gone")
-    direct, mirrored = python_or_cpp(server, f"{HOST}/student")
+    direct, mirrored = both(server, f"{HOST}/student")
     assert mirrored == direct
     assert "main was taken" in mirrored["hints"][0]
 
@@ -79,7 +79,7 @@ def test_a_server_whose_head_is_no_branch(server):
     repo = server.new()
     git(repo, "checkout", "-q", "--detach")
     head = commit_at(repo, "2026-10-05T10:00:00+01:00", {"lab1/step": "detached"})
-    direct, mirrored = python_or_cpp(server, f"{HOST}/student")
+    direct, mirrored = both(server, f"{HOST}/student")
     assert mirrored == direct
     assert mirrored["commit"] == head
 
