@@ -106,7 +106,7 @@ def assert_unharmed(seen: Run, *, window_s: float = 3.0) -> None:
     assert (seen.outcome.outcome, seen.outcome.detail) == ("complete", "")
     (chatter,) = seen.student_channels("/chatter")
     assert list(chatter.data) == list(range(len(chatter.data)))
-    assert len(chatter.data) >= window_s * 10 - 1
+    assert chatter.times_ns[-1] - chatter.times_ns[0] >= (window_s - 0.5) * 1e9  # however slowly it talks
     assert is_in_time(chatter)
     assert exit_of(seen, "arena").max_rss_bytes < ARENA_BYTES_MAX
 
