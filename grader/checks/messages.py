@@ -40,10 +40,10 @@ from grader.checks.support.text import (
     NUMBER,
     OTHER_WORDS_SHARE,
     SECONDS,
+    code_of,
     in_one_line,
     in_words,
     message_pattern,
-    python_or_cpp,
     refuse_others,
     shown,
 )
@@ -67,7 +67,6 @@ _HOURS = re.compile(r"\d:[0-5]\d:$")
 """Hours and minutes before the seconds: a time, and not one in seconds."""
 _LAST_NUMBER = re.compile(rf".*?({NUMBER})\D*", re.DOTALL)
 SECONDS_CHARS_MAX = 60
-TIMED = python_or_cpp(" % rospy.get_time()", " with ros::Time::now().toSec() for %s")
 UNFILLED = ("%s", "%d", "%f", "{}", "{0}")
 
 
@@ -154,14 +153,12 @@ def _misfit(
     message += f" ({len(wrong)} of {count} are wrong)" if len(wrong) < count else ""
     cited = cite(run, params.topic, at_ns, at_ns)
     hint = f"publish {code_of(params.template)}"
+    timed = SECONDS in params.template
+    if timed and len(wrong) > 1 and len({said for _, said in wrong}) == 1:
+        hint += ", made in the loop for each message"
     verdict = failed(message, hint=hint, citations=(cited,)).about(said=in_one_line(text))
-    right = SECONDS in params.template and _tells_time(package, run, heard)
+    right = timed and _tells_time(package, run, heard)
     return verdict.in_part(OTHER_WORDS_SHARE, "the time") if right else verdict
-
-
-def code_of(template: str) -> str:
-    """Return the expression that makes such a text."""
-    return f'"{template.replace(SECONDS, "%s")}"{TIMED if SECONDS in template else ""}'
 
 
 def _tells_time(package: PackageFacts, run: Run, heard: Sequence[Channel]) -> bool:

@@ -14,7 +14,6 @@ from itertools import islice
 from pathlib import PurePosixPath
 from typing import NamedTuple, TypeVar
 
-from grader.checks.messages import code_of
 from grader.checks.support.exit_causes import syntax_hint
 from grader.checks.support.launch import not_executable
 from grader.checks.support.launch_slips import node_slip, own_script
@@ -28,7 +27,7 @@ from grader.checks.support.scripts import (
     names_script,
     programs,
 )
-from grader.checks.support.text import RATE_SLOT, TYPE_SLOT, VALUE_SLOT, in_language
+from grader.checks.support.text import RATE_SLOT, TYPE_SLOT, VALUE_SLOT, code_of, in_language
 from grader.evidence.events import PACKAGE_RUN
 from grader.installable import noetic_messages
 from grader.judging.cited_lines import LINE_CHARS, LINES_READ

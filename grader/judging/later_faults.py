@@ -11,7 +11,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.checks.messages import code_of
 from grader.checks.support.console_output import probes_on
 from grader.checks.support.exit_causes import MAIN, syntax_hint
 from grader.checks.support.launch import NOT_STARTED, refusal, unset_arg_fixes
@@ -25,6 +24,7 @@ from grader.checks.support.text import (
     SAID_VALUE,
     SECONDS,
     VALUE,
+    code_of,
     could_say,
     in_language,
     in_source,

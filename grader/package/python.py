@@ -331,7 +331,12 @@ def reason_of(
     message, text = message[:TEXT_CHARS_MAX], text[:TEXT_CHARS_MAX]
     vague = message.startswith(_VAGUE) or MERGE_MARKER.match(text) or _LONE.match(text)
     odd = "invalid decimal" in message and _strange(text)  # Python 3.10 on `1` and an invisible character
-    if odd or "invalid character" in message or "non-printable" in message:
+    if (
+        odd
+        or "invalid character" in message
+        or "non-printable" in message
+        or _ends_typographic(message, text)
+    ):
         return _character(message, text)
     if of_block := _reason_of_block(message, text, mixed=mixed):
         return of_block
@@ -393,6 +398,15 @@ def _character(message: str, text: str) -> Reason:
     strange = sorted(_strange(text), key=lambda c: c.isprintable() and c not in typographic)
     unknown = Reason("this line holds a character that Python does not know")
     return _character_words(strange[0]) if strange else unknown
+
+
+def _ends_typographic(message: str, text: str) -> bool:
+    """Return whether a text that never ends begins with a plain quote, and ends with a typographic one."""
+    opened = next((quote for quote in "'\"" if text.count(quote) == 1), "")
+    quotes = "".join(group for group, name, _ in _TYPOGRAPHIC if name == "quote")
+    return bool(_NEVER_ENDED.search(message) and opened) and any(
+        c in quotes for c in text.partition(opened)[2]
+    )
 
 
 def _strange(text: str) -> list[str]:

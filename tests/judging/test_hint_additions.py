@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 
 from grader.checks import CHECKS
-from grader.checks.support.exit_causes import CAUSES
-from grader.checks.support.text import LOOP, in_language, init, publisher, set_param
+from grader.checks.support.text import CAUSES, LOOP, in_language, init, publisher, set_param
 from grader.integrations.bundle import Bundle, add_lab
 from grader.judging import judge
 from grader.judging.facts import Facts, try_facts

@@ -65,6 +65,7 @@ CASES = {
     "quote": ("x = \u2018a\u2019\n", 1, "typographic quote \u2018"),
     "double_quote": ("x = \u201ca b\u201d\n", 1, "typographic quote \u201c"),
     "dash": ("x = 1 \u2013 2\n", 1, "typographic dash"),
+    "quote_at_the_end": ("x = 'a b\u2019\n", 1, "typographic quote \u2019"),
     "no_break": ("if 1:\n\u00a0\u00a0x = 1\n", 2, "no-break space (U+00A0)"),
     "zero_width": ("x = 1\u200b\n", 1, "invisible character (U+200B)"),
     "wide": ("if x\uff1a\n  pass\n", 1, "plain `:`"),

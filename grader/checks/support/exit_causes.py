@@ -60,8 +60,9 @@ from grader.checks.support.scripts import (
 )
 from grader.checks.support.text import (
     ARGUMENT_HINT,
+    CAUSES,
     LOOP,
-    RATE_SLOT,
+    NO_INPUT,
     SPIN,
     VALUE_SLOT,
     explain_arguments,
@@ -82,39 +83,12 @@ OTHER_NAMES_SHOWN = 3
 MAIN = "`if __name__ == '__main__':`"
 RUN_IT = "run it by itself with rosrun, and read what it prints last"
 RACES = ("publish() to a closed topic", "topic was closed during publish()")
-NO_INPUT = f"write {VALUE_SLOT} in place of `input()`"
-PAUSE = f"write `rate = {RATE_SLOT}` above it and `rate.sleep()` as its last line"
 PRINTED_ERROR = re.compile(
     r"name '\w+' is not defined|has no attribute|unexpected keyword argument|missing \d+ required|takes \d+ positional"
     r"|unsupported operand|must be str|not callable|(?:Error|Exception)\b"
 )
 """What an `except Exception as e: print(e)` prints of a mistake in the script."""
 LIMITS = ("limit", "note")  # evidence of earlier versions has it as a note
-CAUSES = {
-    "EOFError": ("it waits for input (`input()`), and a graded node gets no input",
-     f"{NO_INPUT}, and pause in the loop: {PAUSE}"),
-    "BdbQuit": ("the debugger (`set_trace()`, `breakpoint()`) waits for input, and a graded node gets no input",
-     "remove `set_trace()` or `breakpoint()`, and its import"),
-    "ROSInterruptException": ("ROS was told to shut down while the node slept, and nothing caught it",
-     "call your main function in `try: … except rospy.ROSInterruptException: pass`"),
-    "ROSInitException": ("it uses ROS before `rospy.init_node(…)`",
-     "call `rospy.init_node(…)` before the first publish, Rate or sleep"),
-    **dict.fromkeys(("LookupException", "ExtrapolationException", "ConnectivityException"), (
-        "tf does not know the transform yet, as always at the start",
-        "catch it, `try: … except tf2_ros.TransformException:`, or give `lookup_transform(…)` a time to wait")),
-    "KeyboardInterrupt": ("Ctrl-C came at a point where nothing handles it",
-     "loop with `while not rospy.is_shutdown():` and sleep with `rospy.Rate`"),
-    "ModuleNotFoundError": ("",
-     "check the spelling of the import (messages: `std_msgs.msg`), and push it if it is a file or package of your own"),
-    "ImportError": ("", "check the spelling of the import: the message types are at http://wiki.ros.org/std_msgs"),
-    "ResourceNotFound": ("there is no such ROS package", "remove `roslib.load_manifest(…)`: catkin needs no such line"),
-    "NameError": ("", "check the spelling, and that it is imported or assigned before it is used"),
-    "ROSSerializationException": ("", "publish a value that fits the message's type"),
-    "SerializationError": ("", "publish a value that fits the message's type"),
-    "SyntaxError": ("", "compare that line and the end of the one above it with the handout, character by character"),
-    "IndentationError": ("", "indent every block by four spaces, all of its lines alike"),
-    "TabError": ("tabs and spaces are mixed in its indentation", "indent every line with four spaces"),
-}  # fmt: skip
 _NUMBER_WANTED = re.compile(r"must be (?:an integer|unsigned integer|float) type")
 _ILLEGAL_NAME = re.compile(
     r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "

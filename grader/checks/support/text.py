@@ -397,3 +397,43 @@ def refused_options(lines: Iterable[str]) -> str:
     """Return what a program says of the options that it is given and does not know, behind a colon; "" of none."""
     said = next((found[1] for line in lines if (found := REFUSED.match(without_colours(line)))), "")
     return f": {shorten(said, 200)}" if said else ""
+
+
+TIMED = python_or_cpp(" % rospy.get_time()", " with ros::Time::now().toSec() for %s")
+
+
+def code_of(template: str) -> str:
+    """Return the expression that makes such a text."""
+    return f'"{template.replace(SECONDS, "%s")}"{TIMED if SECONDS in template else ""}'
+
+
+NO_INPUT = f"write {VALUE_SLOT} in place of `input()`"
+PAUSE = f"write `rate = {RATE_SLOT}` above it and `rate.sleep()` as its last line"
+CAUSES = {
+    "EOFError": ("it waits for input (`input()`), and a graded node gets no input",
+     f"{NO_INPUT}, and pause in the loop: {PAUSE}"),
+    "BdbQuit": ("the debugger (`set_trace()`, `breakpoint()`) waits for input, and a graded node gets no input",
+     "remove `set_trace()` or `breakpoint()`, and its import"),
+    "ROSInterruptException": ("ROS was told to shut down while the node slept, and nothing caught it",
+     "call your main function in `try: … except rospy.ROSInterruptException: pass`"),
+    "ROSInitException": ("it uses ROS before `rospy.init_node(…)`",
+     "call `rospy.init_node(…)` before the first publish, Rate or sleep"),
+    **dict.fromkeys(("LookupException", "ExtrapolationException", "ConnectivityException"), (
+        "tf does not know the transform yet, as always at the start",
+        "catch it, `try: … except tf2_ros.TransformException:`, or give `lookup_transform(…)` a time to wait")),
+    "KeyboardInterrupt": ("Ctrl-C came at a point where nothing handles it",
+     "loop with `while not rospy.is_shutdown():` and sleep with `rospy.Rate`"),
+    "ModuleNotFoundError": ("",
+     "check the spelling of the import (messages: `std_msgs.msg`), and push it if it is a file or package of your own"),
+    "ImportError": ("", "check the spelling of the import: the message types are at http://wiki.ros.org/std_msgs"),
+    "ResourceNotFound": ("there is no such ROS package", "remove `roslib.load_manifest(…)`: catkin needs no such line"),
+    "NameError": ("", "check the spelling, and that it is imported or assigned before it is used"),
+    "ROSSerializationException": ("", "publish a value that fits the message's type"),
+    "SerializationError": ("", "publish a value that fits the message's type"),
+    **dict.fromkeys(("gaierror", "URLError", "ConnectionError", "ConnectionRefusedError"), (
+        "it needs the network, which a graded node does not have", "leave out what connects to other machines")),
+    "SyntaxError": ("", "compare that line and the end of the one above it with the handout, character by character"),
+    "IndentationError": ("", "indent every block by four spaces, all of its lines alike"),
+    "TabError": ("tabs and spaces are mixed in its indentation", "indent every line with four spaces"),
+}  # fmt: skip
+"""What an exception of this type means, and what to do, where nothing better is known."""

@@ -195,13 +195,14 @@ def added_first(body):
     put = [put_in_messages(one) for one in body] if sent else []
     for at, one in enumerate(body):
         nodes = ast.walk(one) if isinstance(one, ast.If) else [one]
-        for name in dict.fromkeys(dotted(t) for node in nodes for t in increments(node)):
+        adding = [(dotted(t), node.lineno) for node in nodes for t in increments(node)]
+        for name, line in dict(reversed(adding)).items():
             used = [i for i, names in enumerate(put) if i != at and name in names]
             first = (used or sent or [at])[0]
             below = [body[i] for i in sent if i >= first]
             if at < first and below:
                 after = body[body.index(below[0]) + 1 :]
-                yield slip(one.lineno, "added-first", "", added_later(one, name, below[0], after), name)
+                yield slip(line, "added-first", "", added_later(one, name, below[0], after), name)
 
 
 def added_later(one, name, publishes, after):
