@@ -139,7 +139,7 @@ def _absent(package: PackageFacts, launch: str, wanted: set[str]) -> Verdict:
         )
     movable = [p for p in near if can_be_moved(p, launch) and (not wanted or started.get(p, wanted))]
     movable += full[:1] if len(full) == 1 else []
-    path = f"launch/{launch}"
+    path = f"{_launch_folder(package)}/{launch}"
     hint = move_hint(package, movable[0], path) if movable else add_hint(package, path)
     if guessed and not movable:
         hint = f"{hint}, or {move_hint(package, guessed[0], path)} if that is meant to be it"
@@ -159,6 +159,14 @@ def _absent(package: PackageFacts, launch: str, wanted: set[str]) -> Verdict:
     verdict = failed(f"{launch} is not in the package{seen}", hint=hint)
     kind: MistakeKind = "file-elsewhere" if movable or guessed else "file-missing"
     return verdict.about(citations=(FileCitation(file=movable[0] if movable else path),)).lost_by(kind, path)
+
+
+def _launch_folder(package: PackageFacts) -> str:
+    """Return `launch`, or the folder that the package has in its place with other capitals: a file system that tells
+    them apart would have both."""
+    folders = {file.path.partition("/")[0] for file in package.files if "/" in file.path}
+    others = sorted(one for one in folders if one.casefold() == "launch")
+    return "launch" if "launch" in folders or not others else others[0]
 
 
 def starts_built(package: PackageFacts, file: LaunchFile, script: str) -> list[LaunchNode]:
