@@ -145,7 +145,7 @@ def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
         _in_degrees(run)
         or _let_go(run, params)
         or _by_other_clock(run, params, course)
-        or _let_go(run, params, once=True)
+        or _let_go(run, params, course)
         or what_is_wrong(taken, params.way, course, mirror=params.relative)
     )
     verdict = failed(words.message, hint=words.hint, measured=figures)
@@ -191,9 +191,9 @@ def _in_degrees(run: Run) -> Words | None:
     return Words(message, "a turn of 90 degrees is math.pi / 2, in radians: math.radians(90)")
 
 
-def _let_go(run: Run, params: PathParams, *, once: bool = False) -> Words | None:
-    """A robot that stops by itself between two messages, and would take the right way if it did not; `once`: one that
-    is told each velocity once, whatever its way would be."""
+def _let_go(run: Run, params: PathParams, course: Course | None = None) -> Words | None:
+    """A robot that stops by itself between two messages, and would take the right way if it did not; with a `course`,
+    one that is told each velocity once, and would come farther than that."""
     seconds = run_seconds(run)
     if seconds is None or not params.relative:
         return None
@@ -204,8 +204,9 @@ def _let_go(run: Run, params: PathParams, *, once: bool = False) -> Words | None
         if longest_s <= (params.hold_s or math.inf):
             continue
         held = driven(commands, None, commands[-1].time_s + STOPS_AFTER_S)
-        is_once = once and len(moves) > 2 and all(a[1:] != b[1:] for a, b in moves)
-        if is_once or followed(relative(held), params.way.points, params.tolerance_m).done:
+        other = followed(relative(held), params.way.points, params.tolerance_m)
+        is_once = course is not None and len(moves) > 2 and all(a[1:] != b[1:] for a, b in moves)
+        if other.done or (is_once and course is not None and other.reached > course.reached):
             again = f"{longest_s:.1f} s pass before the next message on {channel.topic}"
             why = f"the robot stops by itself: {again}, and a velocity holds for {significant(params.hold_s or 0)} s"
             hint = "publish the velocity again and again, ten times a second, for as long as it should drive or turn"

@@ -181,8 +181,8 @@ _CODE = re.compile(
       | \$\([\w\ ./<>…-]+\)(?:/[\w./<>…-]*[\w>…])?         # a substitution of roslaunch
       | "[^"`]{{1,100}}"\ %\ [\w.]+(?:\(\))?                 # a text with its value
       | \#!/[\w/.-]+(?:\ [\w.]+)?                         # the first line of a script
-      | (?<![\w./])(?:[\w.]+\ [-+*/%]?=\ )?\w[\w.]*\((?!s\)|es\)){_TEXT_ARGUMENTS}\)(?:\.\w+(?:\({_TEXT_ARGUMENTS}\))?)*
-        (?:\['?\w+'?\])*
+      | (?<![\w./])(?:[\w.]+\ [-+*/%]?=\ )?(?:\w+::)*\w[\w.]*\((?!s\)|es\))
+        {_TEXT_ARGUMENTS}\)(?:\.\w+(?:\({_TEXT_ARGUMENTS}\))?)*(?:\['?\w+'?\])*
       | (?<![\w./])[A-Za-z_][\w.]*\[[\w.*-]{{1,20}}\]        # an element
       | (?<![\w./~>])~?/?(?<=[~/])[A-Za-z]\w*(?:/\w+)*/?      # a topic, a path
       | \$\{{\w+\}}\)*

@@ -73,7 +73,8 @@ def hint_beside(criterion: CriterionResult, place: str) -> str:
 
 
 WHOLE_LINE = re.compile(
-    r"write (?=\S*[^\w\s])(?!.*( at | above| below| before| after| inside| every| each))", re.DOTALL
+    r"write (?=\S*[^\w\s])(?!.*( at | above| below| before| after| inside| in place of| every| each))",
+    re.DOTALL,
 )
 """A hint that says which code to write, and not where."""
 

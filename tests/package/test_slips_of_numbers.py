@@ -111,6 +111,12 @@ def test_a_script_that_counts_and_reads_no_clock(tmp_path, value, imported, told
     assert kinds.count("no-clock") == told
 
 
+def test_a_count_is_told_where_its_text_is_made(tmp_path):
+    text = "import rospy\nwhile n < 9:\n    text = 'hello %d' % n\n    n += 1\n    pub.publish(text)\n"
+    (tmp_path / "a.py").write_text(text)
+    assert [s.line for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "no-clock"] == [3]
+
+
 IN_A_CLASS = """\
 class A:
     def %s(self):

@@ -43,6 +43,7 @@ def words(text: str) -> list[str]:
         ("`a.py`, `b c.py`", "<code>a.py</code>, <code>b c.py</code>"),
         ("one ` alone, and a.py", "one ` alone, and <code>a.py</code>"),
         ("`` `a.py` ``", "`` <code>a.py</code> ``"),
+        ("call ros::init(argc, argv) once", "call <code>ros::init(argc, argv)</code> once"),
         ("`<b>|&`", "<code>&lt;b&gt;|&amp;</code>"),
     ],
 )

@@ -143,6 +143,7 @@ def test_a_fix_with_several_steps_is_told_step_by_step() -> None:
         ("src/a.py line 3: indent line 3 by four spaces", "indent line 3 by four spaces"),
         ("write f()", "on line 3, write f()"),
         ("write f() after the loop", "write f() after the loop"),
+        ("write f() in place of g()", "write f() in place of g()"),
         ("write the names one below the other", "write the names one below the other"),
         ('write pkg="lab1"', 'on line 3, write pkg="lab1"'),
         (

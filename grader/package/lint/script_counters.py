@@ -363,7 +363,18 @@ def sends_no_time(tree):
         message = "the script reads the clock once, and counts on from there"
     else:
         message = "the script counts, and reads no clock for what it publishes"
-    yield slip(published[0].lineno, "no-clock", message)
+    sent = {name for n in published for arg in n.args for name in names_in(arg)}
+    made = [
+        n for n in all_of(tree, ast.Assign) if sent.intersection(map(dotted, n.targets)) and is_text(n.value)
+    ]
+    yield slip(min((n.lineno for n in made), default=published[0].lineno), "no-clock", message)
+
+
+def is_text(node):
+    """Return whether an expression makes a text: one with values in it, `str(…)`, or a sum with a text."""
+    if isinstance(node, ast.BinOp):
+        return is_text(node.left) or (isinstance(node.op, ast.Add) and is_text(node.right))
+    return isinstance(node, ast.JoinedStr) or bool(text_of(node)) or called_name(node) in ("str", "format")
 
 
 def clock_values(tree):
