@@ -25,7 +25,7 @@ ENDING_S, STUCK_S = 10.0, 2.0
 """So long after it was sent, a goal without a result may yet end, above all because of a newer one; and so long a newer
 one is not begun with behind one that should have ended."""
 ENDING_TIMES, ENDING_LEAST_S = 2.0, 5.0
-"""One whose result matters no more after a time ends within so many of these, or not at all."""
+"""A goal that criteria wait for only so long is taken to end within so many times that, or not at all."""
 
 
 class GoalSender:

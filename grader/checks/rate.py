@@ -352,7 +352,7 @@ def _at_random(found: Rhythm, run: Run, package: PackageFacts, params: RateParam
         return None
     uneven = failed(f"{params.topic} comes unevenly: {hertz(found.mean_hz)} on average")
     is_right = params.low_hz <= found.mean_hz <= params.high_hz
-    wrong = uneven if is_right else _wrong_mean(found, params).model_copy(update={"timing": False})
+    wrong = uneven if is_right else _wrong_mean(found, params).based_on(timing=False)
     return _with_line(wrong, asked[0], params)
 
 

@@ -325,7 +325,7 @@ def _judge_tests(outcome: SessionOutcome, params: PytestParams) -> Verdict:
     if not counted:
         reason = next((t.message for t in outcome.tests if t.message), "")
         skipped = inconclusive(f"every test was skipped{f': {reason}' if reason else ''}")
-        return skipped.model_copy(update={"unjudged": True})
+        return skipped.based_on(unjudged=True)
     total = sum(t.points for t in counted)
     reached = sum(t.points for t in counted if t.outcome == "passed")
     if total <= 0:

@@ -290,3 +290,21 @@ def test_values_of_a_partial_in_the_place_of_each_other(call: str, fix: str, tmp
     (tmp_path / "a.py").write_text(f"{PARTIAL}t = {call}\n")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "swapped"]
     assert [s.fix for s in slips] == ([fix] if fix else [])
+
+
+ANSWERS = {
+    "answer = AddResponse()\n    answer.sum = 3": ["below line 3, write `return answer` at the end of `add`"],
+    "answer = AddResponse()\n    answer.sum = 3\n    return": [
+        "below line 4, write `return answer` at the end of `add`"
+    ],
+    "answer = AddResponse()\n    answer.sum = 3\n    return answer": [],
+    "answer = AddResponse()\n    answer.sum = 3\n    return self.told(answer)": [],
+    "self.answer = AddResponse()\n    self.answer.sum = 3": [],
+}
+
+
+@pytest.mark.parametrize("body", ANSWERS)
+def test_an_answer_that_is_filled_in_and_not_returned(body: str, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"def add(self, request):\n    {body}\n")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.name == "return"]
+    assert [s.fix for s in slips] == ANSWERS[body]

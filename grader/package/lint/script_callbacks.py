@@ -375,3 +375,17 @@ def slow_functions(functions):
     loops = {name: [n for n in inside[name] if isinstance(n, LOOPS)][:BELOW_LIMIT] for name in inside}
     slow = {name for name in loops if any(is_long_sleep(n) for one in loops[name] for n in ast.walk(one))}
     return slow | {name for name in inside if slow & {called_name(n) for n in inside[name]}}
+
+
+def closed_before(tree):
+    """`with open(…) as file: …` with the `rospy.spin()` below it: callbacks come when the file is closed."""
+    for around in all_of(tree, ast.Module, ast.If, ast.FunctionDef, ast.Try):
+        opened = [at for at, one in enumerate(around.body) if isinstance(one, ast.With)][:1]
+        for at in opened:
+            one = around.body[at]
+            spins = [n for later in around.body[at + 1 :] for n in calls_in(later, "spin", "is_shutdown")]
+            if spins and not calls_in(one, "spin", "is_shutdown"):
+                message = "the `with` of line %d ends before line %d, and closes what it has opened"
+                fix = "indent line %d like line %d, so that it is within the `with`"
+                lines = (spins[0].lineno, one.body[0].lineno)
+                yield slip(one.lineno, "wrong-value", message % (one.lineno, lines[0]), fix % lines, "closed")

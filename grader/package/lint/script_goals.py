@@ -1,4 +1,4 @@
-"""Finds callbacks of actions that end their goal and go on, for `slips.py`.
+"""Finds callbacks of actions that end their goal and go on, or cannot be cancelled, for `slips.py`.
 
 Nothing is executed. Python 3.8, standard library only.
 """
@@ -12,6 +12,7 @@ from script_names import (
 from script_tree import (
     LOOPS,
     all_of,
+    argument,
     called_name,
     calls_in,
     dotted,
@@ -117,3 +118,36 @@ def ended_without_result(tree):
     for call in calls_in(tree, "set_succeeded", "set_aborted", "set_preempted"):
         if not call.args and not call.keywords:
             yield slip(call.lineno, "no-result", dotted(call.func), name=call.func.attr)
+
+
+CANCELS = 3
+"""The place of an `ActionServer`'s function for goals that are cancelled."""
+
+
+def never_cancelled(tree):
+    """An `ActionServer(…)` that is given no function for cancels, and a goal's thread of which `run()` is called."""
+    functions = [n.name for n in all_of(tree, ast.FunctionDef) if "cancel" in n.name.lower()]
+    for call in all_of(tree, ast.Call):
+        if (
+            called_name(call) == "ActionServer"
+            and len(call.args) == CANCELS
+            and not argument(call, CANCELS, "cancel_cb")
+        ):
+            message = (
+                "the action server of line %d is given no function for goals that are cancelled" % call.lineno
+            )
+            name = functions[0] if len(functions) == 1 else "on_cancel"
+            owner = "self." if dotted(call.args[-1]).startswith("self.") else ""
+            fix = "on line %d, write `%s%s` behind `%s`" % (call.lineno, owner, name, dotted(call.args[-1]))
+            yield slip(call.lineno, "wrong-value", message, fix, "uncancelled")
+    threads = {
+        n.name for n in all_of(tree, ast.ClassDef) if any(dotted(b).endswith("Thread") for b in n.bases)
+    }
+    made = [n for n in all_of(tree, ast.Assign) if called_name(n.value) in threads]
+    names = {dotted(target) for n in made for target in n.targets} - {"..."}
+    for call in (n.value for n in all_of(tree, ast.Expr) if is_call_alone(n)):
+        owner, _, method = dotted(call.func).rpartition(".")
+        if method == "run" and owner in names and not call.args:
+            message = "`%s.run()` does its work here, not in a thread of its own: nothing else is heard until it ends"
+            fix = "on line %d, write `%s.start()`" % (call.lineno, owner)
+            yield slip(call.lineno, "wrong-value", message % owner, fix, "uncancelled")

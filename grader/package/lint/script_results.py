@@ -317,3 +317,30 @@ def truth(test, name, value):
             kind in (ast.Is, ast.Eq) if is_same and kind in (ast.Is, ast.Eq, ast.IsNot, ast.NotEq) else None
         )
     return False if dotted(test) == name else None
+
+
+def unreturned_answers(tree):
+    """A function that makes an answer, sets its fields, and has no `return` with a value."""
+    for own in all_of(tree, ast.FunctionDef):
+        inside = list(walk_own(own))
+        made = [n for n in inside if isinstance(n, ast.Assign) and called_name(n.value).endswith("Response")]
+        returns = [n for n in inside if isinstance(n, (ast.Return, ast.Yield)) and n.value is not None]
+        name = dotted(made[0].targets[0]) if len(made) == 1 else "..."
+        stored = [n for n in inside if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)]
+        if returns or not isinstance(made[0].targets[0] if made else None, ast.Name) or name == "...":
+            continue
+        if any(dotted(n.value) == name for n in stored):
+            last = own.body[-1].end_lineno
+            message = "`%s` is made and filled in, and not returned" % name
+            fix = "below line %d, write `return %s` at the end of `%s`" % (last, name, own.name)
+            yield slip(made[0].lineno, "wrong-value", message, fix, "return")
+
+
+def swallowed_exceptions(tree):
+    """An `__exit__` that returns True whatever has happened: no exception leaves its `with`."""
+    for own in (n for n in all_of(tree, ast.FunctionDef) if n.name == "__exit__"):
+        last = own.body[-1]
+        if isinstance(last, ast.Return) and getattr(last.value, "value", None) is True:
+            message = "`__exit__` returns True, so that an exception that is raised in its `with` is dropped"
+            fix = "on line %d, write `return False`: then it goes on to where it is expected" % last.lineno
+            yield slip(last.lineno, "wrong-value", message, fix, "swallowed")

@@ -10,9 +10,6 @@ from collections import Counter
 
 from script_tree import all_of, dotted, parents_of, walk
 
-KEPT = ("all_nodes", "all_parents", "prints_of_loops", "all_callbacks", "all_of_self")
-"""What finders keep of a module."""
-
 
 def name_rospy(tree):
     """Write each such name in the tree as `rospy.…`. Return a function from a text to one with the script's own
@@ -26,8 +23,8 @@ def name_rospy(tree):
         if name:
             whole = ast.copy_location(ast.Attribute(value=whole, attr=name, ctx=ast.Load()), node)
         put_in_place(parents[node], node, whole)
-    for kept in KEPT if used else ():
-        vars(tree).pop(kept, None)
+    for kept in set(vars(tree)).difference(tree._fields) if used else ():
+        delattr(tree, kept)  # what finders keep of the module as it was
     own = {whole: name for name, whole in meant.items()}
     ends = {whole: r"(?=\.)" if whole == "rospy" else r"\b" for whole in own}  # the library is called rospy
     whole = sorted(own, key=len, reverse=True)

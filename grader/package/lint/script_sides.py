@@ -125,20 +125,12 @@ def frames_swapped(tree):
     """`t.header.frame_id = child` beside `t.child_frame_id = parent`."""
     found = {}
     for n in all_of(tree, ast.Assign):
-        target, given = dotted(n.targets[0]), dotted(n.value).rpartition(".")[2]
-        field = (
-            "child"
-            if target.endswith(".child_frame_id")
-            else "parent"
-            if target.endswith(".header.frame_id")
-            else ""
-        )
+        owner, field = frame_field(n)
+        given = dotted(n.value).rpartition(".")[2]
         is_child = bool(re.search("child", given, re.IGNORECASE))
         is_parent = not is_child and bool(re.search("parent", given, re.IGNORECASE))
         if (field == "child" and is_parent) or (field == "parent" and is_child):
-            found.setdefault(target.rpartition(".child_frame_id")[0] or target.rpartition(".header")[0], {})[
-                field
-            ] = n
+            found.setdefault(owner, {})[field] = n
     for one in found.values():
         if len(one) == 2:
             first, second = sorted(one.values(), key=lambda n: n.lineno)
@@ -148,7 +140,17 @@ def frames_swapped(tree):
             yield slip(first.lineno, "wrong-value", message, fix, "frames")
 
 
+def frame_field(assigned):
+    """Return the transform of which a line sets a frame, and which of its two: `child`, `parent`; "" of any other."""
+    target = dotted(assigned.targets[0])
+    ends = {".child_frame_id": "child", ".header.frame_id": "parent"}
+    return next(
+        ((target[: -len(end)], field) for end, field in ends.items() if target.endswith(end)), ("", "")
+    )
+
+
 OF_FRAMES = ("sendTransform", "TransformStamped")
+LOOK_UPS = ("lookup_transform", "lookupTransform", "can_transform")
 
 
 def frames_named(tree):
@@ -159,22 +161,16 @@ def frames_named(tree):
         return
     texts = {}
     for n in all_of(tree, ast.Assign):
-        target = dotted(n.targets[0])
-        if text_of(n.value) and target.endswith("frame_id"):
-            texts.setdefault(
-                target.rpartition(".child_frame_id")[0] or target.rpartition(".header")[0], []
-            ).append(n)
+        owner, field = frame_field(n)
+        if field and text_of(n.value):
+            texts.setdefault(owner, []).append(n)
     for pair in texts.values():
         if len(pair) == 2:
-            parent, child = sorted(pair, key=lambda n: dotted(n.targets[0]).endswith("child_frame_id"))
+            child, parent = sorted(pair, key=lambda n: frame_field(n)[1])
             line = min(parent.lineno, child.lineno)
             yield slip(line, "frames", text_of(parent.value), "", text_of(child.value))
     for call in all_of(tree, ast.Call):
         words = [text_of(one) for one in [*call.args, *(k.value for k in call.keywords)]]
-        if sum(map(bool, words)) == 2 and called_name(call) not in (
-            "lookup_transform",
-            "lookupTransform",
-            "can_transform",
-        ):
+        if sum(map(bool, words)) == 2 and called_name(call) not in LOOK_UPS:
             first, second = filter(None, words)
             yield slip(call.lineno, "frames", first, "", second)

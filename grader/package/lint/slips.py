@@ -84,8 +84,8 @@ def slips(tree):
         calls.locks_taken_twice, calls.values_out_of_order, calls.params_read_early, calls.arguments_out_of_order,
         calls.bare_decorators, scans.first_scans,
         sides.named_sides, sides.frames_swapped, sides.frames_named,
-        grids.rows_of_grids, grids.unreturned_answers, grids.never_cancelled, grids.swallowed_exceptions,
-        grids.closed_before,
+        grids.rows_of_grids, script_results.unreturned_answers, goals.never_cancelled,
+        script_results.swallowed_exceptions, callbacks.closed_before,
     )  # fmt: skip
     as_written = {find: list(find(tree)) for find in OF_NAMES}
     own_words = name_rospy(tree)

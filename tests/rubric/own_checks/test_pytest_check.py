@@ -218,6 +218,7 @@ def test_all_skipped_is_open_or_blocked(tmp_path):
     text = "import pytest\ndef test_a(run):\n    if not run.student_channels('/x'):\n        pytest.skip('no /x')\n"
     found = result(tmp_path, text)
     assert (found.status, found.message) == (Status.INCONCLUSIVE, "every test was skipped: no /x")
+    assert found.basis.unjudged
     criteria = TESTS.replace("points: 100", "points: 50, requires: [type]") + (
         "  - {id: type, title: t, points: 50, check: topic-type, scenario: talker,\n"
         "     with: {topic: /x, type: std_msgs/String}}\n"
