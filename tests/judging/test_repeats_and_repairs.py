@@ -45,9 +45,7 @@ def test_what_was_seen_once_costs_nothing() -> None:
 def test_a_line_that_two_runs_show_is_cited_once() -> None:
     lab = rubric({name: value for name, value in NODE.items() if name != "requires"})
     (name,) = (c.id for c in lab.criteria)
-    slow = failed("slow", citations=(FileCitation(file="src/talker.py", line=3),)).model_copy(
-        update={"timing": True}
-    )
+    slow = failed("slow", citations=(FileCitation(file="src/talker.py", line=3),)).if_repeated()
     found = drop_unrepeated_losses(lab, {name: slow}, {name: slow}, {"talker"})
     assert found[name].citations == slow.citations
 
