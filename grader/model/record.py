@@ -6,7 +6,7 @@ import ast
 import inspect
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from itertools import pairwise
@@ -23,6 +23,13 @@ class Record(BaseModel):
 
     # `defer_build`: a command that uses few records does not wait at its start until all are built.
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """Return a copy with some fields changed. Raises TypeError for a field that the record does not have,
+        which pydantic would take without a word; values are not checked."""
+        if unknown := set(update or {}) - set(type(self).model_fields):
+            raise TypeError(f"{type(self).__name__} has no field {', '.join(sorted(unknown))}")
+        return super().model_copy(update=update, deep=deep)
 
     @classmethod
     def read_json(cls, data: bytes | str) -> Self:

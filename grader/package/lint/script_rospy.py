@@ -11,7 +11,7 @@ from collections import Counter
 from script_tree import all_of, dotted, parents_of, walk
 
 
-def name_rospy(tree):
+def spell_rospy_out(tree):
     """Write each such name in the tree as `rospy.…`. Return a function from a text to one with the script's own
     names."""
     meant = meant_by(tree)

@@ -36,7 +36,7 @@ import script_sleeps as sleeps
 import script_threads
 import script_unsent as unsent
 import script_values as values
-from script_rospy import name_rospy
+from script_rospy import spell_rospy_out
 from script_spellings import spell_plainly
 from script_texts import graph_names, said_texts
 from script_tree import (
@@ -88,7 +88,7 @@ def slips(tree):
         script_results.swallowed_exceptions, callbacks.closed_before,
     )  # fmt: skip
     as_written = {find: list(find(tree)) for find in OF_NAMES}
-    own_words = name_rospy(tree)
+    own_words = spell_rospy_out(tree)
     found = []
     for find in finders:
         for one in as_written[find] if find in as_written else find(tree):
