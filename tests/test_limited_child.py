@@ -26,6 +26,7 @@ OF_REPAIRS = {
     "installable",
     "line_slips",
     "line_slips.python",
+    "line_slips.python_habits",
     "package",
     "package.lint",
     "package.lint.script_blocks",

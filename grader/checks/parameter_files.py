@@ -28,7 +28,7 @@ from grader.checks.support.scripts import add_hint, can_be_moved, find_script, m
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
-from grader.line_slips.python import LFS_BEGINS, LFS_POINTER
+from grader.line_slips.python_habits import LFS_BEGINS, LFS_POINTER
 from grader.line_slips.yaml import levels_of
 from grader.model.package import PackageFacts
 from grader.model.record import Record

@@ -18,7 +18,7 @@ from cmake_parser import ast as nodes
 from cmake_parser.interpreter import Context
 
 from grader.line_slips.cmake import find_slip, is_open
-from grader.line_slips.python import MERGE_MARKER, MERGED
+from grader.line_slips.python_habits import MERGE_MARKER, MERGED
 from grader.model.file_fault import Fault
 from grader.model.package import CMAKE, INTERFACE_FOLDERS, CMakeCall, CMakeFacts
 from grader.package.reading import printable, read_markup

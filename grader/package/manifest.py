@@ -17,7 +17,7 @@ from catkin_pkg.condition import evaluate_condition
 from catkin_pkg.package import InvalidPackage, Package, parse_package_string
 from lxml import etree
 
-from grader.line_slips.python import Reason
+from grader.line_slips.python_habits import Reason
 from grader.line_slips.xml import TAGS
 from grader.model.file_fault import Fault
 from grader.model.package import MANIFEST, Dependency, Manifest, Person

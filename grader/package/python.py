@@ -15,19 +15,16 @@ from pydantic import Field
 
 from grader.limited_child import ChildLimits, run_limited
 from grader.line_slips.python import (
-    BLOCK,
     COMMENTED_OUT,
-    DELETE_LINE,
-    LFS_POINTER,
-    MERGE_MARKER,
     OUT_OF_BLOCK,
-    Reason,
     corrected,
+    from_html,
     other_quotes,
     reason_of_doubled,
     reason_of_line,
     without_texts,
 )
+from grader.line_slips.python_habits import BLOCK, DELETE_LINE, LFS_POINTER, MERGE_MARKER, Reason
 from grader.model.file_fault import Fault
 from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
@@ -141,6 +138,8 @@ _MESSAGES: tuple[tuple[str, ...], ...] = (
      "save it as plain text, with an editor for programs"),
     (r"pointer in a file", *LFS_POINTER),
     (r"PDF in a file", "the whole file is a PDF", "write the script as plain text, with an editor for programs"),
+    (r"no indentation in", "no line of the file is indented, as if its spaces were lost when it was copied",
+     "start it, and all lines of a block, four spaces further in than the line with `:` above; or copy the file again"),
     (r"line numbers in", "each line begins with its number, which is no part of the program",
      "delete the numbers in front of the lines"),
     (r"C\+\+ in a file", "the whole file is C++, and its name ends with .py", "write this node in Python, not in C++"),
@@ -329,7 +328,7 @@ def reason_of(
     closed, `mixed` whether the file indents with tabs and with spaces.
     """
     message, text = message[:TEXT_CHARS_MAX], text[:TEXT_CHARS_MAX]
-    vague = message.startswith(_VAGUE) or MERGE_MARKER.match(text) or _LONE.match(text)
+    vague = any((message.startswith(_VAGUE), MERGE_MARKER.match(text), _LONE.match(text), from_html(text)))
     odd = "invalid decimal" in message and _strange(text)  # Python 3.10 on `1` and an invisible character
     if (
         odd

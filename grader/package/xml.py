@@ -10,7 +10,7 @@ from itertools import islice
 
 from lxml import etree
 
-from grader.line_slips.python import LFS_BEGINS, LFS_POINTER, MERGED, Reason
+from grader.line_slips.python_habits import LFS_BEGINS, LFS_POINTER, MERGED, Reason
 from grader.line_slips.text import LineSlip, changed_line, doubled_and_turned
 from grader.line_slips.xml import ATTRIBUTES, DECLARATION, TAGS, slips_of
 from grader.model.file_fault import Fault

@@ -51,8 +51,8 @@ def places(criterion: CriterionResult) -> list[str]:
 
 
 def file_places(criterion: CriterionResult) -> list[str]:
-    """Return those of `places` that are files of the student's: `src/talker.py:17`."""
-    return [clip(_place(citation), PLACE_CHARS) for citation in _cited_files(criterion)]
+    """Return those of `places` that are files of the student's, each line once: `src/talker.py:17`."""
+    return list(dict.fromkeys(clip(_place(citation), PLACE_CHARS) for citation in _cited_files(criterion)))
 
 
 def _cited_files(criterion: CriterionResult) -> list[FileCitation]:

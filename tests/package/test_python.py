@@ -26,6 +26,10 @@ CASES = {
     "exec": ('exec "x"\n', 1, "`exec` has no brackets, as in Python 2"),
     "backticks": ("x = `1`\n", 1, "backticks"),
     "markdown": ("```python\nx = 1\n```\n", 1, "this is Markdown"),
+    "label": ("Toggle line numbers\n#!/usr/bin/env python\nx = 1\n", 1, "this is text, from a page or a chat"),
+    "sentence": ("x = 1\nThis node publishes the numbers.\n", 2, "this is text, from a page or a chat"),
+    "html": ("x = 1\nif x &lt; 2:\n    x = 2\n", 2, "as in the source of a web page"),
+    "html_quotes": ("x = &quot;a&quot;\n", 1, "as in the source of a web page"),
     "markdown_end": ("x = 1\n```\n", 2, "this is Markdown"),
     "unequal": ("if 1 <> 2:\n  pass\n", 1, "`!=`"),
     "long": ("x = 10L\n", 1, "`L`"),
@@ -193,6 +197,7 @@ def assert_cases(report):
         ("if x:\nx = 0\n", "must be indented"),
         ("class A:\ndef f(self):\n    pass\n", "must be indented"),
         ("def f():\nx = 1\n", "must be indented"),
+        ("def f():\nif x:\nx = 1\nif y:\ny = 1\n", "no line of the file is indented"),
     ],
 )
 def test_a_block_without_a_line_is_told_from_one_that_is_not_indented(tmp_path, text, cause):

@@ -69,6 +69,7 @@ NO_SCRIPTS = (
 )
 """How files begin that were saved under a script's name."""
 NUMBERED_LINES = 5
+HEAD_OF_BLOCK = re.compile(r"(?:def|class|if|elif|else|while|for|try|except|with)\b.*:\s*$")
 ENCODINGS = (SyntaxError, LookupError, UnicodeDecodeError)
 
 
@@ -365,6 +366,13 @@ def empty_at_end(lines, line, message):
     return None
 
 
+def has_no_indentation(lines):
+    """Return whether a file with three blocks or more begins each line at the margin."""
+    return sum(map(bool, map(HEAD_OF_BLOCK.match, lines))) > 2 and not any(
+        text[:1].isspace() and text.strip() for text in lines
+    )
+
+
 def block_fault(lines, line, message):
     """Return the fault of a block whose first line or whole body is a comment, or which some of its lines are out of;
     None else."""
@@ -385,6 +393,7 @@ def block_fault(lines, line, message):
     if head is not None and "expected an indented" in message:
         is_out = len(blanks_of(lines[line - 1])) < len(blanks_of(lines[head]))
         told = "the same line twice" if lines[line - 1].strip() == lines[head].strip() else ""
+        told = "no indentation in the text" if has_no_indentation(lines) else told
         if not told and (is_out or lacks_body(lines[head], lines[line - 1])):
             told = "nothing in the block on line %d" % (head + 1)
         if told:

@@ -16,7 +16,6 @@ from itertools import takewhile
 from typing import Any
 
 from grader.line_slips.python import (
-    DELETE_LINE,
     PLAIN,
     corrections,
     reason_of_line,
@@ -24,6 +23,7 @@ from grader.line_slips.python import (
     without_comment_sign,
     without_texts,
 )
+from grader.line_slips.python_habits import DELETE_LINE
 from grader.package.lint.script_blocks import first_version, lacks_body, lacks_head
 from grader.package.lint.script_spellings import without_types
 from grader.package.python_repairs.lost_heads import lost_head_at

@@ -17,7 +17,7 @@ from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
 from grader.files import atomic_write, open_untrusted
-from grader.line_slips.python import MERGED
+from grader.line_slips.python_habits import MERGED
 from grader.model.package import CMAKE, MANIFEST
 from grader.model.repair import Repair, RepairKind, added_lines, messages_of
 from grader.package.lint.script_blocks import first_version

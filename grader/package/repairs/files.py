@@ -183,7 +183,8 @@ def find_renames(package: PackageFacts, wanted: Wanted) -> dict[str, str]:
 
 def _meant_script(package: PackageFacts, wanted: Wanted, name: str, others: set[str]) -> str:
     """Return the only script that has all of the topics of the one of this name, and makes the lab's node or is called
-    by another word for it; "" if there is none. One that has some of them, such as a handed out one, may be another."""
+    by another word for it; "" if there is none. One that only has the topics, where the lab names no node, may do
+    something else, and so may one that has some of them, such as a handed out one."""
     does = [
         (kind, used.lstrip("/"))
         for path, kind, used in wanted.does
@@ -197,7 +198,7 @@ def _meant_script(package: PackageFacts, wanted: Wanted, name: str, others: set[
             found.setdefault(slip.file, set()).add((slip.kind, slip.message.lstrip("/")))
     does_it = {path: done for path, done in found.items() if does and topics <= done}
     called = [path for path in does_it if topics and has_role_of(path, name)]
-    meant = [path for path, done in does_it.items() if not nodes or nodes & done] or called
+    meant = [path for path, done in does_it.items() if nodes & done] or called
     return meant[0] if len(meant) == 1 else ""
 
 

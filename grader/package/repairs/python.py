@@ -17,7 +17,8 @@ from typing import Literal
 
 from grader.installable import exists_somewhere, known_packages, noetic_messages
 from grader.limited_child import ChildLimits, run_limited
-from grader.line_slips.python import COMMENTED_OUT, DELETE_LINE, MERGED, OUT_OF_BLOCK, Reason
+from grader.line_slips.python import COMMENTED_OUT, OUT_OF_BLOCK
+from grader.line_slips.python_habits import DELETE_LINE, MERGED, Reason
 from grader.model.package import INTERFACE_FOLDERS, PackageFacts
 from grader.model.record import Record
 from grader.model.repair import Repair, RepairKind, as_code
