@@ -350,7 +350,7 @@ def refused_type(run: Run, topic: str) -> Verdict | None:
     other = f"another definition of {asked.type}" if asked.type == asked.value else asked.type
     message = f"{asked.actor} subscribes to {topic} with {other}, so nothing arrives"
     wanted = f"{asked.value}, the type" if isinstance(asked.value, str) else "the type"
-    hint = f"use {wanted} that the handout asks for in {subscriber(topic)}"
+    hint = f"in {subscriber(topic)}, use {wanted} that the handout asks for"
     if isinstance(asked.value, str) and "/" in asked.value and asked.type != asked.value:
         of_types, _, name = asked.value.partition("/")
         hint = f"{hint}, with `{imports(of_types, name, 'msg')}` at the top"
