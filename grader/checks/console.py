@@ -56,6 +56,7 @@ from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, failed_or_blocked, passed
 from grader.wording import plural, significant
 
+NUMERAL = re.compile(NUMBER)
 LINE_CHARS_MAX = 1_000
 """A text is looked for in so much of a line."""
 # Decimal numbers are not exact as floats: 0.4 differs from 0.3 by more than 0.1.
@@ -172,12 +173,18 @@ def _not_printed(
     one: Life, lines: Sequence[Line], package: PackageFacts, run: Run, params: PrintsParams
 ) -> Verdict:
     refused = any(OTHER_DEFINITION in line.text for line in lines)  # no number in that line is an answer
-    other = [line for line in lines if any(params.found_in(line)) and not refused]
+    given = (
+        {float(word) for word in one.start.argv if NUMERAL.fullmatch(word)}
+        if params.is_number_alone
+        else set()
+    )
+    other = [line for line in lines if not refused and _says_other(line, params, given)]
     hint = f"print {params.words} where it happens"
     failing = one.ended_early and (one.end is None or one.end.exit_code != 0)
     asked = asked_services(one, run)
     absent = [name for name, is_there in asked.items() if not is_there and name not in offered_services(run)]
     lacking = absent[0] if absent and not one.ended_early else ""
+    never = f"it never prints {params.words}"
     # Where the call failed or the program crashed, a number on a line need not be an answer.
     if other and not (lacking or (failing and params.is_number_alone)):
         near = f", within {significant(params.tolerance)}" if params.tolerance else ""
@@ -188,11 +195,10 @@ def _not_printed(
         early = _called_early(one, asked, run)
         return _early_call(ended, early) if early else end.verdict(failed_or_blocked, f"{ended}: {end.cause}")
     if error := explain_error(package, run):
-        return error.verdict(failed_or_blocked, f"it never prints {params.words}: {error.cause}")
+        return error.verdict(failed_or_blocked, f"{never}: {error.cause}")
     # What comes after Ctrl-C says how the program stops, not what it does.
     own = [line for line in lines if one.interrupt_ns is None or line.at_ns < one.interrupt_ns]
     deaf = unheard(run, package)
-    never = f"it never prints {params.words}"
     unheard_of = (
         failed_or_blocked(f"{never}: {deaf.message}", hint=deaf.hint).caused_by(deaf) if deaf else None
     )
@@ -204,12 +210,23 @@ def _not_printed(
         or unreached_except(package, one, never, params.found_in, _of_client(asked, run))
     ):
         return why
+    # One that goes on until Ctrl-C may still wait for its answer.
+    waits = not one.ended_early and not _of_students(run).isdisjoint(asked)
     if not own:
-        return _nothing_printed(package, run, params, hint).if_repeated().based_on(silent=True)
+        silent = _nothing_printed(package, run, params, hint).if_repeated().based_on(silent=True)
+        return silent.late() if waits else silent
     meant = max(own, key=lambda line: SequenceMatcher(None, params.words, line.text[:LINE_CHARS_MAX]).ratio())
     hint = _of_whole_answer(meant, params) or unfilled(meant.text) or hint
     lost = _of_client(asked, run)(f"{never}; it prints {shown(meant.text)!r}", hint=hint)
-    return lost.about(said=meant.text).if_repeated()
+    lost = lost.about(said=meant.text).if_repeated()
+    return lost.late() if waits else lost
+
+
+def _says_other(line: Line, params: PrintsParams, given: set[float]) -> bool:
+    """Return whether the text stands on the line with other numbers than those that the program was given."""
+    return any(
+        not found.groups() or not set(map(float, found.groups())) <= given for found in params.found_in(line)
+    )
 
 
 def _nothing_printed(package: PackageFacts, run: Run, params: PrintsParams, hint: str) -> Verdict:
@@ -244,13 +261,13 @@ def _unseen(one: Life, package: PackageFacts, run: Run, params: PrintsParams, ne
 
 def _of_client(asked: Iterable[str], run: Run) -> Callable[..., Verdict]:
     """Return how a loss is told: what a client prints wrong may be what another node of the student's answers."""
-    of_students = {
-        name
-        for _, e in run.graph
-        for name, nodes in e.services.items()
-        if any(map(run.is_student_node, nodes))
-    }
-    return failed if of_students.isdisjoint(asked) else failed_or_blocked
+    return failed if _of_students(run).isdisjoint(asked) else failed_or_blocked
+
+
+def _of_students(run: Run) -> set[str]:
+    """Return the services that the student's nodes offer."""
+    offered = (one for _, event in run.graph for one in event.services.items())
+    return {name for name, nodes in offered if any(map(run.is_student_node, nodes))}
 
 
 def _of_whole_answer(line: Line, params: PrintsParams) -> str:

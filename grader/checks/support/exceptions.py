@@ -190,6 +190,8 @@ def _value(message: str, source: str, _marked: tuple[int, int] | None) -> Meanin
         return f"{plural(int(found[2]), 'value')} are expected on the right of `=`{came}", hint
     if found := _NO_ITEMS.search(message):
         return no_items(found[1], source)
+    if message == "sleep length must be non-negative":
+        return "`time.sleep` takes how many seconds to wait, and gets less than 0", "give it 0 or more"
     found = _NO_NUMBER.search(message)
     return _of_text(message, found[1], source) if found else None
 
