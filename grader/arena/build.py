@@ -6,7 +6,7 @@ import json
 import os
 import shlex
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -37,6 +37,8 @@ TRACE = "cmake-trace.json"
 SYNTAX = "syntax.jsonl"
 ENVIRONMENT = "environment"
 SETUP = "setup.bash"
+TWICE = """n=$1; shift; "${@:1:n}" >/dev/null 2>&1; exec "${@:n+1}\""""
+"""Runs so many of its words as one command, and then the others, whose output alone counts."""
 DUMP = """for name in $(compgen -e); do printf '%s=%s\\0' "$name" "${!name}"; done;"""
 """As `env -0` does, which could not even be started where a variable is too large for the kernel."""
 
@@ -66,12 +68,13 @@ async def build(
     python_files: Iterable[str],
     answers: Iterable[str],
     *,
+    headers: Sequence[str] = (),
     last_run: bool = False,
     answers_of: Mapping[str, Iterable[str]] = MappingProxyType({}),
 ) -> tuple[ProcessEnvironment, BuildOutcome]:
     """Run `catkin_make`, then `rosrun` on each script of `answers` as handed in (`answers_of`: of the lab's other
-    packages); what they print is evidence. `python_files`, where there are any, are compiled by ROS's own Python, and
-    not run.
+    packages); what they print is evidence. `headers` are targets to be made before the others. `python_files`, where
+    there are any, are compiled by ROS's own Python, and not run.
 
     Returns the place with the built workspace's environment. Raises ArenaError where the arena fails.
     """
@@ -80,7 +83,9 @@ async def build(
     (place.folder / "bin" / "python-files.json").write_text(json.dumps(to_compile := list(python_files)))
     async with ArenaSession(place, writer, master=False, last_run=last_run) as arena:
         beside = [_syntax_spec(place)] if to_compile else []
-        ended = await _run_catkin_make(place, arena, beside, with_base=wants_base)
+        ended = await _run_catkin_make(
+            place, arena, _catkin_make(place, headers), beside, with_base=wants_base
+        )
         ok = arena.exit_codes.get(CATKIN_MAKE) == 0
         built = await _with_setup(place, arena) if ok else place.from_source()
         for package, scripts in ((None, answers), *answers_of.items()):
@@ -98,26 +103,34 @@ async def build(
         run_in_place(place.workspace, place.sandbox)
     trace, too_much = _trace(place)
     _note_excess(writer, built.built.too_much, too_much)
-    others = {name: own for name in place.workspace.others if (own := place.of(name)) is not None}
     return built, BuildOutcome(
         ok=ok,
         trace=trace,
         root=place.package_folder,
         syntax=_kept_file(place, SYNTAX) if to_compile else None,
-        others={
-            name: CMakeTrace(trace=_trace(one)[0], root=one.package_folder) for name, one in others.items()
-        },
+        others=dict(_traces_of_others(place)),
         cpu_s=arena.cpu_s,
         student_cpu_s=arena.student_cpu_s,
     )
 
 
+def _traces_of_others(place: ProcessEnvironment) -> Iterator[tuple[str, CMakeTrace]]:
+    for name in place.workspace.others:
+        if (own := place.of(name)) is not None:
+            yield name, CMakeTrace(trace=_trace(own)[0], root=own.package_folder)
+
+
 async def _run_catkin_make(
-    place: ProcessEnvironment, arena: ArenaSession, beside: list[dict[str, Any]], *, with_base: bool
+    place: ProcessEnvironment,
+    arena: ArenaSession,
+    command: list[str],
+    beside: list[dict[str, Any]],
+    *,
+    with_base: bool,
 ) -> bool:
-    """Build the workspace, with other processes beside it; return whether the build ended by itself."""
+    """Build the workspace by the command, with other processes beside it; return whether the build ended by itself."""
     arena.course(ScenarioEvent(event="begin"))
-    arena.start(place.spec(CATKIN_MAKE, _catkin_make(place), role="build", build=True, collect=ARCHIVE))
+    arena.start(place.spec(CATKIN_MAKE, command, role="build", build=True, collect=ARCHIVE))
     for spec in beside:
         arena.start(spec)
     if with_base:  # beside the build, on another core
@@ -129,18 +142,23 @@ async def _run_catkin_make(
     return ended
 
 
-def _catkin_make(place: ProcessEnvironment) -> list[str]:
+def _catkin_make(place: ProcessEnvironment, headers: Sequence[str]) -> list[str]:
     """Return the command of the build, with a trace of every `CMakeLists.txt` and of the package's own `.cmake` files.
-    The package's part is picked from it later."""
+    The package's part is picked from it later. Of the `headers`, the targets are made first: whether a program that
+    does not wait for them finds them would be luck, and is judged by the files."""
     own = (place.workspace, *place.workspace.others.values())
     packages = [one.repaired / one.folder for one in own]
     found = {p.relative_to(folder).as_posix() for folder in packages for p in folder.rglob("*.cmake")}
     included = sorted(found)[:INCLUDED_MAX]
-    return [
+    whole = [
         *catkin_make(place), "--trace-expand", "--trace-format=json-v1",
         *(f"--trace-source={name}" for name in ("CMakeLists.txt", *included)),
         f"--trace-redirect={place.output}/{TRACE}",
     ]  # fmt: skip
+    if not headers:
+        return whole
+    first = [*whole, "--make-args", "-k", *headers]
+    return ["/bin/bash", "-c", TWICE, "bash", str(len(first)), *first, *whole]
 
 
 def _note_excess(writer: EvidenceWriter, *found: str) -> None:

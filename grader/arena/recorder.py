@@ -46,6 +46,7 @@ from grader.model.package import PackageFacts
 from grader.model.result import Progress
 from grader.model.submission import Submission
 from grader.package.facts import python_paths, with_build_facts
+from grader.package.manifest import read_manifest
 from grader.package.python import REPORT_BYTES_MAX, SyntaxReport, read_syntax_report
 from grader.ros_env import INSTALL_HINT, NO_ROS, find_ros
 from grader.rubric.model import Rubric
@@ -193,7 +194,13 @@ class Recorder:
             try:
                 await provide_course(place)
                 self._place, outcome = await build(
-                    place, writer, _python_files(place, facts), faulty, last_run=last, answers_of=answers_of
+                    place,
+                    writer,
+                    _python_files(place, facts),
+                    faulty,
+                    headers=_headers_included(place, facts),
+                    last_run=last,
+                    answers_of=answers_of,
                 )
             except ArenaError as error:
                 if not last:
@@ -317,6 +324,21 @@ def _python_files(place: ProcessEnvironment, facts: PackageFacts) -> list[str]:
     if clean and place.ros.python_version == sys.version_info[:2]:
         return []
     return [_above(place, one) + path for one in packages for path in python_paths(one)]
+
+
+def _headers_included(place: ProcessEnvironment, facts: PackageFacts) -> list[str]:
+    """Return the targets that make the headers of the workspace's own messages which C++ of the lab's packages
+    includes."""
+    included = {
+        header.partition("/")[0]
+        for one in (facts, *facts.also)
+        for file in one.files
+        for header in file.headers
+    }
+    folders = (place.workspace.built / "src").iterdir() if included else ()
+    manifests = (read_manifest(folder)[0] for folder in sorted(folders) if folder.is_dir())
+    names = {one.name for one in manifests if one is not None}
+    return [f"{name}_generate_messages_cpp" for name in sorted(names & included)]
 
 
 def _with_build_facts(

@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.registry import NoParams, check
-from grader.checks.support.build_errors import UNKNOWN_COMMAND, explain_error_of_build
+from grader.checks.support.build_errors import MAY_FAIL, UNKNOWN_COMMAND, explain_error_of_build
 from grader.checks.support.cpp_errors import FIRST_ERROR_HINT, first_error
 from grader.checks.support.exit_causes import RUN_IT, explain_end
 from grader.checks.support.launch import IGNORE
@@ -29,6 +29,8 @@ from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite
 from grader.evidence.events import CATKIN_MAKE, STOPPED
 from grader.evidence.run import Run
+from grader.installable import noetic_messages
+from grader.model.generated_headers import fixes_of, reasons_of, unwaited_targets
 from grader.model.package import CMAKE, Executable, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import (
@@ -61,6 +63,7 @@ LINK_LIBRARIES_HINT = (
     "find_package(catkin REQUIRED COMPONENTS …)"
 )
 EXPECTED = "catkin_make exits with 0"
+NOT_BUILT = "not built"
 INSTALL_ROS = (
     "install ROS 1 with `make setup`, or `apt-get install python3-rospy python3-roslaunch rosbash catkin`, "
     "and grade again"
@@ -98,14 +101,16 @@ def build(package: PackageFacts, build: Run, params: BuildParams) -> Verdict:
         By the exit code of `catkin_make`; the first error that it printed is quoted. A package with a file
         `CATKIN_IGNORE` is not built at all. Nodes are run anyway, from their sources. A script can be run
         if `catkin_install_python` puts it into `devel/lib`, or if `rosrun` finds it in the package; another
-        criterion judges whether it is executable.
+        criterion judges whether it is executable. Whether a C++ program waits for the headers of your own
+        messages is read in `CMakeLists.txt`: where none makes it wait, a build with several processes fails
+        on one day and not on the next.
 
     How to fix
         Clone your repository into a new workspace, run `catkin_make`, and fix the first error: the later
         ones often follow from it.
     """
     scripts = f", and {join_words(params.scripts)} there to run" if params.scripts else ""
-    verdict = judge_build(package, build)
+    verdict = _with_unwaited(package, judge_build(package, build))
     if verdict.status is Status.PASS:
         verdict = _unseen(package) or _lost_scripts(package, params.scripts) or verdict
     return verdict.about(expected=f"{verdict.expected or EXPECTED}{scripts}")
@@ -115,12 +120,35 @@ def _unseen(package: PackageFacts) -> Verdict | None:
     """Return the loss of a package that catkin does not find, or is told to pass over: it builds nothing of it."""
     if package.has_no_manifest:
         why = "catkin_make builds nothing of the package: catkin does not see one without package.xml"
-        return failed_or_blocked(why, measured="not built", hint="write package.xml, then run catkin_make")
+        return failed_or_blocked(why, measured=NOT_BUILT, hint="write package.xml, then run catkin_make")
     if package.file(IGNORE) is None:
         return None
     message = f"catkin_make builds nothing of the package: {IGNORE} hides it from catkin"
     place = (FileCitation(file=IGNORE),)
-    return failed(message, measured="not built", hint=f"git rm {IGNORE}", citations=place)
+    return failed(message, measured=NOT_BUILT, hint=f"git rm {IGNORE}", citations=place)
+
+
+def _with_unwaited(package: PackageFacts, verdict: Verdict) -> Verdict:
+    """Return the verdict with the programs that may be compiled too early: by the files, since luck decides whether a
+    build shows them."""
+    views = ((one, unwaited_targets(one, noetic_messages())) for one in package.views())
+    other, found = next((pair for pair in views if pair[1]), (package, []))
+    is_judged = verdict.status in (Status.PASS, Status.FAIL, Status.BLOCKED) or verdict.measured == NOT_BUILT
+    if not found or not is_judged or MAY_FAIL in verdict.message:
+        return verdict
+    why, hint = f"{MAY_FAIL}: {'; '.join(reasons_of(found))}", "; ".join(fixes_of(found))
+    lines = tuple(dict.fromkeys(one.line.place for one in found))
+    if not verdict.status.is_lost or verdict.status.is_open:
+        lost = failed(why, expected=EXPECTED, measured=verdict.measured, hint=hint, citations=lines)
+        return lost.moved(package.way_to(other)) if other.path != package.path else lost
+    if other.path != package.path:
+        why, lines = f"{other.name}: {why}", ()
+    update = {
+        "message": f"{verdict.message}; besides, {why}",
+        "hint": "; ".join(filter(None, (verdict.hint, hint))),
+        "citations": tuple(dict.fromkeys((*verdict.citations, *lines))),
+    }
+    return verdict.model_copy(update=update)
 
 
 def judge_build(package: PackageFacts, build: Run) -> Verdict:
@@ -129,7 +157,7 @@ def judge_build(package: PackageFacts, build: Run) -> Verdict:
     if "start" not in found and "exit" not in found:
         reason = build.metadata.get("not_run") or (build.outcome.detail if build.outcome else "")
         message = f"the package was not built{': ' + reason if reason else ''}"
-        return inconclusive(message, expected=EXPECTED, measured="not built", hint=run_hint(reason))
+        return inconclusive(message, expected=EXPECTED, measured=NOT_BUILT, hint=run_hint(reason))
     if "exit" not in found or (build.outcome is not None and build.outcome.outcome == "host"):
         detail = build.outcome.detail if build.outcome else "the recording was cut short"
         message = f"the build failed on the grading machine: {detail}"
@@ -295,7 +323,7 @@ def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
         Fix the first error of `catkin_make`. For a program that does not start: `rosrun <package>
         <program>` shows what is missing; `target_link_libraries(<program> ${catkin_LIBRARIES})` links ROS.
     """
-    verdict = judge_build(package, build)
+    verdict = _with_unwaited(package, judge_build(package, build))
     expected = f"{verdict.expected}; each program of add_executable starts"
     verdict = (_unseen(package) if verdict.status is Status.PASS else None) or verdict
     if verdict.status is not Status.PASS:

@@ -214,7 +214,8 @@ class SourceFile(Record):
     `link` is the target of a symbolic link as written. A link to a file of the same package has that file's
     facts; any other has `link_problem`, size 0 and the digest of its target's text. `python` marks files
     that are Python by name or shebang; `python_fault` says why ROS's Python does not compile one, and `imports` has the
-    package's own files that it names in its imports.
+    package's own files that it names in its imports. `headers` has what a file of C++ includes, by itself or by the
+    package's own headers, of the form `lab1/Num.h`, as the build makes them of messages.
     `shebang_problem` says why the system cannot start a script by its first line ("" if it can, and for
     files that are not scripts), and `shebang_fault` whether more than that line is wrong. `sha256` is empty
     for a file that cannot be read.
@@ -237,6 +238,7 @@ class SourceFile(Record):
     python: bool = False
     python_fault: Fault | None = None
     imports: tuple[str, ...] = Field(default=(), exclude_if=lambda value: not value)
+    headers: tuple[str, ...] = Field(default=(), exclude_if=lambda value: not value)
 
     @property
     def names_other_language(self) -> bool:

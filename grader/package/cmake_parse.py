@@ -84,6 +84,11 @@ def parse_cmake(folder: Path, name: str) -> CMakeFacts | None:
         if data.kind == "Missing" and not is_link:
             return None
         return CMakeFacts(file=CMAKE, source="parser", calls=(), fault=data)
+    return read_calls(data, folder, name)
+
+
+def read_calls(data: bytes, folder: Path, name: str) -> CMakeFacts:
+    """Return the calls of a package whose `CMakeLists.txt` holds this. Never raises."""
     reader = _Reader(folder, name)
     tree, fault = parse_tree_of(data, CMAKE)
     reader.run(tree, CMAKE, 0)

@@ -15,6 +15,14 @@ from grader.package.reading import SOURCE_LIMIT_BYTES, printable, read_markup
 from grader.wording import join_words
 
 SUFFIXES = frozenset({".cpp", ".cc", ".cxx"})
+_OF_HEADERS = frozenset({".h", ".hh", ".hpp", ".hxx"})
+HEADERS_MAX = 100
+"""So many files are read for what they include, and so much of each counts."""
+_DIRECTIVE = re.compile(
+    r"^[ \t]*#[ \t]*(?:include[ \t]*[<\"](?P<header>[\w./-]{1,200})[>\"]"
+    r"|(?P<off>if[ \t]+0\b)|(?P<on>else|elif|endif)\b)",
+    re.MULTILINE,
+)
 FILES_MAX = 50
 SHORT_S = 0.1
 """A callback may wait for less than this."""
@@ -307,6 +315,44 @@ def _asleep(path: str, code: str) -> Iterator[PythonSlip]:
             line, pause = _line(code, match.start()), f"{pause_s:g}"
             message = f"line {line} of {path} lets it sleep for {pause} s at a time"
             yield PythonSlip(file=path, line=line, kind="deaf", message=message, name=pause)
+
+
+def included_headers(folder: Path, paths: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    """Return of each C++ source among the paths which headers of the form `lab1/Num.h` it includes that are no files of
+    the package: by itself, or by the package's own headers."""
+    own = [path for path in paths if PurePosixPath(path).suffix in SUFFIXES | _OF_HEADERS][:HEADERS_MAX]
+    named = {printable(path): _includes(folder, path) for path in own}
+    ends: dict[str, list[str]] = {}
+    for path in named:
+        ends.setdefault(PurePosixPath(path).name, []).append(path)
+    found: dict[str, tuple[str, ...]] = {}
+    for source in (path for path in named if PurePosixPath(path).suffix in SUFFIXES):
+        others: dict[str, None] = {}
+        read, queue = {source}, [source]
+        for path in queue:
+            for header in named[path]:
+                alike = [
+                    p for p in ends.get(PurePosixPath(header).name, ()) if f"/{p}".endswith(f"/{header}")
+                ]
+                queue += [p for p in dict.fromkeys(alike) if p not in read]
+                read.update(alike)
+                if not alike and re.fullmatch(r"\w+/\w+\.h", header):
+                    others[header] = None
+        found[source] = tuple(others)
+    return found
+
+
+def _includes(folder: Path, path: str) -> tuple[str, ...]:
+    """Return what a file includes, but for comments and what stands behind `#if 0`."""
+    data = read_markup(folder, path, SOURCE_LIMIT_BYTES)
+    text = "" if isinstance(data, Fault) else data.decode("utf-8", "replace")
+    code = _TEXT.sub(lambda found: found[0] if found[0].startswith('"') else " ", text)
+    found, is_off = list[str](), False
+    for match in _DIRECTIVE.finditer(code):
+        is_off = match["off"] is not None or (is_off and match["on"] is None)
+        if match["header"] and not is_off:
+            found.append(match["header"].removeprefix("../"))
+    return tuple(found[:HEADERS_MAX])
 
 
 def _typed(path: str, code: str) -> Iterator[PythonSlip]:

@@ -26,7 +26,7 @@ from grader.model.message_definitions import PARTS, parse_interface
 from grader.model.package import Interface, PackageFacts, Shebang, ShebangFault, SourceFile
 from grader.model.python_slip import PythonSlip
 from grader.model.submission import SourcePackage, Submission
-from grader.package.cpp import SUFFIXES, cpp_slips
+from grader.package.cpp import SUFFIXES, cpp_slips, included_headers
 from grader.package.own_modules import drop_slips_of_modules, imported_files
 from grader.package.python import check_syntax
 from grader.package.reading import (
@@ -305,7 +305,7 @@ def read_package(
         manifest=manifest,
         manifest_fault=manifest_fault,
         cmake=cmake,
-        files=_with_imports(_with_faults(files, report.faults), texts),
+        files=_with_imports(package.folder, _with_faults(files, report.faults), texts),
         launch_files=tuple(one for one in launch_files if not one.given),
         launched=tuple(one for one in launch_files if one.given),
         hints=hints,
@@ -400,9 +400,20 @@ def _with_faults(files: tuple[SourceFile, ...], faults: Mapping[str, Fault]) -> 
     return tuple(file.model_copy(update={"python_fault": faults.get(file.path)}) for file in files)
 
 
-def _with_imports(files: Iterable[SourceFile], texts: Mapping[str, str]) -> tuple[SourceFile, ...]:
-    imported = {path: own[:IMPORTS_MAX] for path, own in imported_files(texts).items()}
-    return tuple(one.model_copy(update={"imports": imported.get(one.path, ())}) for one in files)
+def _with_imports(
+    folder: Path, files: Collection[SourceFile], texts: Mapping[str, str]
+) -> tuple[SourceFile, ...]:
+    imported = imported_files(texts)
+    included = included_headers(folder, (one.path for one in files if not one.link_problem))
+    return tuple(
+        one.model_copy(
+            update={
+                "imports": imported.get(one.path, ())[:IMPORTS_MAX],
+                "headers": included.get(one.path, ())[:IMPORTS_MAX],
+            }
+        )
+        for one in files
+    )
 
 
 def _read_git_ignores(package: SourcePackage, paths: Iterable[str]) -> tuple[IgnoreLine, ...]:

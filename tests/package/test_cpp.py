@@ -472,3 +472,15 @@ def test_topics_of_a_private_handle(taken: str, handle: str, topic: str, fix: st
 def test_topics_of_a_handle_that_is_made_private() -> None:
     text = HANDLES % ("", "handle", "handle", "/in") + '\nros::NodeHandle handle("~");\n'
     assert [one.name for one in slips_of("src/node.cpp", text)] == ["private mean"]
+
+
+def test_headers_are_those_that_a_source_includes_by_itself_or_by_its_own(tmp_path: Path) -> None:
+    files = {
+        "src/a.cpp": '#include <lab/Num.h>\n// #include <lab/Other.h>\n  # include "part.h"\n',
+        "include/lab/part.h": '#include "deep.hpp"\n#if 0\n#include <lab/Unused.h>\n#endif\n#include <lab/Srv.h>\n',
+        "include/lab/deep.hpp": '#include <lab/part.h>\n#include "std_msgs/String.h"\n#include <vector>\n',
+        "src/b.cpp": "int main() {}\n",
+    }
+    facts = facts_of(package(tmp_path, files))
+    found = {file.path: file.headers for file in facts.files if file.headers}
+    assert found == {"src/a.cpp": ("lab/Num.h", "lab/Srv.h", "std_msgs/String.h")}

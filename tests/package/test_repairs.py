@@ -353,42 +353,6 @@ def test_a_name_that_is_written_apart_is_put_together_in_each_tag(tmp_path: Path
     assert ">msgs<" not in text
 
 
-def test_a_program_waits_for_no_header_of_a_package_that_is_not_there(tmp_path: Path) -> None:
-    node = "#include <lab_msgs/Num.h>\n"
-    folder = package(tmp_path, {"src/a.cpp": node, CMAKELISTS: f"{CMAKE}add_executable(a src/a.cpp)\n"})
-    assert not any("headers" in one.message for one in find_repairs(folder, facts_of(folder, "lab"), WANTED))
-
-
-EXPORTED = "${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS}"
-
-
-@pytest.mark.parametrize(
-    ("lines", "fix"),
-    [
-        ("add_dependencies(a lab_generate_messages_cpp)\n", f"write add_dependencies(a {EXPORTED})"),
-        ("add_dependencies(a ${PROJECT_NAME}_gencpp)\n", f"write add_dependencies(a {EXPORTED})"),
-        ("add_dependencies(a b first_pkg_generate_messages_cpp ${catkin_EXPORTED_TARGETS})\n",
-         f"write add_dependencies(a b {EXPORTED})"),
-        ("add_dependencies(a lab_gencpp)\nadd_dependencies(b lab_gencpp)\n",
-         f"write add_dependencies(a {EXPORTED}); write add_dependencies(b {EXPORTED})"),
-        ("add_dependencies(a std_msgs_generate_messages_cpp)\n", ""),
-        ("add_dependencies(a ${OTHER}_generate_messages_cpp)\n", ""),
-        ("add_dependencies(a b)\n", ""),
-        ("generate_messages()\nadd_dependencies(a lab_generate_messages_cpp)\n", ""),
-    ],
-)  # fmt: skip
-def test_a_program_waits_for_no_headers_that_nothing_makes(tmp_path: Path, lines: str, fix: str) -> None:
-    programs = "".join(f"add_executable({a} src/{a}.cpp)\ntarget_link_libraries({a} x)\n" for a in "ab")
-    catkin = CMAKE.replace("COMPONENTS ", "COMPONENTS message_generation ")
-    folder = package(tmp_path, {"src/a.cpp": "\n", "src/b.cpp": "\n", CMAKELISTS: catkin + programs + lines})
-    found = repair_all(folder)
-    assert [one.fix for one in found] == ([fix] if fix else [])
-    assert find_repairs(folder, facts_of(folder), WANTED) == ()
-    older = (catkin + programs + lines).replace("3.0.2", "2.8.3")  # warns only
-    (folder / CMAKELISTS).write_text(older)
-    assert find_repairs(folder, facts_of(folder), WANTED) == ()
-
-
 @pytest.mark.parametrize("given", ["$(arg from)", "$(env FROM)", "$(eval 'la' + 'b')"])
 def test_a_package_that_a_launch_file_works_out_is_no_slip(tmp_path: Path, given: str) -> None:
     text = FILES[LAUNCHED].replace('pkg="lab"', f'pkg="{given}"')
@@ -423,30 +387,6 @@ def test_what_to_write_for_the_clock_of_ros_is_right_on_each_line(tmp_path: Path
     assert found is not None
     assert found.message.startswith("line 3 of drive.py: time.sleep and time.time() keep to")
     assert found.fix.startswith("on line 3, write `from rospy import sleep`; on line 4, measure time")
-
-
-@pytest.mark.parametrize(
-    ("headers", "targets"),
-    [
-        (["lab_msgs/Num.h"], "${catkin_EXPORTED_TARGETS}"),
-        (["lab/Own.h"], "${${PROJECT_NAME}_EXPORTED_TARGETS}"),
-        (["lab/Own.h", "lab_msgs/Num.h"], "${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS}"),
-    ],
-)
-def test_a_program_waits_for_the_headers_that_it_includes(
-    headers: list[str], targets: str, tmp_path: Path
-) -> None:
-    node = "".join(f"#include <{one}>\n" for one in headers)
-    cmake = CMAKE.replace("catkin_p", "add_message_files(FILES Own.msg)\ngenerate_messages()\ncatkin_p")
-    cmake += "add_executable()\nadd_executable(a src/a.cpp)\n"
-    folder = package(tmp_path, {"src/a.cpp": node, "msg/Own.msg": "int8 a\n", CMAKELISTS: cmake})
-    (tmp_path / "lab_msgs" / "msg").mkdir(parents=True)
-    (tmp_path / "lab_msgs" / "msg" / "Num.msg").write_text("int8 a\n")
-    (tmp_path / "lab_msgs" / "package.xml").write_text("<package><name>lab_msgs</name></package>")
-    beside = facts_of(tmp_path / "lab_msgs", "lab_msgs")
-    facts = facts_of(folder, "lab").model_copy(update={"also": (beside,)})
-    found = [one for one in find_repairs(folder, facts, WANTED) if "headers" in one.message]
-    assert [one.fix.partition(", write ")[2] for one in found] == [f"add_dependencies(a {targets})"]
 
 
 CPP_CMAKE = CMAKE.replace(" rospy", " roscpp") + "add_executable(a src/a.cpp)\n"

@@ -36,6 +36,7 @@ from grader.installable import (
     noetic_messages,
 )
 from grader.model.file_fault import Fault
+from grader.model.generated_headers import fixes_of, reasons_of, unwaited_targets
 from grader.model.message_definitions import meant_field
 from grader.model.package import CMAKE, INTERFACE_FOLDERS, MANIFEST, CMakeCall, PackageFacts, meant_command
 from grader.model.verdict import FileCitation
@@ -324,6 +325,8 @@ def _missing_dependency(found: re.Match[str], package: PackageFacts, _lines: Seq
         hint = join_words(f"on line {line} write {one}" for line, one in written.items())
     if not any(PurePosixPath(file.path).suffix in OF_FILES.values() for file in package.files):
         return Explained(f"{why}: the package has no messages of its own", hint)
+    if cmake_calls(package, "generate_messages"):
+        return Explained(why, hint)
     hint = f"{hint}; messages of your own need generate_messages(…) above it"
     return Explained(why, hint, uncalled="generate_messages")
 
@@ -349,6 +352,7 @@ _KEYWORDS = dict.fromkeys(OF_INTERFACES, "FILES") | {
 _PLACE = "end it with `DESTINATION ${{CATKIN_PACKAGE_BIN_DESTINATION}}`, spelt like this"
 
 
+MAY_FAIL = "a parallel build (-j) sometimes fails"
 FIXES_MAX = 4
 MADE = (".msg", ".srv", ".action")
 """Files of which the build makes headers."""
@@ -395,11 +399,16 @@ def _half_written(found: re.Match[str], package: PackageFacts, lines: Sequence[s
 
 def _unwaited(package: PackageFacts, text: str, what: str, targets: str, lines: Sequence[str]) -> Explained:
     """Return that programs do not wait for a header that the build makes. Any of them may be compiled too early."""
+    if found := unwaited_targets(package, noetic_messages()):
+        why = "; ".join(reasons_of(found))
+        return Explained(
+            f"{text}: {why}, so {MAY_FAIL}", "; ".join(fixes_of(found)), place=found[0].line.place
+        )
     warned = re.search(NO_TARGET, " ".join(line.strip() for line in lines))
     if warned is not None:  # older policies only warn of it
         one = _missing_dependency(warned, package, lines)
-        return one._replace(why=f"{text}: {one.why}, so a parallel build (-j) sometimes fails")
-    why = f"{text}: nothing makes it wait for {what}, so a parallel build (-j) sometimes fails"
+        return one._replace(why=f"{text}: {one.why}, so {MAY_FAIL}")
+    why = f"{text}: nothing makes it wait for {what}, so {MAY_FAIL}"
     waiting = programs_without(package, "add_dependencies")
     fixes = [
         f"below the add_executable(…) on line {call.line}, write add_dependencies({call.args[0]} {targets})"

@@ -11,6 +11,7 @@ from cmake_parser.ast import Command, Token
 
 from grader.installable import is_no_package, known_packages, noetic_messages
 from grader.line_slips.cmake import find_slip, is_open
+from grader.model.generated_headers import GENERATE
 from grader.model.package import (
     CMAKE,
     INTERFACE_FOLDERS,
@@ -38,7 +39,6 @@ from grader.package.repairs.cmake_calls import (
 )
 from grader.package.repairs.editing import Files, keep_first_version, naming_files, rename_word
 from grader.package.repairs.interfaces import (
-    GENERATE,
     define_as_asked,
     depend_on_exported,
     make_interfaces,

@@ -9,6 +9,15 @@ from pathlib import PurePosixPath
 from cmake_parser.ast import Command
 
 from grader.installable import noetic_definitions, noetic_messages
+from grader.model.generated_headers import (
+    GENERATE,
+    LIKE_GENERATED,
+    MAKES_TARGETS,
+    OF_GENERATION,
+    Unwaited,
+    fixes_of,
+    unwaited_targets,
+)
 from grader.model.message_definitions import (
     DIVIDER,
     DIVIDING,
@@ -21,7 +30,8 @@ from grader.model.message_definitions import (
     meant_field,
     parse_interface,
 )
-from grader.model.package import INTERFACE_FOLDERS, Interface, InterfaceField, PackageFacts
+from grader.model.package import CMAKE, INTERFACE_FOLDERS, Interface, InterfaceField, PackageFacts
+from grader.package.cmake_parse import commands_of, read_calls
 from grader.package.repairs.cmake_calls import (
     add_call,
     all_words,
@@ -30,6 +40,7 @@ from grader.package.repairs.cmake_calls import (
     change_word,
     cmake_text,
     has_call,
+    replace_token,
     values_behind,
     words_of,
 )
@@ -38,11 +49,9 @@ from grader.package.repairs.files import is_own
 from grader.package.repairs.names import CPP, Wanted, is_near
 from grader.wording import is_one_edit, join_words, lines_text, numbers_text
 
-OF_GENERATION = re.compile(r"_generate_messages|_gen(cpp|py)$")
-"""Targets that generate_messages(…) makes."""
 OF_PACKAGE = re.compile(r"^MSG: (\w+)/", re.MULTILINE)
 """What stands above each further type in a full definition."""
-GENERATE, GENERATION = "generate_messages", "message_generation"
+GENERATION = "message_generation"
 EXPORTED = "${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS}"
 LINES_MAX = 20
 """Of one definition that are put right: each reads the file again."""
@@ -139,45 +148,45 @@ def _delete(files: Files, call: Command, why: str) -> None:
 def wait_for_headers(files: Files, package: PackageFacts, name: str) -> None:
     """Make programs wait for the headers of definitions that were handed in, which they include and nothing makes them
     wait for."""
-    defining = {name: package.interfaces, **{one.name or "": one.interfaces for one in package.also}}
-    made = {
-        maker: "|".join(PurePosixPath(one.path).stem for one in own) for maker, own in defining.items() if own
-    }
-    headers = "|".join(f"{re.escape(maker)}/(?:{stems})" for maker, stems in made.items())
-    includes = re.compile(rf"#\s*include\s*[<\"]({headers})(?:Request|Response|Action)?\.h[>\"]")
-    waiting = _waiting(files)
-    found = []
-    for call in calls_of(files, "add_executable") if made else ():
-        target, *sources = [token.value for token in words_of(call)] or [""]
-        included = [one for path in sources for one in includes.findall(files.text(path) or "")]
-        makers = {one.partition("/")[0] for one in included}
-        of_own, of_others = ["${${PROJECT_NAME}_EXPORTED_TARGETS}"], ["${catkin_EXPORTED_TARGETS}"]
-        exported = (of_own if name in makers else []) + (of_others if makers - {name} else [])
-        if target not in waiting and exported:
-            found.append((target, call, " ".join(exported)))
+    calls = read_calls(cmake_text(files).encode(), files.folder, name).calls
+    found = unwaited_targets(package, noetic_messages(), calls, all_made=True)
+    found = [one for one in found if {one.line.file, one.above.file} == {CMAKE}]
     if not found:
         return
-    lines, fixes = cmake_text(files).split("\n"), list[str]()
-    for target, call, exported_targets in reversed(found):
-        at = cmake_text(files).count("\n", 0, call.span.stop) + 1
-        new = f"add_dependencies({target} {exported_targets})"
-        lines.insert(at, new)
-        fixes.insert(0, f"below the add_executable(…) on line {call.line}, write {new}")
-    targets = join_words(target for target, *_ in found)
-    why = f"{targets} may be compiled before the headers of the messages"
-    change_line(files, found[0][1], "\n".join(lines), why, "; ".join(fixes))
+    text, last = cmake_text(files), 0
+    for one in sorted(found, key=_place_changed, reverse=True):  # places above stay
+        if (place := _place_changed(one)) != last:  # a loop makes several by one call
+            text = _wait_by(text, one, name)
+        last = place
+    why = f"{join_words(one.target for one in found)} may be compiled before the headers of the messages"
+    message = f"line {found[0].line.line} of {CMAKE}: {why}"
+    files.change("build-line", CMAKE, text, message, "; ".join(fixes_of(found)))
 
 
-def _waiting(files: Files) -> set[str]:
-    """Return the targets that wait for others: a program waits for what the libraries wait for that it links."""
-    waiting = {token.value for call in calls_of(files, "add_dependencies") for token in words_of(call)[:1]}
-    linked = [[token.value for token in words_of(c)] for c in calls_of(files, "target_link_libraries")]
-    for _ in linked:
-        more = {words[0] for words in linked if words and not waiting.isdisjoint(words[1:])} - waiting
-        if not more:
-            break
-        waiting |= more
-    return waiting
+def _place_changed(one: Unwaited) -> int:
+    """Return the line of the call that is changed, or below which one is written."""
+    return one.above.line if one.lost is None else one.lost.line
+
+
+def _wait_by(text: str, one: Unwaited, name: str) -> str:
+    """Return the text of `CMakeLists.txt` with which a target waits for the headers that it includes."""
+    commands = {command.line: command for command in commands_of(text.encode()) or ()}
+    target = words_of(commands[one.call.line])[0].value
+    if one.lost is None or one.lost.line < one.above.line:
+        at = commands[one.above.line].span.stop
+        text = f"{text[:at]}\nadd_dependencies({target} {one.exported}){text[at:]}"
+        return text if one.lost is None else _without(text, commands[one.lost.line])
+    words = words_of(commands[one.lost.line])
+    absent = [word for word in words[1:] if word.value.replace("${PROJECT_NAME}", name) in one.absent]
+    for word in reversed(absent[1:]):
+        text = replace_token(text, word, "")
+    place = absent[0] if absent else words[-1]
+    return replace_token(text, place, one.exported if absent else f"{place.value} {one.exported}")
+
+
+def _without(text: str, call: Command) -> str:
+    """Return the text without a call; its lines stay, empty."""
+    return text[: call.span.start] + "\n" * text[call.span].count("\n") + text[call.span.stop :]
 
 
 def depend_on_exported(files: Files, package: PackageFacts, name: str) -> None:
@@ -187,12 +196,14 @@ def depend_on_exported(files: Files, package: PackageFacts, name: str) -> None:
     known = {*_components(files)[1], *noetic_messages(), *(one.name for one in package.also)}
     own = {name, "${PROJECT_NAME}"}
     known |= own if has_call(files, package, GENERATE) else set()
+    made = {w[0].value for c in calls_of(files, *MAKES_TARGETS, "add_custom_target") if (w := words_of(c))}
     text, fixes, found = cmake_text(files), list[str](), list[tuple[Command, str]]()
     for call in reversed(calls_of(files, "add_dependencies")):  # places above stay
         target, *waited = [token.value for token in words_of(call)] or [""]
-        makers = {one: OF_GENERATION.split(one)[0] for one in waited if OF_GENERATION.search(one)}
         lost = [
-            one for one, maker in makers.items() if maker not in known and (maker in own or "$" not in maker)
+            one
+            for one in waited
+            if one not in made and _is_no_target(one.replace("${PROJECT_NAME}", name), known)
         ]
         if not lost:
             continue
@@ -204,6 +215,16 @@ def depend_on_exported(files: Files, package: PackageFacts, name: str) -> None:
     if found and re.match(r"[3-9]|\d\d", "".join(versions[:1])):
         call, lost_target = found[0]
         change_line(files, call, text, f"there is no target {lost_target} to wait for", "; ".join(fixes))
+
+
+def _is_no_target(word: str, known: Collection[str]) -> bool:
+    """Return whether a word means a target of `generate_messages(…)`, and none of these packages makes it."""
+    found = OF_GENERATION.search(word)
+    return (
+        "$" not in word
+        and bool(LIKE_GENERATED.search(word))
+        and (not found or word[: found.start()] not in known)
+    )
 
 
 def _components(files: Files) -> tuple[list[Command], list[str]]:
