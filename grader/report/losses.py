@@ -7,7 +7,7 @@ have to be written, the scripts that one `chmod` makes executable, the criteria 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -126,20 +126,44 @@ def _joined(criterion: CriterionResult, scripts: Sequence[CriterionResult]) -> C
     found = [one.mistake for one in scripts if one.mistake]
     paths = [one.name for one in found]
     if criterion.check == INSTALL:
-        reasons: dict[str, list[str]] = {}
-        for one in scripts:
-            if one.mistake and one.mistake.kind == "cannot-be-run":
-                path = one.mistake.name
-                reasons.setdefault(one.message.partition("; ")[0].removeprefix(f"{path} "), []).append(path)
-        why = [f"{join_words(of)} {reason}" for reason, of in reasons.items()]
+        # The build runs each by the right Python, but its first line stays wrong.
+        unstarted = [one for one in scripts if one.mistake and one.mistake.kind == "cannot-be-run"]
+        why = _by_text(
+            (one.message.partition("; ")[0].removeprefix(f"{_path(one)} "), one) for one in unstarted
+        )
+        fixes = _by_text((one.hint, one) for one in unstarted if one.hint)
         then = f"makes {join_words(paths)} executable"
         if why:
             then = f"makes {'programs' if len(paths) > 1 else 'a program'} of {join_words(paths)}"
-        message, hint = "; ".join([criterion.message, *why]), f"{criterion.hint}; the build then {then}"
-        return criterion.model_copy(update={"message": message, "hint": hint})
+        message = "; ".join(
+            [criterion.message, *(f"{join_words(of)} {reason}" for reason, of in why.items())]
+        )
+        more = [
+            fix if all(path in fix for path in of) else f"in {join_words(of)}, {fix}"
+            for fix, of in fixes.items()
+        ]
+        lines = (c for one in unstarted for c in one.citations if isinstance(c, FileCitation))
+        update = {
+            "message": message,
+            "hint": "; ".join([criterion.hint, f"the build then {then}", *more]),
+            "citations": tuple(dict.fromkeys((*criterion.citations, *lines))),
+        }
+        return criterion.model_copy(update=update)
     own = criterion.mistake.name if criterion.mistake else ""
     hint = criterion.hint.replace(own, " ".join([own, *paths]))
     return criterion.model_copy(update={"message": without_bit([own, *paths]), "hint": hint})
+
+
+def _path(one: CriterionResult) -> str:
+    return one.mistake.name if one.mistake else ""
+
+
+def _by_text(said: Iterable[tuple[str, CriterionResult]]) -> dict[str, list[str]]:
+    """Return each text once, with the scripts that it is said of."""
+    found: dict[str, list[str]] = {}
+    for text, one in said:
+        found.setdefault(text, []).append(_path(one))
+    return found
 
 
 def without_bit(paths: Sequence[str]) -> str:

@@ -15,7 +15,7 @@ from grader.files import atomic_write, check_writable
 from grader.integrations.ci_results import REPORT_NAMES
 from grader.model.repair import Repair
 from grader.model.result import ErrorInfo, Repaired
-from grader.model.verdict import Mistake, Status
+from grader.model.verdict import FileCitation, Mistake, Status
 from grader.report.files import result_bytes, write_reports
 from grader.report.forms import FORMS
 from grader.report.hidden_criteria import without_hidden
@@ -196,6 +196,8 @@ def test_why_a_script_cannot_be_run_is_told_where_the_build_makes_up_for_it():
         5,
         check="executable",
         message="src/a.py cannot be run: there is no `#!` line at the top; rosrun answers: no",
+        hint="write #!/usr/bin/env python3",
+        citations=(FileCitation(file="src/a.py", line=1),),
         mistake=Mistake(kind="cannot-be-run", name="src/a.py"),
     )
     install = criterion(
@@ -205,7 +207,10 @@ def test_why_a_script_cannot_be_run_is_told_where_the_build_makes_up_for_it():
     assert loss.criterion.message == (
         "nothing installs src/a.py; src/a.py cannot be run: there is no `#!` line at the top"
     )
-    assert loss.criterion.hint == "do; the build then makes a program of src/a.py"
+    assert loss.criterion.hint == (
+        "do; the build then makes a program of src/a.py; in src/a.py, write #!/usr/bin/env python3"
+    )
+    assert loss.criterion.citations == unusable.citations
 
 
 def test_files_that_are_missing_are_all_named_in_markdown():
