@@ -16,7 +16,7 @@ import tarfile
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from itertools import islice
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 
 from pydantic import Field
@@ -27,8 +27,9 @@ from grader.files import open_untrusted
 from grader.model.package import PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.submission import SourcePackage, Submission
+from grader.package.cmake_parse import commands_of
 from grader.package.manifest import read_manifest
-from grader.package.reading import printable
+from grader.package.reading import printable, read_markup
 from grader.package.repairs.files import to_utf8
 
 CATKIN_IGNORE = "CATKIN_IGNORE"
@@ -44,6 +45,9 @@ MANIFEST = """<package format="2"><name>{}</name><version>0.0.0</version><descri
 <maintainer email="student@example.org">student</maintainer><license>TODO</license>
 <buildtool_depend>catkin</buildtool_depend></package>
 """
+LAUNCH_SUFFIXES = {".launch", ".test", ".xml"}
+LAUNCH_FILES_MAX, LAUNCH_BYTES_MAX = 50, 100_000
+IN_LAUNCH_FILES = re.compile(r"\$\(find\s+([\w.-]+)\s*\)|\bpkg\s*=\s*[\"']([\w.-]+)[\"']")
 ELF = b"\x7fELF"
 MEMBERS_MAX = 50_000
 _TOO_MANY = f"what the build left is more than {MEMBERS_MAX} files"
@@ -145,17 +149,45 @@ def run_in_place(workspace: Workspace, sandbox: Sandbox) -> None:
 
 
 def needed_packages(submission: Submission, course: Collection[str] = ()) -> list[SourcePackage]:
-    """Return the lab's packages and their dependencies within the submission, the lab's first; none of the
-    `course`'s."""
+    """Return the lab's packages and those of the submission that they need, the lab's first; none of the `course`'s.
+    They need what their manifests declare, and of what catkin sees in the same workspace, what their launch files and
+    CMakeLists.txt name."""
     needed = [submission.package, *submission.also]
     others = {
         p.name: p for p in submission.packages if p.name not in {*(one.name for one in needed), *course}
     }
-    for package in needed:
+    for package in needed if others else ():
         manifest, _ = read_manifest(package.folder)
-        names = sorted({d.name for d in manifest.dependencies} & others.keys()) if manifest else ()
-        needed.extend(others.pop(name) for name in names)
+        names = {one.name for one in manifest.dependencies} if manifest else set()
+        names |= {
+            name for name in _named_packages(package) if name in others and _is_beside(others[name], package)
+        }
+        needed.extend(others.pop(name) for name in sorted(names & others.keys()))
     return needed
+
+
+def _named_packages(package: SourcePackage) -> set[str]:
+    """Return the words of launch files and of `CMakeLists.txt` that may name packages."""
+    names: set[str] = set()
+    found = (path for path in package.folder.rglob("*") if path.suffix in LAUNCH_SUFFIXES)
+    for path in sorted(islice(found, LAUNCH_FILES_MAX)):
+        data = read_markup(package.folder, path.relative_to(package.folder).as_posix(), LAUNCH_BYTES_MAX)
+        text = data.decode("utf-8", "replace") if isinstance(data, bytes) else ""
+        begin, *rest = text.split("<!--")
+        text = "".join([begin, *(part.partition("-->")[2] for part in rest)])
+        names |= {one for pair in IN_LAUNCH_FILES.findall(text) for one in pair if one}
+    data = read_markup(package.folder, "CMakeLists.txt", LAUNCH_BYTES_MAX)
+    for command in (commands_of(data) or ()) if isinstance(data, bytes) else ():
+        if command.identifier.lower() == "find_package":
+            names |= {str(token.value) for token in command.args if token.kind != "COMMENT"}
+    return names
+
+
+def _is_beside(other: SourcePackage, package: SourcePackage) -> bool:
+    """Return whether catkin sees both in one workspace: below the same `src`, or else the same folder."""
+    above = PurePosixPath(package.path).parent
+    source = next((one for one in (above, *above.parents) if one.name == "src"), above)
+    return source in PurePosixPath(other.path).parents
 
 
 def _folder_name(package: SourcePackage) -> str:

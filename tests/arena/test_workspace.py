@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.workspace import LARGE_BYTES
+from grader.arena.workspace import LARGE_BYTES, needed_packages
 from grader.files import read_untrusted
+from grader.intake.open import open_submission
 from grader.rubric.scenario import Scenario, Start, Until
-from tests.arena.support import SCRIPT, make_place, printed, run
+from tests.arena.support import MANIFEST, SCRIPT, make_place, printed, run
 
 pytestmark = pytest.mark.ros
 LIST = """
@@ -99,3 +100,36 @@ def test_untrusted_files_are_read_only_as_files(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     assert read_untrusted(tmp_path / "file", 3) == b"123"
     assert [read_untrusted(tmp_path / name) for name in ("link", "pipe", "none", ".")] == [None] * 4
+
+
+NEEDED = {
+    "manifest": ("package.xml", "<depend>other</depend>", "src/other", True),
+    "include": ("launch/a.launch", '<include file="$(find other)/launch/b.launch"/>', "src/deep/other", True),
+    "node": ("launch/a.launch", "<node pkg = 'other' type='a' name='a'/>", "src/other", True),
+    "component": ("CMakeLists.txt", "find_package(catkin REQUIRED COMPONENTS other)", "src/other", True),
+    "comment": (
+        "launch/a.launch",
+        '<!-- <node pkg="other"/> --> <a/> <!-- $(find other)',
+        "src/other",
+        False,
+    ),
+    "comment-of-cmake": ("CMakeLists.txt", "# find_package(other)", "src/other", False),
+    "other-workspace": ("launch/a.launch", "<node pkg='other'/>", "old/src/other", False),
+}
+
+
+@pytest.mark.parametrize(("file", "text", "place", "comes"), NEEDED.values(), ids=NEEDED)
+def test_what_a_package_names_of_its_workspace_comes_along(
+    file: str, text: str, place: str, comes: bool, tmp_path: Path
+) -> None:
+    declared = text if file == "package.xml" else ""
+    files = {
+        "src/lab/package.xml": MANIFEST.replace("</package>", f"{declared}</package>"),
+        f"{place}/package.xml": MANIFEST.replace("<name>lab<", "<name>other<"),
+        **({} if file == "package.xml" else {f"src/lab/{file}": text}),
+    }
+    for path, content in files.items():
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_text(content)
+    submission = open_submission(str(tmp_path), package="lab", workdir=tmp_path / "work")
+    assert [one.name for one in needed_packages(submission)] == ["lab", *(["other"] if comes else [])]
