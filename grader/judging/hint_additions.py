@@ -27,11 +27,11 @@ from grader.checks.support.scripts import (
     names_script,
     programs,
 )
-from grader.checks.support.text import RATE_SLOT, TYPE_SLOT, VALUE_SLOT, code_of, in_language
+from grader.checks.support.text import RATE_SLOT, TYPE_SLOT, VALUE_SLOT, code_of, in_language, texts_in
 from grader.evidence.events import PACKAGE_RUN
 from grader.installable import noetic_messages
 from grader.judging.cited_lines import LINE_CHARS, LINES_READ
-from grader.judging.facts import Facts, language_of, scripts_of
+from grader.judging.facts import Facts, language_of, names_started, scripts_of
 from grader.model.launch_file import LaunchFile
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
@@ -40,11 +40,13 @@ from grader.model.verdict import FileCitation, Status, Verdict, cited_lines
 from grader.rubric.model import Criterion, Rubric
 from grader.wording import join_words, on_lines, significant
 
-POINTS_MAX = 3
+POINTS_MAX = 10
+"""So many faults are told at one criterion, and the others counted."""
 _NO_FIELD = re.compile(r"has no attribute '(?P<field>\w+)'.*? \((?P<file>[\w./-]+), line (?P<line>\d+)\)")
 _NO_PARAMETER = re.compile(r"\((?P<file>[\w./-]+), line (?P<line>\d+)\): the parameter '[^']+' is not set")
 _READS_PARAMETER = re.compile(r"""\bget_param\(\s*(['"])(?P<name>[\w~/]+)\1\s*\)""")
 USUAL_RATE_HZ = 10
+PARAMETERS_MAX = 3
 Told = TypeVar("Told", Verdict, CriterionResult)
 OF_FILES = ("build", "cmake", "manifest")
 """Checks whose criterion takes the advice: it is of the package as a whole."""
@@ -53,17 +55,41 @@ OF_FILES = ("build", "cmake", "manifest")
 def add_advice(
     results: Sequence[CriterionResult], package: PackageFacts, rubric: Rubric
 ) -> tuple[CriterionResult, ...]:
-    """Return the criteria, with what none of them tells as the hint of one that passed."""
+    """Return the criteria, with what none of them tells as the hint of one that passed: one that names the file, or
+    else one of the package as a whole."""
     visible = {c.id for c in rubric.criteria if c.visibility == "visible"}
     # Only on one that passed: a loss has a hint of its own.
     good = [c for c in results if c.status is Status.PASS and c.id in visible]
-    host = next((c for check in OF_FILES for c in good if c.check == check), None)
+    host = next((c.id for check in OF_FILES for c in good if c.check == check), None)
     every = (*_points(package, rubric.package), *_typed(package, rubric))
-    points = [point.text for point in every if not _is_told(point, results)][:POINTS_MAX]
-    if host is None or not points:
-        return tuple(results)
-    told = host.model_copy(update={"hint": "; ".join(filter(None, (host.hint, *points)))})
-    return tuple(told if c is host else c for c in results)
+    told: dict[str, list[str]] = {}
+    for point in every:
+        place = _own_criterion(point, [c.id for c in good], rubric) or host
+        if place is not None and not _is_told(point, results):
+            told.setdefault(place, []).append(point.text)
+    return tuple(
+        c.model_copy(update={"hint": "; ".join(filter(None, (c.hint, *_first_points(told[c.id]))))})
+        if c.id in told
+        else c
+        for c in results
+    )
+
+
+def _first_points(points: Sequence[str]) -> list[str]:
+    """Return as many as are read, with how many more there are."""
+    more = len(points) - POINTS_MAX
+    rest = [f"there {'are' if more > 1 else 'is'} {more} more of the kind"] if more > 0 else []
+    return [*points[:POINTS_MAX], *rest]
+
+
+def _own_criterion(point: _Point, good: Collection[str], rubric: Rubric) -> str | None:
+    """Return which of the `good` criteria names the file of the point, or else runs it; None where none does."""
+    name = PurePosixPath(point.place.file).name
+    criteria = [c for c in rubric.criteria if c.id in good]
+    for c in criteria:
+        if name in {PurePosixPath(text).name for text in texts_in(c.parameters)}:
+            return c.id
+    return next((c.id for c in criteria if c.scenario and name in names_started(c, rubric)), None)
 
 
 def _is_sure(slip: PythonSlip) -> bool:
@@ -327,7 +353,7 @@ def name_other_parameters(verdict: Verdict, criterion: Criterion, facts: Facts) 
                 others.setdefault(one["name"], below)
     if not others:
         return verdict
-    told = join_words(f"'{name}' on line {line}" for name, line in islice(others.items(), POINTS_MAX))
+    told = join_words(f"'{name}' on line {line}" for name, line in islice(others.items(), PARAMETERS_MAX))
     return verdict.model_copy(update={"hint": f"{verdict.hint}, and one to {told}"})
 
 

@@ -32,6 +32,7 @@ LIMIT = 500
 TO_FIX, NOT_DECIDED = "To fix", "Not decided yet: no points are lost for good"
 INDENT = 2
 SOURCE_CHARS_MIN = 20
+ADVICE_CHARS = 3000
 PLAIN_LETTERS = str.maketrans({"…": "...", "→": "->", "±": "+/-", sentences.MINUS: "-", "\N{EN DASH}": "-"})
 """What stands for the grader's own signs where an encoding lacks them."""
 
@@ -210,7 +211,9 @@ class Terminal:
 
     def _advice(self, criterion: CriterionResult) -> RenderableType:
         words = self._words(criterion.message or criterion.title)
-        return Group(self._line(criterion), words, *self._rows([("hint", criterion.hint)]))
+        # It may be of several files, and is nowhere else in a terminal.
+        hint = [self._words(criterion.hint, ADVICE_CHARS, name="hint")] if criterion.hint else []
+        return Group(self._line(criterion), words, *hint)
 
     def _note_lines(self, notes: tuple[Note, ...]) -> list[RenderableType]:
         said = [self._words(f"{sentences.note_place(note)}: {sentences.note_text(note)}") for note in notes]

@@ -184,6 +184,28 @@ def test_what_does_not_start_is_told_where_nothing_is_lost(tmp_path) -> None:
     assert add_advice([lost], package, rubric(CMAKE_CHECK)) == (lost,)
 
 
+def test_advice_on_a_file_is_told_where_the_file_is_judged(tmp_path) -> None:
+    package = facts(tmp_path, **{"src/talker.py": "print 'a'\n", "src/old.py": "print 'b'\n"})
+    own = {
+        "id": "bit",
+        "title": "t",
+        "points": 0,
+        "check": "executable",
+        "with": {"path": "scripts/talker.py"},
+    }
+    results = [criterion(), criterion().model_copy(update={"id": "bit"})]
+    of_package, of_talker = add_advice(results, package, rubric(CMAKE_CHECK, own))
+    assert of_package.hint.startswith("src/old.py has")
+    assert of_talker.hint.startswith("src/talker.py has")
+
+
+def test_all_faults_are_told_up_to_a_limit(tmp_path) -> None:
+    files = {f"src/old{number}.py": "print 'a'\n" for number in range(13)}
+    (told,) = add_advice([criterion()], facts(tmp_path, **files), rubric(CMAKE_CHECK))
+    assert told.hint.count(" has a syntax error") == 10
+    assert told.hint.endswith("; there are 3 more of the kind")
+
+
 def test_a_value_that_is_given_to_a_misspelt_name_is_told_unless_a_loss_names_its_line(tmp_path) -> None:
     package = facts(
         tmp_path, **{"src/a.py": "changed = False\nuo = up = 1\nif changed: f()\nchnaged = True\n"}
