@@ -20,6 +20,7 @@ from grader.checks.support.cpp_errors import (
     plainly,
     programs_without,
 )
+from grader.checks.support.cpp_types import TYPE_ERRORS
 from grader.checks.support.missing_packages import is_declared, missing_package
 from grader.checks.support.scripts import (
     CPP_SUFFIXES,
@@ -448,11 +449,6 @@ def _not_catkin(found: re.Match[str], package: PackageFacts, _lines: Sequence[st
     return Explained(f"{package.manifest.file} is for a ROS 2 package", "make a package for ROS 1")  # type: ignore[union-attr]
 
 
-_NUMBER = (
-    r"'(?:std_msgs::(?:U?Int\d+|Float\d+|Bool)_<.*>::_data_type|geometry_msgs::\w+_<.*>::_\w_type|u?int\d+_t"
-    r"|(?:(?:un)?signed )?(?:int|short|char|float|double|long|bool)(?: int)?)'"
-)
-"""What the compiler calls the type of a number, and of the fields of messages that hold one."""
 _EXPLAINED: tuple[tuple[str, Explain], ...] = (
     (r'Could not find a package \w+ file provided by "([\w-]+(?:[,;.:][\w,;.:-]*)?)"', missing_package),
     (r'By not providing "Find([\w-]+)\.cmake"', _missing_library),
@@ -516,31 +512,6 @@ _EXPLAINED: tuple[tuple[str, Explain], ...] = (
     (r"cannot find -l(\S+?)(?::|$)", missing_link),
     (r"([\w+./-]+): No such file or directory", missing_header),
     (r"'(\w+)' has not been declared", _half_written),
-    (
-        r"cast from 'const char ?\*' to '(\w+)' loses precision",
-        plainly(
-            "`({1})` makes one {1} of where the text in quotes lies in memory",
-            "remove the `({1})` on that line: a text in quotes goes into a std_msgs/String as it is",
-        ),
-    ),
-    (
-        rf"(?:invalid conversion from|cannot convert) 'const char ?(?:\*|\[\d+\])' to {_NUMBER}",
-        plainly(
-            "a text in quotes stands where a number belongs", "on that line, write the number without quotes"
-        ),
-    ),
-    (
-        rf"cannot convert 'std::(?:__cxx11::)?(?:basic_)?string\b.* to {_NUMBER} in (?:assignment|initialization)",
-        plainly(
-            "a text stands where a number belongs",
-            "on that line, write a number; `std::stod(…)` makes one of a text",
-        ),
-    ),
-    (
-        r"no match for 'operator=' \(operand types are 'std_msgs::(?:String|U?Int\d+|Float\d+|Bool)\b",
-        plainly(
-            "a message is given a value, and not its field", "write `.data` behind the message on that line"
-        ),
-    ),
+    *TYPE_ERRORS,
     *CPP_ERRORS,
 )

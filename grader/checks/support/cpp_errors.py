@@ -24,6 +24,7 @@ _CMAKE_ERROR = re.compile(
     r"^CMake Error(?: at (?P<file>[^:()]+):(?P<line>\d+)(?: \((?P<call>\w+)\))?)?:?\s*(?P<text>.*)"
 )
 _COMPILER_ERROR = re.compile(r"^(?P<file>[^:\s][^:]*):(?P<line>\d+):(?:\d+:)? (?:fatal )?error: (?P<text>.*)")
+_REQUIRED = re.compile(r"^(?P<file>[^:\s][^:]*):(?P<line>\d+):\d+:\s+required from here")
 _OTHER_ERROR = re.compile(
     r"(?P<text>.*(?:\b[Ee]rror:|Error\(s\)|undefined reference|cannot find -l|No rule to make|[A-Za-z]Error:|\*\*\*).*)"
 )
@@ -77,7 +78,10 @@ def plainly(why: str, hint: str) -> Explain:
 
 def first_error(lines: Sequence[str], package: PackageFacts) -> BuildError | None:
     """Return the first line that fits: a compiler's error comes before make's summary of it."""
+    required: FileCitation | None = None
     for index, line in enumerate(lines):
+        if match := _REQUIRED.match(line):
+            required = _own_line(package, match["file"], int(match["line"])) or required
         if match := _CMAKE_ERROR.match(line):
             below = lines[index + 1 :]
             called = [(match["file"] or "", int(match["line"] or 0)), *_callers(below)]
@@ -89,8 +93,12 @@ def first_error(lines: Sequence[str], package: PackageFacts) -> BuildError | Non
             return BuildError("cmake", shown(text, ERROR_CHARS), place)
         if match := _COMPILER_ERROR.match(line):
             place = _own_line(package, match["file"], int(match["line"]))
-            where = f"{posixpath.basename(match['file'])}:{match['line']}: "
-            name = "" if match["file"].startswith(SYSTEM) else where
+            of_system = match["file"].startswith(SYSTEM)
+            # in a header of ROS, where the student's own line is the last one that led there
+            place = required if of_system else place
+            file, number = (place.file, place.line) if of_system and place else (match["file"], match["line"])
+            where = f"{posixpath.basename(file)}:{number}: "
+            name = "" if of_system and not place else where
             # the other name of a type is long, and would leave no room for what is wrong with it
             text = name + re.sub(r" \{aka [^}]*\}", "", match["text"])
             return BuildError("compiler", shown(text, ERROR_CHARS), place)
@@ -336,39 +344,11 @@ def other_namespace(found: re.Match[str], package: PackageFacts, _lines: Sequenc
     return Explained(f"{found.string}: it is no namespace" if near else found.string, hint)
 
 
-def _no_message(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
-    """Of a callback, or a topic, with what is no message: a pointer to one, or another class."""
-    # The class of a message has its allocator in its name.
-    kind = re.sub(r"_<std::allocator<void> ?>", "", found[1]).strip()
-    own = re.compile(r"/src/\S*?([\w-]+\.(?:cpp|cc|cxx)):(\d+):\d+:\s+required from here")
-    place = next((m for line in lines if (m := own.search(line))), None)
-    where = f"{place[1]}:{place[2]}: " if place else ""
-    bare = kind.removeprefix("const ").rstrip("*& ")
-    if kind.endswith("*"):
-        why = f"{where}a callback takes a plain pointer, `{kind}`, and ROS has none to give it"
-        return Explained(why, f"write `const {bare}::ConstPtr&` as the type of what the callback takes")
-    return Explained(f"{where}`{kind}` is no message type", "write the type of the topic's messages")
-
-
 def _no_placeholder(name: str) -> Explained:
     """The Boost of ROS Noetic knows `_1` by itself, and later ones do not."""
     why = f"{name} in boost::bind(…) is unknown to this grading machine's Boost, which is newer than ROS Noetic's"
     hint = f"{ON_THE_MACHINE}build it with ROS Noetic's Boost; boost::placeholders::{name} works with both"
     return Explained(why, hint, of_machine=True)
-
-
-def _explain_subscription(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    """roscpp takes the message's type from a function, and of a lambda or of what `bind` makes it has to be told."""
-    given = found[1]
-    why = "subscribe(…) does not take this callback"
-    if "lambda" in given or "bind" in given.lower():
-        kind = "a lambda" if "lambda" in given else "what bind(…) makes"
-        hint = "write the type behind subscribe: nh.subscribe<std_msgs::String>(…), with your own type"
-        return Explained(f"{why}: {kind} does not tell it the message's type", hint)
-    if method := re.search(r"\((\w+)::\*\)", given):
-        fix = f"give the object behind the method: `this` in a method of {method[1]}, elsewhere the address of one"
-        return Explained(f"{why}: a method of {method[1]} needs its object", fix)
-    return Explained(f"{found.string}: these arguments do not fit", f"write it as in `{OF_ROS['subscribe']}`")
 
 
 def _no_address(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -497,14 +477,6 @@ def _no_language(found: re.Match[str], package: PackageFacts, _lines: Sequence[s
     )
 
 
-def _no_arrow(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
-    """Of `msg.data`, `msg` being what a callback gets."""
-    source = re.compile(rf"\|.*?\b(\w+)\.{found[1]}\b")
-    name = next((m[1] for line in lines if (m := source.search(line))), "msg")
-    why = "a ConstPtr is a pointer, whose fields stand behind `->`"
-    return Explained(why, f"write `{name}->{found[1]}` in place of `{name}.{found[1]}`")
-
-
 CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
     (r"Cannot determine link language for target \"([^\"]+)\"", _no_language),
     (r"expected (',' or )?';' before '([^']+)'", _no_semicolon),
@@ -522,7 +494,6 @@ CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
         _outside,
     ),
     (r"re(?:declaration|definition) of '([^']+)'", _twice),
-    (r"no matching function for call to '(?:ros::)?NodeHandle::subscribe(.*)", _explain_subscription),
     (rf"no matching function for call to '(?:ros::(?:\w+::)?)?({'|'.join(OF_ROS)})[<(]", _other_arguments),
     (r"statement cannot resolve address of overloaded function()", _no_call),
     (r"'(\w+)' is not a member of 'ros'(?!;)", _no_ros_h),
@@ -547,17 +518,11 @@ CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
     (r"invalid use of (?:non-static )?member function '([^']+)'", _no_call),
     (r"'(?P<scope>[^']+)::(?P<name>\w+)' has not been declared", _no_type),
     (r"'(?P<name>\w+)' is not a member of '(?P<scope>\w+_msgs)'(?!;)", _no_type),
-    (r"'__s_get\w+' is not a member of '([^']+)'", _no_message),
-    (
-        r"'__get\w+' in '\w+', which is of (non-class|pointer) type",
-        plainly("publish(…) is given what is no message, but of a {1} type", "write `pub.publish(msg)`"),
-    ),
     (
         r"could not convert '.*operator=\(",
         plainly("a single `=` sets a value, and compares nothing", "write `==` on that line"),
     ),
     (r"'(\w+)' (?:has not been declared|is not a class, namespace, or enumeration)", other_namespace),
-    (r"(?:ConstPtr|Ptr|shared_ptr).* has no member named '(\w+)'", _no_arrow),
     (
         r"base operand of '->' has non-pointer type",
         plainly("`->` is for pointers, and this is none", "on that line, write a dot in place of `->`"),
