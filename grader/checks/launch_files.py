@@ -132,7 +132,7 @@ def _lacking(package: PackageFacts, file: LaunchFile, params: LaunchXmlParams) -
     """Return why roslaunch starts nothing, or nodes are not there; those that are there earn their share."""
     refused = next(refusals(package, file), None)
     found = {PurePosixPath(script).name: missing_node(package, file, script) for script in params.scripts}
-    found |= {program: _program(file, program) for program in params.programs}
+    found |= {program: _program(package, file, program) for program in params.programs}
     lost = joined([one for one in (refused.verdict() if refused else None, *found.values()) if one])
     right = [name for name, one in found.items() if one is None]
     # From a file that it refuses, roslaunch starts nothing.
@@ -165,7 +165,7 @@ def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdic
         node.line == slip.line for node in built
     ):  # what the program is shows once roslaunch starts it
         slip = slip._replace(fix="; ".join((slip.fix, *built_fixes(package, file, name))))
-    return slip.verdict() if slip else _no_node(file, package.name, name)
+    return slip.verdict() if slip else _no_node(package, file, package.name, name)
 
 
 def _of_its_words(package: PackageFacts, file: LaunchFile, name: str) -> Slip | None:
@@ -183,7 +183,7 @@ def _of_its_words(package: PackageFacts, file: LaunchFile, name: str) -> Slip | 
     return found[0]._replace(fix=fix) if len(found) == 1 else None
 
 
-def _program(file: LaunchFile, program: str) -> Verdict | None:
+def _program(package: PackageFacts, file: LaunchFile, program: str) -> Verdict | None:
     if nodes_of_program(file, program):
         return None
     pkg, _, name = program.partition("/")
@@ -194,7 +194,7 @@ def _program(file: LaunchFile, program: str) -> Verdict | None:
         if node.type == name:
             why = f'{name} is not in the package "{node.pkg}"'
             return Slip(node.file, node.line, why, f'write pkg="{pkg}"').verdict()
-    return _no_node(file, pkg, name)
+    return _no_node(package, file, pkg, name)
 
 
 def _slip_for(package: PackageFacts, node: LaunchNode, name: str) -> Slip | None:
@@ -216,7 +216,7 @@ def _is_meant(node: LaunchNode, name: str) -> bool:
     return written in {name, stem} or bool(near_names(name, [written])) or node.name == stem
 
 
-def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
+def _no_node(package: PackageFacts, file: LaunchFile, pkg: str, name: str) -> Verdict:
     message = f"{file.path} has no <node> for {name}"
     for place, why, hint in _in_its_place(file, pkg, name):
         cited = place if isinstance(place, FileCitation) else FileCitation(file=file.path, line=place)
@@ -224,7 +224,30 @@ def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
     # What an <include> does not bring may be the node.
     if slip := next(include_slips(file), None):
         return slip.verdict()
-    return failed(message, hint=f"below <launch>, add {_node_tag(file, pkg, name)}")
+    return failed(message, hint=_add_node(package, file, pkg, name))
+
+
+def _add_node(package: PackageFacts, file: LaunchFile, pkg: str, name: str) -> str:
+    """Return where to add a node: below its neighbour of the same package where that is in a group, or has a namespace
+    or a remap of its own, which the new one then needs too."""
+    moved = [node for node in file.brings if node.pkg == pkg and node.renaming]
+    beside, tag = (moved[-1] if moved else None), _node_tag(file, pkg, name)
+    if beside is None or len({node.namespace for node in moved}) > 1:
+        return f"below <launch>, add {tag}"
+    own = [line for line in beside.renaming if line.tag == "node"]
+    tag = tag.replace("/>", "".join(f' ns="{line.value}"' for line in own) + "/>")
+    script = find_script(package, name)
+    asked = {s.message for s in package.slips if script is not None and s.file == script.path}
+    behind = [one for one in beside.renaming if one.tag == "remap" and one.line >= beside.line]
+    remaps = "".join(
+        f'<remap from="{old}" to="{new}"/>'
+        for old, new in beside.remaps[len(beside.remaps) - len(behind) :]
+        if old in asked and new.startswith("/")
+    )
+    tag = f"{tag.removesuffix('/>')}>{remaps}</node>" if remaps else tag
+    where = f"line {beside.line}{f' of {beside.file}' * (beside.file != file.path)}"
+    of_group = ", inside of its <group>" * any(line.tag == "group" for line in beside.renaming)
+    return f"right below the <node> on {where}{of_group}, add {tag}"
 
 
 def _in_its_place(file: LaunchFile, pkg: str, name: str) -> Iterator[tuple[FileCitation | int, str, str]]:

@@ -31,6 +31,7 @@ from grader.checks.support.launch_connections import (
     blame_same_script,
     ended_by_itself,
     ended_soon,
+    find_renaming,
     over_another_topic,
     wrong_name,
 )
@@ -151,8 +152,12 @@ def _why_unconnected(
         message = f"{_comes_up(nodes)}; the file declares {plural(len(file.nodes), 'node')}{quoted(run)}"
         return failed(message, hint="give the talker and the listener a <node> each")
     other = over_another_topic(run, params.topic, quoted(run))
-    blamed = blame_renaming(package, run, file.brings, params.topic, other)
-    return blamed or blame_same_script(package, run, file.brings, params.topic, other) or other
+    blamed = (
+        blame_renaming(package, run, file.brings, params.topic, other)
+        or blame_same_script(package, run, file.brings, params.topic, other)
+        or blame_place(package, file, file.brings, params.topic, other)
+    )
+    return blamed.based_on(unjudged=False) if blamed else other
 
 
 def _skipped(package: PackageFacts, file: LaunchFile, nodes: Sequence[str]) -> Verdict | None:
@@ -364,6 +369,10 @@ def _find_unnamed(
     something to judge here: others that are `found` running."""
     missing = joined([lost for one in params.scripts if (lost := missing_node(package, file, one))])
     if missing is not None:
+        there = [node for script in params.scripts for node in nodes_of_script(package, file, script)]
+        renaming = find_renaming(package, there, params.topic) if params.topic else None
+        hint = f"{missing.hint}; then in {file.path} {renaming.fix}" if renaming else missing.hint
+        missing = missing.model_copy(update={"hint": hint})
         return missing.based_on(unjudged=missing.basis.unjudged or not found)
     if twins := _twins(file, params):
         return twins
@@ -577,6 +586,5 @@ def _not_connected(
     of_launch_file = blame_renaming(
         package, run, nodes if len(nodes) > 1 else file.brings, topic, other
     ) or blame_place(package, file, nodes, topic, other)
-    if of_launch_file is not None:
-        return of_launch_file
-    return other.based_on(unjudged=True) if all(w.own for w in wanted) else other
+    other = of_launch_file or other.based_on(unjudged=True)
+    return other.based_on(unjudged=other.basis.unjudged and all(w.own for w in wanted))

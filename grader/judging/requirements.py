@@ -55,7 +55,8 @@ class Requirements:
             return _blocked(verdict, root, message, timing=timing)
         undecided = next((r for r in criterion.requires if self.verdicts[r].status.is_open), None)
         if undecided is None:
-            return verdict
+            part = {"status": Status.PARTIAL, "score": verdict.basis.part}
+            return verdict.model_copy(update=part) if verdict.basis.part else verdict
         message = f"{verdict.message}; and {undecided} could not be judged"
         # what this one was told would put right what nobody knows to be wrong
         hint = f"see {undecided} first"

@@ -147,6 +147,8 @@ class Basis(Record):
     unjudged: bool = False
     """It rests on the absence of evidence: the judge turns it, even a pass, into `blocked` where a required criterion
     explains the absence."""
+    part: float = 0.0
+    """The share of the points that what is right earns where no other criterion explains a loss that is `unjudged`."""
     unbuilt: bool = False
     """What is absent is made by the build alone."""
     silent: bool = False
@@ -250,10 +252,12 @@ class Verdict(Record):
         return self.model_copy(update={"citations": tuple(cited)})
 
     def in_part(self, share: float, right: str) -> Verdict:
-        """Return a fail as one that earns `share` of the points, 0 to 1, for what is right. Where nothing is, and
-        where nothing could be judged, it stays as it is."""
-        if self.status is not Status.FAIL or self.basis.unjudged or share <= 0:
+        """Return a fail as one that earns `share` of the points, 0 to 1, for what is right. Where nothing is, it stays
+        as it is. Where it is unjudged, the judge gives the share, unless another criterion explains it."""
+        if self.status is not Status.FAIL or share <= 0:
             return self
+        if self.basis.unjudged:
+            return self.model_copy(update={"right": right}).based_on(part=share)
         return self.model_copy(update={"status": Status.PARTIAL, "score": share, "right": right})
 
     def lost_by(self, kind: MistakeKind, name: str, meant: str = "") -> Verdict:

@@ -6,7 +6,7 @@ What `ns` and `<remap>` make of its name, which of them to remove to have the ri
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import PurePosixPath
 from typing import NamedTuple
@@ -35,7 +35,7 @@ RENAMES = ("remap", "args")
 
 
 class Renaming(NamedTuple):
-    """What renames a topic, a clause after `it`; what to remove, so that the topic has its name; and the lines."""
+    """What renames a topic, a clause after `the launch file`; what gives the topic its name back; and the lines."""
 
     why: str
     fix: str
@@ -48,55 +48,94 @@ class _Use(NamedTuple):
     node: LaunchNode
     name: str
 
-    def topic(self, *, drop_ns: bool = False, drop_remaps: bool = False) -> str:
-        """Return the topic's whole name, as ROS resolves it: first by the namespace, then by the remaps."""
-        namespace = "/" if drop_ns else self.node.namespace
-        whole = _whole(self.name, namespace)
-        table = {} if drop_remaps else {_whole(old, namespace): new for old, new in self.node.remaps}
-        return _whole(table.get(whole, whole), namespace)
+    def space(self, gone: Collection[LaunchLine | None] = ()) -> str:
+        """Return the node's namespace, with both slashes, without the lines that are `gone`."""
+        found = [line for line in self.node.renaming if line.tag not in RENAMES]
+        if not any(line in gone for line in found):
+            return self.node.namespace
+        space = "/"
+        for line in found:
+            if line not in gone:
+                value = line.value.strip("/")
+                space = f"/{value}/" if line.value.startswith("/") else f"{space}{value}/"
+        return space
 
-    @property
-    def remaps(self) -> Iterator[tuple[str, LaunchLine | None]]:
-        """The new names that `<remap>`s give the topic, with their lines where they are known."""
+    def topic(self, gone: Collection[LaunchLine | None] = (), space: str = "") -> str:
+        """Return the topic's whole name, as ROS resolves it: first by the namespace, then by the remaps. Lines that
+        are `gone` do not count; `space` is another namespace than the node's."""
+        space = space or self.space(gone)
+        table = {self._whole(old, space): new for old, new, line in self._lines() if line not in gone}
+        whole = self._whole(self.name, space)
+        return self._whole(table.get(whole, whole), space)
+
+    def remaps(self, gone: Collection[LaunchLine | None] = ()) -> list[tuple[str, LaunchLine | None]]:
+        """Return the new names that `<remap>`s give the topic, with their lines where they are known."""
+        space = self.space(gone)
+        whole = self._whole(self.name, space)
+        return [(new, line) for old, new, line in self._lines() if self._whole(old, space) == whole]
+
+    def _lines(self) -> Iterator[tuple[str, str, LaunchLine | None]]:
         lines = [line for line in self.node.renaming if line.tag in RENAMES]
         # Some remaps may come without their line: which line is whose is not known then.
         known = len(lines) == len(self.node.remaps)
         for index, (old, new) in enumerate(self.node.remaps):
-            if _whole(old, self.node.namespace) == _whole(self.name, self.node.namespace):
-                yield new, lines[index] if known else None
+            yield old, new, lines[index] if known else None
+
+    def _whole(self, name: str, space: str) -> str:
+        private = f"{self.node.name}/{name[1:].lstrip('/')}" if name.startswith("~") else name
+        return private if private.startswith("/") else f"{space}{private}"
 
 
 def find_renaming(
-    package: PackageFacts,
-    nodes: Sequence[LaunchNode],
-    topic: str,
-    run: Run | None = None,
-    *,
-    in_scripts: bool = True,
+    package: PackageFacts, nodes: Sequence[LaunchNode], topic: str, run: Run | None = None
 ) -> Renaming | None:
-    """Return what gives the topic another name in these nodes. None unless it has the right one in all of them once
-    that is removed, and the nodes have names of their own still. `run` shows which topics the nodes had; without
-    `in_scripts`, the scripts are taken to write the topic's name, whatever they write now."""
-    uses = [use for node in nodes if (use := _use_of(package, node, topic, run, in_scripts=in_scripts))]
-    if len(uses) < 2 or all(use.topic() == topic for use in uses):
+    """Return what in the launch file gives the topic another name in these nodes. None unless it has the right one in
+    all of them once that is put right, and the nodes have names of their own still. `run` shows which topics the
+    nodes had."""
+    uses = [use for node in nodes if (use := _use_of(package, node, topic, run))]
+    return _renaming_of(uses, topic)
+
+
+def _renaming_of(uses: Sequence[_Use], topic: str) -> Renaming | None:
+    wrong = [use for use in uses if use.topic() != topic]
+    if not wrong:
         return None
     # What removes least is tried first.
-    for drop_ns, drop_remaps in ((True, False), (False, True), (True, True)):
-        names = {use.node.name if drop_ns else use.node.full_name for use in uses}
-        right = all(use.topic(drop_ns=drop_ns, drop_remaps=drop_remaps) == topic for use in uses)
-        if right and len(names) == len(uses):
-            return _described(uses, topic, drop_ns=drop_ns, drop_remaps=drop_remaps)
-    return None
+    for some in (wrong, uses):
+        spaces = {line for use in some for line in use.node.renaming if line.tag not in RENAMES}
+        for dropped in (spaces, set[LaunchLine](), spaces):
+            gone: set[LaunchLine | None] = {*dropped}
+            if dropped is not spaces or not _is_right(uses, gone, topic):
+                gone |= {line for use in some for _, line in use.remaps(gone)}
+            if gone and _is_right(uses, gone, topic):
+                return _described(uses, topic, gone)
+    return _moved(uses, wrong, topic)
 
 
-def _names_in_scripts(
-    package: PackageFacts, nodes: Sequence[LaunchNode], topic: str
-) -> tuple[PythonSlip, ...]:
-    """Return where the scripts of the nodes name a topic, and it is another one; nothing where a script names several,
-    or none of another name."""
-    named = [_named_in(package, node) for node in nodes]
-    other = [one for found in named for one in found if one.message.lstrip("/") != topic.lstrip("/")]
-    return tuple(dict.fromkeys(other)) if all(len(found) == 1 for found in named) else ()
+def _is_right(uses: Sequence[_Use], gone: Collection[LaunchLine | None], topic: str) -> bool:
+    names = {f"{use.space(gone)}{use.node.name}" for use in uses}
+    return len(names) == len(uses) and all(use.topic(gone) == topic for use in uses)
+
+
+def _moved(uses: Sequence[_Use], wrong: Sequence[_Use], topic: str) -> Renaming | None:
+    """Return the namespaces that nodes have to be in for the topic, which is in one itself, to have its name."""
+    slips = list[Slip]()
+    for use in wrong:
+        space = topic.removesuffix(use.name)
+        if not space.endswith("/") or space == "/" or use.topic(space=space) != topic:
+            return None
+        slip = wrong_name(use.node, f"{space}{use.node.name}")
+        right = (one for one in uses if one.topic() == topic)
+        if any(
+            line.line == slip.line and line.file == slip.file for one in right for line in one.node.renaming
+        ):
+            return None  # it would take others out of theirs
+        slips.append(slip)
+    nodes = join_words(use.node.full_name for use in wrong)
+    spaces = join_words(dict.fromkeys(topic.removesuffix(use.name).strip("/") for use in wrong))
+    why = f"has {nodes} outside of the namespace {spaces}"
+    cited = tuple(dict.fromkeys(slip.place for slip in slips))
+    return Renaming(why, "; ".join(dict.fromkeys(slip.fix for slip in slips)), cited)
 
 
 def _named_in(package: PackageFacts, node: LaunchNode) -> list[PythonSlip]:
@@ -105,16 +144,16 @@ def _named_in(package: PackageFacts, node: LaunchNode) -> list[PythonSlip]:
     return [s for s in package.slips if s.file == path and s.kind in {"publisher", "subscriber"}]
 
 
-def _use_of(
-    package: PackageFacts, node: LaunchNode, topic: str, run: Run | None, *, in_scripts: bool
-) -> _Use | None:
-    """Return how the node's script writes the name, if that gives a topic that the node had."""
-    written = {slip.message for slip in _named_in(package, node)} if in_scripts else set[str]()
+def _use_of(package: PackageFacts, node: LaunchNode, topic: str, run: Run | None) -> _Use | None:
+    """Return how the node's script writes the name, if that gives a topic that the node had: the only name in it, or
+    one that can be the topic's."""
+    written = {slip.message for slip in _named_in(package, node)}
     had = _topics(run, node) if run is not None else None
     resolvable = UNRESOLVED not in f"{node.namespace}{node.remaps}"
     # of a topic that belongs into the node's namespace, the script writes what is behind it
-    below = topic.removeprefix(node.namespace).lstrip("/")
-    for name in dict.fromkeys((below, topic.lstrip("/"), topic)) if resolvable else ():
+    names = [topic[place + 1 :] for place, letter in enumerate(topic) if letter == "/"]
+    usual = (topic.removeprefix(node.namespace).lstrip("/"), topic.lstrip("/"), *names, topic)
+    for name in dict.fromkeys(written if len(written) == 1 else usual) if resolvable else ():
         use = _Use(node, name)
         if (not written or name in written) and (had is None or use.topic() in had):
             return use
@@ -127,35 +166,33 @@ def _topics(run: Run, node: LaunchNode) -> set[str]:
     return {topic for topics in ends for topic, there in topics.items() if names & set(there)}
 
 
-def _whole(name: str, namespace: str) -> str:
-    return name if name.startswith("/") else f"{namespace}{name}"
-
-
-def _described(uses: Sequence[_Use], topic: str, *, drop_ns: bool, drop_remaps: bool) -> Renaming:
-    name = topic.lstrip("/")
+def _described(uses: Sequence[_Use], topic: str, gone: Collection[LaunchLine | None]) -> Renaming:
+    """Return what the lines that are to be `gone` make of the topic, and how to remove them."""
     why, fixes, lines = list[str](), list[str](), list[LaunchLine]()
-    if drop_ns:
-        spaces = dict.fromkeys(use.node.namespace.strip("/") for use in uses if use.node.namespace != "/")
-        found = [line for use in uses for line in use.node.renaming if line.tag not in RENAMES]
+    found = [line for use in uses for line in use.node.renaming if line in gone and line.tag not in RENAMES]
+    remaps = [(use.name, *one) for use in uses for one in use.remaps(gone) if one[1] in gone]
+    moved = [use.node for use in uses if use.topic() != topic]
+    if found:
+        spaces = dict.fromkeys(node.namespace.strip("/") for node in moved if node.namespace != "/")
         why.append(f"puts its nodes in the namespace{'s' * (len(spaces) > 1)} {join_words(spaces)}")
-        values = dict.fromkeys(line.value for line in found) or spaces
-        given = [f'ns="{value}"' for value in values]
+        given = [f'ns="{value}"' for value in dict.fromkeys(line.value for line in found)]
         fixes.append(f"{join_words(given)}{_in_lines(found)}")
         lines += found
-    if drop_remaps:
-        remaps = [remap for use in uses for remap in use.remaps]
-        found = [line for _, line in remaps if line is not None]
-        why.append(f"remaps {name} to {join_words(dict.fromkeys(new for new, _ in remaps))}")
-        if found and all(line.tag == "args" for line in found):
-            words = join_words(dict.fromkeys(f"{name}:={new}" for new, _ in remaps))
-            fixes.append(f"{words} from the args{_in_lines(found)}")
+    if remaps:
+        names = join_words(dict.fromkeys(name for name, _, _ in remaps))
+        why.append(f"remaps {names} to {join_words(dict.fromkeys(new for _, new, _ in remaps))}")
+        known = [line for _, _, line in remaps if line is not None]
+        if known and all(line.tag == "args" for line in known):
+            words = join_words(dict.fromkeys(f"{name}:={new}" for name, new, _ in remaps))
+            fixes.append(f"{words} from the args{_in_lines(known)}")
         else:
-            fixes.append(f"the <remap>{'s' * (len(set(found)) != 1)} of {name}{_in_lines(found)}")
-        lines += found
-    moved = (use.node for use in uses if use.topic() != topic)
+            fixes.append(f"the <remap>{'s' * (len(set(known)) != 1)} of {names}{_in_lines(known)}")
+        lines += known
     places = sorted({(one.file, one.line) for one in (lines or moved)})
     cited = tuple(FileCitation(file=file, line=line) for file, line in places)
-    return Renaming(" and ".join(why), f"remove {' and '.join(fixes)}: then {name} is {topic}", cited[:8])
+    named = dict.fromkeys(use.name for use in uses if use.topic() != topic)
+    then = f"then {join_words(named)} {'is' if len(named) == 1 else 'are'} {topic}"
+    return Renaming(" and ".join(why), f"remove {' and '.join(fixes)}: {then}", cited[:8])
 
 
 def _in_lines(found: Sequence[LaunchLine]) -> str:
@@ -225,7 +262,7 @@ def blame_renaming(
     renaming = find_renaming(package, nodes, topic, run)
     if renaming is None:
         return None
-    message = f"{verdict.message}: it {renaming.why}"
+    message = f"{verdict.message}: the launch file {renaming.why}"
     update = {"message": message, "hint": renaming.fix, "citations": renaming.citations}
     return verdict.model_copy(update=update)
 
@@ -240,7 +277,11 @@ def explain_by_late_remap(check: Check, package: PackageFacts, run: Run, verdict
         ends = [topic for topic in had if f"/{topic}".endswith(f"/{late.value}")]
         ends = [topic for topic in ends if topic.startswith(late.namespace)]
         spaces = {topic.removesuffix(late.value.lstrip("/")) for topic in ends}
-        meant = {_whole(late.to, space) for space in spaces if space.endswith("/")}
+        meant = {
+            late.to if late.to.startswith("/") else f"{space}{late.to}"
+            for space in spaces
+            if space.endswith("/")
+        }
         if any(topic not in had and re.search(rf"{re.escape(topic)}(?![\w/])", said) for topic in meant):
             why = f"the <remap> on line {late.line} of {late.file} has no effect on the nodes above it"
             hint = f"move the <remap> from line {late.line} of {late.file} to above line {late.above}"
@@ -281,10 +322,11 @@ def blame_place(
 ) -> Verdict | None:
     """Return the verdict with the namespaces that keep nodes apart, or with the scripts' own names for the topic; None
     where the launch file puts none of the nodes into a namespace and remaps nothing."""
+    blamed = _blame_scripts(package, file, verdict, nodes, topic)
     moved = [node for node in nodes if node.remaps or node.namespace != "/"]
-    if len({node.namespace for node in moved} - {"/"}) > 1:
+    if blamed is None and len({node.namespace for node in moved} - {"/"}) > 1:
         return _in_namespaces(file, verdict, moved, topic)
-    return _blame_scripts(package, file, verdict, nodes, topic) if moved else None
+    return blamed if moved or blamed is None else blamed.based_on(unjudged=True)
 
 
 def _in_namespaces(file: LaunchFile, verdict: Verdict, nodes: Sequence[LaunchNode], topic: str) -> Verdict:
@@ -294,7 +336,7 @@ def _in_namespaces(file: LaunchFile, verdict: Verdict, nodes: Sequence[LaunchNod
     places = {(line.file, line.line) for line in found} or {(n.file or file.path, n.line) for n in nodes}
     outside = f'write one <node> of each outside of <group ns="{spaces[0]}">'
     update = {
-        "message": f"{verdict.message}: it puts its nodes in the namespaces {join_words(spaces)}",
+        "message": f"{verdict.message}: the launch file puts its nodes in the namespaces {join_words(spaces)}",
         "hint": f"{outside}: in it, {topic.lstrip('/')} becomes /{spaces[0]}{topic}",
         "citations": tuple(FileCitation(file=path, line=line) for path, line in sorted(places))[:4],
     }
@@ -338,15 +380,30 @@ def _blame_scripts(
     package: PackageFacts, file: LaunchFile, verdict: Verdict, nodes: Sequence[LaunchNode], topic: str
 ) -> Verdict | None:
     """Name the lines of the scripts that have another topic, and what gives the right one another name then. None where
-    no script has another, and the launch file gives the right one no other name: it does not keep the nodes apart."""
-    named = _names_in_scripts(package, nodes, topic)
-    renaming = find_renaming(package, nodes, topic, in_scripts=False)
-    if not named:
+    it is not plain how to have the topic in all nodes."""
+    uses = [use for node in nodes if (use := _use_of(package, node, topic, None))]
+    spaces = [
+        one.namespace for one in file.brings if one.namespace != "/" and topic.startswith(one.namespace)
+    ]
+    name = topic.removeprefix(max(spaces, key=len, default="/"))
+    wrong = [use for use in uses if use.topic() != topic]
+    # A name that would be right in another namespace is left as it is, if that helps.
+    others = [use for use in wrong if not f"/{topic}".endswith(f"/{use.name}")]
+    for changed in (others, wrong) if len(uses) > 1 else ():
+        right = [_Use(use.node, name) if use in changed else use for use in uses]
+        named = [_named_in(package, use.node) for use in changed]
+        renaming = _renaming_of(right, topic)
+        if all(len(found) == 1 for found in named) and (renaming or _is_right(right, (), topic)):
+            break
+    else:
+        return None
+    slips = list(dict.fromkeys(one for found in named for one in found))
+    if not slips:
         return verdict if renaming is not None else None
-    lines = join_words(f"line {one.line} of {one.file}" for one in named)
-    others = join_words(dict.fromkeys(one.message for one in named))
-    hint = f"write {topic.lstrip('/')} on {lines}, not {others}"
+    lines = join_words(f"line {one.line} of {one.file}" for one in slips)
+    before = join_words(dict.fromkeys(one.message for one in slips))
+    hint = f"write {name} on {lines}, not {before}"
     if renaming is not None:
         hint = f"{hint}; then in {file.path} {renaming.fix}"
-    cited = (*(one.place for one in named), *(renaming.citations if renaming is not None else ()))
+    cited = (*(one.place for one in slips), *(renaming.citations if renaming is not None else ()))
     return verdict.model_copy(update={"hint": hint, "citations": cited})
