@@ -53,6 +53,16 @@ class Choice:
 
 
 def choose_package(candidates: list[Candidate], wanted: WantedPackage) -> Choice | None:
+    """Return the lab's package, with remarks on files that it lacks and other packages have."""
+    choice = _choose(candidates, wanted)
+    if choice is None:
+        return None
+    chosen, known = choice.package, {choice.package.name, *(one.name for one in wanted.each)}
+    others = [c for c in candidates if c.has_manifest and c.name not in known][:COPIES_LOOKED_AT]
+    return replace(choice, hints=(*choice.hints, *_in_another_package(chosen, others, wanted)))
+
+
+def _choose(candidates: list[Candidate], wanted: WantedPackage) -> Choice | None:
     """Return the lab's package: by its manifest's name, by that in other case, by its folder's name, in this order.
 
     What catkin does not see (a marker file, no manifest) comes after all that it does see. Last comes the only name
@@ -194,10 +204,36 @@ def _left_behind(chosen: Candidate, others: list[Candidate], wanted: WantedPacka
             yield f"{printable(name)} is in {where}: move it to {printable(chosen.path)}, into the same folder there"
 
 
+def _in_another_package(chosen: Candidate, others: list[Candidate], wanted: WantedPackage) -> Iterator[str]:
+    """Yield where other packages have the lab's files that the one which is graded lacks; each begins with its name."""
+    own = _files_of(chosen.folder, wanted.files)
+    missing = wanted.files - own
+    for other in others if missing else ():
+        places = _places_of(other.folder, missing)
+        called = f'"{other.name}"'.encode()
+        for name, path in sorted(places.items()):
+            there = f"{printable(other.path)}/{printable(path)}, in another package"
+            fix = f"move it to {printable(chosen.path)}/{printable(path)}"
+            if name.endswith(".launch") and called in (
+                read_untrusted(other.folder / path, _LARGEST_BYTES) or b""
+            ):
+                fix += f', with pkg="{printable(chosen.name)}" in it'
+            fix += (
+                "" if own else f", or grade {printable(other.path)} with --package {shlex.quote(other.name)}"
+            )
+            yield f"{printable(name)} is at {there}: {fix}"
+        missing -= places.keys()
+
+
 def _files_of(folder: Path, names: frozenset[str], *, near: bool = False) -> frozenset[str]:
     """Return which of the lab's files are there by name, in whatever folder of the package; with `near`, only in those
     that a package has: what is deeper may be in another one, and the folder a workspace."""
-    found: set[str] = set()
+    return frozenset(_places_of(folder, names, near=near))
+
+
+def _places_of(folder: Path, names: frozenset[str], *, near: bool = False) -> dict[str, str]:
+    """Return the paths of those files, the nearest of each name."""
+    found: dict[str, str] = {}
     if names:
         for below in islice(walk(folder, tolerant=True), FOLDERS_OF_A_COPY):
             below.folders[:] = [name for name in below.folders if name not in BUILD_SPACES]
@@ -205,8 +241,10 @@ def _files_of(folder: Path, names: frozenset[str], *, near: bool = False) -> fro
                 below.folders[:] = (
                     sorted(USUAL_FOLDERS.intersection(below.folders)) if below.path == "." else []
                 )
-            found |= names & {entry.name for entry in below.others}
-    return frozenset(found)
+            for entry in below.others:
+                if entry.name in names:
+                    found.setdefault(entry.name, below.inside(entry.name))
+    return found
 
 
 def _name_hint(chosen: Candidate, lab: WantedPackage) -> str:

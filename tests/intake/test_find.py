@@ -248,6 +248,32 @@ def test_what_another_copy_has_and_the_graded_one_has_not_is_named(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("beside", "told"),
+    [
+        (
+            {"week1/scripts/talker.py": ""},
+            [
+                "talker.py is at week1/scripts/talker.py, in another package: move it to lab1/scripts/talker.py"
+            ],
+        ),
+        (
+            {"week1/launch/lab.launch": '<node pkg="week1"/>', "lab1/scripts/talker.py": ""},
+            [
+                "lab.launch is at week1/launch/lab.launch, in another package: move it to lab1/launch/lab.launch, "
+                'with pkg="lab1" in it'
+            ],
+        ),
+        ({"week1/scripts/other.py": ""}, []),
+    ],
+)
+def test_what_another_package_has_and_the_lab_s_own_has_not_is_named(beside, told, tmp_path):
+    files = {**tree("lab1", "lab1"), **tree("week1", "week1"), "lab1/scripts/listener.py": "", **beside}
+    wanted = WantedPackage(name="lab1", files=frozenset({"talker.py", "listener.py", "lab.launch"}))
+    found = opened(write(tmp_path / "repo", files), tmp_path, package=wanted)
+    assert list(found.hints) == told
+
+
+@pytest.mark.parametrize(
     "text",
     [
         manifest("lab1"),

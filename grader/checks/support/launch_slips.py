@@ -156,8 +156,12 @@ def _absent(package: PackageFacts, launch: str, wanted: set[str]) -> Verdict:
         hint = f"{move_hint(package, broken[0].path, path)}; then {repair}"
     if parts and set(parts.values()) == wanted and not movable:
         hint = f"{hint}, with the <node>s of {join_words(parts)} in it"
+    beside = () if movable or guessed else package.hints_on(launch)
+    if beside:
+        where, _, hint = beside[0].partition(": ")
+        seen = f"; {where}"
     verdict = failed(f"{launch} is not in the package{seen}", hint=hint)
-    kind: MistakeKind = "file-elsewhere" if movable or guessed else "file-missing"
+    kind: MistakeKind = "file-elsewhere" if movable or guessed or beside else "file-missing"
     return verdict.about(citations=(FileCitation(file=movable[0] if movable else path),)).lost_by(kind, path)
 
 
