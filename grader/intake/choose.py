@@ -17,13 +17,13 @@ from lxml import etree
 
 from grader.errors import PackageNotFound, SubmissionError
 from grader.files import read_untrusted
+from grader.intake.loose_files import loose_files
 from grader.intake.names import LONGEST_PACKAGE_NAME, brief, encodable, is_archive_name, listing, printable
 from grader.intake.tree import Folder, is_file, is_there, read_file, walk
 from grader.model.package import BUILD_SPACES, CMAKE, MANIFEST, meant_manifest
 from grader.wording import is_one_edit
 
 COPIES_LOOKED_AT, FOLDERS_OF_A_COPY = 50, 300
-FIRST_LINE_BYTES = 200
 USUAL_FOLDERS = frozenset({"src", "scripts", "nodes", "launch"})
 
 
@@ -270,9 +270,15 @@ def _ignored_hint(chosen: Candidate) -> str:
 
 
 def not_found(
-    root: Path, candidates: list[Candidate], wanted: WantedPackage, git_links: tuple[str, ...]
+    root: Path,
+    candidates: list[Candidate],
+    wanted: WantedPackage,
+    git_links: tuple[str, ...],
+    *,
+    modes_known: bool = True,
 ) -> PackageNotFound:
-    """Return the error for a submission without the package; it says what is there instead, and what to do."""
+    """Return the error for a submission without the package; it says what is there instead, and what to do.
+    `modes_known`: the disk tells which files are executable."""
     packages = sorted(
         (c for c in candidates if c.has_manifest),
         key=lambda c: (-len(_files_of(c.folder, wanted.files)), c.name),
@@ -282,11 +288,12 @@ def not_found(
     name = printable(wanted.asked or wanted.name)
     return PackageNotFound(
         f"there is no package {name} in this submission; {here}",
-        hint=_where_it_went(root, wanted.asked or wanted.name, git_links) or _rename(root, packages, wanted),
+        hint=_where_it_went(root, wanted.asked or wanted.name, git_links)
+        or _rename(root, packages, wanted, modes_known=modes_known),
     )
 
 
-def _rename(root: Path, packages: list[Candidate], wanted: WantedPackage) -> str:
+def _rename(root: Path, packages: list[Candidate], wanted: WantedPackage, *, modes_known: bool) -> str:
     # reversed, so that of several with one name the nearest stays
     seen = {c.name: c for c in reversed(packages) if c.ignored_by is None and encodable(c.path)}
     if wanted.asked and packages:
@@ -294,7 +301,7 @@ def _rename(root: Path, packages: list[Candidate], wanted: WantedPackage) -> str
     name = printable(wanted.asked or wanted.name)
     if not seen:
         told = f"It is the folder whose {MANIFEST} says <name>{name}</name>"
-        loose = _loose_files(root, wanted.files)
+        loose = loose_files(root, wanted.files, modes_known=modes_known)
         made = f"`catkin_create_pkg {name} std_msgs rospy` makes it, to hold {loose}"
         return f"{told}: {made}." if loose else f"{told}: was it handed in (and pushed)?"
     counts = {c: len(_files_of(c.folder, wanted.files)) for c in seen.values()}
@@ -313,33 +320,6 @@ def _rename(root: Path, packages: list[Candidate], wanted: WantedPackage) -> str
         f'then in project(…) and each pkg="…"), '
         f"or grade it with --package {shlex.quote(brief(name))}."
     )
-
-
-def _loose_files(root: Path, names: frozenset[str]) -> str:
-    """Return where most of the lab's files lie, though in no package: `publisher.py in week1/`; "" for nowhere."""
-    found = {
-        folder.path: sorted(names & {entry.name for entry in folder.others})
-        for folder in islice(walk(root, tolerant=True), FOLDERS_OF_A_COPY)
-    }
-    path = max(found, key=lambda path: len(found[path]), default="")
-    if not path or not found[path]:
-        return ""
-    folder = root if path == "." else root / path
-    return (
-        listing(found[path])
-        + ("" if path == "." else f" in {printable(path)}/")
-        + _windows(folder, found[path])
-    )
-
-
-def _windows(folder: Path, names: list[str]) -> str:
-    """Return what to do with those of the files whose lines end as on Windows; "" for none."""
-    first = {name: (read_untrusted(folder / name, FIRST_LINE_BYTES) or b"").split(b"\n")[0] for name in names}
-    crlf = [name for name, line in first.items() if line.startswith(b"#!") and line.endswith(b"\r")]
-    if not crlf:
-        return ""
-    them = "it" if len(crlf) == 1 else "them"
-    return f"; {listing(crlf)} cannot be started, because of Windows' line ends (CRLF): dos2unix {them} first"
 
 
 TAKE_IN = "delete {0}/.git, `git rm --cached {0}`, `git add {0}`, commit and push"

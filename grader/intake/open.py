@@ -251,7 +251,9 @@ def locate(opened: Opened, wanted: WantedPackage) -> Located:
     loose = choose_loose(opened.root, candidates, wanted, opened.git_links)
     if loose and around is None:
         return Located(opened=opened, candidates=candidates, choice=loose, also={})
-    raise not_found(opened.root, candidates, wanted, opened.git_links)
+    of_archive = opened.archive_modes
+    modes_known = of_archive is None or any(bit is not None for bit in of_archive.values())
+    raise not_found(opened.root, candidates, wanted, opened.git_links, modes_known=modes_known)
 
 
 def _locate(opened: Opened, wanted: WantedPackage) -> Located | None:

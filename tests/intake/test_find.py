@@ -169,17 +169,28 @@ def test_an_empty_folder_of_a_package_that_is_needed_may_be_a_submodule(tmp_path
             "packages here: first, second",
             "--package NAME.",
         ),
-        ({"week1/talker.py": "x"}, "no package.xml", "makes it, to hold talker.py in week1/."),
+        (
+            {"week1/talker.py": "x"},
+            "no package.xml",
+            "makes it, to hold talker.py in week1/; talker.py is not executable: chmod +x it.",
+        ),
         # However much git keeps beside it.
         (
             {**{f".git/objects/{n:03}/x": "" for n in range(300)}, "my/lab/week1/talker.py": "x"},
             "no package.xml",
-            "makes it, to hold talker.py in my/lab/week1/.",
+            "makes it, to hold talker.py in my/lab/week1/; talker.py is not executable",
         ),
         (
             {"week1/talker.py": "#!/usr/bin/env python\r\n", "week1/listener.py": "#!/usr/bin/env python\n"},
             "no package.xml",
-            "week1/; talker.py cannot be started, because of Windows' line ends (CRLF): dos2unix it first.",
+            "week1/; talker.py cannot be started, because of Windows' line ends (CRLF): dos2unix it first; "
+            "listener.py, talker.py are not executable: chmod +x them.",
+        ),
+        (
+            {"talker.py": '"""\nprint "this"\n"""\nprint(\'x\')\n    print "hello %s" % name\n'},
+            "no package.xml",
+            "hold talker.py; talker.py is not executable: chmod +x it; line 5 of talker.py prints as in Python 2: "
+            "write print(…), with brackets.",
         ),
     ],
 )
