@@ -183,14 +183,18 @@ def test_an_empty_folder_of_a_package_that_is_needed_may_be_a_submodule(tmp_path
         (
             {"week1/talker.py": "#!/usr/bin/env python\r\n", "week1/listener.py": "#!/usr/bin/env python\n"},
             "no package.xml",
-            "week1/; talker.py cannot be started, because of Windows' line ends (CRLF): dos2unix it first; "
-            "listener.py, talker.py are not executable: chmod +x them.",
+            (
+                "week1/; talker.py cannot be started, because of Windows' line ends (CRLF): dos2unix it first; "
+                "listener.py, talker.py are not executable: chmod +x them."
+            ),
         ),
         (
             {"talker.py": '"""\nprint "this"\n"""\nprint(\'x\')\n    print "hello %s" % name\n'},
             "no package.xml",
-            "hold talker.py; talker.py is not executable: chmod +x it; line 5 of talker.py prints as in Python 2: "
-            "write print(…), with brackets.",
+            (
+                "hold talker.py; talker.py is not executable: chmod +x it; line 5 of talker.py prints as in Python 2: "
+                "write print(…), with brackets."
+            ),
         ),
     ],
 )
@@ -270,8 +274,10 @@ def test_what_another_copy_has_and_the_graded_one_has_not_is_named(tmp_path):
         (
             {"week1/launch/lab.launch": '<node pkg="week1"/>', "lab1/scripts/talker.py": ""},
             [
-                "lab.launch is at week1/launch/lab.launch, in another package: move it to lab1/launch/lab.launch, "
-                'with pkg="lab1" in it'
+                (
+                    "lab.launch is at week1/launch/lab.launch, in another package: move it to lab1/launch/lab.launch, "
+                    'with pkg="lab1" in it'
+                )
             ],
         ),
         ({"week1/scripts/other.py": ""}, []),
