@@ -117,8 +117,7 @@ def _absent(package: PackageFacts, launch: str, wanted: set[str]) -> Verdict:
     full = package.launches_of(wanted)
     programs = wanted if full else {_program_meant(package, one) for one in wanted}
     guessed = [] if full else package.launches_of(programs)[:1]
-    others = [f.path for f in package.launch_files]
-    names = paths_by_name(package)
+    others, names = [f.path for f in package.launch_files], paths_by_name(package)
     near = [names[n] for n in near_names(launch, names)]
     stem = PurePosixPath(launch).stem
     near += [p for n, p in names.items() if n == f"{stem}.xml" and p not in near]
@@ -156,13 +155,11 @@ def _absent(package: PackageFacts, launch: str, wanted: set[str]) -> Verdict:
         hint = f"{move_hint(package, broken[0].path, path)}; then {repair}"
     if parts and set(parts.values()) == wanted and not movable:
         hint = f"{hint}, with the <node>s of {join_words(parts)} in it"
-    beside = () if movable or guessed else package.hints_on(launch)
-    if beside:
-        where, _, hint = beside[0].partition(": ")
-        seen = f"; {where}"
-    verdict = failed(f"{launch} is not in the package{seen}", hint=hint)
-    kind: MistakeKind = "file-elsewhere" if movable or guessed or beside else "file-missing"
-    return verdict.about(citations=(FileCitation(file=movable[0] if movable else path),)).lost_by(kind, path)
+    remark = next(iter(() if movable or guessed else package.hints_on(launch)), "").partition(": ")
+    seen, hint = (f"; {remark[0]}", remark[2]) if remark[0] else (seen, hint)
+    kind: MistakeKind = "file-elsewhere" if movable or guessed else "file-missing"
+    cited = (FileCitation(file=movable[0] if movable else path),)
+    return failed(f"{launch} is not in the package{seen}", hint=hint, citations=cited).lost_by(kind, path)
 
 
 def _launch_folder(package: PackageFacts) -> str:

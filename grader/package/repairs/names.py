@@ -240,9 +240,11 @@ def repair_script_names(
     }
     branches = [f"/{'/'.join(branch)}" for branch in _branches(wanted)]
     names = _repair_dots(files, file, names, branches)
+    names = _repair_whole_names(files, file, names, node, wanted)
+    done = set[Name]()  # with another of the same name
     for role in ROLES:
         asked = asked_of.get(role, branches)
-        given = [name for name in names if name.role == role]
+        given = [name for name in names if name.role == role and name not in done]
         # of a topic that the script has too, one of nearly the name is another one
         alike_roles = TOPIC_ROLES if role in TOPIC_ROLES else {role}
         used = {_resolve(name, node) for name in names if name.role in alike_roles}
@@ -255,15 +257,38 @@ def repair_script_names(
             alike = {_resolve(one, node) for one in given if right and _is_slip(one, right, node)}
             if role in TOPIC_ROLES and len(alike) > 1:
                 continue  # any of them may be meant, or none
-            if right and _resolve(name, node) not in {_bare(w, role) for w in asked}:
+            if right and name not in done and _resolve(name, node) not in {_bare(w, role) for w in asked}:
                 literal = _literal(name, right, node)
-                same = [one for one in dict.fromkeys(given) if one.value == name.value]
-                if role == "client" and len(same) > 1:  # waited for, and called
-                    _replace_all(files, file, dict.fromkeys(same, literal), right)
-                    break
                 shown = literal if literal.startswith("~") else right
+                same = [one for one in dict.fromkeys(names) if _is_same(one, name)]
+                if len(same) > 1:  # waited for, and called; read, and set
+                    _replace_all(files, file, dict.fromkeys(same, literal), shown)
+                    done |= {*same}
+                    continue
                 _replace_literal(files, file, name, literal, shown, plain=right in wanted.plain)
                 node = literal if role == "node" else node
+
+
+def _is_same(one: Name, other: Name) -> bool:
+    """Return whether both stand for one service that is asked, or one parameter, and are written alike."""
+    of_both = {KINDS[one.role], KINDS[other.role]} == {"parameter-name"} or one.role == other.role == "client"
+    return of_both and "key" not in (one.role, other.role) and one.value == other.value
+
+
+def _repair_whole_names(
+    files: Files, file: str, names: Sequence[Name], node: str, wanted: Wanted
+) -> list[Name]:
+    """Find the node's own parameters that are written with its name in front, `/lamp/color`, which is right for no
+    other name or namespace, and return the other names."""
+    whole = {f"/{node}/{own}": f"~{own}" for own in wanted.private}
+    found = {
+        name: whole[name.value]
+        for name in names
+        if KINDS[name.role] == "parameter-name" and name.value in whole
+    }
+    for value in dict.fromkeys(name.value for name in found):
+        _replace_all(files, file, {n: to for n, to in found.items() if n.value == value}, whole[value])
+    return [name for name in names if name not in found]
 
 
 def _name_node(files: Files, file: str, wanted: Wanted) -> str:
@@ -410,7 +435,7 @@ def _resolve(name: Name, node: str) -> str:
 def _is_slip(name: Name, right: str, node: str) -> bool:
     resolved, bare = _resolve(name, node), _bare(right, name.role)
     astray = resolved != bare and name.value.lstrip("/~") == bare.lstrip("/")
-    if name.role == "param" and name.value.lstrip("/") == bare.removeprefix(f"/{node.strip('/')}/"):
+    if name.role != "node" and name.value.lstrip("/") == bare.removeprefix(f"/{node.strip('/')}/"):
         return True  # `color` for `~color`
     return is_near(resolved, bare) or astray
 
@@ -420,7 +445,7 @@ def _literal(name: Name, right: str, node: str) -> str:
     own = f"/{node.strip('/')}/"
     if name.role == "node":
         return right.strip("/")
-    if (name.value.startswith("~") or name.role == "param") and node and right.startswith(own):
+    if node and right.startswith(own):
         return f"~{right.removeprefix(own)}"
     whole = name.value.startswith("/") or (name.role == "param" and name.value.startswith("~"))
     return right if whole else right.lstrip("/")  # relative, so that the node stays in its namespace
