@@ -17,6 +17,7 @@ from typing import NamedTuple, TypeVar
 from grader.checks.support.exit_causes import syntax_hint
 from grader.checks.support.launch import not_executable
 from grader.checks.support.launch_slips import node_slip, own_script
+from grader.checks.support.missing_names import right_import
 from grader.checks.support.scripts import (
     BACKUPS,
     CPP_SUFFIXES,
@@ -27,7 +28,7 @@ from grader.checks.support.scripts import (
     names_script,
     programs,
 )
-from grader.checks.support.text import RATE_SLOT, TYPE_SLOT, VALUE_SLOT, code_of, in_language, texts_in
+from grader.checks.support.text import RATE_SLOT, TYPE_SLOT, VALUE_SLOT, code_of, in_language, shown, texts_in
 from grader.evidence.events import PACKAGE_RUN
 from grader.installable import noetic_messages
 from grader.judging.cited_lines import LINE_CHARS, LINES_READ
@@ -43,6 +44,10 @@ from grader.wording import join_words, on_lines, significant
 POINTS_MAX = 10
 """So many faults are told at one criterion, and the others counted."""
 _NO_FIELD = re.compile(r"has no attribute '(?P<field>\w+)'.*? \((?P<file>[\w./-]+), line (?P<line>\d+)\)")
+_NO_MODULE = re.compile(
+    r"(?:No module named|cannot import name '\w+' from) '(?P<module>\w+)[\w.]*'.*? "
+    r"\((?P<file>[\w./-]+), line (?P<line>\d+)\)"
+)
 _NO_PARAMETER = re.compile(r"\((?P<file>[\w./-]+), line (?P<line>\d+)\): the parameter '[^']+' is not set")
 _READS_PARAMETER = re.compile(r"""\bget_param\(\s*(['"])(?P<name>[\w~/]+)\1\s*\)""")
 USUAL_RATE_HZ = 10
@@ -371,3 +376,29 @@ def name_other_lines(verdict: Verdict, facts: Facts) -> Verdict:
         return verdict
     hint = f"{verdict.hint}, and correct `{found['field']}` on {on_lines(others)} too"
     return verdict.model_copy(update={"hint": hint})
+
+
+def name_other_imports(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdict:
+    """Return the verdict; where an import looks in a wrong module for what the build makes, its hint has the package's
+    other lines that look there too."""
+    found, build = _NO_MODULE.search(verdict.message), facts.runs.get(PACKAGE_RUN)
+    package = facts.package_of(criterion)
+    maker = re.match(r"write `from (\w+)", verdict.hint)
+    if not (found and build and package and maker):
+        return verdict
+    wrong, others = found["module"], dict[str, list[str]]()
+    same = re.compile(rf"\s*(?:from|import)\s+{re.escape(wrong)}\b")
+    for file in (one for one in package.files if one.python and not is_product(one.path)):
+        lines = enumerate(build.file_lines(file.path)[:LINES_READ], 1)
+        for number, line in ((n, text[:LINE_CHARS].strip()) for n, text in lines if same.match(text)):
+            fix = (right_import(line, package) or ("", ""))[1]
+            if not fix and wrong not in {
+                maker[1],
+                *noetic_messages(),
+            }:  # `import lab.msg`: no line can import it
+                fix = f"write `{shown(line.replace(wrong, maker[1], 1))}`"
+            if fix and (file.path, number) != (found["file"], int(found["line"])):
+                where = "" if file.path == found["file"] else f" of {file.path}"
+                others.setdefault(fix, []).append(f"on line {number}{where}")
+    told = [f"{fix} {join_words(where, most=POINTS_MAX)}" for fix, where in others.items()]
+    return verdict.model_copy(update={"hint": "; ".join([verdict.hint, *told])}) if told else verdict

@@ -53,6 +53,7 @@ from grader.judging.hint_additions import (
     compile_command,
     fill_slots,
     lab_names,
+    name_other_imports,
     name_other_lines,
     name_other_parameters,
     name_rospy,
@@ -332,7 +333,8 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
                 found = explain_loss(check, facts.package_of(criterion), run, found)
                 found = _of_the_build(criterion, facts, run, found)
         found = fill_slots(choose_hint_language(found, criterion, facts), criterion, facts.rubric)
-        found = name_other_parameters(name_other_lines(found, facts), criterion, facts)
+        found = name_other_imports(name_other_lines(found, facts), criterion, facts)
+        found = name_other_parameters(found, criterion, facts)
         found = _with_package_name(found, criterion, facts)
         found = name_same_file(name_rospy(found, criterion, facts), criterion, facts)
         return _without_git(found, facts.package)

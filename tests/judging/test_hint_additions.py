@@ -17,6 +17,7 @@ from grader.judging.hint_additions import (
     add_advice,
     choose_hint_language,
     fill_slots,
+    name_other_imports,
     name_other_parameters,
     name_rospy,
     name_same_file,
@@ -469,3 +470,30 @@ def test_parameters_are_not_known_where_a_launch_file_may_set_them() -> None:
     message = f"ended before (KeyError: '/hz' ({SCRIPT['path']}, line 2): the parameter '/hz' is not set)"
     verdict = failed(message, hint="give it a default: `rospy.get_param('/hz', …)`")
     assert name_other_parameters(verdict, lab.criteria[0], try_facts(lab, runs)) == verdict
+
+
+@pytest.mark.parametrize(
+    ("line", "other", "added"),
+    [
+        ("from laab.msg import Num as N", "", "; write `from lab.msg import Num as N` on line 3"),
+        ("from laab.msg import Sum", "from laab.msg import Num, Sum",
+         "; write `from lab.msg import Sum` on line 3; write `from lab.msg import Num, Sum` on line 2 of src/other.py"),
+        ("import laab.msg as m", "    from laab.msg import Num",
+         "; write `import lab.msg as m` on line 3; write `from lab.msg import Num` on line 2 of src/other.py"),
+        ("from std_msgs.msg import Num", "from lab.msg import Num", ""),
+        ("from lab.msg import Sum", "from lab.msg import Sum", ""),
+        ("from laabs.msg import Num", "# from laab.msg import Num", ""),
+    ],
+)  # fmt: skip
+def test_other_imports_from_the_same_wrong_module_are_named(line: str, other: str, added: str) -> None:
+    lab, wrong = rubric(RATE, scenarios={"talker": SCENARIO}), "from laab.msg import Num"
+    texts = {SCRIPT["path"]: f"#!\n{wrong}\n{line}\n", "src/other.py": f"#!\n{other}\n"}
+    files = [{**SCRIPT, "path": path} for path in texts]
+    made = [{"path": f"msg/{name}.msg", "fields": []} for name in ("Num", "Sum")]
+    package = {"package": {"name": "lab", "files": files, "interfaces": made}, "attachments": texts}
+    why = f"ModuleNotFoundError: No module named 'laab' ({SCRIPT['path']}, line 2): the build makes Num"
+    verdict = failed(f"it ended: {why}", hint="write `from lab.msg import Num`")
+    found = name_other_imports(
+        verdict, lab.criteria[0], try_facts(lab, build_runs({"runs": {"package": package}}))
+    )
+    assert found.hint == f"{verdict.hint}{added}"

@@ -144,27 +144,36 @@ def hiding_file(found: Traceback, package: PackageFacts) -> tuple[str, str] | No
 
 
 def own_message(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
+    """Return why the import of a traceback fails where `right_import` knows a better one, and that."""
+    return right_import(found.innermost.source, package) if found.kind in IMPORT_ERRORS else None
+
+
+def right_import(source: str, package: PackageFacts) -> tuple[str, str] | None:
     """Return the import as it has to be where the line looks for what the build makes of the package's own messages,
     services and actions in another place, or by another name."""
-    asked = _imported_names(found.innermost.source) if found.kind in IMPORT_ERRORS else None
+    asked = _imported_names(source)
     if asked is None:
         return None
     module, names = asked
+    there = noetic_messages().get(module.removesuffix(".msg"), {})
     places = [
         (name, f"{one.name}.{own.module}")
         for one in (*package.also, package)
         for own in one.interfaces
         for name in own.classes
+        if name not in there
     ]
     made = dict(sorted(places, key=lambda one: one[1] == module))  # two packages may have one of that name
     near_by = module.partition(".")[0] in {package.name, *(one.name for one in package.also)}
     meant = {name: _class_of(name, made, near=near_by) for name in names}
+    aliases = dict(re.findall(r"\b(\w+)( as \w+)", source))
     lines: dict[str, list[str]] = {}
     for name in names:
-        lines.setdefault(made.get(meant[name], module), []).append(meant[name])
+        lines.setdefault(made.get(meant[name], module), []).append(f"{meant[name]}{aliases.get(name, '')}")
     right = [f"from {place} import {', '.join(several)}" for place, several in lines.items()]
     own = [meant[name] for name in names if meant[name] in made]
-    if not own or right == [f"from {module} import {', '.join(names)}"]:
+    is_right = all(meant[name] == name and made.get(name, module) == module for name in names)
+    if not own or is_right:
         return None
     cause = f"the build makes {join_words(own)}, in {made[own[0]]}"
     return cause, f"write {join_words(f'`{line}`' for line in right)}"
