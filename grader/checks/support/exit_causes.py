@@ -62,7 +62,9 @@ from grader.checks.support.text import (
     ARGUMENT_HINT,
     CAUSES,
     LOOP,
+    NEEDS_NETWORK,
     NO_INPUT,
+    OFFLINE,
     SPIN,
     VALUE_SLOT,
     explain_arguments,
@@ -182,8 +184,8 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
         said = (known for line in printed for text, known in OF_ROSCPP.items() if text in line)
         ended = f"{signal_name(life.end.signal)} ended it"
         return Ending(*(argument_not_given(ended, life.start.argv, package) or next(said, (ended, RUN_IT))))
-    if code == 0:
-        return _not_run(life, run, package) or _ran_to_the_end(printed, package)
+    if (offline := _offline(code, printed)) or code == 0:
+        return offline or _not_run(life, run, package) or _ran_to_the_end(printed, package)
     # roslaunch goes on printing after it has said why.
     exceptions = [line for line in printed if line.startswith("RLException: ")]
     last = next(iter(exceptions or printed[::-1]), "")
@@ -193,6 +195,13 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
     explained = explain_arguments(last, given)
     words, hint = (f"{words}; {explained[0]}", explained[1]) if explained else (words, RUN_IT)
     return Ending(f"it exited with code {code}{words}", hint)
+
+
+def _offline(code: int | None, printed: Sequence[str]) -> Ending | None:
+    if not printed or not OFFLINE.search(printed[-1]):
+        return None
+    cause = f"it ended with exit code {code}; its last output: {shown(printed[-1])}: {NEEDS_NETWORK[0]}"
+    return Ending(cause, NEEDS_NETWORK[1], of_machine=True)
 
 
 def _ran_to_the_end(printed: Sequence[str], package: PackageFacts) -> Ending:
@@ -293,6 +302,10 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
         return _of_machine(found, lacking, place, package)
     if broken := broken_import(found, package):
         return _of_broken_machine(found, broken, place)
+    where = f" ({place.file}, line {place.line})" if place else ""
+    if OFFLINE.search(found.text) and not any("/rosgraph/" in frame.file for frame in found.frames):
+        cause = f"{shown(found.text.rstrip('.'))}{where}: {NEEDS_NETWORK[0]}"
+        return Ending(cause, NEEDS_NETWORK[1], (place,) if place else (), of_machine=True)
     source = package.file(place.file) if place and found.kind in SYNTAX else None
     fault = source.python_fault if source else None
     place = fault.place if fault and fault.line else place

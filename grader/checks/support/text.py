@@ -408,6 +408,15 @@ def code_of(template: str) -> str:
 
 
 NO_INPUT = f"write {VALUE_SLOT} in place of `input()`"
+OFFLINE = re.compile(
+    r"name resolution|Name or service not known|No address associated with hostname|Network is unreachable"
+    r"|(?i:could not|unable to) resolve host|No route to host"
+)
+"""What Python, curl, wget, ping and ssh say where there is no network."""
+NEEDS_NETWORK = (
+    "it needs the network, which a graded node does not have",
+    "leave out what connects to other machines; if the lab asks for it, tell your instructor: a graded node is offline",
+)
 PAUSE = f"write `rate = {RATE_SLOT}` above it and `rate.sleep()` as its last line"
 CAUSES = {
     "EOFError": ("it waits for input (`input()`), and a graded node gets no input",
@@ -430,8 +439,8 @@ CAUSES = {
     "NameError": ("", "check the spelling, and that it is imported or assigned before it is used"),
     "ROSSerializationException": ("", "publish a value that fits the message's type"),
     "SerializationError": ("", "publish a value that fits the message's type"),
-    **dict.fromkeys(("gaierror", "URLError", "ConnectionError", "ConnectionRefusedError"), (
-        "it needs the network, which a graded node does not have", "leave out what connects to other machines")),
+    "ConnectionRefusedError": ("nothing answers at that address while a node is graded",
+     "leave out what connects there, or catch the error, so that the node goes on without it"),
     "SyntaxError": ("", "compare that line and the end of the one above it with the handout, character by character"),
     "IndentationError": ("", "indent every block by four spaces, all of its lines alike"),
     "TabError": ("tabs and spaces are mixed in its indentation", "indent every line with four spaces"),
