@@ -1,7 +1,7 @@
 """What can be installed: ROS packages, Python modules and messages that exist, and the grader's own extras.
 
 Whether a name in a student's file is one of these, and lacking here, is found where it is asked for:
-`checks/support/missing_names.py` for imports, `checks/support/build_errors.py` for builds.
+`checks/support/missing_modules.py` for imports, `checks/support/build_errors.py` for builds.
 """
 
 from __future__ import annotations
@@ -37,6 +37,12 @@ ROS_2 = {
 """No machine for ROS 1 has these."""
 OF_ROS = {"genmsg", "rosgraph_msgs", "rosunit"}
 """Packages of ROS that Debian has for Python alone."""
+OF_EVERY_ROS = {
+    "actionlib", "actionlib_msgs", "diagnostic_msgs", "geometry_msgs", "nav_msgs", "rosgraph", "rosgraph_msgs",
+    "roslib", "rosnode", "rospkg", "rospy", "rosservice", "rostopic", "sensor_msgs", "shape_msgs", "std_msgs",
+    "std_srvs", "tf2_msgs", "tf2_ros", "trajectory_msgs", "visualization_msgs",
+}  # fmt: skip
+"""Modules that come with any installation of ROS that a course uses."""
 CMAKE_TOO = {"apriltag", "casadi", "dlib", "dynamixel_sdk", "keyboard", "pigpio", "serial", "torch", "zmq"}
 """Modules of Python whose names packages of ROS or of CMake have too."""
 MODULE_OF = {

@@ -44,8 +44,8 @@ from grader.model import SandboxMode
 from grader.model.message_rate import RateBounds
 from grader.model.package import PackageFacts
 from grader.model.result import Progress
-from grader.model.submission import Submission
-from grader.package.facts import python_paths, with_build_facts
+from grader.model.submission import SourcePackage, Submission
+from grader.package.facts import imports_of_machine, python_paths, with_build_facts
 from grader.package.manifest import read_manifest
 from grader.package.python import REPORT_BYTES_MAX, SyntaxReport, read_syntax_report
 from grader.ros_env import INSTALL_HINT, NO_ROS, find_ros
@@ -213,10 +213,11 @@ class Recorder:
         recording.add(outcome)
         report = _syntax_report(outcome.syntax, writer)
         also = tuple(
-            _with_build_facts(one, outcome.others[one.asked], report, _above(place, one))
-            for one in facts.also
+            _with_build_facts(one, source, outcome.others[one.asked], report, _above(place, one))
+            for source, one in zip(self._submission.also, facts.also, strict=True)
         )
-        told = _with_build_facts(facts, CMakeTrace(trace=outcome.trace, root=outcome.root), report, "")
+        trace = CMakeTrace(trace=outcome.trace, root=outcome.root)
+        told = _with_build_facts(facts, self._submission.package, trace, report, "")
         recording.facts = told.model_copy(update={"also": also})
         self._progress.step("build", *(("done", "") if outcome.ok else ("failed", "catkin_make failed")))
 
@@ -316,12 +317,16 @@ def _above(place: ProcessEnvironment, facts: PackageFacts) -> str:
 def _python_files(place: ProcessEnvironment, facts: PackageFacts) -> list[str]:
     """Return the files that ROS's Python is to compile, from the main package's folder in the workspace.
 
-    There are none where this Python is of the same version and had nothing to say against any: ROS's would find the
-    same.
+    There are none where this Python is of the same version and had nothing to say against any, and they import nothing
+    that only some machines have: ROS's would find the same.
     """
     packages = (facts, *facts.also)
     clean = not any(file.python_fault for one in packages for file in one.files)
-    if clean and place.ros.python_version == sys.version_info[:2]:
+    if (
+        clean
+        and not any(map(imports_of_machine, packages))
+        and place.ros.python_version == sys.version_info[:2]
+    ):
         return []
     return [_above(place, one) + path for one in packages for path in python_paths(one)]
 
@@ -342,7 +347,7 @@ def _headers_included(place: ProcessEnvironment, facts: PackageFacts) -> list[st
 
 
 def _with_build_facts(
-    facts: PackageFacts, cmake: CMakeTrace, report: SyntaxReport | None, above: str
+    facts: PackageFacts, source: SourcePackage, cmake: CMakeTrace, report: SyntaxReport | None, above: str
 ) -> PackageFacts:
     """Return the facts refined by what the build showed of this package, whose paths stand behind `above`."""
     own = report.below(above) if report else None
@@ -352,6 +357,7 @@ def _with_build_facts(
         cmake_root=cmake.root,
         python_faults=own.faults if own else None,
         python_slips=own.slips if own else None,
+        folder=source.folder,
     )
 
 

@@ -20,6 +20,7 @@ from itertools import islice
 from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
 
+from grader.installable import OF_EVERY_ROS
 from grader.model.file_fault import Fault
 from grader.model.git_ignores import IgnoreLine
 from grader.model.message_definitions import PARTS, parse_interface
@@ -297,8 +298,7 @@ def read_package(
         launch_files = read_launch_files(package.folder, readable, names, commands, {*others, *needed})
         report = asked.result()
     files = tuple(entry.file for entry in entries)
-    scripts = [one.path for one in files if one.python and one.link is None]
-    texts = {path: (read_data(package.folder, path) or b"").decode("utf-8", "replace") for path in scripts}
+    texts = _texts(package.folder, files)
     return PackageFacts(
         name=package.name,
         path=package.path,
@@ -341,12 +341,13 @@ def with_build_facts(
     cmake_root: str | None = None,
     python_faults: Mapping[str, Fault] | None = None,
     python_slips: tuple[PythonSlip, ...] | None = None,
+    folder: Path | None = None,
 ) -> PackageFacts:
     """Return `facts` refined by what the build showed: CMake's own trace, and ROS's own Python on the sources.
 
     `cmake_trace` is a file that CMake wrote by `--trace-expand --trace-format=json-v1`, `cmake_root` the package's
     folder as CMake saw it. `python_faults` replace the faults of all `python_paths`, and `python_slips` the slips of
-    all but C++. What is None stays as it was.
+    all but C++, with the package's `folder`. What is None stays as it was.
     """
     changes: dict[str, object] = {}
     if cmake_trace is not None and facts.cmake is not None:
@@ -358,9 +359,10 @@ def with_build_facts(
         asked = set(python_paths(facts))
         kept = {f.path: f.python_fault for f in facts.files if f.python_fault and f.path not in asked}
         changes["files"] = _with_faults(facts.files, {**kept, **python_faults})
-    if python_slips is not None:
+    if python_slips is not None and folder is not None:
+        slips = drop_slips_of_modules(python_slips, _texts(folder, facts.files))
         of_cpp = (slip for slip in facts.slips if PurePosixPath(slip.file).suffix in SUFFIXES)
-        changes["slips"] = (*python_slips, *of_cpp)
+        changes["slips"] = (*slips, *of_cpp)
     return facts.model_copy(update=changes)
 
 
@@ -370,6 +372,11 @@ def python_paths(facts: PackageFacts) -> tuple[str, ...]:
     Python by name or shebang, not too large, no link by absolute path, and a name that is valid Unicode.
     """
     return tuple(f.path for f in facts.files if _to_check(f) and not _only_here(f))
+
+
+def imports_of_machine(facts: PackageFacts) -> bool:
+    """Return whether a script imports what this Python lacks, and only some installations of ROS have."""
+    return not OF_EVERY_ROS.issuperset(s.message for s in facts.slips if s.kind == "lacking-import")
 
 
 def _interfaces(folder: Path, entries: Iterable[Entry]) -> tuple[Interface, ...]:
@@ -398,6 +405,12 @@ def _readable(entries: Iterable[Entry]) -> Iterable[Entry]:
 
 def _with_faults(files: tuple[SourceFile, ...], faults: Mapping[str, Fault]) -> tuple[SourceFile, ...]:
     return tuple(file.model_copy(update={"python_fault": faults.get(file.path)}) for file in files)
+
+
+def _texts(folder: Path, files: Iterable[SourceFile]) -> dict[str, str]:
+    """Return the texts of the package's scripts by path."""
+    scripts = [one.path for one in files if one.python and one.link is None]
+    return {path: (read_data(folder, path) or b"").decode("utf-8", "replace") for path in scripts}
 
 
 def _with_imports(

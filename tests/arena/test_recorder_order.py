@@ -96,6 +96,14 @@ def test_none_that_the_same_python_has_read_already(tmp_path: Path) -> None:
     assert read_by_ros(tmp_path, SCRIPT, HERE) == []
 
 
+@pytest.mark.parametrize(
+    ("module", "read"), [("no_such_module", True), ("std_msgs.msg", False), ("math", False)]
+)
+def test_all_where_one_imports_what_only_some_machines_have(tmp_path: Path, module: str, read: bool) -> None:
+    """ROS's own Python has other modules than the grader's."""
+    assert (read_by_ros(tmp_path, f"{SCRIPT}import {module}\n", HERE) == ["node.py"]) == read
+
+
 def test_all_where_one_is_wrong(tmp_path: Path) -> None:
     """What is said of it is said in the words of the Python that students have."""
     assert read_by_ros(tmp_path, SCRIPT + "print 'two'\n", HERE) == ["node.py"]

@@ -260,6 +260,23 @@ def test_a_module_that_is_used_and_not_imported_is_meant_by_one_that_is_not_ther
     assert there.of_machine
 
 
+def test_a_module_that_exists_and_is_used_is_the_one_that_is_meant_though_another_is_not_imported(tmp_path):
+    """All that the machine lacks is told at once, ROS's packages too, and none of the package's own."""
+    source = (
+        "import moveit_commander\nimport serial\nfrom mavros_msgs.msg import State\n"
+        "import zmq\nprint(moveit_commander, serial, State, zmq, time.time())\n"
+    )
+    files = {"src/a.py": source, "src/zmq.py": ""}
+    end = explained(
+        tmp_path,
+        files,
+        ("src/a.py", 1, "import moveit_commander"),
+        error="ModuleNotFoundError: No module named 'moveit_commander'",
+    )
+    assert end.of_machine
+    assert end.cause.endswith("this grading machine lacks moveit_commander, serial and mavros_msgs")
+
+
 @pytest.mark.parametrize(
     ("line", "hint"),
     [

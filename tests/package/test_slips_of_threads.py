@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from grader.package.facts import with_build_facts
 from grader.package.own_modules import drop_slips_of_modules
 from grader.package.python import check_syntax
+from tests.package.trees import facts_of
 
 pytestmark = pytest.mark.usefixtures("without_processes")
 
@@ -137,6 +139,9 @@ def test_a_base_class_of_another_file(base: str, said: tuple[str, str] | None, t
     texts = {"a.py": "from b import Base\n" + OWN, "b.py": base}
     for name, text in texts.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
-    slips = drop_slips_of_modules(check_syntax(tmp_path, ["a.py", "b.py"]).slips, texts)
+    alone = check_syntax(tmp_path, ["a.py", "b.py"]).slips
+    slips = drop_slips_of_modules(alone, texts)
     found = [(s.name, s.fix) for s in slips if s.kind == "base-unmade"]
     assert found == ([said] if said else [])
+    # what ROS's own Python says of the files is seen together, too
+    assert with_build_facts(facts_of(tmp_path), python_slips=alone, folder=tmp_path).slips == slips

@@ -20,19 +20,15 @@ from grader.checks.support.exceptions import (
     without_base,
 )
 from grader.checks.support.launch_slips import unfound_program
-from grader.checks.support.missing_names import (
-    IMPORT_ERRORS,
+from grader.checks.support.missing_modules import (
     broken_import,
-    hiding_file,
     imported_line,
     is_module,
     lacking_module,
     lacking_too,
-    name_slip,
-    other_name,
-    unmade,
     unused_import,
 )
+from grader.checks.support.missing_names import IMPORT_ERRORS, hiding_file, name_slip, other_name, unmade
 from grader.checks.support.operand_types import explain_by_definition, explain_operand
 from grader.checks.support.processes import Life, early_end, lives, nodes_of, signal_name
 from grader.checks.support.rospy_calls import (

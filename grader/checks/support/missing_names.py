@@ -16,7 +16,6 @@ from grader.checks.support.rospy_calls import fields_of
 from grader.checks.support.scripts import (
     BUILD_FIRST_HINT,
     OF_FILES,
-    SYNTAX,
     cmake_calls,
     is_product,
     path_in_package,
@@ -28,8 +27,6 @@ from grader.installable import (
     ROS_2,
     TUTORIALS,
     WINDOWS,
-    exists_somewhere,
-    is_python_module,
     known_packages,
     nearest_module,
     noetic_messages,
@@ -37,7 +34,6 @@ from grader.installable import (
 from grader.line_slips.python import parsed
 from grader.model.package import CMAKE, Interface, PackageFacts
 from grader.model.python_slip import PythonSlip
-from grader.model.verdict import FileCitation
 from grader.wording import closest, join_words
 
 SETUP_PAGE = "http://docs.ros.org/en/noetic/api/catkin/html/howto/format2/installing_python.html"
@@ -284,10 +280,14 @@ def _makes(package: PackageFacts, message: str) -> bool:
 
 
 def unimported_module(found: Traceback, package: PackageFacts) -> str:
-    """Return a module that the script which imports one that is not there uses, and does not import; "" for none."""
-    file = found.innermost.file
-    slips = (s for s in package.slips if s.kind == "undefined" and file.endswith(f"/{s.file}"))
-    return next((s.name for s in slips if s.fix == IMPORT % s.name), "")
+    """Return a module that the script uses, and does not import, where it uses nothing of the one that it imports and
+    that is not there; "" for none."""
+    file, asked = found.innermost.file, NO_MODULE.search(found.message)
+    own = [s for s in package.slips if file.endswith(f"/{s.file}")]
+    unused = {s.message for s in own if s.kind == "unused-import"}
+    if asked is None or asked[1] in known_packages() or asked[1] not in unused:
+        return ""
+    return next((s.name for s in own if s.kind == "undefined" and s.fix == IMPORT % s.name), "")
 
 
 def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
@@ -525,85 +525,3 @@ def name_slip(slip: PythonSlip, package: PackageFacts) -> NameSlip | None:
         return NameSlip(name, slip.line, why, fix, lines)
     is_module = fix == IMPORT % name
     return NameSlip(name, slip.line, why, fix, (f"import {name}",) if is_module else ())
-
-
-def lacking_too(place: FileCitation | None, package: PackageFacts) -> tuple[str, ...]:
-    """Return the modules of Python, none of ROS's, that the script imports and that were not there either."""
-    slips = (
-        s for s in package.slips if place is not None and (s.file, s.kind) == (place.file, "lacking-import")
-    )
-    return tuple(dict.fromkeys(s.message for s in slips if is_python_module(s.message)))
-
-
-def unused_import(place: FileCitation, package: PackageFacts) -> str:
-    """Return that the import on that line is not needed, and which other lines import what is not needed and not there
-    either; "" where it is needed, or another name of the file is not there."""
-    own = [s for s in package.slips if s.file == place.file]
-    if any(s.kind in {"undefined", "misspelt"} for s in own):
-        return ""
-    unused = {s.line for s in own if s.kind == "unused-import"}
-    lacking = [(s.line, s.message) for s in own if s.kind == "lacking-import"]
-    needed = {module for line, module in lacking if line not in unused}
-    if any(line == place.line and module in needed for line, module in lacking):
-        return ""
-    spare = {line for line, module in lacking if module not in needed} | {place.line}
-    fixes = {s.line: s.fix for s in own if s.kind == "unused-import" and s.line in spare}
-    # from below, so that the lines above stay where they are
-    return join_words([fixes[line] for line in sorted(fixes, reverse=True)]) if place.line in fixes else ""
-
-
-def lacking_module(found: Traceback, package: PackageFacts) -> str:
-    """Return the module that exists and that this machine lacks; "" for a name that is the student's own affair."""
-    match = NO_MODULE.search(found.message) if found.kind == "ModuleNotFoundError" else None
-    # roslib.load_manifest, which rosbuild needed, asks for the ROS package itself
-    name = found.message if found.kind == "ResourceNotFound" else match[1] if match else ""
-    own = {*package.own_modules, *(file.path.partition("/")[0] for file in package.files if "/" in file.path)}
-    sure = found.kind == "ResourceNotFound" or (bool(found.frames) and found.frames[-1].in_library)
-    known = name in known_packages() or not is_module(name, package)
-    lacks = exists_somewhere(name, own) and (known or not sure)
-    otherwise = own_message(found, package) or unimported_module(found, package)
-    return name if name and name not in own and lacks and not otherwise else ""
-
-
-def is_module(name: str, package: PackageFacts) -> bool:
-    """Return whether it is a module of Python, and no package of ROS that messages come from."""
-    declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
-    whole = [one.fix for one in package.slips if one.kind == "lacking-import" and one.message == name]
-    of_messages = any(one.endswith((".msg", ".srv")) for one in whole)
-    return name not in declared and not name.endswith(("_msgs", "_srvs")) and not of_messages
-
-
-def broken_import(found: Traceback, package: PackageFacts) -> str:
-    """Return the file of ROS's or of the machine's that cannot be imported; "" where the student takes part in it.
-
-    Someone else's file raised it while a line of the student's imported it, and nothing of the package has the name of
-    a module that takes part.
-    """
-    last = found.frames[-1] if found.frames else None
-    imports = imported_line(found) or not found.own_frames
-    kinds = (*IMPORT_ERRORS, *SYNTAX) if not found.own_frames else ()
-    if last is None or not last.in_library or not imports or (kinds and found.kind not in kinds):
-        return ""
-    words = set(
-        re.findall(r"\w+", " ".join([found.message, *(f"{f.file} {f.source}" for f in found.frames)]))
-    )
-    own = {
-        name.partition(".")[0]
-        for one in (package, *package.also)
-        for file in one.files
-        for name in file.path.split("/")[-2:]
-        if file.python and not name.startswith("__init__")
-    }
-    shadowed = (
-        own
-        - {f.file.rpartition("/")[2].partition(".")[0] for f in found.own_frames}
-        - {"src", "scripts", "nodes", "bin"}
-    )
-    return "" if shadowed & words else f"{last.file}, line {last.line}"
-
-
-def imported_line(found: Traceback) -> str:
-    """Return the student's line that imports something, and nothing else, if it was the last of them to be run."""
-    source = found.innermost.source
-    only = all(re.match(r"\s*((import|from)\s|$)", part) for part in source.split(";"))
-    return source if only else ""

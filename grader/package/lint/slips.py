@@ -16,6 +16,8 @@ Nothing is executed. A file has to be parsed by ROS's own Python, which is to ru
 import ast
 import builtins
 import importlib.util
+import os
+from importlib.machinery import PathFinder
 
 import script_arithmetic as arithmetic
 import script_bases
@@ -335,9 +337,11 @@ def imports(tree):
 
 
 def is_there(module):
-    """Return whether Python finds a module, without importing it."""
+    """Return whether Python finds a module, without importing it; ROS's are on a path that an isolated Python leaves
+    out."""
+    path = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     try:
-        return importlib.util.find_spec(module) is not None
+        return bool(importlib.util.find_spec(module) or PathFinder.find_spec(module, [*filter(None, path)]))
     except (ImportError, ValueError, AttributeError):
         return False
 
