@@ -99,6 +99,10 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
     return verdict.about(expected=expected, measured=first_values(first.values), citations=cited)
 
 
+BEGINNINGS = {"range": "the first number of its range", "count": "the number in `count(…)`"}
+"""What a counter begins with that has no name."""
+
+
 def _cite_start(
     verdict: Verdict, first: Count, run: Run, package: PackageFacts, params: StartParams
 ) -> Verdict:
@@ -122,7 +126,7 @@ def _cite_start(
         return verdict
     slip = wrong[0]
     where = f"line {slip.line} of {slip.file}"
-    name = "the first number of its range" if slip.name == "range" else f"`{slip.name}`"
+    name = BEGINNINGS.get(slip.name, f"`{slip.name}`")
     why = f"{where} sets {name} to {slip.message}"
     start = params.start
     if slip.name in count_up:
@@ -194,6 +198,10 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
     if wrong and any(is_written_as(one.name, params.topic) for one in left_out):
         verdict = cite_slip(verdict, count, run, package, "published-in-part")
     verdict = cite_slip(verdict, count, run, package, "no-effect", "set-in-loop")
+    flags = [s for s in slips_of(package, run, count.callerid, "wrong-value") if s.name == "stuck"]
+    if flags and any(step.change == 0 for step in wrong) and verdict.status.is_lost:
+        why = f"{flags[0].file}, line {flags[0].line}: {flags[0].message}"
+        verdict = verdict.explained(why, f"in {flags[0].file}, {flags[0].fix}", (flags[0].place,))
     at = wrong[0] if wrong else Step(0, 0, 0, count.times_ns[0], count.times_ns[-1], 0, 0)
     measured = f"{plural(right, 'step')} of +1, {len(wrong)} others; {first_values(count.values)}"
     cited = (cite(run, params.topic, at.from_ns, at.to_ns),)

@@ -39,7 +39,7 @@ from grader.model.python_slip import PythonSlip
 from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation, Status, Verdict, cited_lines
 from grader.rubric.model import Criterion, Rubric
-from grader.wording import join_words, on_lines, significant
+from grader.wording import NOTHING_TO_DO, join_words, on_lines, significant
 
 POINTS_MAX = 10
 """So many faults are told at one criterion, and the others counted."""
@@ -49,6 +49,9 @@ _NO_MODULE = re.compile(
     r"\((?P<file>[\w./-]+), line (?P<line>\d+)\)"
 )
 _NO_PARAMETER = re.compile(r"\((?P<file>[\w./-]+), line (?P<line>\d+)\): the parameter '[^']+' is not set")
+_CATCHES = re.compile(r"\s*except\s*(?::|.*\b(?:KeyError|Exception)\b)")
+OF_ROS = ("use_sim_time", "rosdistro", "rosversion", "run_id")
+"""Parameters that roscore or a run sets."""
 _READS_PARAMETER = re.compile(r"""\bget_param\(\s*(['"])(?P<name>[\w~/]+)\1\s*\)""")
 USUAL_RATE_HZ = 10
 PARAMETERS_MAX = 3
@@ -337,11 +340,14 @@ def name_same_file(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verd
 
 
 def name_other_parameters(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdict:
-    """Return the verdict; where a parameter is not set that a script reads, its hint has those that it reads below and
-    that nothing sets either."""
-    found, build = _NO_PARAMETER.search(verdict.message), facts.runs.get(PACKAGE_RUN)
+    """Return the verdict; where a parameter that a script reads, or a module, is not there, its hint has those
+    parameters that it reads below and that nothing sets either."""
+    unset = _NO_PARAMETER.search(verdict.message) if "default" in verdict.hint else None
+    # what a repair finds behind an import is told with it
+    hides = verdict.basis.of_machine or verdict.hint.startswith("write `from ")
+    found, build = unset or (hides and _NO_MODULE.search(verdict.message)), facts.runs.get(PACKAGE_RUN)
     scenario, package = facts.rubric.scenarios.get(criterion.scenario or ""), facts.package_of(criterion)
-    if found is None or build is None or scenario is None or package is None or "default" not in verdict.hint:
+    if not found or build is None or scenario is None or package is None:
         return verdict
     if any(one.launch or one.load for one in scenario.start) or any(one.file for one in scenario.params):
         return verdict  # what files set is not known here
@@ -350,16 +356,28 @@ def name_other_parameters(verdict: Verdict, criterion: Criterion, facts: Facts) 
     given = [str(param.name) for param in scenario.params]
     given += (one["name"] for line in lines[number - 1 : number] for one in _READS_PARAMETER.finditer(line))
     given += re.findall(r"""\b(?:set|has)_param\(\s*['"]([^'"]+)""", "\n".join(lines))
-    known = {name.rpartition("/")[2].lstrip("~") for name in given}
+    known = {name.rpartition("/")[2].lstrip("~") for name in (*given, *OF_ROS)}
     others: dict[str, int] = {}
     for below, line in enumerate(lines[number:], number + 1):
         for one in _READS_PARAMETER.finditer(line):
             if one["name"].rpartition("/")[2].lstrip("~") not in known:
                 others.setdefault(one["name"], below)
-    if not others:
+    if not others or (unset is None and any(_CATCHES.match(line) for line in lines)):
         return verdict
     told = join_words(f"'{name}' on line {line}" for name, line in islice(others.items(), PARAMETERS_MAX))
-    return verdict.model_copy(update={"hint": f"{verdict.hint}, and one to {told}"})
+    if unset:
+        return verdict.model_copy(update={"hint": f"{verdict.hint}, and one to {told}"})
+    early = (s.fix for s in package.slips if (s.file, s.name) == (found["file"], "early"))
+    text = join_words([f"give a default to {told}", *early])
+    return verdict.model_copy(update={"hint": _with_next(verdict, text)})
+
+
+def _with_next(verdict: Verdict, text: str) -> str:
+    """Return the verdict's hint with what is next; before what the machine lacks, which only the instructor can add."""
+    if not verdict.basis.of_machine:
+        return f"{verdict.hint}; then {text}"
+    hint = verdict.hint.replace(NOTHING_TO_DO, "For the rest, ", 1)
+    return f"{text}. {hint[:1].upper()}{hint[1:]}"
 
 
 def name_other_lines(verdict: Verdict, facts: Facts) -> Verdict:

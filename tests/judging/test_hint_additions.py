@@ -26,9 +26,10 @@ from grader.judging.hint_additions import (
 from grader.judging.judge import judge_files
 from grader.model.package import PackageFacts
 from grader.model.result import CriterionResult
-from grader.model.verdict import FileCitation, Status, failed
+from grader.model.verdict import FileCitation, Status, failed, machine_lacks
 from grader.package.facts import read_package
 from grader.rubric.load import load_rubric, read_beside_rubric
+from grader.wording import NOTHING_TO_DO
 from tests.package.trees import CMAKE, MANIFEST, NODE, make_package
 from tests.rubric.samples import faults, spoiled
 from tests.support.a_class import criterion as criterion_of
@@ -459,6 +460,20 @@ def test_parameters_that_are_not_set_either_are_named(
     verdict = failed(message, hint="give it a default: `rospy.get_param('/hz', …)`")
     found = name_other_parameters(verdict, lab.criteria[0], try_facts(lab, runs))
     assert found.hint == f"{verdict.hint}{added}"
+    # those behind a module that is not there, and that an `except` may be for
+    lacks = message.replace("KeyError: '/hz'", "No module named 'serial'")
+    hidden = machine_lacks(lacks, hint=f"{NOTHING_TO_DO}tell")
+    found = name_other_parameters(hidden, lab.criteria[0], try_facts(lab, runs))
+    first = (
+        f"give a default to {added.removeprefix(', and one to ')}. For the rest, " if added else NOTHING_TO_DO
+    )
+    assert found.hint.removesuffix("tell") == first or "get_param('/hz')" in below
+    caught = {
+        **package,
+        "attachments": {SCRIPT["path"]: f"{source}try:\n    a()\nexcept KeyError as e:\n    pass\n"},
+    }
+    facts = try_facts(lab, build_runs({"runs": {"package": caught}}))
+    assert name_other_parameters(hidden, lab.criteria[0], facts) == hidden
 
 
 def test_parameters_are_not_known_where_a_launch_file_may_set_them() -> None:

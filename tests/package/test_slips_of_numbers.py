@@ -61,6 +61,13 @@ def test_where_a_counter_goes_back_is_known(tmp_path, code, found):
         ("n = 1\nm = 2\npub.publish(n)", []),
         ("class A:\n    def __init__(self):\n        self.n = 3\n    def f(self):\n        self.n = self.n + 1",
          [("start-value", 3, "3")]),
+        ("class A:\n    n: int = 3\na = A()\nwhile True:\n    pub.publish(a.n)\n    a.n += 1",
+         [("start-value", 2, "3")]),
+        ("n = count(1)\nwhile True:\n    pub.publish(next(n))", [("start-value", 1, "1")]),
+        ("def f():\n    for n in range(1, 9):\n        yield n", [("start-value", 2, "1")]),
+        ("for n in range(1, 9):\n    print(n)", []),
+        ("class A:\n    def f(self):\n        self.n += 1\n        return self.n\npub.publish(a.f())",
+         [("added-first", 3, "")]),
         ("n = -2\nwhile True:\n    n += 1\n    if n == 9:\n        n = 0\n    pub.publish(n)",
          [("start-value", 1, "-2"), ("added-first", 3, "")]),
     ],
@@ -69,6 +76,28 @@ def test_where_a_counter_begins_is_known(tmp_path, code, found):
     (tmp_path / "a.py").write_text(code + "\n")
     slips = check_syntax(tmp_path, ["a.py"]).slips
     assert [(s.kind, s.line, s.message) for s in slips if s.kind in {"start-value", "added-first"}] == found
+
+
+@pytest.mark.parametrize(
+    ("code", "found"),
+    [
+        ("from values import RATE\nrate = rospy.Rate(RATE)", [("rate-number", 2, "5")]),
+        (
+            "import values as v\nrate = rospy.Rate(v.RATE)\nif n > v.LIMIT:\n    n = 0",
+            [("rate-number", 2, "5"), ("reset-limit", 3, "100"), ("reset-value", 4, "0")],
+        ),
+        ("from values import *\nrate = rospy.Rate(TWICE)", []),
+        ("from values import RATE\nRATE = 10\nrate = rospy.Rate(RATE)", [("rate-number", 3, "10")]),
+        ("from values import NAME as RATE\nrate = rospy.Rate(RATE)", []),
+    ],
+)
+def test_numbers_of_another_module_are_known(tmp_path, code, found):
+    (tmp_path / "a.py").write_text(f"{code}\n")
+    (tmp_path / "values.py").write_text("RATE = 5\nLIMIT: int = 100\nNAME = 'a'\nTWICE = 1\nTWICE = 2\n")
+    slips = check_syntax(tmp_path, ["a.py", "values.py"]).slips
+    assert [
+        (s.kind, s.line, s.message) for s in slips if s.kind in {"rate-number", "reset-limit", "reset-value"}
+    ] == found
 
 
 @pytest.mark.parametrize(

@@ -25,6 +25,8 @@ KINDS = {
 }
 KINDS |= {"publish-twice", "no-effect", "callback-missing"}
 TALK = "def talk():\n    pub.publish(1)\n"
+ENDLESS = "def talk():\n    while True:\n        pub.publish(1)\n"
+GETS = "{}:\n    try:\n        pub.publish(q.get(timeout=1))\n    except queue.Empty:\n        break\n"
 OUT = "def out():\n    while True:\n        m = yield\n        print(m)\no = out()\n"
 TASK = "async def talk():\n    await x()\n"
 HEARD = "rospy.Subscriber('t', String, heard)\n"
@@ -40,6 +42,15 @@ SLIPS = {
     "thread-started": (TALK + "t = Thread(target=talk)\nt.daemon = True\nt.start()\n", []),
     "thread-listed": (TALK + "t = Thread(target=talk)\nfor one in [t]:\n    one.start()\n", []),
     "thread-handed": (TALK + "t = Thread(target=talk)\nbegin(t)\n", []),
+    "thread-run": (ENDLESS + "t = Thread(target=talk)\nu = Thread(target=talk)\nt.run()\nu.run()\n",
+                   ["stuck:6:on line 6, write `t.start()` in place of `t.run()`, and the same on line 7"]),
+    "thread-run-once": (TALK + "t = Thread(target=talk)\nt.run()\n", []),
+    "thread-called": (ENDLESS + "Thread(target=talk()).start()\nt = Thread(target=talk())\nt.start()\n",
+                      ["stuck:4:on line 4, write `target=talk`, without the brackets, and the same on line 5"]),
+    "thread-called-once": (TALK + "Thread(target=talk()).start()\n", []),
+    "queue-left": (GETS.format("while not rospy.is_shutdown()"),
+                   ["ends-node:5:on line 5, write `continue` in place of `break`"]),
+    "queue-drained": (GETS.format("while True"), []),
     "process": (TALK + "pub = rospy.Publisher('a', Int8)\nProcess(target=talk).start()\n",
                 ["stuck:4:on line 4, write `threading.Thread(…)` in place of `Process(…)`, and import threading"]),
     "process-own": (("def talk():\n    rospy.init_node('a')\n    pub = rospy.Publisher('a', Int8)\n    pub.publish(1)\n"

@@ -409,7 +409,8 @@ def _judge_death(count: Count, run: Run, package: PackageFacts, params: WrapPara
     if last >= params.maximum - 1:
         message = f"the {who} at {significant(last + 1)}, where the counter should reset: {end.cause}"
         limits = slips_of(package, run, count.callerid, "reset-limit")
-        high = next((one for one in limits if int(one.message) > params.maximum), None)
+        # a range ends before its last number
+        high = next((s for s in limits if int(s.message) - (s.name == "range") > params.maximum), None)
         first = next((one for one in limits if one.fix), None)
         if first is not None:
             why = f"{message}; line {first.line} computes the `%` before the `+`, so the counter never wraps"

@@ -175,6 +175,9 @@ def _subscript(source: str, marked: tuple[int, int] | None) -> ast.Subscript | N
 def _key(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning:
     if "get_param" in source:
         return f"the parameter {message} is not set", f"give it a default: `rospy.get_param({message}, …)`"
+    if call := re.search(r"\.(substitute|format)\(", source):
+        why = f"`{call[1]}(…)` gets no value for {message}, which the text has a place for"
+        return why, f"write `{shown(message[1:-1])}=…` in its brackets"
     return (
         f"there is no key {message}",
         f"check which keys there are, or use `.get({message}, …)` with a default",
@@ -521,9 +524,7 @@ def _below_home(path: str) -> str:
 def _command(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
     if not (found := _COMMAND.match(message)):
         return None
-    hint = (
-        "leave it out, or catch the error: a node that is started here has neither your folder nor a network"
-    )
+    hint = "leave it out, or catch the error: a graded node has neither your folder nor a network"
     return f"the command `{shown(found[1])}` fails (exit code {found[2]})", hint
 
 

@@ -1,5 +1,5 @@
 """Writes what a student's Python has of rospy under other names as `rospy.…`, for the finders of `slips.py`: what
-`from rospy import Rate`, `import rospy as ros` and `log = rospy.loginfo` give a name.
+`from rospy import Rate`, `import rospy as ros` and `log = rospy.loginfo` give a name. Numbers of another module, too.
 
 Nothing is executed. Python 3.8, standard library only.
 """
@@ -62,6 +62,20 @@ def times_given(tree):
         else:
             given.update(filter(None, (getattr(node, "arg", None), getattr(node, "name", None))))
     return given
+
+
+def write_numbers(tree, numbers):
+    """Write each number of another module, by its name in the tree, as that number."""
+    nodes = all_of(tree, ast.Name, ast.Attribute) if numbers else []
+    given, parents = times_given(tree) if numbers else {}, parents_of(tree) if numbers else {}
+    for node in nodes:
+        name = dotted(node)
+        if name in numbers and isinstance(node.ctx, ast.Load) and given[name.partition(".")[0]] <= 1:
+            put_in_place(
+                parents[node], node, ast.copy_location(ast.Constant(value=numbers[name], kind=None), node)
+            )
+    for kept in set(vars(tree)).difference(tree._fields) if numbers else ():
+        delattr(tree, kept)  # what finders keep of the module as it was
 
 
 def put_in_place(parent, node, new):

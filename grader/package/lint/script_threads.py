@@ -14,6 +14,7 @@ from script_tree import (
     calls_in,
     dotted,
     functions_in,
+    gives_function,
     is_call_alone,
     lines_from,
     names_in,
@@ -31,7 +32,7 @@ SENDERS = ("publish", "put", "put_nowait")
 def waits(tree):
     """All that this module finds."""
     finders = (
-        unstarted_threads, forked_publishers, async_callbacks, unstarted_generators, lost_tasks,
+        unstarted_threads, run_here, forked_publishers, async_callbacks, unstarted_generators, lost_tasks,
         unused_calls, spent_generators, emptied_once, timed_twice, kept_errors, left_on_errors,
     )  # fmt: skip
     for find in finders:
@@ -61,6 +62,47 @@ def unstarted_threads(tree):
                 "below line %d, write `%s.start()`" % (call.end_lineno, target),
                 target,
             )
+
+
+def run_here(tree):
+    """`Thread(target=work())`, and `worker.run()`, which run a function that never ends in the thread that calls it."""
+    functions, parents, runs, early = functions_in(tree), parents_of(tree), {}, []
+    for call in (n for n in all_of(tree, ast.Call) if called_name(n) in STARTED):
+        target, parent = next(iter(argument(call, 1, "target")), None), parents.get(call)
+        name, what = dotted(getattr(target, "func", target)), STARTED[called_name(call)]
+        own = functions.get(name.rpartition(".")[2])
+        if own is None or not any(isinstance(n, ast.While) for n in ast.walk(own)) or gives_function(own):
+            continue
+        if isinstance(target, ast.Call):
+            early.append((call.lineno, name, what, target.args))
+        elif isinstance(parent, ast.Assign):
+            runs[dotted(parent.targets[0])] = what
+    early.sort(key=lambda one: one[0])
+    if early:
+        line, name, what, values = early[0]
+        message = "line %d runs `%s()` itself, and makes its %s only when that ends" % (line, name, what)
+        fix = "on line %d, write `target=%s`, without the brackets" % (line, name)
+        fix += " and with `args=(…,)` for what is in them" if values else ""
+        yield slip(line, "stuck", message, fix + and_on([one[0] for one in early[1:]]), name)
+    started = {dotted(n.func.value) for n in calls_in(tree, "start")} if runs else set()
+    called = (
+        [n for n in calls_in(tree, "run") if dotted(n.func.value) in runs.keys() - started] if runs else []
+    )
+    called.sort(key=place)
+    if called:
+        name, line = dotted(called[0].func.value), called[0].lineno
+        message = "`%s.run()` on line %d starts no %s: the lines below wait until it ends" % (
+            name,
+            line,
+            runs[name],
+        )
+        fix = "on line %d, write `%s.start()` in place of `%s.run()`" % (line, name, name)
+        yield slip(line, "stuck", message, fix + and_on([n.lineno for n in called[1:]]), name)
+
+
+def and_on(lines):
+    """Return that the same is to be done on other lines."""
+    return ", and the same on line %s" % " and ".join(map(str, lines)) if lines else ""
 
 
 def used_for(name, tree):
@@ -366,16 +408,20 @@ def kept_errors(tree):
 
 
 def left_on_errors(tree):
-    """A loop that waits for one message at a time, and that an exception of `wait_for_message(…)` makes it leave."""
+    """A loop that waits for one message at a time, and that an exception of `wait_for_message(…)`, or an empty queue,
+    makes it leave."""
     parents = parents_of(tree)
     for call in all_of(tree, ast.Call):
         given = argument(call, 2, "timeout") if called_name(call) == "wait_for_message" else []
+        given = given or ([call] if called_name(call) in ("get", "get_nowait") else [])
+        of_queue = given == [call]
         around, handlers = call, []
         while given and around in parents and not isinstance(around, (ast.FunctionDef, *LOOPS)):
             around = parents[around]
             handlers += around.handlers if isinstance(around, ast.Try) else []
-        if not isinstance(around, ast.While):
+        if not isinstance(around, ast.While) or (of_queue and not calls_in(around.test, "is_shutdown")):
             continue
+        handlers = [h for h in handlers if not of_queue or dotted(h.type).rpartition(".")[2] == "Empty"]
         for one in handlers:
             left = next((n for n in one.body if isinstance(n, (ast.Break, ast.Return))), None)
             if left is not None:
@@ -383,6 +429,8 @@ def left_on_errors(tree):
                 message = (
                     "the `%s` on line %d leaves the loop as soon as line %d has waited too long for a message"
                 )
+                if of_queue:
+                    message = "the `%s` on line %d leaves the loop as soon as the queue of line %d is empty"
                 fix = "on line %d, write `continue` in place of `%s`" % (left.lineno, word)
                 yield slip(left.lineno, "ends-node", message % (word, left.lineno, call.lineno), fix)
 

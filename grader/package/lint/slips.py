@@ -5,10 +5,10 @@ objects for `script_objects.py`, callbacks for `script_callbacks.py`, what these
 classes for `script_bases.py`, threads and generators for `script_threads.py`, ends of goals for `script_goals.py`,
 loops for `script_loops.py`, their sleeps for `script_sleeps.py`, their rates for `script_rates.py`, values for
 `script_values.py`, arithmetic for `script_arithmetic.py`, scans for `script_scans.py`, sides and frames for
-`script_sides.py`, rows of grids for `script_grids.py`, counters and clocks for `script_counters.py`, what functions
-return for `script_results.py`, calls that cannot work for `script_calls.py`, publishers and messages that nothing uses
-for `script_unsent.py`. What a script spells in another way, `script_rospy.py` and `script_spellings.py` write as
-finders look for it.
+`script_sides.py`, rows of grids for `script_grids.py`, counters for `script_counters.py`, clocks for
+`script_clocks.py`, what functions return for `script_results.py`, calls that cannot work for `script_calls.py`,
+publishers and messages that nothing uses for `script_unsent.py`. What a script spells in another way,
+`script_rospy.py` and `script_spellings.py` write as finders look for it.
 
 Nothing is executed. A file has to be parsed by ROS's own Python, which is to run it: Python 3.8, standard library only.
 """
@@ -23,6 +23,7 @@ import script_arithmetic as arithmetic
 import script_bases
 import script_callbacks as callbacks
 import script_calls as calls
+import script_clocks as clocks
 import script_counters as counters
 import script_goals as goals
 import script_grids as grids
@@ -38,7 +39,7 @@ import script_sleeps as sleeps
 import script_threads
 import script_unsent as unsent
 import script_values as values
-from script_rospy import spell_rospy_out
+from script_rospy import spell_rospy_out, write_numbers
 from script_spellings import spell_plainly
 from script_texts import graph_names, said_texts
 from script_tree import (
@@ -61,8 +62,9 @@ SLIPS_LIMIT = 100
 """Of a file."""
 
 
-def slips(tree):
-    """What compiles and is not meant: names that are not called or not there, questions that wait for a keyboard."""
+def slips(tree, numbers=()):
+    """What compiles and is not meant: names that are not called or not there, questions that wait for a keyboard.
+    `numbers` are those that it has from other modules, by their names."""
     spell_plainly(tree)
     finders = (
         uncalled_and_asked, objects.names_of_objects, names.misspelt, rates.loop_rates, rates.nanoseconds,
@@ -72,16 +74,16 @@ def slips(tree):
         loops.stopped_loops, loops.lacking_loops, loops.published_before,
         sleeps.sleepless_loops, sleeps.sleeps_twice, loops.publishes_twice, callbacks.callbacks,
         callbacks.waiting_callbacks, objects.queue_sizes, graph_names,
-        objects.object_slips, said_texts, loops.deaf_loops, counters.clock_values, counters.counter_slips,
+        objects.object_slips, said_texts, loops.deaf_loops, clocks.clock_values, counters.counter_slips,
         counters.counter_starts, without_effect, values.assigned_late, objects.hidden_names, objects.subscribed_again,
         imports, objects.taken_off, objects.unstarted_servers, values.wrong_values, values.decided_conditions,
         values.times_added_again, values.params_read_unset, values.defaults_first, values.overwritten_values,
         values.published_in_turn, values.letters_of_keys,
         arithmetic.arithmetic_slips, scans.scan_slips, values.flagged_loops,
         values.kept_velocities, values.values_never_set_back, values.emptied_files,
-        script_prints.unprinted_messages, counters.values_left_out, counters.published_unchanged,
+        script_prints.unprinted_messages, clocks.values_left_out, clocks.published_unchanged,
         unsent.unused_publishers, unsent.unsent_messages, unsent.lost_objects, rates.loops_of_numbers,
-        goals.finished_goals, goals.finished_in_loops, goals.ended_without_result, counters.sends_no_time, without_node,
+        goals.finished_goals, goals.finished_in_loops, goals.ended_without_result, clocks.sends_no_time, without_node,
         debuggers, script_results.results, rates.turns_taken_off, script_bases.unmade_bases, script_threads.waits,
         calls.locks_taken_twice, calls.values_out_of_order, calls.params_read_early, calls.arguments_out_of_order,
         calls.bare_decorators, scans.first_scans,
@@ -91,6 +93,7 @@ def slips(tree):
     )  # fmt: skip
     as_written = {find: list(find(tree)) for find in OF_NAMES}
     own_words = spell_rospy_out(tree)
+    write_numbers(tree, dict(numbers))
     found = []
     for find in finders:
         for one in as_written[find] if find in as_written else find(tree):
@@ -321,7 +324,7 @@ def imports(tree):
         modules = listed if isinstance(node, ast.Import) else [node.module or ""]
         module = modules[0].partition(".")[0]
         bound = [alias.asname or alias.name.partition(".")[0] for alias in node.names]
-        if len(modules) > 1 or getattr(node, "level", 0) or module in counters.PLAIN_MODULES - {"numpy"}:
+        if len(modules) > 1 or getattr(node, "level", 0) or module in clocks.PLAIN_MODULES - {"numpy"}:
             continue
         if not used.intersection(bound) and bound != ["*"] and "__all__" not in used and not in_texts:
             why = (

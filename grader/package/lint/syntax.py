@@ -14,6 +14,7 @@ import io
 import json
 import keyword
 import os
+import posixpath
 import re
 import sys
 import tokenize
@@ -34,6 +35,8 @@ except ImportError:  # Windows, where students look at their files
     resource = None
 
 SIZE_LIMIT_BYTES = 2000000
+MODULE_LIMIT_BYTES, IMPORTS_LIMIT = 50_000, 10
+"""Of a module that only gives numbers their names, and of how many of them a script has."""
 MEMORY_LIMIT_BYTES = 1 << 30
 CPU_LIMIT_S = 20
 MESSAGE_LIMIT = 500
@@ -85,7 +88,7 @@ def check_all(root, names):
     warnings.simplefilter("ignore")
     left = ALL_SLIPS_LIMIT
     for name in names:
-        report = check(root, name, with_slips=left > 0)
+        report = check(root, name, names, with_slips=left > 0)
         report["slips"] = report["slips"][:left]
         left -= len(report["slips"])
         yield report
@@ -103,7 +106,8 @@ def set_limits():
             resource.setrlimit(limit, (value, value))
 
 
-def check(root, name, with_slips=True):
+def check(root, name, names=(), with_slips=True):
+    """Return the report on a file; `names` are all of the package's that may be read."""
     report = {"file": name, "faults": [], "slips": []}
     try:
         with open(os.path.join(root, name), "rb") as file:
@@ -136,11 +140,44 @@ def check(root, name, with_slips=True):
         text = data.decode("utf-8", "replace")
         if with_slips:
             report["slips"] = [
-                *with_comments(slips(tree), text),
+                *with_comments(slips(tree, numbers_of_modules(root, name, names, tree)), text),
                 *argument_texts(text),
                 *commented_calls(text),
             ]
     return report
+
+
+def numbers_of_modules(root, name, names, tree):
+    """Return the numbers that a script has from the package's own modules beside it, as it reads them: `RATE`, or
+    `settings.RATE`."""
+    beside = {posixpath.basename(one)[: -len(".py")]: one for one in names if one.endswith(".py")}
+    folder, found = posixpath.dirname(name), {}
+    for node in [n for n in tree.body if isinstance(n, (ast.Import, ast.ImportFrom))][:IMPORTS_LIMIT]:
+        for one in node.names:
+            module = one.name if isinstance(node, ast.Import) else node.module or ""
+            path = beside.get(module.rpartition(".")[2])
+            if path is None or path == name or posixpath.dirname(path) != folder:
+                continue
+            for key, value in numbers_in(os.path.join(root, path)).items():
+                if isinstance(node, ast.Import):
+                    found["%s.%s" % (one.asname or module, key)] = value
+                elif one.name in (key, "*"):
+                    found[key if one.name == "*" else one.asname or key] = value
+    return found
+
+
+def numbers_in(path):
+    """Return the numbers that a module gives its names, each once."""
+    with contextlib.suppress(OSError, SyntaxError, ValueError, RecursionError, MemoryError):
+        with open(path, "rb") as file:
+            tree = ast.parse(file.read(MODULE_LIMIT_BYTES))
+        given = [n for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+        given = [n.id for n in given]
+        made = [n for n in tree.body if isinstance(n, (ast.Assign, ast.AnnAssign))]
+        named = [(getattr(n, "target", None) or n.targets[0], n.value) for n in made]
+        values = {t.id: getattr(v, "value", None) for t, v in named if isinstance(t, ast.Name)}
+        return {k: v for k, v in values.items() if type(v) in (int, float) and given.count(k) == 1}
+    return {}
 
 
 def further_errors(lines, error):
