@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -241,9 +240,8 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
         message = f"{_script(one)} did not end on Ctrl-C and had to be stopped with SIG{stopped_by}"
         # A line that is known to keep the node alive goes before any excuse.
         in_cpp = slips_of_program(one.start.argv, package, "deaf")
-        own = [
-            s for s in package.slips if s.kind in {"deaf", "stuck"} and s.file == one.start.script
-        ] + in_cpp
+        kinds = {"deaf", "deaf-loop", "stuck"}
+        own = [s for s in package.slips if s.kind in kinds and s.file == one.start.script] + in_cpp
         if deaf := [s for s in own if s.fix]:
             why, told = _deaf_loops(deaf)
             hint = "; ".join(dict.fromkeys(s.fix for s in told))
@@ -270,12 +268,9 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
     return failed(message, hint=hint, citations=end.citations)
 
 
-_DEAF_LOOP = re.compile(r"the loop on line \d+ never checks whether the node should end")
-
-
 def _deaf_loops(slips: Sequence[PythonSlip]) -> tuple[str, Sequence[PythonSlip]]:
     """Return why a script goes on after Ctrl-C, and what of it is told: any of its loops that never ask may be why."""
-    loops = [s for s in slips[:LOOPS_TOLD] if _DEAF_LOOP.fullmatch(s.message) and s.file == slips[0].file]
+    loops = [s for s in slips[:LOOPS_TOLD] if s.kind == "deaf-loop" and s.file == slips[0].file]
     if slips[0] not in loops or len(loops) == 1:
         return slips[0].message, slips[:1]
     return f"the loops on {on_lines(s.line for s in loops)} never check whether the node should end", loops

@@ -13,10 +13,10 @@ SlipKind = Literal[
     "reset-limit", "set-in-loop", "reset-early", "never-called", "main-guard", "never-reached", "spin-in-loop",
     "loop-left", "ends-node", "sleep-outside", "sleep-twice", "callback-called", "callback-missing",
     "callback-values", "callback-waits", "defined-twice", "subscribed-again", "clock-value", "queue-size", "deaf",
-    "node-name", "no-init", "commented-out", "publisher", "publisher-type", "subscriber", "subscriber-type",
-    "outside-method", "object", "undefined", "no-effect", "compared", "publishes", "prints", "argument-text",
-    "unused-import", "lacking-import", "unregistered", "not-started", "start-value", "hides-class", "float-index",
-    "ranges-read", "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed",
+    "deaf-loop", "node-name", "no-init", "commented-out", "publisher", "publisher-type", "subscriber",
+    "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes", "prints",
+    "argument-text", "unused-import", "lacking-import", "unregistered", "not-started", "start-value", "hides-class",
+    "float-index", "ranges-read", "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed",
     "printed-in-part", "published-in-part", "never-published", "takes-number", "typed-text", "goes-on",
     "no-argument", "read-late", "debugger", "drops-result", "returns-list", "fills", "catches", "no-result",
     "stuck", "runs-out", "base-unmade", "rate-as-time", "frames",
@@ -67,7 +67,7 @@ class PythonSlip(Placed, Record):
     - `sleep-outside`, `sleep-twice`: a loop whose `sleep()` is outside it, or that only makes its Rate, or that
       waits twice in each turn.
     - `publish-twice`: a loop that publishes on one topic more than once in each turn.
-    - `deaf`: why the node goes on after Ctrl-C.
+    - `deaf`, `deaf-loop`: why the node goes on after Ctrl-C; a loop that does not ask whether the node should end.
     - `callback-called`, `callback-values`, `callback-missing`: a callback that is called where it should only be named,
       that takes another number of values than ROS passes, or that does not exist.
     - `callback-waits`: a topic's or service's callback that sleeps, or never ends, or makes its publisher itself.

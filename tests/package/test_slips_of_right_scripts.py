@@ -267,7 +267,7 @@ class A:
 def test_a_style_that_few_students_write_is_no_slip(name: str, tmp_path: Path) -> None:
     kind, text = RIGHT[name]
     (tmp_path / "a.py").write_text(text, encoding="utf-8")
-    assert [s.message for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == kind] == []
+    assert [s.message for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind.startswith(kind)] == []
 
 
 LIKE_SLIPS = {

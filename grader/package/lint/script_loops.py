@@ -516,7 +516,8 @@ def deaf(loop, within):
     if not isinstance(test, (ast.Constant, ast.Lambda)):  # its own condition ends it, too
         asks = (ASKS_AS_WELL if is_loose else ASKS_TOO) % test.end_lineno
     fixes = [asks, *ends] if isinstance(loop, ast.While) or within else [ENDS_FOR % loop.lineno]
-    return slip(loop.lineno, "deaf", "the %s whether the node should end" % named, "; then ".join(fixes))
+    kind = "deaf" if within else "deaf-loop"
+    return slip(loop.lineno, kind, "the %s whether the node should end" % named, "; then ".join(fixes))
 
 
 def is_endless_for(loop):
