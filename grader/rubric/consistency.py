@@ -200,6 +200,13 @@ def _points(rubric: WrittenRubric) -> Iterator[Fault]:
         elif len(given) > 1:
             fault = f"give one of points, bonus and penalty, not {' and '.join(given)}"
             yield (*criterion.place, given[1]), fault
+        for key in ("bonus", "penalty"):
+            extra = criterion.data.get(key)
+            if is_number(extra) and extra > TOTAL_POINTS:
+                yield (
+                    (*criterion.place, key),
+                    f"{extra:g} is more than the {TOTAL_POINTS} points of the rubric",
+                )
     given_points = [criterion.data.get("points", 0) for criterion in rubric.criteria]
     ids = {criterion.id for criterion in rubric.criteria}
     if not all(is_number(points) and points >= 0 for points in given_points) or len(ids) < len(given_points):
@@ -279,9 +286,11 @@ def _best(
 
 
 def _gates(rubric: WrittenRubric) -> Iterator[Fault]:
-    known = {criterion.id: criterion.data for criterion in rubric.criteria}
+    known, first = {criterion.id: criterion.data for criterion in rubric.criteria}, dict[str, int]()
     for index, gate in as_maps(rubric.data.get("gates")):
         name, at_most = gate.get("criterion"), gate.get("at_most")
+        if first.setdefault(str(name), index) != index:
+            yield ("gates", index, "criterion"), f'"{name}" is that of gates[{first[str(name)]}] already'
         if isinstance(name, str) and name not in known:
             near = did_you_mean(name, known)
             yield ("gates", index, "criterion"), f'there is no criterion "{name}"{near}'

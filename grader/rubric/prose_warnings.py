@@ -17,9 +17,11 @@ from grader.rubric.yaml_lines import (
     KeyPath,
     WrittenCriterion,
     WrittenRubric,
+    as_list,
     as_map,
     as_texts,
     numbers_in,
+    published_in,
     starts_of,
     texts_in,
 )
@@ -86,6 +88,8 @@ def prose_warnings(rubric: WrittenRubric) -> Iterator[Fault]:
             yield from _unsaid_node(at, given, rubric)
         yield from _other_text(criterion, rubric, TEXTS.get(check, VALUES))
         yield from _of_another_topic(criterion, rubric)
+        yield from _value_of_another(criterion, rubric)
+        yield from _sent_in_another_order(criterion)
         if check == "logs":
             yield from _other_level(criterion, handout)
         parent, child = (rf"`?{re.escape(str(given.get(key)))}`?(?!\w)" for key in ("parent", "child"))
@@ -230,6 +234,52 @@ def _of_another_topic(criterion: WrittenCriterion, rubric: WrittenRubric) -> Ite
     others = {topic for one in rubric.criteria for topic in one.topics}
     if isinstance(criterion.given.get("topic"), str) and named and named <= others and not named & own:
         yield (*criterion.at, "topic"), f"is not what the title has: {join_words(sorted(named))}"
+
+
+def _value_of_another(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield a word to publish that the title has in another case, or that another criterion's title has alone."""
+    value, title = criterion.given.get("value"), str(criterion.data.get("title"))
+    words = set(re.findall(r"\w+", title))
+    if criterion.check != "field-equals" or not isinstance(value, str) or value in words:
+        return
+    there = [one for one in rubric.criteria if one.check == "field-equals" and one is not criterion]
+    told = [
+        one.id for one in there if one.given.get("value") == value and value in str(one.data.get("title"))
+    ]
+    said = words & {*re.findall(r"\w+", rubric.handout)}
+    # Of longer words, the spelling is looked at anyway
+    same = next((one for one in sorted(said) if one.lower() == value.lower() and not is_slip(value, one)), "")
+    if same:
+        yield (*criterion.at, "value"), f"is {value}, and the title has {same}, as the handout"
+    elif told:
+        yield (
+            (*criterion.at, "value"),
+            f"{value} is in the title of {told[0]}, and not in this one's",
+        )
+
+
+def _sent_in_another_order(criterion: WrittenCriterion) -> Iterator[Fault]:
+    """Yield a first or last value that is asked for, where the title has a number that the run sends, and not first or
+    last."""
+    when, numbers = criterion.given.get("when"), PLAIN_NUMBER.findall(str(criterion.data.get("title")))
+    sent = [
+        one for one in published_in(criterion.scenario) if one.get("topic") != criterion.given.get("topic")
+    ]
+    values = [
+        value
+        for one in sent
+        for value in (*as_list(one.get("values")), one.get("value"))
+        if value is not None
+    ]
+    inside = [{number for _, number in numbers_in((), value)} for value in values]
+    if when not in {"first", "last"} or len(numbers) != 1 or len(inside) < 2:
+        return
+    number, end = float(numbers[0]), inside[0 if when == "first" else -1]
+    if any(number in one for one in inside) and len(end) == 1 and number not in end:
+        fault = (
+            f"the {when} message that {criterion.run} sends has {end.pop():g}, not {number:g} as the title"
+        )
+        yield (*criterion.at, "when"), fault
 
 
 def _other_level(criterion: WrittenCriterion, handout: str) -> Iterator[Fault]:

@@ -35,6 +35,7 @@ from grader.rubric.yaml_lines import (
     given_steps,
     published_in,
     services_in,
+    started_files,
     starts_of,
     topics_in,
 )
@@ -51,7 +52,7 @@ ASKED_OF_STUDENT = frozenset({
 })  # fmt: skip
 """Checks of messages on a topic that the student has to publish on."""
 WHERE_IT_IS = frozenset({"ends-at", "stays-within", "path"})
-NEVER_OF_GRADER = frozenset({"latched", "counter-start", "counter-step", "counter-wrap"})
+NEVER_OF_GRADER = frozenset({"latched", "topic-type", "counter-start", "counter-step", "counter-wrap"})
 """Checks of the student's messages that have no `of`."""
 ENDINGS = (".py", ".yaml", ".yml", ".sh", ".bash", ".exe", ".pl", ".lua", ".js", ".rb")
 """Of files that a start may name."""
@@ -285,7 +286,7 @@ def _of_grader(rubric: WrittenRubric) -> Iterator[Fault]:
             if part == "request" and one.get("service") in _served_names(scenario):
                 fault = f"the grader offers {one['service']} itself (serves): a student's node should call it"
                 yield ("scenarios", name, *at, "service"), fault
-    asked = [str(one.given.get("topic")) for one in rubric.criteria if one.check in ASKED_OF_STUDENT]
+    asked = [one for one in rubric.criteria if one.check in ASKED_OF_STUDENT]
     for criterion in rubric.criteria:
         path, check, given, scenario = criterion.at, criterion.check, criterion.given, criterion.scenario
         is_place = check in WHERE_IT_IS and given.get("of") is None
@@ -297,7 +298,8 @@ def _of_grader(rubric: WrittenRubric) -> Iterator[Fault]:
             if program:
                 fault = f"{program} publishes on {topic}: name the one on which the student's node answers"
                 yield (*path, *at, "topic"), fault
-            others = asked.count(str(topic)) - (check in NEVER_OF_GRADER)
+            alike = [one for one in asked if _runs_alike(one.scenario, scenario)]
+            others = sum(one.given.get("topic") == topic for one in alike) - (check in NEVER_OF_GRADER)
             if isinstance(topic, str) and topic in _sent_by_grader(scenario) and not others:
                 fault = (
                     f"the grader itself sends on {topic}: name the one on which the student's node answers"
@@ -307,6 +309,14 @@ def _of_grader(rubric: WrittenRubric) -> Iterator[Fault]:
         if check == "service" and service in _served_names(scenario):
             fault = f"the grader offers {service} itself (serves), and service judges the student's"
             yield (*path, "service"), f"{fault}: calls judges what was asked"
+
+
+def _runs_alike(one: dict[str, Any], other: dict[str, Any]) -> bool:
+    """Return whether what a program publishes in one run, it may publish in the other."""
+    launched = any(
+        start.get("launch") or start.get("built") for run in (one, other) for start in starts_of(run)
+    )
+    return launched or bool(started_files(one) & started_files(other))
 
 
 def _forgotten_topics(criteria: list[WrittenCriterion]) -> Iterator[Fault]:

@@ -116,7 +116,8 @@ def _misspelt_words(rubric: WrittenRubric, *, code: bool) -> Iterator[tuple[KeyP
         hinted = set(re.findall(_WORD, " ".join(map(" ".join, hints)))) if code else set[str]()
         # No placeholders of templates: `{number}`.
         for word in re.findall(rf"(?<![{{\w]){_WORD}(?![\w}}])", text):
-            near = next((one for one in sorted(known | hinted) if is_slip(word, one)), "")
+            near_ones = [one for one in sorted(known | hinted) if is_slip(word, one)]
+            near = next(iter(sorted(near_ones, key=lambda one: one.lower() != word.lower())), "")
             # A word that is there twice was meant.
             if near and _count(word, word, rubric.texts) == 1:
                 yield path, word, near

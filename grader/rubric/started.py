@@ -84,6 +84,11 @@ def _other_packages(rubric: WrittenRubric) -> Iterator[Fault]:
                 f"this criterion judges {owner}: write name: {owner}, or package: {asked} beside its check"
             )
             yield (*criterion.at, "name"), fault
+        if criterion.check in {"manifest", "dependencies"}:
+            for number, name in as_texts(given.get("dependencies")):
+                if name == owner:
+                    fault = f"{name} is the package itself, and no package depends on itself: take it out"
+                    yield (*criterion.at, "dependencies", number), fault
     for at, file, owner, is_given in named:
         others = {other for _, same, other, is_said in named if same == file and other != owner and is_said}
         if not is_given and others:
@@ -179,6 +184,8 @@ def _plain_arguments(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield a start with fewer or more plain arguments than all others of its script have, and requests whose fields
     are in another order than the arguments that they come from."""
     given: dict[KeyPath, tuple[str, list[str]]] = {}
+    counts = re.findall(r"\b(one|two|three|four|[1-4])\b[^.;]{0,40}\barguments?\b", rubric.handout)
+    said = [{"one": "1", "two": "2", "three": "3", "four": "4"}.get(one, one) for one in counts]
     for place, start in rubric.starts():
         plain = [
             text for _, text in as_texts(start.get("args")) if ":=" not in text and not OPTION.fullmatch(text)
@@ -186,7 +193,8 @@ def _plain_arguments(rubric: WrittenRubric) -> Iterator[Fault]:
         given[place] = str(start.get("script")), plain
     for place, (script, plain) in given.items():
         others = [len(one) for at, (other, one) in given.items() if other == script != "None" and at != place]
-        if len(others) > 1 and len({*others}) == 1 and len(plain) != others[0] and plain:
+        is_known = len(others) > 1 or [str(number) for number in others] == said
+        if is_known and len({*others}) == 1 and len(plain) != others[0] and plain:
             fault = f"has {plural(len(plain), 'argument')}, and the other starts of {script} have {others[0]}"
             yield (*place, "args"), fault
     for criterion in rubric.criteria:

@@ -35,6 +35,7 @@ from grader.rubric.yaml_lines import (
     given_steps,
     items_in,
     published_in,
+    started_files,
     starts_of,
     texts_in,
 )
@@ -337,20 +338,14 @@ def wait_faults(rubric: WrittenRubric) -> Iterator[Fault]:
             for key in ("effect", "topics")
         ]
         # What a program publishes in another run, it may publish here.
-        own = _started_files(scenario)
-        alike = {run, *(name for name, one in rubric.scenarios.items() if own & _started_files(one))}
+        own = started_files(scenario)
+        alike = {run, *(name for name, one in rubric.scenarios.items() if own & started_files(one))}
         judged += [one.given for one in rubric.criteria if one.run in alike and one.check != "hears"]
         awaited = [text for _, text in texts_in((), scenario.get("until"))]
         named = any(one.get("topic") == topic or topic in one for one in judged) or topic in awaited
         if sent and isinstance(topic, str) and not named and topic not in topics_of_programs(scenario):
             told = f"the grader itself sends on {topic}, and its messages do not count"
             yield (*at, "wait", "topic"), f"{told}: name the one on which the node answers"
-
-
-def _started_files(scenario: dict[str, Any]) -> set[str]:
-    return {
-        str(start[key]) for start in starts_of(scenario) for key in ("script", "launch") if start.get(key)
-    }
 
 
 def slash(path: KeyPath, name: object, what: str) -> Iterator[Fault]:

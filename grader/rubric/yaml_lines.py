@@ -537,6 +537,13 @@ def starts_of(scenario: Mapping[str, Any]) -> list[dict[str, Any]]:
     return [start for _, start in as_maps(scenario.get("start"))]
 
 
+def started_files(scenario: Mapping[str, Any]) -> set[str]:
+    """Return the student's scripts and launch files that a scenario starts."""
+    return {
+        str(start[key]) for start in starts_of(scenario) for key in ("script", "launch") if start.get(key)
+    }
+
+
 def given_steps(scenario: Mapping[str, Any], kind: str) -> list[dict[str, Any]]:
     """Return what the scenario's steps of one kind (`publish`) say."""
     return [as_map(step[kind]) for _, step in as_maps(scenario.get("steps")) if kind in step]

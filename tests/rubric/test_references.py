@@ -371,7 +371,7 @@ def test_what_names_only_what_is_there_loads(tmp_path: Path) -> None:
         pytest.param(
             "check: logs, with: {text: a}, scenario: launch",
             "check: reacts, with: {cause: {topic: /chatter}, effect: {topic: /chatter, field: text, value: a}, "
-            "within_s: 1}, scenario: listener",
+            "within_s: 1}, scenario: real",
             "39: criteria[9].with.effect.field: std_msgs/String has no field text: there is data",
             id="field-that-the-type-lacks",
         ),
