@@ -7,6 +7,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from grader.arena.run_end import LATE_MOST, is_silent
@@ -26,6 +27,12 @@ ENDING_S, STUCK_S = 10.0, 2.0
 one is not begun with behind one that should have ended."""
 ENDING_TIMES, ENDING_LEAST_S = 2.0, 5.0
 """A goal that criteria wait for only so long is taken to end within so many times that, or not at all."""
+MARGIN_S, GOES_ON = 0.1, 2
+"""A result that should have come so long ago is late on any machine, and with so much feedback behind that the server
+goes on with its goal."""
+STOPPED, STOPPED_S, STOPPED_GAPS, STOPPED_BEHIND_S, STILL_BEHIND_S = 3, 0.5, 5.0, 1.0, 0.25
+"""A server that sent so much feedback has stopped when it is silent for so long, and for so many of its gaps, and does
+nothing else. So long a newer goal is not begun with behind that one, and so long each after it."""
 
 
 class GoalSender:
@@ -47,6 +54,8 @@ class GoalSender:
         self._asked: dict[str, tuple[float, float]] = {}
         self._unended: dict[str, tuple[float, float]] = {}
         """The goals that got no result: when one may still end, and how long a newer one waits behind it (s)."""
+        self._stopped: dict[str, tuple[int, float]] = {}
+        """Those on which the server does no more: how much feedback had come, and how long a newer one waits (s)."""
 
     def advertise(self, action: Action) -> None:
         place = self._arena.place
@@ -86,34 +95,39 @@ class GoalSender:
         else:
             left_s, since = action.cancel_after_s, ""
             found = await self._result(action, name, left_s)
-            if found is None:
+            if found is None and not self._is_behind(action, name):
                 self._runner.send_message(cancel, {"id": name}, 0, 1, {"action": "cancel", **about})
                 self._asked[name] = time.monotonic(), self._live.lost_s
                 left_s, since = self._patience_s(action), " after it was cancelled"
                 found = await self._in_time(action, name, left_s)
+                if found is None and self._is_lost(action, name):
+                    left_s = round(time.monotonic() - self._asked[name][0], 1)
+        is_behind = found is None and self._is_behind(action, name)
         if found is None:
             self._note_unended(action, name)
-        late = BEHIND if self._is_behind(action, name) else f"no result within {left_s:.3g} s{since}"
+            if is_behind:
+                self._stopped = {goal: (count, STILL_BEHIND_S) for goal, (count, _) in self._stopped.items()}
+        late = BEHIND if is_behind else f"no result within {left_s:.3g} s{since}"
         value_, detail = found or (None, late)
         self._note("result", action, type=action.type, value=value_, detail=detail)
 
     async def _end(self, action: Action, name: str) -> tuple[tuple[Any, str] | None, float]:
         """Return the end of a goal that is not cancelled, and how long it was waited for (s)."""
         begun_s, lost_before_s, left_s = time.monotonic(), self._live.lost_s, self._patience_s(action)
-        reports = self._live.topics[f"{action.name}/feedback"].count
+        feedback = self._live.topics[f"{action.name}/feedback"]
+        wanted = feedback.count + self._judged_goal(action).feedback
         found = await self._in_time(action, name, left_s)
         if found is None and left_s < action.limit_s:
             # Feedback that comes late is another criterion's
-            wanted = reports + self._judged_goal(action).feedback
-            feedback = self._live.topics[f"{action.name}/feedback"]
 
             def has_reported() -> bool:
                 silent = time.monotonic() > max(begun_s, feedback.last_s) + left_s
-                return feedback.count >= wanted or silent
+                return feedback.count >= wanted or silent or self._has_stopped(action, name)
 
             found = await self._result(action, name, action.limit_s - left_s, has_reported)
             waited_s = time.monotonic() - begun_s - (self._live.lost_s - lost_before_s)
-            left_s = min(action.limit_s, max(left_s, round(waited_s, 1)))
+            least_s = 0.0 if self._is_lost(action, name) else left_s
+            left_s = min(action.limit_s, max(least_s, round(waited_s, 1)))
         return found, left_s
 
     def _judged_goal(self, action: Action) -> JudgedGoal:
@@ -123,6 +137,9 @@ class GoalSender:
         """Keep in mind that this goal has no end, and may keep the server from newer ones."""
         # A short wait for a goal whose end nothing asks for is the rubric's own: the server may rightly go on with it.
         matters_s = self._judged.get((action.name, self._sent[action.name]), JudgedGoal(0.0)).matters_s
+        self._live.unended.add(action.name)
+        if self._has_stopped(action, name):
+            self._stopped[name] = self._live.topics[f"{action.name}/feedback"].count, STOPPED_BEHIND_S
         if action.cancel_after_s is not None:
             self._unended[name] = ENDING_S, STUCK_S
         elif matters_s > 0:
@@ -144,7 +161,36 @@ class GoalSender:
         """Return the end of a goal, if it comes within what criteria ask for. On a full machine, too, a server at rest
         gets the processor when it wants it."""
         is_short = left_s < action.limit_s
-        return await self._result(action, name, left_s, lambda: is_short and self._is_older(name, left_s))
+
+        def is_enough() -> bool:
+            return is_short and (self._is_older(name, left_s) or self._is_lost(action, name))
+
+        return await self._result(action, name, left_s, is_enough)
+
+    def _is_lost(self, action: Action, name: str) -> bool:
+        """Return whether a result is too late by now, and what the server sent says that it will not be there soon: it
+        goes on behind the goal's end, or has stopped."""
+        judged, seen = self._judged_goal(action), self._live.topics[f"{action.name}/feedback"]
+        if not 0 < judged.within_s < math.inf or not self._is_older(name, judged.within_s + MARGIN_S):
+            return False
+        sent_s = self._asked[name][0]
+        if action.cancel_after_s is not None:
+            goes_on = sum(at_s > sent_s + judged.within_s for at_s in seen.latest_s) >= GOES_ON
+        else:
+            goes_on = 0 < judged.feedback < sum(at_s > sent_s for at_s in seen.latest_s)
+        return goes_on or self._has_stopped(action, name)
+
+    def _has_stopped(self, action: Action, name: str) -> bool:
+        """Return whether the server sent feedback on this goal, has been silent for long, and does nothing else. One
+        that sleeps for a time of its own may yet go on."""
+        topic, live = f"{action.name}/feedback", self._live
+        seen, since_s = live.topics[topic], self._asked[name][0]
+        own_s = [at_s for at_s in seen.latest_s if at_s > since_s] if action.cancel_after_s is None else []
+        owners = {live.owners.get(node, "") for node in live.published.get(topic, ())}
+        if live.naps or len(own_s) < STOPPED or not owners <= live.at_rest.keys():
+            return False
+        gap_s = max(later - earlier for earlier, later in pairwise(own_s))
+        return time.monotonic() > own_s[-1] + max(STOPPED_S, STOPPED_GAPS * gap_s)
 
     async def _result(
         self, action: Action, name: str, limit_s: float, is_enough: Callable[[], bool] = lambda: False
@@ -183,9 +229,10 @@ class GoalSender:
     def _is_behind(self, action: Action, name: str) -> bool:
         """Return whether the server has not begun with this goal for a while, since it still works on an earlier one
         that got no result in its time. One that was not cancelled may end only because of this goal: it gets longer."""
+        reports = self._live.topics[f"{action.name}/feedback"].count
         stuck = {
             goal: left_s for goal, (end_s, left_s) in self._unended.items() if self._is_older(goal, end_s)
-        }
+        } | {goal: left_s for goal, (count, left_s) in self._stopped.items() if count == reports}
         stuck.pop(name, None)
         came = self._arena.watch(f"{action.name}/status")
         if not stuck or not came or not self._is_older(name, min(stuck.values())):

@@ -396,6 +396,10 @@ async def release_when_up(permit: StartPermit, names: set[str], arena: ArenaSess
         permit.release()
 
 
+GOAL_CTRL_C_S = 1.0, 0.2
+"""An action's server that goes on with a goal may do so behind Ctrl-C, too: its end says nothing of it."""
+
+
 async def stop(starts: tuple[Start, ...], arena: ArenaSession, *, warped: bool) -> None:
     """Take a last look at the graph, then Ctrl-C for everything that runs, the grader's own programs last.
 
@@ -407,10 +411,13 @@ async def stop(starts: tuple[Start, ...], arena: ArenaSession, *, warped: bool) 
         await arena.wait(lambda: not arena.live.running, HELD_S)
     if arena.live.running:
         await arena.look_at_connections()
+    live = arena.live
     launched = {start.name for start in starts if start.launch is not None}
-    for names in (arena.live.running, arena.live.helpers):
-        stops = [
-            arena.interrupt(name, int_s=LAUNCH_CTRL_C_S if name in launched else CTRL_C_S, term_s=TERM_S)
-            for name in sorted(names)
-        ]
-        await asyncio.gather(*stops)
+    patience_s = dict.fromkeys(launched, (LAUNCH_CTRL_C_S, TERM_S))
+    servers = {node for action in live.unended for node in live.published.get(f"{action}/status", ())}
+    patience_s = {live.owners.get(node, ""): GOAL_CTRL_C_S for node in servers} | patience_s
+    for names in (live.running, live.helpers):
+        waits_s = [(name, *patience_s.get(name, (CTRL_C_S, TERM_S))) for name in sorted(names)]
+        await asyncio.gather(
+            *(arena.interrupt(n, int_s=int_s, term_s=term_s) for n, int_s, term_s in waits_s)
+        )

@@ -68,6 +68,8 @@ class RunState:
     """The services and actions that the grader offers."""
     polled: dict[str, frozenset[str]] = field(default_factory=dict)
     """By process, the services for which its script looks in the list of all again and again."""
+    unended: set[str] = field(default_factory=set)
+    """The actions of the student's of which a goal got no result."""
     ends_for_newer: bool = False
     """An action's server of the package ends its goal for a newer one."""
     gives_up: bool = False

@@ -25,7 +25,7 @@ from grader.wording import join_words, plural, significant, there_is
 LISTED = 10
 """So many values of the feedback are listed."""
 GOES_ON_NS = 1_000_000_000
-"""Feedback so long after a goal was cancelled says that the server goes on with it."""
+"""Feedback so long after a goal was cancelled says that the server goes on with it, if the lab does not say."""
 SURELY = 10
 """With so many of these messages, that is no matter of a busy machine."""
 LONGER, LONGER_S = 1.5, 1.0
@@ -284,7 +284,8 @@ def _late_feedback(run: Run, goal: Goal, params: ActionResultParams) -> int:
     stopped_ns, until_ns = goal.cancelled_ns, goal.ended_ns or run.end_ns
     if stopped_ns is None:
         return 0
-    return sum(stopped_ns + GOES_ON_NS < t <= until_ns for channel in reports for t in channel.times_ns)
+    goes_on_ns = round(1e9 * params.within_s) if params.within_s else GOES_ON_NS
+    return sum(stopped_ns + goes_on_ns < t <= until_ns for channel in reports for t in channel.times_ns)
 
 
 def _other_end(package: PackageFacts, run: Run, goal: Goal, params: ActionResultParams) -> Verdict:

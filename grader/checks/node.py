@@ -237,19 +237,20 @@ def _short_watch(one: Life, up_ns: int, params: NodeLivesParams) -> Verdict | No
 def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
     stopped_by = one.end.stopped_by if one.end else None
     if stopped_by in {"TERM", "KILL"}:
+        on_a_goal = _on_a_goal(one, run)
         message = f"{_script(one)} did not end on Ctrl-C and had to be stopped with SIG{stopped_by}"
         # A line that is known to keep the node alive goes before any excuse.
         in_cpp = slips_of_program(one.start.argv, package, "deaf")
         kinds = {"deaf", "deaf-loop", "stuck"}
         own = [s for s in package.slips if s.kind in kinds and s.file == one.start.script] + in_cpp
-        if deaf := [s for s in own if s.fix]:
+        if (deaf := [s for s in own if s.fix]) and on_a_goal is None:
             why, told = _deaf_loops(deaf)
             hint = "; ".join(dict.fromkeys(s.fix for s in told))
             return failed(f"{message}: {why}", hint=hint, citations=tuple(s.place for s in told))
-        if slow := max(in_cpp, key=lambda s: float(s.name), default=None):
+        if on_a_goal is None and (slow := max(in_cpp, key=lambda s: float(s.name), default=None)):
             slept = f"{slow.message}, also after Ctrl-C, so its end is not counted"
             return passed(f"{_script(one)} is one node and stayed alive; {slept}")
-        if excuse := _locked_up(one, run) or _asleep(one, package) or _asking(one, run, package):
+        if excuse := on_a_goal or _locked_up(one, run) or _asleep(one, package) or _asking(one, run, package):
             return excuse
         hint = IN_A_LOOP + python_or_cpp("; a bare `except:` in the loop swallows the Ctrl-C", "")
         return failed(message, hint=hint).if_repeated()  # no line of the script is known to be why
@@ -314,6 +315,21 @@ def _asking(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
         return None  # it asks for nothing, or has been told all
     waits = f"line {asks.line} waits for a line that is typed, also after Ctrl-C, so its end is not counted"
     return passed(f"{_script(one)} is one node and stayed alive; {waits}")
+
+
+def _on_a_goal(one: Life, run: Run) -> Verdict | None:
+    """Return that the node was at work on a goal that got no result, which is another criterion's: the callback of an
+    action's server looks whether its goal was cancelled, and not whether the node is to end."""
+    ends = {event.topic: event.value for _, event in run.actors if event.action == "result"}
+    channels = [c for c in run.student_channels() if c.callerid in nodes_of(run, one.name)]
+    served = {c.topic.rpartition("/")[0] for c in channels if c.topic.endswith(("/status", "/feedback"))}
+    unended = sorted(
+        action for action, value in ends.items() if action and action in served and value is None
+    )
+    if not unended:
+        return None
+    goes_on = f"it was still at work on a goal of {unended[0]}, so its end is not counted"
+    return passed(f"{_script(one)} is one node and stayed alive; {goes_on}")
 
 
 def _locked_up(one: Life, run: Run) -> Verdict | None:

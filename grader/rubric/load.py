@@ -362,9 +362,14 @@ def goals_of(rubric: Rubric) -> dict[str, dict[tuple[str, int], JudgedGoal]]:
         if criterion.check == "action-result" and criterion.scenario:
             one = ActionResultParams.model_validate(criterion.parameters)
             own, goal = found[criterion.scenario], (one.action, one.goal)
-            matters_s, feedback = own.get(goal, JudgedGoal(0.0))
+            known = own.get(goal, JudgedGoal(0.0, within_s=0.0))
             more_s = math.inf if one.matters_s is None else one.matters_s
-            own[goal] = JudgedGoal(max(matters_s, more_s), max(feedback, one.least_feedback))
+            within_s = 0.0 if one.of_feedback_alone else one.within_s or math.inf
+            own[goal] = JudgedGoal(
+                max(known.matters_s, more_s),
+                max(known.feedback, one.least_feedback),
+                max(known.within_s, within_s),
+            )
     return dict(found)
 
 

@@ -13,6 +13,7 @@ A new kind of step takes
 
 from __future__ import annotations
 
+import math
 from hashlib import sha256
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -261,16 +262,19 @@ class Action(Record):
     limit_s: StepSeconds = 30.0
     """Without a result within this time, the run goes on. It waits less long where the criteria on this goal
     have a `within_s`: half as long again, or 1 s more than that, and until the feedback that they ask for has
-    come. That holds for the last goal of an action, and for others that are not cancelled, where the server
+    come; and no longer than `within_s` if the server goes on behind the end of the goal, or its feedback has
+    stopped. That holds for the last goal of an action, and for others that are not cancelled, where the server
     ends a goal for a newer one (`is_preempt_requested()`). So let the goal that is cancelled be the last."""
 
 
 class JudgedGoal(NamedTuple):
     """What criteria ask of a goal: for how many seconds after it was sent, or cancelled, its result matters (0 if no
-    criterion asks for it, infinite if one says nothing of how soon it has to come), and how much feedback it takes."""
+    criterion asks for it, infinite if one says nothing of how soon it has to come), how much feedback it takes, and
+    within how many seconds the result has to come (infinite if one does not say)."""
 
     matters_s: float
     feedback: int = 0
+    within_s: float = math.inf
 
 
 class Play(Record):

@@ -113,23 +113,23 @@ def test_what_a_run_does_makes_sense(old, new, fault, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "goals"),
     [
-        ("", "", {1: (2.5, 5), 2: (math.inf, 0), 3: (1.5, 0)}),
-        (", within_s: 1.5}", "}", {1: (math.inf, 5), 2: (math.inf, 0), 3: (1.5, 0)}),
+        ("", "", {1: (2.5, 5, 1.5), 2: (math.inf, 0, math.inf), 3: (1.5, 0, 0.5)}),
+        (", within_s: 1.5}", "}", {1: (math.inf, 5, math.inf), 2: (math.inf, 0, math.inf), 3: (1.5, 0, 0.5)}),
         (
             ", goal: 2, status: ABORTED",
             ", goal: 2, within_s: 8, status: ABORTED",
-            {1: (2.5, 5), 2: (12, 0), 3: (1.5, 0)},
+            {1: (2.5, 5, 1.5), 2: (12, 0, 8), 3: (1.5, 0, 0.5)},
         ),
         (
             ", result: {total: 5}, within_s: 1.5}",
             ", feedback: 7}",
-            {1: (0, 7), 2: (math.inf, 0), 3: (1.5, 0)},
+            {1: (0, 7, 0), 2: (math.inf, 0, math.inf), 3: (1.5, 0, 0.5)},
         ),
     ],
     ids=["as it is", "no within_s", "half as long again", "of feedback alone"],
 )
 def test_how_long_the_result_of_a_goal_matters_and_how_much_feedback_it_takes(
-    old: str, new: str, goals: dict[int, tuple[float, int]], tmp_path: Path
+    old: str, new: str, goals: dict[int, tuple[float, int, float]], tmp_path: Path
 ) -> None:
     text = (rubrics_folder() / "examples" / "action-server.yaml").read_text(encoding="utf-8")
     assert old in text
