@@ -12,6 +12,7 @@ from grader.checks.build import judge_build
 from grader.checks.package_files import RUNTIME_KINDS
 from grader.checks.stamps import StampsParams
 from grader.checks.stamps import stamps as judge_stamps
+from grader.checks.support.topics import TF_TOPICS
 from grader.errors import RosMissing, SubmissionError
 from grader.evidence.reader import load_evidence, package_facts
 from grader.evidence.run import Run
@@ -321,6 +322,13 @@ class Proposal:
         scenario, steps = f"{name}-answers", []
         for topic, kind in listens.items():
             found = self._answers(name, topic)
+            if not found and topic in TF_TOPICS:
+                frames = (
+                    "{parent: map, child: base_link, translation: [{from: 0, to: 1}, 0, 0], duration_s: 2}"
+                )
+                words = f"{script} listens to /tf, which is not covered: a step can send transforms, "
+                self.notes.extend({f"{words}- transform: {frames}"} - {*self.notes})
+                continue
             if not found:
                 step = rubric_draft.step_for(topic, kind)["publish"]
                 words = f"{script} listens to {topic} ({kind}), which is not covered: a step can send it something, "

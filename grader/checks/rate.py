@@ -85,7 +85,8 @@ class RateParams(OnTopic):
     """Whose messages count: the `student`'s nodes', those of a `program` that the scenario starts beside them, or
     `anyone`'s."""
     cause: Annotated[Condition, Refers("cause")] | None = None
-    """For a rate that changes within the run: only messages that come while this is true count. Null: all of them."""
+    """For a rate that changes within the run: only messages that come while this is true count. It needs a `field`,
+    unless it is a service without one (`std_srvs/Trigger`): then it is true from the call on. Null: all of them."""
     within_s: Annotated[float, Field(ge=0)] = 0.0
     """How soon after the cause begins the rate has to hold. Required with a `cause`; give the longest pause of the loop
     before it, which a node may sleep to its end."""
@@ -94,8 +95,6 @@ class RateParams(OnTopic):
     def _has_cause(self) -> RateParams:
         if (self.cause is None) == bool(self.within_s):
             raise ValueError("give cause and within_s together")
-        if self.cause is not None and self.cause.field is None:
-            raise ValueError("a cause of a rate needs a field: a message alone has no end")
         return self
 
     @property

@@ -175,9 +175,10 @@ def _unknown(key: str, value: object, keys: Collection[str]) -> str:
     glued = re.match(r"(\w+)(?:\s*[:=]\s*|\s+)(?=\S)", key)
     if glued and glued[1] in keys:
         return f": write {glued[1]}, a colon and a blank before its value"
-    cut = value is None and " " in key
+    near = did_you_mean(key, keys)
+    cut = value is None and (" " in key or not near)
     there = f": there is {join_words(sorted(keys))}" if len(keys) <= KEYS_LISTED else ""
-    return ": between { and }, text with a comma needs quotes" if cut else did_you_mean(key, keys) or there
+    return ": between { and }, text with a comma needs quotes" if cut else near or there
 
 
 def _of_other_unit(key: str, value: object, keys: Collection[str]) -> str:

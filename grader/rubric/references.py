@@ -86,6 +86,7 @@ def reference_faults(
     yield from unknown_names(rubric, checks)
     yield from reach_faults(rubric, checks)
     yield from _of_grader(rubric)
+    yield from _endless_causes(rubric)
     yield from _forgotten_topics(rubric.criteria)
     yield from _same_names(rubric)
     yield from _other_goals_and_types(rubric.criteria)
@@ -317,6 +318,16 @@ def _runs_alike(one: dict[str, Any], other: dict[str, Any]) -> bool:
         start.get("launch") or start.get("built") for run in (one, other) for start in starts_of(run)
     )
     return launched or bool(started_files(one) & started_files(other))
+
+
+def _endless_causes(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield causes of a rate that never end. A service that is asked nothing, as Trigger is, may be one."""
+    for criterion in rubric.criteria:
+        cause = as_map(criterion.given.get("cause"))
+        asked = [one for _, part, one in services_in(criterion.scenario) if part == "request"]
+        is_call = any(one.get("service") == cause.get("topic") and not one.get("request") for one in asked)
+        if criterion.check == "rate" and cause and cause.get("field") is None and not is_call:
+            yield criterion.at, "a cause of a rate needs a field: a message alone has no end"
 
 
 def _forgotten_topics(criteria: list[WrittenCriterion]) -> Iterator[Fault]:

@@ -206,7 +206,7 @@ class WrittenRubric:
     """A rubric as it is written, with all faults that it may have."""
 
     def __init__(self, data: object) -> None:
-        self.data = as_map(data)
+        self.data = as_map(_comparable(data))
         self.scenarios = {name: as_map(one) for name, one in as_map(self.data.get("scenarios")).items()}
         self.criteria = [
             WrittenCriterion(
@@ -254,6 +254,23 @@ class WrittenRubric:
         """Yield the parameters that the scenarios set, each with its place."""
         for name, scenario in self.scenarios.items():
             yield from ((("scenarios", name, *at), one) for at, one in set_in(scenario))
+
+
+class _MadeUp(dict[str, Any]):
+    """`{made_up: rate}` in place of a value: it may be looked up among texts and numbers, as these may."""
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        return hash(str(self))
+
+
+def _comparable(value: object) -> object:
+    """Return the same data, in which values that are made up can be in a set."""
+    if isinstance(value, list):
+        return [_comparable(one) for one in value]
+    if not isinstance(value, dict):
+        return value
+    inside = {key: _comparable(one) for key, one in value.items()}
+    return _MadeUp(inside) if inside.keys() == {"made_up"} else inside
 
 
 def packages_in(rubric: dict[str, Any]) -> list[str]:

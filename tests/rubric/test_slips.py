@@ -19,11 +19,13 @@ import yaml
 
 from grader.errors import RubricError
 from grader.ros_env import STANDINS
+from grader.rubric import validation_warnings
 from grader.rubric.find import rubrics_folder
 from grader.rubric.load import load_rubric, warnings_of
 from grader.rubric.simulators import FIELD_M, ROBOTS
 from grader.rubric.simulators import PROGRAMS as PROGRAMS_KNOWN
 from grader.rubric.step_faults import step_faults
+from grader.rubric.yaml_lines import WrittenRubric
 from tests.rubric.samples import faults
 
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -141,6 +143,31 @@ def test_what_a_right_node_can_do_is_asked_without_a_warning(
 @pytest.mark.parametrize("path", sorted(rubrics_folder().rglob("*.yaml")), ids=lambda path: path.stem)
 def test_a_rubric_of_the_graders_own_loads_without_a_word(path: Path) -> None:
     assert warnings_of(load_rubric(str(path)), path.name) == []
+
+
+@pytest.mark.parametrize(
+    "name", ["tf-broadcaster", "turtle-square", "scan-to-cmd-vel", "battery", "action-server"]
+)
+def test_any_value_of_a_criterion_may_be_made_up(examples: Path, name: str) -> None:
+    """It is a map then, where a text or a number was."""
+    written = (examples / f"{name}.yaml").read_text(encoding="utf-8")
+    for index, criterion in enumerate(LOADER(written).get_single_data()["criteria"]):
+        for key in criterion.get("with", ()):
+            data: Any = LOADER(written).get_single_data()
+            data["criteria"][index]["with"][key] = {"made_up": "number"}
+            for _, fault in validation_warnings.warnings(WrittenRubric(data)):
+                assert isinstance(fault, str)
+
+
+def test_a_service_that_is_asked_nothing_changes_a_rate_from_its_call_on(examples: Path) -> None:
+    step = "      - call: {service: /slower, type: std_srvs/Trigger}\n      - publish:"
+    path = _spoiled(examples, "battery", "      - publish:", step)
+    text, cause = (
+        path.read_text(encoding="utf-8"),
+        "cause: {topic: /battery_state, field: percentage, max: 0.2}",
+    )
+    path.write_text(text.replace(cause, "cause: {topic: /slower}"), encoding="utf-8")
+    assert load_rubric(str(path)).rubric.criteria
 
 
 @pytest.mark.parametrize(
