@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from grader.checks.reacts import ORDER_S
 from grader.checks.registry import Refers, check
 from grader.checks.support.clocks import Lateness, excused, lateness
-from grader.checks.support.conditions import Condition, how_shown, true_spans
+from grader.checks.support.conditions import Condition, absent_in, how_shown, true_spans, words_in
 from grader.checks.support.exit_causes import explain_early_end, explain_error
 from grader.checks.support.fields import value_text
 from grader.checks.support.parameters import params_on_server, resolved_param, where_given
@@ -157,7 +157,7 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     """
     expected = f"{params.low_hz:g} to {params.high_hz:g} Hz on {params.topic}, evenly"
     if params.cause is not None:
-        expected += f", from {significant(params.within_s)} s after {params.cause.words}"
+        expected += f", from {significant(params.within_s)} s after {words_in(run, params.cause)}"
     # In warped time messages arrive faster than their node's clock says.
     if run.clock != "real":
         message = "rates are judged in real time only, and this run was warped"
@@ -181,7 +181,8 @@ def _judge(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
         or passed(f"{params.topic} runs at {hertz(found.mean_hz)}, evenly")
     )
     if params.cause is not None:
-        verdict = verdict.model_copy(update={"message": f"with {params.cause.words}, {verdict.message}"})
+        message = f"with {words_in(run, params.cause)}, {verdict.message}"
+        verdict = verdict.model_copy(update={"message": message})
     citations = (cite(run, params.topic, found.times_ns[0], found.times_ns[-1]),)
     measured = found.described(*params.bounds_ns)
     if verdict.status is Status.INCONCLUSIVE or verdict.basis.own_load:
@@ -195,15 +196,15 @@ def _without_messages(
 ) -> Iterator[Verdict]:
     """Yield the verdict on the stretches without a message. If they are all there is, none may be long enough."""
     silent = [one for one in _spans(run, params, cause) if _rhythm(channels, one, params) is None]
-    longest_ns = max((until_ns - from_ns for from_ns, until_ns in silent), default=0)
+    longest_ns, words = max((end_ns - from_ns for from_ns, end_ns in silent), default=0), words_in(run, cause)
     if longest_ns >= max(params.min_window_s * 1e9, SILENT_PERIODS * params.period_ns):
-        message = f"no message came on {params.topic} for {seconds(longest_ns)} with {cause.words}"
+        message = f"no message came on {params.topic} for {seconds(longest_ns)} with {words}"
         yield failed(message, hint=f"publish on {params.topic} all the time, also then").if_repeated()
     elif is_all and any(map(cause.holds, cause.come_in(run))):
-        yield grade_again(f"{cause.words} lasted too short a time to judge the rate of {params.topic}")
+        yield grade_again(f"{words} lasted too short a time to judge the rate of {params.topic}")
     elif is_all:
         hint = f"{how_shown(run, cause)} while your node runs"
-        yield failed_or_blocked(f"{cause.words} never came in this run", hint=hint).if_repeated()
+        yield failed_or_blocked(absent_in(run, cause), hint=hint).if_repeated()
 
 
 def _excuse_lateness(
@@ -498,7 +499,7 @@ def _by_parameter(
     """Say where the value comes from, if the rate of the node's loop is a parameter with another value than the asked
     one: by the script's line, or because the node reads one that is the rate which was measured."""
     if params.cause is not None:
-        pause = f"with {params.cause.words}, wait {significant(1 / params.rate_hz)} s between two messages"
+        pause = f"with {words_in(run, params.cause)}, wait {significant(1 / params.rate_hz)} s between two messages"
         return verdict.model_copy(update={"hint": f"look at how the loop changes its rate: {pause}"})
     for channel in run.student_channels(params.topic):
         slip, own = (

@@ -131,6 +131,20 @@ def is_called(run: Run, name: str) -> bool:
     return not sent and any(called)
 
 
+def words_in(run: Run, cause: Condition) -> str:
+    """Return the condition in words, as those of a run that may call a service."""
+    is_call = cause.field is None and is_called(run, cause.topic)
+    return f"a call of {cause.topic}" if is_call else cause.words
+
+
+def absent_in(run: Run, cause: Condition) -> str:
+    """Return that a cause never came in a run; of a service, that no call was answered."""
+    asked = exchanges(run, cause.topic) if is_called(run, cause.topic) else ()
+    failed = any(one.response is None and one.detail != NOT_OFFERED for one in asked)
+    since = ", since the service did not answer" if failed else ""
+    return f"{words_in(run, cause)} never came in this run{since}"
+
+
 def how_shown(run: Run, cause: Condition) -> str:
     """Return what shows a student whether the cause comes."""
     command = "rosservice call" if is_called(run, cause.topic) else "rostopic echo"

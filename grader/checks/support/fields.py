@@ -118,7 +118,9 @@ def set_beside(channels: Iterable[Channel], time_ns: int, path: str, wanted: obj
         return ""
     each = (m for c in channels for t, m in zip(c.times_ns, c.values, strict=True) if t == time_ns)
     leaves = [leaf for message in each for leaf in _leaves(message)]
-    found = [name for name, value in leaves if name != path and _equal(value, wanted, tolerance)]
+    # rospy counts the messages in `header.seq` itself
+    own = [(name, value) for name, value in leaves if name not in {path, "header.seq"}]
+    found = [name for name, value in own if _equal(value, wanted, tolerance)]
     return found[0] if len(found) == 1 else ""
 
 
@@ -128,7 +130,7 @@ def changing_beside(channels: Iterable[Channel], path: str) -> str:
     for message in (one for channel in channels for one in channel.values):
         for name, value in _leaves(message):
             seen.setdefault(name, set()).add(value_text(value))
-    found = [name for name, values in seen.items() if name != path and len(values) > 1]
+    found = [name for name, values in seen.items() if name not in {path, "header.seq"} and len(values) > 1]
     return found[0] if len(found) == 1 else ""
 
 

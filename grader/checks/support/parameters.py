@@ -446,9 +446,10 @@ def _misplaced(
             node = next((one for one in file.brings if one.full_name == event.actor), None)
             last = name.rpartition("/")[2]
             own = [p for p in file.params if p.name in there and p.name.startswith(f"{event.actor}/")]
-            params = [*own, *(p for p in file.params if p.name in there)]
+            # What stands where the node looks for it is in its place: the run has another file, or the node set it
+            params = [p for p in (*own, *file.params) if p.name in there and p.name != name]
             same = [p for p in params if p.name.rpartition("/")[2] == last]
-            near = [p for p in own if near_names(last, [p.name.rpartition("/")[2]])]
+            near = [p for p in params if p in own and near_names(last, [p.name.rpartition("/")[2]])]
             if node is not None and (param := next(iter(same or near), None)):
                 yield name, param, node
 
