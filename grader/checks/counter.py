@@ -30,6 +30,7 @@ from grader.checks.support.processes import (
     OnTopic,
     by_copies,
     is_written_as,
+    observed_until_ns,
     slips_of,
 )
 from grader.checks.support.recorder_losses import losses
@@ -41,10 +42,14 @@ from grader.checks.support.topics import (
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.verdict import Status, Verdict, failed, failed_or_blocked, grade_again, inconclusive, passed
-from grader.wording import join_words, plural, significant
+from grader.wording import NOTHING_TO_DO, join_words, plural, seconds, significant
 
 CONNECT_NS = 1_000_000_000
 LARGEST = 2.0**64
+LOOP_PERIODS = 2
+"""How long a loop may have published nothing when the run ends, in its own periods."""
+SLOW = 1.5
+"""From so many nominal periods between two values on, the values are few because the loop is slow."""
 
 
 class StartParams(OnTopic):
@@ -190,7 +195,7 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
     wrong, right = found.steps, sum(s.change == 1 for s in steps)
     verdict = (
         _wrong(count, found, run, params)
-        or _too_few(len(steps), run, package, params)
+        or _too_few(count, len(steps), run, package, params)
         or passed(f"the counter goes up by one, {plural(right, 'time')}")
     )
     verdict = _of_clock(verdict, count, run, package, params)
@@ -339,13 +344,23 @@ def _usual_fault(usual: float) -> str:
     return f"counts in steps of {significant(usual)}" if usual > 0 else "counts down"
 
 
-def _too_few(steps: int, run: Run, package: PackageFacts, params: StepParams) -> Verdict | None:
+def _too_few(count: Count, steps: int, run: Run, package: PackageFacts, params: StepParams) -> Verdict | None:
     if steps >= params.min_steps:
         return None
     end = explain_early_end(package, run)
     cause = f": the node ended ({end.cause})" if end else ""
-    message = f"only {plural(steps + 1, 'value')} came on {params.topic}{cause}"
+    message = f"only {plural(len(count.values), 'value')} came on {params.topic}{cause}"
     # What the recorder lost is not charged.
     if losses(run, params.topic):
         return grade_again(message)
-    return failed_or_blocked(message, hint=f"publish in a loop `{LOOP}`")
+    tail_ns = (observed_until_ns(run) or count.times_ns[-1]) - count.times_ns[-1]
+    if end or not steps or tail_ns > LOOP_PERIODS * count.period_ns:
+        return failed_or_blocked(message, hint=f"publish in a loop `{LOOP}`")
+    # The values go on to the end of the run: the loop is there.
+    message += f" in {seconds(count.times_ns[-1] - count.times_ns[0])}"
+    if count.period_ns * params.rate_hz < SLOW * 1e9:
+        longer = f"let the run last for {params.min_steps + 1} values"
+        return inconclusive(message, hint=f"{NOTHING_TO_DO}tell your instructor. In the rubric: {longer}")
+    return failed_or_blocked(
+        f"{message}: it is too slow", hint=f"publish at {significant(params.rate_hz)} Hz"
+    )

@@ -423,7 +423,7 @@ def _no_shell(package: PackageFacts, file: LaunchFile, params: OpensParams) -> V
     for place, why, hint in _in_its_place(file, package.name, name):
         cited = place if isinstance(place, FileCitation) else FileCitation(file=file.path, line=place)
         return failed(f"{message}: {why}", hint=hint, citations=(cited,))
-    return failed(f"{message}{seen}", hint=f"below <launch>, add {_node_tag(file, package.name, name)}")
+    return failed(f"{message}{seen}", hint=_add_node(package, file, package.name, name))
 
 
 def _page(

@@ -273,15 +273,19 @@ Launched = Mapping[str, Collection[str]]
 
 
 def launched_in(package: PackageFacts | None, build: Run | None = None) -> Launched:
-    """Return which programs each launch file starts. One that can also run something else (what it includes, a command,
-    what only roslaunch works out) starts `ANY`. Of scripts whose lines the build has, which others they can use."""
+    """Return which programs each launch file starts, and which others it includes. One that can also run something else
+    (a file that is not in the packages, a command, what only roslaunch works out) starts `ANY`. Of scripts whose lines
+    the build has, which others they can use."""
     packages = (package, *package.also) if package is not None else ()
-    found: dict[str, set[str]] = {}
-    for file in (file for one in packages for file in one.launch_files):
+    files = [file for one in packages for file in one.launch_files]
+    found: dict[str, set[str]] = {PurePosixPath(file.path).name: set() for file in files}
+    for file in files:
         types = {node.type or "$(" for node in (*file.nodes, *file.brings)}
-        unclear = file.fault is not None or any("$(" in one for one in types) or len(file.includes) > 0
+        included = {PurePosixPath(one).name for one in file.includes}
+        unclear = file.fault is not None or any("$(" in one for one in types) or not included <= found.keys()
         unclear = unclear or any(param.value is None for param in file.params)
-        found.setdefault(PurePosixPath(file.path).name, set()).update({ANY} if unclear else types)
+        found[PurePosixPath(file.path).name].update({ANY} if unclear else types | included)
+    _add_what_those_name(found)
     if build is not None and len(packages) == 1:
         found.update(_scripts_named(packages[0], build))
     return found
@@ -298,10 +302,15 @@ def _scripts_named(package: PackageFacts, build: Run) -> dict[str, set[str]]:
         said = {"__init__", *repair_charges.words_of(" ".join(lines).replace(".", " "))}
         words.setdefault(PurePosixPath(file.path).name, set()).update(said)
     named = {name: {one for one in words if one.removesuffix(".py") in said} for name, said in words.items()}
-    for name, found in named.items():  # with what those name, and so on
+    _add_what_those_name(named)
+    return named
+
+
+def _add_what_those_name(named: Mapping[str, set[str]]) -> None:
+    """Add to what each file names all that those name, and so on."""
+    for name, found in named.items():
         for others in named.values():
             others.update(found if name in others else ())
-    return named
 
 
 ANY = "*"
@@ -334,7 +343,7 @@ def is_used_by(
     if both & _started_files(scenario):
         return True
     if name.endswith((".launch", ".launch.xml")):
-        included = any(ANY in launched.get(one, {ANY}) for one in _started_files(scenario))
+        included = any({ANY, name} & {*launched.get(one, {ANY})} for one in _started_files(scenario))
         return launches and not known and included
     a_program = any(name in found for file, found in launched.items() if not file.endswith(".py"))
     imported = [launched.get(one, {name}) for one in _started_files(scenario)]

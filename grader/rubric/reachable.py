@@ -52,6 +52,8 @@ from grader.wording import plural
 
 WRAPS = {"minimum": 0, "maximum": 127, "wraps": 2}
 """Of `counter-wrap`, with their defaults."""
+STEPS = 10
+"""The default of `min_steps` of `counter-step`."""
 MANY = 3
 """A recording may hold so many times the messages that a scenario waits for, as it is closed a little later."""
 FEWEST = 2
@@ -143,9 +145,13 @@ def _too_few(criteria: Sequence[WrittenCriterion]) -> Iterator[Fault]:
             if isinstance(count, int) and isinstance(least, int) and least > MANY * count:
                 yield (*path, "topics", topic, "at_least"), f"{name} ends after {count} messages on {topic}"
         window_s, rate_hz = until.get("window_s"), given.get("rate_hz")
-        if criterion.check != "rate" or not is_number(window_s) or not is_number(rate_hz):
+        if not is_number(window_s) or not is_number(rate_hz):
             continue
-        if 0 < window_s * rate_hz < FEWEST:
+        steps = given.get("min_steps", STEPS)
+        if criterion.check == "counter-step" and is_number(steps) and 0 < window_s * rate_hz < steps:
+            takes = f"at {rate_hz:g} Hz {plural(steps, 'step')} take {steps / rate_hz:g} s"
+            yield (*path, "rate_hz"), f"{takes}, and window_s is {window_s:g} s"
+        if criterion.check == "rate" and 0 < window_s * rate_hz < FEWEST:
             each = f"at {rate_hz:g} Hz a message comes each {1 / rate_hz:g} s, and window_s is {window_s:g} s"
             yield (*path, "rate_hz"), f"{each}: it is messages a second"
 

@@ -137,6 +137,37 @@ def test_the_bit_of_a_script_concerns_the_launch_files_that_may_start_it(starts:
     assert not is_used_by(asked.scenarios["talker"], bit, asked, built=True, launched=known)
 
 
+@pytest.mark.parametrize("included", ["other.launch", "all.launch"])
+def test_a_launch_file_concerns_those_that_include_it(included: str) -> None:
+    launched = {**SCENARIO, "start": [{"name": "all", "launch": "lab.launch"}]}
+    asked = rubric(*ALL, scenarios={"talker": SCENARIO, "lab": launched})
+    texts = {
+        "launch/lab.launch": f'<launch><include file="$(find lab_1)/launch/{included}"/></launch>',
+        "launch/all.launch": '<launch><include file="$(dirname)/third.launch"/></launch>',
+        "launch/other.launch": "<launch/>",
+        "launch/third.launch": "<launch/>",
+    }
+    files = [
+        one.model_dump() for one in parse_launch_files({p: t.encode() for p, t in texts.items()}, ["lab1"])
+    ]
+    known = launched_in(complete_facts({**PACKAGE, "name": "lab1", "launch_files": files}))
+    used = {
+        path
+        for path in texts
+        if is_used_by(
+            asked.scenarios["lab"],
+            Repair(kind="package-name", file=path, message="m", fix="f"),
+            asked,
+            built=True,
+            launched=known,
+        )
+    }
+    others = (
+        {"launch/all.launch", "launch/third.launch"} if included == "all.launch" else {"launch/other.launch"}
+    )
+    assert used == {"launch/lab.launch", *others}
+
+
 def test_what_a_launch_file_starts_is_no_module_of_another_script() -> None:
     launched = {**SCENARIO, "start": [{"name": "all", "launch": "lab.launch"}]}
     asked = rubric(*ALL, scenarios={"talker": SCENARIO, "lab": launched})

@@ -54,6 +54,8 @@ COUNTERS = [
      "151: criteria[12].with: minimum, 127, is not less than maximum, 0"),
     ("wraps: 2", "wraps: 5", "151: criteria[12].with.wraps: wraps ends after 258 messages, and 5 wraps take 641"),
     ("258", "100", "151: criteria[12].with.wraps: wraps ends after 100 messages, and 2 wraps take 257"),
+    ("maximum: 127, rate_hz: 10}\n    scenario: wraps", "maximum: 127, rate_hz: 1}\n    scenario: talker",
+     "142: criteria[11].with.rate_hz: at 1 Hz 10 steps take 10 s, and window_s is 6 s"),
 ]  # fmt: skip
 """Slips in the rubric of a lab with a counter."""
 NAMES = [
