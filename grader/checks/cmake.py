@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import Annotated, NamedTuple
@@ -462,6 +463,12 @@ def _without_call(
         ):  # it is told to become the right one
             return Lack(why, "write {} into it, after PROGRAMS", _line(of_programs), path)
         return Lack(f"{why}, and is not {PYTHON}(…)", f"{fix} below it", _line(of_programs), path)
+    # CMake knows no variable by its $ alone: the path is that of a file, which is not there.
+    if plain := next((one for one in all_named if re.search(r"\$\w", one.path)), None):
+        why = (
+            f"line {plain.call.line}: install({plain.kind} …) names {shown(plain.path)}, which does not exist"
+        )
+        return Lack(f"{why}, and not {{}}", f"{fix} in place of it", _line(plain), path)
     why = f"{NOT_CALLED}, so nothing installs {{}}"
     above = next(iter(cmake_calls(package, "catkin_package")), None)
     line = above.place if above else None

@@ -28,6 +28,7 @@ from grader.checks.support.launch_slips import (
     built_fixes,
     find_launch,
     has_program,
+    hints_at_their_lines,
     illegal_name,
     include_slips,
     later_fixes,
@@ -133,7 +134,8 @@ def _lacking(package: PackageFacts, file: LaunchFile, params: LaunchXmlParams) -
     refused = next(refusals(package, file), None)
     found = {PurePosixPath(script).name: missing_node(package, file, script) for script in params.scripts}
     found |= {program: _program(package, file, program) for program in params.programs}
-    lost = joined([one for one in (refused.verdict() if refused else None, *found.values()) if one])
+    losses = [one for one in (refused.verdict() if refused else None, *found.values()) if one]
+    lost = joined(hints_at_their_lines(losses))
     right = [name for name, one in found.items() if one is None]
     # From a file that it refuses, roslaunch starts nothing.
     return lost and lost.in_part(0.0 if refused else len(right) / len(found), join_words(right))

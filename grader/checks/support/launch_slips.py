@@ -287,6 +287,25 @@ def at_its_lines(slip: Slip, slips: Sequence[Slip]) -> Slip:
     return slip._replace(fix=f"on {on_lines(lines)}, {slip.fix}") if len(slips) > 1 else slip
 
 
+def hints_at_their_lines(losses: Sequence[Verdict]) -> list[Verdict]:
+    """Return the losses; of several, each hint to write something names its line, or all lines of the same hint."""
+    lines = [
+        (one.hint, place.line)
+        for one in losses
+        for place in one.citations[:1]
+        if isinstance(place, FileCitation)
+    ]
+    return [
+        one.model_copy(update={"hint": f"on {on_lines(at)}, {one.hint}"})
+        if len(losses) > 1
+        and one.hint.startswith("write ")
+        and "line" not in one.hint
+        and (at := [line for hint, line in lines if hint == one.hint and line])
+        else one
+        for one in losses
+    ]
+
+
 def later_fixes(file: LaunchFile, script: str) -> Iterator[str]:
     """Yield what lets the file start a script: an `if` or `unless` that leaves its node out, and its name as `type`."""
     name = PurePosixPath(script).name
