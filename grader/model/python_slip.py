@@ -19,7 +19,7 @@ SlipKind = Literal[
     "float-index", "ranges-read", "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed",
     "printed-in-part", "published-in-part", "never-published", "takes-number", "typed-text", "goes-on",
     "no-argument", "read-late", "debugger", "drops-result", "returns-list", "fills", "catches", "no-result",
-    "stuck", "runs-out", "base-unmade", "rate-as-time", "frames",
+    "stuck", "runs-out", "base-unmade", "rate-as-time", "frames", "step-number",
 ]  # fmt: skip
 
 
@@ -121,6 +121,7 @@ class PythonSlip(Placed, Record):
     - `frames`: two texts that are given next to each other, `message` and `name`, in a script that sends transforms.
     - `start-value`, `added-first`: where a counter, `name`, gets its first number, `message`, and where a loop adds one
       to it before it publishes (`fix`: which lines to move).
+    - `step-number`: where a number, `message`, that is not 1 is added to the variable `name`.
     - `reset-value`, `reset-limit`: where a counter goes back, to the number `message`, or when it reaches it (`name`:
       `range`, where it is that of a loop).
     - `sets-parameter`: where it sets a parameter.

@@ -26,7 +26,11 @@ CASES = {
     "exec": ('exec "x"\n', 1, "`exec` has no brackets, as in Python 2"),
     "backticks": ("x = `1`\n", 1, "backticks"),
     "markdown": ("```python\nx = 1\n```\n", 1, "this is Markdown"),
-    "label": ("Toggle line numbers\n#!/usr/bin/env python\nx = 1\n", 1, "this is text, from a page or a chat"),
+    "label": (
+        "Toggle line numbers\n#!/usr/bin/env python\nx = 1\n",
+        1,
+        "this is text, from a page or a chat",
+    ),
     "sentence": ("x = 1\nThis node publishes the numbers.\n", 2, "this is text, from a page or a chat"),
     "html": ("x = 1\nif x &lt; 2:\n    x = 2\n", 2, "as in the source of a web page"),
     "html_quotes": ("x = &quot;a&quot;\n", 1, "as in the source of a web page"),

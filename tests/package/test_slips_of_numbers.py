@@ -101,6 +101,32 @@ def test_numbers_of_another_module_are_known(tmp_path, code, found):
 
 
 @pytest.mark.parametrize(
+    ("line", "number"),
+    [
+        ("n += 2", "2"),
+        ("n = n + 2", "2"),
+        ("n = (n + 2) % 128", "2"),
+        ("self.n -= 1", "-1"),
+        ("n = n - 3", "-3"),
+        ("n += 1", None),
+        ("n = n + 1", None),
+        ("n = m + 2", None),
+        ("n = n + m", None),
+        ("n *= 2", None),
+        ("n = n + 0.5", None),
+        ("n = m = n + 2", "2"),
+        ("n, m = n + 2, m", None),
+    ],
+)
+def test_the_number_that_is_added_to_a_counter_is_known(tmp_path, line, number):
+    (tmp_path / "a.py").write_text(f"n = 0\nwhile True:\n    pub.publish(n)\n    {line}\n")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "step-number"]
+    assert [(s.line, s.message, s.name) for s in slips] == (
+        [(4, number, line.split(maxsplit=1)[0])] if number else []
+    )
+
+
+@pytest.mark.parametrize(
     ("body", "fix"),
     [
         ("if n < 127:\n n += 1\nelse:\n n = 0\npub.publish(n)", "move lines 3 to 6 below line 7"),

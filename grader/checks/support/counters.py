@@ -276,12 +276,21 @@ def added_early(first: Count, run: Run, package: PackageFacts, start: int) -> Py
     starts = slips_of(package, run, first.callerid, "start-value")
     added = slips_of(package, run, first.callerid, "added-first")
     early = [one for one in added if {s.message for s in starts if s.name == one.name} == {str(start)}]
-    return early[0] if len(early) == 1 and first.values[0] == start + 1 else None
+    steps = [int(one.message) for one in stepping(first, run, package) if early and one.name == early[0].name]
+    return early[0] if len(early) == 1 and first.values[0] == start + (steps or [1])[0] else None
+
+
+def stepping(count: Count, run: Run, package: PackageFacts) -> list[PythonSlip]:
+    """Return the one line that adds the number by which the counter usually goes on, and is not 1; none where others
+    may be meant."""
+    usual = count.usual_step()
+    added = [s for s in slips_of(package, run, count.callerid, "step-number") if float(s.message) == usual]
+    return added if len(added) == 1 else []
 
 
 def cite_early(verdict: Verdict, slip: PythonSlip) -> Verdict:
     """Return the verdict of a counter that begins, or goes on after its wrap, one too high, with the line."""
-    why = f"line {slip.line} of {slip.file} adds one to `{slip.name}` before it is published"
+    why = f"line {slip.line} of {slip.file} adds to `{slip.name}` before it is published"
     return verdict.explained(why, f"in {slip.file}, {slip.fix}", (slip.place,))
 
 

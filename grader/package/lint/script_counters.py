@@ -179,7 +179,8 @@ def reset_the_wrong_way(ifs, name):
 
 
 def counter_starts(tree):
-    """Where a counter gets its first number, and where a loop adds one before it publishes: no slips."""
+    """Where a counter gets its first number, where another one than 1 is added, and where a loop adds to it before it
+    publishes: no slips."""
     loops = all_of(tree, *LOOPS)
     later = {id(n) for loop in loops for n in ast.walk(loop) if n is not loop}
     for node in all_of(tree, ast.If):
@@ -191,6 +192,14 @@ def counter_starts(tree):
         value = signed(node.value) if isinstance(node, ast.Assign) else None
         if value is not None and id(node) not in later and dotted(node.targets[0]) in counted:
             yield slip(node.lineno, "start-value", "%d" % value, name=dotted(node.targets[0]))
+        number = added_number(node)
+        if number not in (None, 1):
+            yield slip(
+                node.lineno,
+                "step-number",
+                "%d" % number,
+                name=dotted(getattr(node, "target", None) or node.targets[0]),
+            )
     for owner in all_of(tree, ast.ClassDef):  # `value: int = 1` of a dataclass
         for node in constants_in(owner.body):
             own = [name for name in counted if name.rpartition(".")[2] == dotted(node) != name]
@@ -221,6 +230,21 @@ def added_before_return(function):
                 last.lineno,
             )
             yield slip(one.lineno, "added-first", "", fix, name)
+
+
+def added_number(node):
+    """Return the number that a statement adds to a variable: `n += 2`, `n = n - 1`, `n = (n + 2) % 128`."""
+    if isinstance(node, ast.AugAssign):
+        op, number = node.op, signed(node.value)
+    else:
+        value = node.value
+        while isinstance(value, ast.BinOp) and isinstance(value.op, ast.Mod):
+            value = value.left
+        if not isinstance(value, ast.BinOp) or dotted(value.left) != dotted(node.targets[0]):
+            return None
+        op, number = value.op, signed(value.right)
+    sign = {ast.Add: 1, ast.Sub: -1}.get(type(op))
+    return None if sign is None or number is None else sign * number
 
 
 def added_first(body):
