@@ -203,9 +203,9 @@ def charged_verdict(
     told_at_once = paths != [] and all(path in verdict.hint for path in paths)
     if copy.status.is_lost and verdict.hint and (told_at_once or not (is_next or further)):
         return _with_passed(verdict, copy, repairs)  # the repair brings up what its own advice is about
-    told = [one for one in repairs if is_told(one, verdict.hint) and not _is_further_down(one, verdict)]
-    clauses = verdict.hint.split("; ") if told else []
-    if any(one not in told for one in repairs):
+    told, beside = _told(repairs, verdict)
+    clauses = verdict.hint.split("; ") if told or beside else []
+    if any(one not in [*told, *beside] for one in repairs):
         clauses = [clause for clause in clauses if any(is_told(one, clause) for one in told)]
     hints = clauses + advice_on(one for one in repairs if one not in told)
     said = verdict.message
@@ -312,6 +312,15 @@ def is_told(repair: Repair, hint: str) -> bool:
     }  # one tag is as good as the other
     of_package = repair.kind in {"package-name", *OF_BUILDS} and repair.file in OF_PACKAGES
     return of_package and new <= words_of(hint) and new != set()
+
+
+def _told(repairs: Iterable[Repair], verdict: Verdict) -> tuple[list[Repair], list[Repair]]:
+    """Return the repairs that the verdict's own hint tells, and those of the same words in CMakeLists.txt, where it is
+    only about package.xml."""
+    told = [one for one in repairs if is_told(one, verdict.hint) and not _is_further_down(one, verdict)]
+    cited = {one.file for one in verdict.citations if isinstance(one, FileCitation)}
+    beside = [one for one in told if one.file == CMAKE and cited == {MANIFEST}]
+    return [one for one in told if one not in beside], beside
 
 
 def _is_further_down(repair: Repair, verdict: Verdict) -> bool:

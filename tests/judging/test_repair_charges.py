@@ -550,6 +550,23 @@ def test_a_dependency_is_told_with_one_tag() -> None:
     assert re.fullmatch(r"add <exec_depend>rospy</exec_depend> below line \d+", manifest.hint)
 
 
+def test_the_same_slip_in_both_files_of_a_package_is_told_for_both() -> None:
+    words = {"kind": "manifest-line", "line": 5, "before": "<depend>rspy</depend>", "message": "no rspy"}
+    tag = Repair(file="package.xml", after="<depend>rospy</depend>", fix="<depend>rospy</depend>", **words)
+    call = {"file": "CMakeLists.txt", "kind": "build-line", "before": "  rspy", "after": "  rospy"}
+    component = Repair(**words | call, fix="write rospy instead of rspy")
+    asked = rubric(
+        {"id": "manifest", "check": "manifest", "with": {"name": "lab1", "dependencies": ["rospy"]}},
+        {"id": "build", "check": "build", "requires": ["manifest"]},
+    )
+    tool = ["buildtool_depend", "catkin"]
+    runs = built({"manifest": {"dependencies": [tool, ["depend", "rspy"]]}}, exit_code=1)
+    copy = built({"manifest": {"dependencies": [tool, ["depend", "rospy"]]}}, exit_code=0)
+    manifest, _ = judge(asked, runs | on_copy(copy, tag, component))
+    told = r"write rospy instead of rspy on line \d+; CMakeLists.txt line 5: write rospy instead of rspy"
+    assert re.fullmatch(told, manifest.hint)
+
+
 def test_a_file_that_is_written_as_a_whole_gets_no_hint_on_its_lines() -> None:
     words = {"kind": "build-line", "file": "CMakeLists.txt", "message": "m"}
     line = Repair(line=1, before="a", fix="f", **words)
