@@ -192,8 +192,10 @@ def _with_repaired_copy(
         launched=launched_in(of_copy.package, of_copy.runs.get(PACKAGE_RUN)),
     )
     verdicts = charge_once(rubric, verdicts, uses)
-    # what no repair helps still has all of its faults
+    # what no repair helps still has all of its faults, and where none helps anything, all have
     as_it_is = add_later_faults(verdicts, rubric, facts)
+    if not uses:
+        return as_it_is, uses
     behind = add_later_faults(verdicts, rubric, of_copy, handed_in=facts.package, repairs=repairs)
     told = {i: behind[i] if i in uses or not v.basis.of_machine else as_it_is[i] for i, v in verdicts.items()}
     return told, uses

@@ -387,6 +387,10 @@ def test_an_exception_gets_the_name_that_is_used(caught: str, meant: str, tmp_pa
             "class A:\n    def go(self):\n        pass\n    self.go()\n",
             ["indent line 4 like the lines of the method above it, or delete it"],
         ),
+        (  # once they are in the method, what this gives a value has one
+            "class A:\n    def go(self):\n        made = 1\n    pub.publish(made)\n    rate.sleep()\n",
+            ["indent lines 4 to 5 like the lines of the method above them, or delete them"] * 2,
+        ),
         (
             "class A:\n    def __init__(self, naMe):\n        self.name = name\n",
             ["write naMe instead of name"],
@@ -404,8 +408,10 @@ def test_an_exception_gets_the_name_that_is_used(caught: str, meant: str, tmp_pa
 )
 def test_a_name_that_is_not_there_and_one_that_is_spelt_alike(tmp_path, text, told):
     (tmp_path / "a.py").write_text(text)
-    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind in ("misspelt", "outside-method")]
-    assert [s.fix for s in slips] == told
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.fix for s in slips if s.kind in ("misspelt", "outside-method")] == told
+    strays = {s.line for s in slips if s.kind == "outside-method"}
+    assert not any(s.kind == "undefined" and s.line in strays for s in slips)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from script_tree import (
     called_name,
     calls_in,
     dotted,
+    lines_from,
     names_in,
     parents_of,
     published_type,
@@ -68,20 +69,18 @@ def misspelt(tree):
     functions = {n.name for n in all_of(tree, *FUNCTIONS[:2])} - stored
     odd = {*keys, *unbound, *outside}
     made = {dotted(n.targets[0]): dotted(getattr(n.value, "func", None)) for n in all_of(tree, ast.Assign)}
-    unknown = [n for n in names if n.id not in known or id(n) in odd]
+    unknown = [n for n in names if n.id not in known or id(n) in odd][:USES_LIMIT]
+    strays = sorted({n.lineno for n in unknown if id(n) in outside and (n.id == "self" or n.id not in known)})
+    yield from slips_outside(strays)
+    unknown = [n for n in unknown if id(n) not in outside or n.lineno not in strays]
     of_classes = {id(n) for one in tree.body if isinstance(one, ast.ClassDef) for n in ast.walk(one)}
-    for node in unknown[:USES_LIMIT]:
+    for node in unknown:
         kind, line, message = "undefined", node.lineno, ""
         fitting = stored if id(node) in texts else own - functions if is_value(node, tree) else own
         fitting = fitting - unfit.get(id(node), set())
         others = attributes if id(node) in of_classes else set()
         near = meant_for(node, tree, known, fitting, others)
         near = "" if made.get(near) == node.id else near  # `twist = Twist()` lacks an import
-        if id(node) in outside and (node.id == "self" or node.id not in known):
-            message = "line %d is in the class, but in none of its methods, so it runs before them" % line
-            fix = "indent line %d like the lines of the method above it, or delete it" % line
-            yield slip(line, "outside-method", message, fix)
-            continue
         if id(node) in keys:
             message = "the key `%s` is written here without quotes" % node.id
             fix = "on line %d, write `%s`" % (line, keys[id(node)])
@@ -327,6 +326,16 @@ def outside_methods(tree):
         for statement in node.body if isinstance(node, ast.ClassDef) else ():
             if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Call):
                 yield from ast.walk(statement)
+
+
+def slips_outside(lines):
+    """Yield these lines of a class that are in none of its methods, with those next to each other in one fix."""
+    for at, line in enumerate(lines):
+        message = "line %d is in the class, but in none of its methods, so it runs before them" % line
+        together = [one for i, one in enumerate(lines) if i - one == at - line]
+        where, them = lines_from(together[0], together[-1]), "them" if together[1:] else "it"
+        fix = "indent %s like the lines of the method above %s, or delete %s" % (where, them, them)
+        yield slip(line, "outside-method", message, fix)
 
 
 def unbound_names(tree, known):
