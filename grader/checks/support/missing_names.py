@@ -416,9 +416,7 @@ def _other_attributes(package: PackageFacts, owner: str, wrong: str, source: str
         if kind != owner and wrong in names and owner in {*own.classes, *own.members}
     ]
     # `self._result.count`: what is called so is the right part, with a field of another one
-    part = next(
-        (one for one in ("Request", "Response", "Goal", "Result", "Feedback") if owner.endswith(one)), ""
-    )
+    part = (re.search("(Request|Response|Goal|Result|Feedback)$", owner) or [""])[0]
     is_right_part = bool(part and re.search(rf"(?i)\b\w*_?{part[:3]}\w*\.{wrong}\b", source))
     if len(having) == 1 and not near_names(wrong, known) and not is_right_part:
         return f"{wrong} is a field of {having[0]}", f"make it as {having[0]}(), not as {owner}()"
@@ -435,7 +433,9 @@ def _other_attributes(package: PackageFacts, owner: str, wrong: str, source: str
     # what is set is no method of a text
     if len(known) == 1 and of_value and not re.search(rf"\.{wrong}\s*[-+*/]?=(?!=)", source):
         return f"it is the whole message ({owner})", f"write `.{known[0]}.{wrong}` instead of `.{wrong}`"
-    return _other_field(owner, known, wrong, source)
+    why, fix = _other_field(owner, known, wrong, source)
+    of_own = [f", or add it to {one.path}" for one in package.interfaces if owner in one.classes]
+    return why, fix + "".join(of_own if "that you mean" in fix else ())
 
 
 def _other_field(owner: str, known: tuple[str, ...], wrong: str, source: str) -> tuple[str, str]:
