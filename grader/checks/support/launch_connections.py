@@ -228,15 +228,44 @@ def wrong_name(node: LaunchNode, name: str) -> Slip:
     return Slip(at.file, at.line, why, "; ".join(fixes))
 
 
-def over_another_topic(run: Run, topic: str, said: str = "") -> Verdict:
-    """Return why nodes that are there are not connected: other topics, other types, or an end that is missing."""
-    others = {
+def _idle_remaps(run: Run, nodes: Sequence[LaunchNode], topic: str) -> Renaming | None:
+    """Return the `<remap>`s to the topic, of a name that none of these nodes has; None unless they are alike, and the
+    nodes that have them are connected over one other topic."""
+    wrong = [
+        (line, old, had & _connected(run, topic))
+        for node in nodes
+        if (had := _topics(run, node) - {"/rosout"})
+        and (tags := [line for line in node.renaming if line.tag == "remap"])
+        and len(node.remaps) == len(tags)
+        for (old, new), line in zip(node.remaps, tags, strict=True)
+        if _whole(new, node.namespace) == topic and _whole(old, node.namespace) not in had
+    ]
+    spaces = {
+        node.namespace for node in nodes if topic in {_whole(new, node.namespace) for _, new in node.remaps}
+    }
+    olds, others = {old for _, old, _ in wrong}, {one for _, _, had in wrong for one in had}
+    if not len(olds) == len(others) == len(spaces) == 1:
+        return None
+    old, right = olds.pop(), others.pop().removeprefix(spaces.pop())
+    lines = [line for line, _, _ in wrong]
+    where = on_lines(sorted(line.line for line in lines))
+    why = f"remaps {old}, which is no topic of these nodes"
+    return Renaming(why, f'on {where}, write from="{right}"', tuple(line.place for line in lines))
+
+
+def _connected(run: Run, topic: str) -> set[str]:
+    """Return the other topics over which nodes of the student's are connected."""
+    return {
         c.topic
         for _, event in run.graph
         for c in event.connections
         if c.topic not in {topic, "/rosout"} and run.is_student_node(c.subscriber)
     }
-    if others:
+
+
+def over_another_topic(run: Run, topic: str, said: str = "") -> Verdict:
+    """Return why nodes that are there are not connected: other topics, other types, or an end that is missing."""
+    if others := _connected(run, topic):
         message = f"the nodes are connected over {join_words(sorted(others))}, not over {topic}"
         return failed(message + said, hint=f"both have to use {topic}; look for a <remap> or a namespace")
     publishers, subscribers = nodes_on(run, topic, "publishers"), nodes_on(run, topic, "subscribers")
@@ -259,7 +288,7 @@ def blame_renaming(
     package: PackageFacts, run: Run, nodes: Sequence[LaunchNode], topic: str, verdict: Verdict
 ) -> Verdict | None:
     """Return the verdict with the lines of the launch file that give the topic another name; None where none do."""
-    renaming = find_renaming(package, nodes, topic, run)
+    renaming = find_renaming(package, nodes, topic, run) or _idle_remaps(run, nodes, topic)
     if renaming is None:
         return None
     message = f"{verdict.message}: the launch file {renaming.why}"

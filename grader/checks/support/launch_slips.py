@@ -296,7 +296,7 @@ def hints_at_their_lines(losses: Sequence[Verdict]) -> list[Verdict]:
         if isinstance(place, FileCitation)
     ]
     return [
-        one.model_copy(update={"hint": f"on {on_lines(at)}, {one.hint}"})
+        one.model_copy(update={"hint": f"on {on_lines(sorted(at))}, {one.hint}"})
         if len(losses) > 1
         and one.hint.startswith("write ")
         and "line" not in one.hint
