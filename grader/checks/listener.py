@@ -16,6 +16,7 @@ from grader.checks.support.console_output import (
     probes_on,
     text_places,
 )
+from grader.checks.support.exceptions import NUMBER_OF_PARTS
 from grader.checks.support.exit_causes import explain_early_end, explain_error
 from grader.checks.support.processes import (
     GlobalName,
@@ -346,7 +347,9 @@ def _judge_error(package: PackageFacts, run: Run) -> Verdict | None:
     if twice := run_slip(package, run, "defined-twice"):
         return failed(f"a callback never runs: {twice.message}", hint=twice.fix, citations=(twice.place,))
     if end := explain_error(package, run):
-        return end.verdict(failed, f"an error stops the node from printing: {end.cause}")
+        verdict = end.verdict(failed, f"an error stops the node from printing: {end.cause}")
+        all_of_it = f"{NUMBER_OF_PARTS}, and each is to be printed"
+        return verdict.model_copy(update={"hint": verdict.hint.replace(NUMBER_OF_PARTS, all_of_it)})
     slip = run_slip(package, run, "callback-called", "callback-missing")
     # A function that no Subscriber is given may be for another topic than the one that was sent on.
     if slip is not None and not (slip.name and slip.kind == "callback-missing"):
