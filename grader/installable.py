@@ -186,6 +186,19 @@ def install_hint(
     return f"{ON_THE_MACHINE}{commands}, then grade again{own}"
 
 
+PROGRAMS_OF_ROS = {
+    "joint_state_publisher": ("joint_state_publisher",),
+    "joy": ("joy_node",),
+    "map_server": ("map_server", "map_saver"),
+    "robot_state_publisher": ("robot_state_publisher", "state_publisher"),
+    "teleop_twist_keyboard": ("teleop_twist_keyboard.py",),
+    "tf": ("static_transform_publisher", "tf_echo", "tf_monitor", "tf_remap", "view_frames"),
+    "tf2_ros": ("static_transform_publisher", "buffer_server"),
+    "topic_tools": ("drop", "mux", "relay", "throttle", "transform"),
+}
+"""What launch files start of ROS's packages. Debian has some of these packages without their programs."""
+
+
 def install_command(name: str, ros: str = "") -> str:
     """Return how a package is installed; `ros` is the distribution below /opt/ros, "" for Debian's own ROS."""
     packages = known_packages().get(name, ())

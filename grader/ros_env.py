@@ -18,7 +18,7 @@ from typing import Literal, NamedTuple
 
 from grader.errors import RosMissing
 from grader.host_programs import HOST_PATH, find_host_program, run_host_program
-from grader.installable import install_command, known_packages, noetic_messages
+from grader.installable import PROGRAMS_OF_ROS, install_command, known_packages, noetic_messages
 from grader.model.package import MANIFEST
 from grader.model.record import Record
 from grader.portable import system
@@ -269,7 +269,8 @@ class RosPackages:
         if package not in self.folders:
             return self._unknown(package, ())
         there = self.programs(package)
-        return "" if name in there else f'{package} has no program "{name}"{did_you_mean(name, there)}'
+        is_known = name in there or name in PROGRAMS_OF_ROS.get(package, ())
+        return "" if is_known else f'{package} has no program "{name}"{did_you_mean(name, there)}'
 
     def type_fault(self, type_: str, kind: TypeKind, own: Collection[str] = ()) -> str:
         """Return why there is no such type; empty where there may be. Packages of `own` are the student's."""

@@ -19,6 +19,7 @@ from grader.checks.registry import NotRecorded
 from grader.checks.support.exit_causes import explain_by_exception
 from grader.checks.support.launch import explain_by_refused_launch
 from grader.checks.support.launch_connections import explain_by_late_remap
+from grader.checks.support.launch_slips import explain_by_lacking_program
 from grader.checks.support.parameters import (
     explain_by_given_value,
     explain_by_misplaced_parameter,
@@ -283,6 +284,7 @@ def _with_made_up(rubric: Rubric, criterion: Criterion, verdict: Verdict) -> Ver
 
 # In this order: each gets the verdict as the one before it left it.
 EXPLANATIONS = (
+    explain_by_lacking_program,
     explain_by_refused_launch,
     explain_by_late_remap,
     explain_by_exception,
@@ -299,8 +301,8 @@ def explain_loss(check: Check, package: PackageFacts | None, run: object, verdic
     """Return a lost mark with what explains it in the run as a whole."""
     if package is None or not isinstance(run, Run):
         return verdict
-    for explain in EXPLANATIONS if verdict.status.is_lost else ():
-        verdict = explain(check, package, run, verdict)
+    for explain in EXPLANATIONS:
+        verdict = verdict if not verdict.status.is_lost else explain(check, package, run, verdict)
     return explain_by_waiting_callback(check, package, run, verdict)  # that may take back an excuse
 
 

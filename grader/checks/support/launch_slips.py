@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import NamedTuple
 
+from grader.checks.registry import Check
 from grader.checks.support.scripts import (
     BUILD_FIRST_HINT,
     CPP_SUFFIXES,
@@ -22,12 +23,20 @@ from grader.checks.support.scripts import (
     script_of_role,
 )
 from grader.checks.support.text import near_names, shown
-from grader.installable import known_packages
+from grader.evidence.run import Run
+from grader.installable import PROGRAMS_OF_ROS, install_command, known_packages
 from grader.model.file_fault import Fault
 from grader.model.launch_file import SUBSTITUTION, LaunchFile, LaunchLine, LaunchNode
 from grader.model.package import Executable, PackageFacts, SourceFile
-from grader.model.verdict import FileCitation, MistakeKind, Verdict, failed, failed_or_blocked
-from grader.wording import has_role_of, join_words, on_lines, there_is
+from grader.model.verdict import (
+    FileCitation,
+    MistakeKind,
+    Verdict,
+    failed,
+    failed_or_blocked,
+    machine_lacks,
+)
+from grader.wording import ON_THE_MACHINE, has_role_of, join_words, on_lines, there_is
 
 OTHER_ATTRIBUTES = {"package": "pkg", "exec": "type", "executable": "type", "script": "type"}
 """What ROS 2, or plain English, calls them."""
@@ -500,7 +509,7 @@ def owner_of(package: PackageFacts, node: LaunchNode) -> PackageFacts | None:
 
 _NO_PROGRAM = re.compile(r"cannot launch node of type \[([^/\]]+)/([^\]]+)\]: Cannot locate node")
 # Where the package itself is not found, roslaunch repeats its name alone.
-_NO_PACKAGE = re.compile(r"cannot launch node of type \[([^/\]]+)/[^\]]+\]: \1$")
+_NO_PACKAGE = re.compile(r"cannot launch node of type \[([^/\]]+)/([^\]]+)\]: \1$")
 
 
 def unfound_program(printed: Sequence[str], package: PackageFacts) -> tuple[str, str] | None:
@@ -515,6 +524,30 @@ def unfound_program(printed: Sequence[str], package: PackageFacts) -> tuple[str,
         hint = "write the name of the package that has the program as pkg"
         return f"roslaunch finds no package {shown(found[1])}", hint
     return None
+
+
+ROS = "noetic"
+"""Debian's own packages may lack the program."""
+
+
+def explain_by_lacking_program(_check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
+    """Return a lost mark as open where roslaunch did not find a program of ROS's, which this machine then lacks: nobody
+    knows what the other nodes do with it."""
+    started = {(node.pkg, node.type) for file in package.launch_files for node in file.brings}
+    for _, printed in run.console:
+        found = _NO_PROGRAM.search(printed.line) or _NO_PACKAGE.search(printed.line)
+        known = PROGRAMS_OF_ROS.get(found[1], ()) if found and found.groups() in started else ()
+        if found is None or found[2] not in known:
+            continue
+        why = f"the launch file starts {found[2]} of {found[1]}, which this grading machine lacks"
+        return machine_lacks(
+            f"{verdict.message}; {why}",
+            hint=f"{ON_THE_MACHINE}{install_command(found[1], ROS)}, then grade again",
+            expected=verdict.expected,
+            measured=verdict.measured,
+            citations=verdict.citations,
+        )
+    return verdict
 
 
 def right_remap(
