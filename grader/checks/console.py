@@ -173,12 +173,7 @@ def _not_printed(
     one: Life, lines: Sequence[Line], package: PackageFacts, run: Run, params: PrintsParams
 ) -> Verdict:
     refused = any(OTHER_DEFINITION in line.text for line in lines)  # no number in that line is an answer
-    given = (
-        {float(word) for word in one.start.argv if NUMERAL.fullmatch(word)}
-        if params.is_number_alone
-        else set()
-    )
-    other = [line for line in lines if not refused and _says_other(line, params, given)]
+    other = [line for line in lines if not refused and _says_other(line, one, params)]
     hint = f"print {params.words} where it happens"
     failing = one.ended_early and (one.end is None or one.end.exit_code != 0)
     asked = asked_services(one, run)
@@ -222,11 +217,11 @@ def _not_printed(
     return lost.late() if waits else lost
 
 
-def _says_other(line: Line, params: PrintsParams, given: set[float]) -> bool:
-    """Return whether the text stands on the line with other numbers than those that the program was given."""
-    return any(
-        not found.groups() or not set(map(float, found.groups())) <= given for found in params.found_in(line)
-    )
+def _says_other(line: Line, one: Life, params: PrintsParams) -> bool:
+    """Return whether the text stands on the line; a number alone, with another one than the program was given."""
+    given = {float(word) for word in one.start.argv if params.is_number_alone and NUMERAL.fullmatch(word)}
+    found = [set(map(float, each.groups())) for each in params.found_in(line)]
+    return any(not numbers or not numbers <= given for numbers in found)
 
 
 def _nothing_printed(package: PackageFacts, run: Run, params: PrintsParams, hint: str) -> Verdict:

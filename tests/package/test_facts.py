@@ -56,7 +56,8 @@ def test_an_empty_folder_is_no_crash(tmp_path):
 def test_ros_python_has_the_last_word(tmp_path):
     package = make_package(tmp_path / "lab1", FILES)
     fault = Fault(file="src/a.py", line=1, kind="SyntaxError", message="invalid syntax")
-    facts = with_build_facts(read_package(package), python_faults={"src/a.py": fault}, python_slips=())
+    given = read_package(package)
+    facts = with_build_facts(given, folder=package.folder, python_faults={"src/a.py": fault}, python_slips=())
     assert facts.file("src/a.py").python_fault == fault
     assert facts.file("src/bad.py").python_fault is None
     assert facts.slips == ()

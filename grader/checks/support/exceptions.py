@@ -85,6 +85,7 @@ SLIPS = {
      "call `next(…)` on it once, on the line below the one that makes it"),
     "exceptions must derive from BaseException": ("only an exception can be raised, and this is none",
      "write the exception that is meant around it: `raise ValueError(…)`"),
+    "sleep length must be non-negative": ("`time.sleep` is given less than 0 seconds", "give it 0 or more"),
     "is not a bool": ("the message takes True or False, and gets something else", "publish a bool, without `str(…)`"),
     "required argument is not a float": ("a field of numbers is given something else, such as a text",
      "give it a number: `float(…)`"),
@@ -193,8 +194,6 @@ def _value(message: str, source: str, _marked: tuple[int, int] | None) -> Meanin
         return f"{plural(int(found[2]), 'value')} are expected on the right of `=`{came}", hint
     if found := _NO_ITEMS.search(message):
         return no_items(found[1], source)
-    if message == "sleep length must be non-negative":
-        return "`time.sleep` takes how many seconds to wait, and gets less than 0", "give it 0 or more"
     found = _NO_NUMBER.search(message)
     return _of_text(message, found[1], source) if found else None
 

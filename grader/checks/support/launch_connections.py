@@ -64,15 +64,15 @@ class _Use(NamedTuple):
         """Return the topic's whole name, as ROS resolves it: first by the namespace, then by the remaps. Lines that
         are `gone` do not count; `space` is another namespace than the node's."""
         space = space or self.space(gone)
-        table = {self._whole(old, space): new for old, new, line in self._lines() if line not in gone}
-        whole = self._whole(self.name, space)
-        return self._whole(table.get(whole, whole), space)
+        table = {_whole(self.node, old, space): new for old, new, line in self._lines() if line not in gone}
+        whole = _whole(self.node, self.name, space)
+        return _whole(self.node, table.get(whole, whole), space)
 
     def remaps(self, gone: Collection[LaunchLine | None] = ()) -> list[tuple[str, LaunchLine | None]]:
         """Return the new names that `<remap>`s give the topic, with their lines where they are known."""
         space = self.space(gone)
-        whole = self._whole(self.name, space)
-        return [(new, line) for old, new, line in self._lines() if self._whole(old, space) == whole]
+        whole = _whole(self.node, self.name, space)
+        return [(new, line) for old, new, line in self._lines() if _whole(self.node, old, space) == whole]
 
     def _lines(self) -> Iterator[tuple[str, str, LaunchLine | None]]:
         lines = [line for line in self.node.renaming if line.tag in RENAMES]
@@ -80,10 +80,6 @@ class _Use(NamedTuple):
         known = len(lines) == len(self.node.remaps)
         for index, (old, new) in enumerate(self.node.remaps):
             yield old, new, lines[index] if known else None
-
-    def _whole(self, name: str, space: str) -> str:
-        private = f"{self.node.name}/{name[1:].lstrip('/')}" if name.startswith("~") else name
-        return private if private.startswith("/") else f"{space}{private}"
 
 
 def find_renaming(
@@ -228,6 +224,12 @@ def wrong_name(node: LaunchNode, name: str) -> Slip:
     return Slip(at.file, at.line, why, "; ".join(fixes))
 
 
+def _whole(node: LaunchNode, name: str, space: str) -> str:
+    """Return a name of a node's as ROS resolves it in this namespace, which has both slashes."""
+    private = f"{node.name}/{name[1:].lstrip('/')}" if name.startswith("~") else name
+    return private if private.startswith("/") else f"{space}{private}"
+
+
 def _idle_remaps(run: Run, nodes: Sequence[LaunchNode], topic: str) -> Renaming | None:
     """Return the `<remap>`s to the topic, of a name that none of these nodes has; None unless they are alike, and the
     nodes that have them are connected over one other topic."""
@@ -238,10 +240,12 @@ def _idle_remaps(run: Run, nodes: Sequence[LaunchNode], topic: str) -> Renaming 
         and (tags := [line for line in node.renaming if line.tag == "remap"])
         and len(node.remaps) == len(tags)
         for (old, new), line in zip(node.remaps, tags, strict=True)
-        if _whole(new, node.namespace) == topic and _whole(old, node.namespace) not in had
+        if _whole(node, new, node.namespace) == topic and _whole(node, old, node.namespace) not in had
     ]
     spaces = {
-        node.namespace for node in nodes if topic in {_whole(new, node.namespace) for _, new in node.remaps}
+        node.namespace
+        for node in nodes
+        if topic in {_whole(node, new, node.namespace) for _, new in node.remaps}
     }
     olds, others = {old for _, old, _ in wrong}, {one for _, _, had in wrong for one in had}
     if not len(olds) == len(others) == len(spaces) == 1:
