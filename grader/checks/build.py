@@ -221,6 +221,14 @@ def _name_missing(
         link = f"target_link_libraries({lost} ${{catkin_LIBRARIES}})"
         hint = f"write add_executable({lost} {source}), and below it {link}"
         hint = hint if sources else f"{add_hint(package, source)}; then {hint}"
+        loops = (
+            c for c in cmake_calls(package, "foreach") if len(c.args) == 1 or c.args[1:] == ("IN", "LISTS")
+        )
+        if (loop := next(loops, None)) is not None and sources:
+            why = f"{why}: the foreach(…) on line {loop.line} goes through nothing, as its variable has no value"
+            listed = next((c for c in cmake_calls(package, "set") if lost in c.args[1:]), None)
+            right = f"${{{listed.args[0]}}}" if listed else "…"
+            hint = f"on line {loop.line}, write `foreach({loop.args[0]} {right})`"
     else:
         return verdict
     # A function, as a backslash in the text would begin an escape.

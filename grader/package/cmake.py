@@ -21,10 +21,10 @@ from grader.model.package import CMAKE, CMakeCall, CMakeFacts
 from grader.package.cmake_parse import commands_of, parse_cmake
 from grader.package.reading import printable, read_markup
 
-# What steers CMake or only talks; everything else is a fact.
+# What steers CMake or only talks; everything else is a fact, and so is what a loop goes through.
 _LEFT_OUT = frozenset(
     {
-        *("if", "elseif", "else", "endif", "foreach", "endforeach", "while", "endwhile", "block", "endblock"),
+        *("if", "elseif", "else", "endif", "endforeach", "while", "endwhile", "block", "endblock"),
         *("function", "endfunction", "macro", "endmacro", "return", "break", "continue", "message"),
     },
 )

@@ -145,7 +145,9 @@ class _Reader:
         self.run(node.if_false or (), file, depth + 1)
 
     def _loop(self, node: nodes.ForEach, file: str, depth: int) -> None:
-        variable, *items = self._arguments(node.args, file) or [""]
+        args = self._arguments(node.args, file)
+        self.calls.append(CMakeCall(name="foreach", args=tuple(args), file=file, line=node.line))
+        variable, *items = args or [""]
         before = self.variables.pop(variable, None)
         for item in self._items(items):
             self.steps += 1

@@ -29,6 +29,7 @@ from grader.checks.support.scripts import (
     cmake_calls,
     installed,
     own_header,
+    where_written,
 )
 from grader.checks.support.text import in_one_line, near_names, shown
 from grader.installable import (
@@ -143,7 +144,21 @@ def _missing_source(found: re.Match[str], package: PackageFacts, _lines: Sequenc
         words = f"targets are built from {join_words(absent)}"
         taken = _calls_of_targets(package, made, absent)
         return _missing_files(absent, package, words, "the calls that name them", taken)
+    path = PurePosixPath(found[1])
+    if not path.stem.strip(".") or path.name in CPP_SUFFIXES:
+        why = f"a target is built from {found[1]}: a variable in its name has no value"
+        return Explained(why, "correct the name of the variable in `${…}` on that line")
     taken = _calls_of_targets(package, made, [found[1]])
+    own = next((call for call in made if found[1] in call.args), None)
+    loop = own and where_written(package, path.stem, own)
+    if own is not None and loop is not own and loop is not None:
+        there = [f.path for f in package.files if f.path.endswith(CPP_SUFFIXES)]
+        near = near_names(found[1], there)
+        seen = f"; {there_is(near)}" if near else ""
+        why = f"line {loop.line} names {path.stem}, and so a target is built from {found[1]}"
+        add = f"add {found[1]} and push it, or remove {path.stem} from line {loop.line}"
+        right = near and f"on line {loop.line}, write {PurePosixPath(near[0]).stem} in place of {path.stem}"
+        return Explained(f"{why}, which is not in the package{seen}", right or add, place=loop.place)
     return _missing_files([found[1]], package, f"a target is built from {found[1]}", leave=taken)
 
 
@@ -258,7 +273,14 @@ def _missing_script(found: re.Match[str], package: PackageFacts, _lines: Sequenc
     others = [_below(one.path, package) for one in named if not one.path.startswith("$")]
     absent = [p for p in dict.fromkeys((path, *others)) if there.isdisjoint((p, p.removeprefix("./")))]
     paths = absent if len(absent) > 1 else [path]
-    return _missing_files(paths, package, f"catkin_install_python(…) names {join_words(paths)}")
+    told = _missing_files(paths, package, f"catkin_install_python(…) names {join_words(paths)}")
+    call = next((one.call for one in named if one.path.endswith(path)), None)
+    written = where_written(package, path, call) if call is not None else None
+    if written is None or written is call or len(paths) > 1:
+        return told
+    hint = told.hint.replace("remove it from that call", f"remove it from line {written.line}")
+    hint = hint if "remove it" in hint else f"on line {written.line}, {hint}"
+    return told._replace(hint=hint, place=written.place)
 
 
 def _missing_files(

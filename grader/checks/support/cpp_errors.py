@@ -10,6 +10,7 @@ from typing import NamedTuple
 from grader.checks.support.scripts import (
     CPP_SUFFIXES,
     cmake_calls,
+    loop_variable,
     own_header,
     part_not_linked,
     path_in_package,
@@ -405,6 +406,8 @@ def _explain_unlinked(found: re.Match[str], package: PackageFacts, lines: Sequen
         words = "roscpp" if "COMPONENTS" in catkin[0].args else "COMPONENTS roscpp"
         return Explained(why, f"in the find_package(…) on line {catkin[0].line}, add {words}")
     part = "" if name.startswith("ros::") else part_not_linked(package)
+    made = next((c for c in cmake_calls(package, "add_executable") if c.args[:1] == (program,)), None)
+    program = (made and loop_variable(package, made)) or program
     hint = f"write {call_below(program, 'target_link_libraries', '${catkin_LIBRARIES}')}{own}"
     return Explained(why, part or hint)
 

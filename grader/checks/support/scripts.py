@@ -174,9 +174,21 @@ def cmake_calls(package: PackageFacts, *names: str) -> tuple[CMakeCall, ...]:
 
 
 def where_written(package: PackageFacts, text: str, call: CMakeCall) -> CMakeCall:
-    """Return the `set(…)` above a call that has a word of its: a variable brings it there; else the call."""
-    above = [c for c in cmake_calls(package, "set") if c.file == call.file and c.line < call.line]
+    """Return the `set(…)`, `list(…)` or `foreach(…)` above a call that has a word of its: a variable brings it there;
+    else the call."""
+    above = [
+        c
+        for c in cmake_calls(package, "set", "list", "foreach")
+        if c.file == call.file and c.line < call.line
+    ]
     return next((c for c in above if text in c.args[1:]), call)
+
+
+def loop_variable(package: PackageFacts, call: CMakeCall) -> str:
+    """Return `${node}` where `foreach(node …)` makes several targets by one call; "" where it is in no loop."""
+    made = {c.args[0] for c in cmake_calls(package, call.name) if c.args and c.place == call.place}
+    above = [c for c in cmake_calls(package, "foreach") if c.file == call.file and c.line <= call.line]
+    return f"${{{above[-1].args[0]}}}" if len(made) > 1 and above and above[-1].args else ""
 
 
 def programs(package: PackageFacts) -> tuple[Executable, ...]:
