@@ -95,7 +95,7 @@ def wanted_of(rubric: Rubric, package: str = "") -> Wanted:
         package=package,
         started=tuple(started),
         launched=tuple(dict.fromkeys(launched)),
-        definitions=tuple(_definitions(criteria)),
+        definitions=tuple(dict([*_of_services(rubric, package), *_definitions(criteria)]).items()),
         does=tuple(dict.fromkeys(_of_scripts(rubric, criteria))),
         **{field: tuple(names) for field, names in found.items()},
     )
@@ -108,6 +108,17 @@ def _definitions(criteria: Iterable[Criterion]) -> Iterator[tuple[str, tuple[Int
         parts = ((*path.rpartition("."), str(kind)) for path, kind in types.items())
         named = (InterfaceField(part=part, type=kind, name=name, line=0) for part, _, name, kind in parts)
         yield file, tuple(parse_definition(text, PurePosixPath(file).suffix) if text else named)
+
+
+def _of_services(rubric: Rubric, package: str) -> Iterator[tuple[str, tuple[InterfaceField, ...]]]:
+    """Yield the definitions of the package's services that the grader itself calls, or offers."""
+    for scenario in rubric.scenarios.values():
+        calls = [step.call for step in scenario.steps if step.call is not None]
+        named = [(one.type, one.definition) for one in (*scenario.calls, *calls)]
+        for kind, text in (*named, *((one.type, one.definition) for one in scenario.serves)):
+            maker, _, name = kind.partition("/")
+            if text and maker == package:
+                yield f"srv/{name}.srv", tuple(parse_definition(text, ".srv"))
 
 
 def _of_scripts(rubric: Rubric, criteria: Sequence[Criterion]) -> Iterator[tuple[str, Doing, str]]:
