@@ -56,6 +56,17 @@ def there_is(names: Iterable[str]) -> str:
     return f"there {'is' if len(items) == 1 else 'are'} {join_words(items)}"
 
 
+def name_package(name: str, places: Iterable[str] = ()) -> str:
+    """Return what to write where a package has a slip of the name that it should have, which has to be the same
+    everywhere: in these places, or in those that every package has."""
+    usual = (
+        f"<name>{name}</name> in package.xml",
+        f"project({name}) in CMakeLists.txt",
+        f'pkg="{name}" in each <node>',
+    )
+    return f"write {join_words(places) or join_words(usual)}"
+
+
 def first_few(names: Sequence[str], most: int) -> str:
     """Return `a, b, c and 4 more`: the first `most` names, and how many more there are."""
     more = f" and {len(names) - most} more" if len(names) > most else ""

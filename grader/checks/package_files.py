@@ -14,7 +14,7 @@ from grader.installable import known_packages, noetic_messages
 from grader.model.package import MANIFEST, Dependency, Manifest, PackageFacts, meant_manifest
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, failed_or_blocked, passed
-from grader.wording import is_one_edit, is_word_of, join_words, on_lines, plural
+from grader.wording import is_one_edit, is_word_of, join_words, name_package, on_lines, plural
 
 CORE = ("rospy", "roscpp", "message_generation", "message_runtime")
 OTHERS = {
@@ -358,7 +358,7 @@ def _rename(package: PackageFacts, found: Manifest, name: str) -> str:
     # With `-w`, grep would not find the name in `<name>_generate_messages_py`.
     words, such = ("", f"{such} or {made}") if made else ("w", such)
     search = f"`grep -rn{words} {found.name} .` shows whether it stands anywhere else, as in {such}"
-    return f"write {join_words(places[:PLACES_SHOWN])}; {search}"
+    return f"{name_package(name, places[:PLACES_SHOWN])}; {search}"
 
 
 def _strays(found: Manifest, own: Collection[str | None]) -> Iterator[str]:
@@ -485,7 +485,7 @@ def _unreadable(package: PackageFacts, params: ManifestParams) -> Verdict:
     other = ""
     if lacks_tag and package.name != name:
         other = f"; it names the package {package.name!r} instead of {name!r}"
-        hint = f"{hint}; write <name>{name}</name>, and project({name}) in CMakeLists.txt"
+        hint = f"{hint}; {name_package(name)}"
     message = f"{fault.file}{line} cannot be read: {fault.explanation}{other}"
     return failed(message, measured=fault.message, hint=hint, citations=(fault.place,))
 

@@ -32,7 +32,7 @@ from grader.model.verdict import FileCitation
 from grader.rubric.load import LoadedRubric, find_rubric_for_package, load_rubric, packages_of_labs
 from grader.rubric.model import Rubric
 from grader.rubric.scenario import Scenario, Start, Until
-from grader.wording import closest
+from grader.wording import closest, name_package
 
 ALIKE = 0.75
 """How alike a package's name and a lab's must be to suggest the lab."""
@@ -224,7 +224,7 @@ def _none(found: FoundPackages) -> UsageError:
         hint = f"give the lab with --rubric: {labs}; or --rubric FILE for a lab of your own"
     else:
         hint = (
-            f"{near} is for a package named {known[near]}: fix <name> in {MANIFEST}, "
+            f"{near} is for a package named {known[near]}: {name_package(known[near])}, "
             f"or add --rubric {near} --package NAME; all labs: {', '.join(known)}"
         )
     return UsageError(f"no lab is for the package {listing(names)}", hint=hint)

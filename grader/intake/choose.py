@@ -21,7 +21,7 @@ from grader.intake.loose_files import loose_files
 from grader.intake.names import LONGEST_PACKAGE_NAME, brief, encodable, is_archive_name, listing, printable
 from grader.intake.tree import Folder, is_file, is_there, read_file, walk
 from grader.model.package import BUILD_SPACES, CMAKE, MANIFEST, meant_manifest
-from grader.wording import is_one_edit
+from grader.wording import is_one_edit, name_package
 
 COPIES_LOOKED_AT, FOLDERS_OF_A_COPY = 50, 300
 USUAL_FOLDERS = frozenset({"src", "scripts", "nodes", "launch"})
@@ -315,11 +315,13 @@ def _rename(root: Path, packages: list[Candidate], wanted: WantedPackage, *, mod
             f"(<name> in its {MANIFEST}), or grade it with --package NAME."
         )
     manifest = MANIFEST if only.path == "." else f"{only.path}/{MANIFEST}"
-    return (
-        f"Rename to {wanted.name} (<name>{brief(name)}</name> in {brief(manifest)}, line {named[1]}; "
-        f'then in project(…) and each pkg="…"), '
-        f"or grade it with --package {shlex.quote(brief(name))}."
-    )
+    places = [
+        f"<name>{wanted.name}</name> in {brief(manifest)}, line {named[1]}, in place of {brief(name)}",
+        f"project({wanted.name}) in CMakeLists.txt",
+        f'pkg="{wanted.name}" in each <node>',
+    ]
+    right = name_package(wanted.name, places)
+    return f"{right[:1].upper()}{right[1:]}, or grade it with --package {shlex.quote(brief(name))}."
 
 
 TAKE_IN = "delete {0}/.git, `git rm --cached {0}`, `git add {0}`, commit and push"

@@ -98,7 +98,7 @@ def test_the_package_is_found(files, path, hints, tmp_path):
         (
             tree("a:other"),
             "packages here: other",
-            "Rename to lab1 (<name>other</name> in a/package.xml, line 3;",
+            "Write <name>lab1</name> in a/package.xml, line 3, in place of other, project(lab1) in CMakeLists.txt",
         ),
         (tree("a:other"), "packages here: other", "or grade it with --package other."),
         (tree("a:lab2"), "packages here: lab2", "--package lab2"),
@@ -121,9 +121,13 @@ def test_the_package_is_found(files, path, hints, tmp_path):
             "no package.xml",
             "In a/, manifest.xml is rosbuild's, which catkin does not read: write package.xml, and a CMakeLists.txt w",
         ),
-        ({**tree("b:other"), "b/package.xml.orig": ""}, "packages here: other", "Rename to lab1"),
+        (
+            {**tree("b:other"), "b/package.xml.orig": ""},
+            "packages here: other",
+            "Write <name>lab1</name> in ",
+        ),
         # A workspace that is called like the lab is not the lab's package.
-        (tree("lab1/src/other"), "packages here: other", "Rename to lab1"),
+        (tree("lab1/src/other"), "packages here: other", "Write <name>lab1</name> in "),
     ],
 )
 def test_what_is_there_instead_is_named(files, message, hint, tmp_path):

@@ -126,7 +126,9 @@ def test_a_near_miss_names_the_lab(name: str, tmp_path: Path) -> None:
     with pytest.raises(UsageError) as caught:
         choose_all(write_package(tmp_path / "work", name), None)
     assert caught.value.message == f"no lab is for the package {name}"
-    assert caught.value.hint.startswith("leeds-comp3631-lab1 is for a package named lab1: fix <name>")
+    assert caught.value.hint.startswith(
+        "leeds-comp3631-lab1 is for a package named lab1: write <name>lab1</name> in"
+    )
     assert "--rubric leeds-comp3631-lab1 --package NAME" in caught.value.hint
 
 

@@ -59,7 +59,7 @@ from grader.package.repairs.programs import (
     name_targets,
     spell_variables,
 )
-from grader.wording import join_words, numbers_text
+from grader.wording import join_words, name_package, numbers_text
 
 OF_WORKSPACE = "catkin_workspace"
 DEPENDS_MAX = 50
@@ -77,8 +77,7 @@ def rename_package(files: Files, package: PackageFacts, wanted: Wanted) -> None:
         return
     old, new = manifest.name, wanted.package
     message = f"line {manifest.name_line} of {MANIFEST}: the package is called {old}, not {new}"
-    fix = f'write {new} instead of {old} in {MANIFEST}, in project(…) and in every pkg="…"'
-    files.change("package-name", MANIFEST, rename_word(text, old, new), message, fix)
+    files.change("package-name", MANIFEST, rename_word(text, old, new), message, name_package(new))
     for file in naming_files(files.folder):
         other = files.text(file)
         if file != MANIFEST and other is not None:
