@@ -41,13 +41,23 @@ from grader.checks.support.launch_slips import (
     starts_built,
 )
 from grader.checks.support.scripts import CPP_SUFFIXES, RIGHT_SHEBANG, add_hint, find_script, programs
+from grader.checks.support.shell_scripts import find_obstacle, value_given
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.launch_file import LAUNCH_TAGS, LaunchFile, LaunchNode
 from grader.model.package import PackageFacts, SourceFile
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Status, Verdict, failed, failed_or_blocked, joined, passed
+from grader.model.verdict import (
+    Citations,
+    FileCitation,
+    Status,
+    Verdict,
+    failed,
+    failed_or_blocked,
+    joined,
+    passed,
+)
 from grader.wording import join_words, plural, there_is
 
 
@@ -435,7 +445,7 @@ def _page(
     mine = [p for p in pages if _is_program(p.program, params)]
     if _url(mine, params):
         return None
-    cited = tuple(cite(run, "/grader/actor", p.at_ns) for p in pages[:1])
+    cited: Citations = tuple(cite(run, "/grader/actor", p.at_ns) for p in pages[:1])
     hint = f"write {params.program} {params.urls[0]} in the script"
     if not mine and _url(pages, params):
         message = f"the page is opened in {join_words(p.program for p in pages)}, not in {params.program}"
@@ -448,16 +458,38 @@ def _page(
             hint = f"write {blank['name']}=… in {where}, without spaces around the `=`"
         elif slip := _misspelt_address(package, build, file, params):
             hint = f"{slip.file}: {slip.fix}"
-        elif slip := _unread_variable(package, build, file, params):
+        elif slip := _obstacle(package, build, file, params) or _unread_variable(
+            package, build, file, params
+        ):
+            cited = (slip.place, *cited)
             message, hint = f"{message}: {slip.why} ({slip.file}, line {slip.line})", slip.fix
         return failed(message, hint=hint, citations=cited)
     if slip := next(refusals(package, file), None):
         return slip.verdict(quoted(run))
     if absence := refusal(run, package):
         return absence.verdict(absence.why)
-    slip = _misspelt_program(package, file, run, params) or _unread_variable(package, build, file, params)
+    slip = _misspelt_program(package, file, run, params)
+    obstacle = None if slip else _obstacle(package, build, file, params)
+    slip = slip or obstacle or _unread_variable(package, build, file, params)
     hint = f"{slip.file}: {slip.fix}" if slip else hint
-    return failed(f"the script opens nothing in {params.program}{_words(package, file, run)}", hint=hint)
+    why = (
+        f": {obstacle.why} ({obstacle.file}, line {obstacle.line})"
+        if obstacle
+        else _words(package, file, run)
+    )
+    cited = (slip.place,) if slip else ()
+    return failed(f"the script opens nothing in {params.program}{why}", hint=hint, citations=cited)
+
+
+def _obstacle(package: PackageFacts, build: Run, file: LaunchFile, params: OpensParams) -> Slip | None:
+    """Return the line of a shell script that keeps it from opening the page."""
+    for node in _shells(package, file):
+        source = find_script(package, node.type or "")
+        lines = build.file_lines(source.path) if source is not None else ()
+        found = find_obstacle(lines, params.program, params.urls[0], given=bool(node.args))
+        if source is not None and found is not None:
+            return Slip(source.path, found.number, found.why, found.fix)
+    return None
 
 
 NOT_FOUND = re.compile(r"/(?P<file>[^/\s]+): line (?P<line>\d+): (?P<name>\S+): command not found")
@@ -513,24 +545,6 @@ def _misspelt_address(
 
 _NEAR_ADDRESS = 0.9
 _ASSIGNMENT = re.compile(r"\s*(?:export\s+)?([A-Za-z_]\w*)=[\"']?([^\"'\s]+)")
-
-
-def value_given(line: str, name: str) -> str:
-    """Return the line of a shell with `$NAME` in place of what is not quite that; "" where nothing is."""
-    # In this order: in single quotes, without the closing brace, without the `$`, and another name behind the `$`.
-    slips = (
-        rf"'\$\{{?{name}\}}?'",
-        rf"\$\{{{name}(?!\}})",
-        rf"(?<![\w$/{{-]){name}\b",
-        rf"\$\{{?(?!{name}\b)[A-Za-z_]\w*\}}?",
-    )
-    values = (f'"${name}"', f"${{{name}}}", f"${name}", f"${name}")
-    # In a replacement, a backslash would begin an escape.
-    changed = (
-        re.sub(slip, value.replace("\\", "\\\\"), line, count=1)
-        for slip, value in zip(slips, values, strict=True)
-    )
-    return next((one for one in changed if one != line), "")
 
 
 def _blanks(run: Run, pages: list[Page]) -> re.Match[str] | None:

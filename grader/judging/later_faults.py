@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 from grader.checks.support.console_output import probes_on
 from grader.checks.support.exit_causes import MAIN, syntax_hint
-from grader.checks.support.launch import NOT_STARTED, refusal, unset_arg_fixes
+from grader.checks.support.launch import NOT_STARTED, refusal
 from grader.checks.support.launch_connections import find_renaming
-from grader.checks.support.launch_slips import find_launch, later_fixes, refusals
+from grader.checks.support.launch_slips import find_launch, later_fixes, refusals, unset_arg_fixes
 from grader.checks.support.missing_names import name_slip
 from grader.checks.support.scripts import CPP_SUFFIXES, SYNTAX, cmake_calls, lines_making
 from grader.checks.support.text import (

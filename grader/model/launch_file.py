@@ -80,7 +80,11 @@ class LaunchNode(Placed, Record):
     """The `<remap>`s and `ns` in force, in the file's order."""
     by_args: tuple[LaunchLine, ...] = Field(default=(), exclude_if=lambda value: not value)
     """Where `pkg`, `type` or `name`, which is the `tag`, is only a `$(arg …)`: the `<arg>` that gives it, by its
-    `default` or `value`, which is the `value`."""
+    `default` or `value`, which is the `value`. Of a `<remap>` in the node, the tag is `to`."""
+    condition: LaunchLine | None = Field(default=None, exclude_if=lambda value: value is None)
+    """Why it is `uncertain`: the tag's line, with its `if` or `unless` as `value`."""
+    left_out: tuple[LaunchLine, ...] = Field(default=(), exclude_if=lambda value: not value)
+    """Each `<param>` and `<remap>` in it that its `if` or `unless`, the `value`, leaves out; the `tag` is its name."""
 
     @property
     def full_name(self) -> str:
@@ -98,6 +102,8 @@ class LaunchParam(Placed, Record):
     file: str
     line: int
     attribute: str = "name"
+    by_arg: LaunchLine | None = Field(default=None, exclude_if=lambda value: value is None)
+    """Where its value is only a `$(arg …)`: the `<arg>` that gives it, by its `default` or `value`."""
 
 
 class LaunchLoad(Placed, Record):

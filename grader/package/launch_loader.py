@@ -45,6 +45,7 @@ _SUBSTITUTION = re.compile(r"\$\(([^()]*)\)")
 _ARGUMENT = re.compile(r"\$\(arg\s+([^()\s]+)\s*\)")
 _WORDS = re.compile(r"\$\((\w+)\s*([\w-]*)[^()]*\)")
 SUBSTITUTIONS = ("find", "arg", "env", "optenv", "anon", "eval", "dirname")
+_NESTED = re.compile(r"\$\((?!eval\b)[^()$]*\$\(\w+ [^()]*\)")
 _UNSET_MAX = 20
 _OFF_MAX = 20
 _SLASHES = re.compile(r"//+")
@@ -91,8 +92,11 @@ def load(root: etree._Element, scope: Scope, find: Find, others: frozenset[str] 
     return loader.loaded
 
 
-def node_of(element: etree._Element, scope: Scope, remapping: Sequence[etree._Element] = ()) -> LaunchNode:
+def node_of(element: etree._Element, scope: Scope) -> LaunchNode:
     """Return one `<node>` as it stands in this scope, with its own `<remap>`s."""
+    inside = [one for one in element if isinstance(one.tag, str)]
+    remapping = [one for one in inside if one.tag == "remap" and wanted(one, scope)]
+    off = [one for one in inside if one.tag in {"param", "remap"} and not wanted(one, scope)]
     below = scope.below(scope.get(element, "ns"), element)
     words = (word.partition(":=") for word in (scope.get(element, "args") or "").split())
     # `_name:=value` sets a parameter of the node's own, and renames nothing.
@@ -110,17 +114,33 @@ def node_of(element: etree._Element, scope: Scope, remapping: Sequence[etree._El
         file=scope.file,
         namespace=below.namespace,
         renaming=renaming,
-        by_args=tuple(_by_args(element, scope)),
+        by_args=tuple(_by_args(element, scope, remapping)),
         uncertain=scope.uncertain,
+        condition=scope.condition,
+        left_out=tuple(
+            _line(one, scope, _condition(one)).model_copy(
+                update={"tag": one.get("name") or one.get("from") or ""}
+            )
+            for one in off
+        ),
         unknown=(*unknown_attributes(element), *scope.unknown),
     )
 
 
-def _by_args(element: etree._Element, scope: Scope) -> Iterator[LaunchLine]:
-    """Yield the `<arg>`s that give the node's names, where they are nothing else."""
-    for name in ("pkg", "type", "name"):
-        if place := scope.place_of(element.get(name)):
+def _by_args(
+    element: etree._Element, scope: Scope, remapping: Sequence[etree._Element]
+) -> Iterator[LaunchLine]:
+    """Yield the `<arg>`s that give the node's names, and the new ones of its topics, where they are nothing else."""
+    written = [(name, element.get(name)) for name in ("pkg", "type", "name")]
+    written += [("to", one.get("to")) for one in remapping]
+    for name, text in written:
+        if place := scope.place_of(text):
             yield place.model_copy(update={"tag": name})
+
+
+def _condition(element: etree._Element) -> str:
+    """Return the `if` or `unless` of a tag as it is written."""
+    return " ".join(f'{key}="{element.get(key)}"' for key in ("if", "unless") if element.get(key))
 
 
 class _Loader:
@@ -164,7 +184,7 @@ class _Loader:
 
     def _note_off(self, element: etree._Element) -> None:
         """Note the nodes that are left out, by the `if` or `unless` of the tag that leaves them out."""
-        said = " ".join(f'{key}="{element.get(key)}"' for key in ("if", "unless") if element.get(key))
+        said = _condition(element)
         off = ((node.get("type") or "", line_of(element) or 0, said) for node in element.iter("node"))
         self.loaded.switched_off += islice(off, max(0, _OFF_MAX - len(self.loaded.switched_off)))
 
@@ -191,7 +211,7 @@ class _Loader:
 
     def _node(self, element: etree._Element, scope: Scope) -> None:
         own = [c for c in element if isinstance(c.tag, str) and wanted(c, scope)]
-        node = node_of(element, scope, [c for c in own if c.tag == "remap"])
+        node = node_of(element, scope)
         self.loaded.nodes.append(node)
         # A `<param>` or `<rosparam>` in a `<node>` is private: it goes below the node's name.
         inside = scope.model_copy(update={"namespace": f"{node.full_name}/"})
@@ -220,6 +240,11 @@ class _Loader:
         """Note a `$(…)` that is none of roslaunch's, or that finds a package of nearly this one's name."""
         own, fault = next(iter(scope.own), ""), ("", "")
         for value in () if scope.of(element).uncertain else element.attrib.values():
+            if nested := _NESTED.search(str(value)):
+                fault = (
+                    f"{nested[0]}…) has a $(…) in another one",
+                    "write the name itself in place of the inner $(…)",
+                )
             for word, name in _WORDS.findall(str(value)):
                 if word not in SUBSTITUTIONS:
                     near = (one for one in SUBSTITUTIONS if is_one_edit(word.lower(), one))
@@ -374,6 +399,7 @@ def _param(element: etree._Element, scope: Scope) -> LaunchParam:
         type=scope.get(element, "type"),
         file=scope.file,
         line=line_of(element) or 0,
+        by_arg=scope.place_of(element.get("value")),
     )
 
 
@@ -402,6 +428,7 @@ class Scope(Record):
     renaming: tuple[LaunchLine, ...] = ()
     private: tuple[LaunchParam, ...] = ()
     uncertain: bool = False
+    condition: LaunchLine | None = None
     unknown: tuple[str, ...] = ()
 
     def text(self, written: str) -> str:
@@ -424,7 +451,8 @@ class Scope(Record):
     def of(self, element: etree._Element) -> Scope:
         """Return the scope in the element, as far as its own conditions go."""
         conditions = f"{self.get(element, 'if') or ''}{self.get(element, 'unless') or ''}"
-        return self.model_copy(update={"uncertain": True}) if "$(" in conditions else self
+        found = {"uncertain": True, "condition": _line(element, self, _condition(element))}
+        return self.model_copy(update=found) if "$(" in conditions else self
 
     def below(self, namespace: str | None, element: etree._Element | None = None) -> Scope:
         """Return the scope in a group, node or include with this `ns`, which is noted where the element is given."""

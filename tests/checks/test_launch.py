@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from grader.checks.launch_files import value_given
 from grader.checks.support.launch import died, finished, is_exact, name_pattern, refusal, why_died
 from grader.checks.support.launch_slips import right_remap
 from grader.checks.support.parameters import explain_yaml, explain_yaml_line
+from grader.checks.support.shell_scripts import find_obstacle, value_given
 from grader.evidence.run import Run
 from grader.judging.facts import NO_PACKAGE
 from grader.model.file_fault import Fault
@@ -289,6 +289,7 @@ def test_a_recorder_without_a_topic(tmp_path: Path, args: str, *, told: bool) ->
         (("/state", "light"), "/left/state", '<remap from="state" to="light"/>'),
         (("light", "state"), "/left/state", '<remap from="state" to="light"/>'),
         (("state", "/light"), "/light", '<remap from="state" to="light"/>'),
+        (("state", "ligth"), "/left/ligth", 'on line 4 of a.launch, write to="light"'),
         (("state", "light"), "/left/lamp/state", "look at its <remap>"),
     ],
 )
@@ -298,3 +299,35 @@ def test_a_remap_that_does_not_make_the_topic(remap: tuple[str, str], published:
     place, told = right_remap(lamp, "/left/light", [published])
     assert hint in told
     assert place.line == (1 if "look" in hint else 4)
+
+
+PAGE = "https://www.e-yantra.org/"
+
+
+@pytest.mark.parametrize(
+    ("script", "given", "told"),
+    [
+        ("#!/bin/bash\nfirefox $1\n", False, (2, f"on line 2, write {PAGE} in place of $1")),
+        ("#!/bin/bash\nfirefox $1\n", True, None),
+        ('URL=${1}\nfirefox -new-tab "$URL"\n', False, (1, f"on line 1, write URL={PAGE}")),
+        ("echo hi\nexit 0\nfirefox page\n", True, (2, "delete line 2")),
+        ("if [ -z $DISPLAY ]; then\n  exit 1\nfi\nfirefox page\n", True, None),
+        ("for i in 1 2; do\n  break\n  firefox page\ndone\n", True, (2, "delete line 2")),
+        ("for i in 1 2; do\n  break\ndone\nfirefox page\n", True, None),
+        ("if true; then exit; fi\nfirefox page\n", True, None),
+        ("[ -f x ] && exit\nfirefox page\n", True, None),
+        (
+            'if [ "$1" = go ]\nthen\n  firefox page\nfi\n',
+            False,
+            (1, "take line 3 out of the block that begins on line 1"),
+        ),
+        ("if true\nthen\n  exit\nelse\n  firefox page\nfi\n", True, None),
+        ("page() {\n  return\n}\nfirefox page\n", True, None),
+        ("firefox page\nexit 0\n", False, None),
+    ],
+)
+def test_what_keeps_a_shell_script_from_its_page(
+    script: str, given: bool, told: tuple[int, str] | None
+) -> None:
+    found = find_obstacle(script.splitlines(), "firefox", PAGE, given=given)
+    assert (found and (found.number, found.fix)) == told

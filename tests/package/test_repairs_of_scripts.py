@@ -353,6 +353,10 @@ CASES = {
         swapped(TALKER, ("    rate = ", "    rospy.get_param('colour', 'red')\n    rate = ")), ["parameter-name"],
         "the parameter colour should be ~colour", asking(private=("colour",)),
     ),
+    "private-parameter-behind-the-nodes-name": Case(
+        swapped(TALKER, ("    rate = ", "    rospy.get_param('/talker/colour', 'red')\n    rate = ")),
+        ["parameter-name"], "the parameter /talker/colour should be ~colour", asking(private=("colour",)),
+    ),
     "private-service": Case(
         swapped(TALKER, ("    rate = ", "    rospy.Service('~estimate', Trigger, answer)\n    rate = ")),
         ["service-name"], "the service ~estimate should be /estimate", asking(servers=("/estimate",)),

@@ -83,6 +83,8 @@ _REFUSALS = (
      "$(find …) and pkg need a package's exact name, and a package of your own is handed in too"),
     (_UNSET.pattern, 'its <arg name="{0}"> has no default',
      'write <arg name="{0}" default="…"/>'),
+    (r"Dollar signs '\$' cannot be inside of substitution args", "a $(…) stands in another one",
+     "write the name itself in place of the inner $(…)"),
     (r"unknown machine \[([^\[\]\n]+)\]", "there is no <machine> of the name {0}",
      'remove machine="{0}" from the <node>: it runs on this computer then'),
     (r"output must be one of", 'output is "screen" or "log", in lower case', 'write output="screen"'),
@@ -358,21 +360,6 @@ def _unset_args(text: str, package: PackageFacts) -> Absence | None:
     return Absence(why, hint, citations=tuple(dict.fromkeys(tuple(arg.place for arg in args))))
 
 
-def unset_arg_fixes(file: LaunchFile, told: str, given: Iterable[str] = ()) -> Iterator[str]:
-    """Yield what to write for each argument of the file that has no value, that is not `given` on the command line
-    (`a:=5`), and that is not told yet."""
-    names = {word.partition(":=")[0] for word in given}
-    for arg in file.unset_args:
-        written = f'<arg name="{arg.name}" default="…"/>'
-        # a name that is nearly that of an argument is told as that: `$(arg right), not $(arg slip)`
-        if written not in told and f"not $(arg {arg.name})" not in told and arg.name not in names:
-            yield (
-                f"on line {arg.line} of {arg.file} write {written}"
-                if arg.declared
-                else f"below <launch> in {arg.file} add {written}"
-            )
-
-
 def died(run: Run, node: LaunchNode) -> int | None:
     """Return the exit code with which roslaunch saw it die before Ctrl-C; None where it did not."""
     # After Ctrl-C, all nodes end.
@@ -397,6 +384,7 @@ def why_not_up(package: PackageFacts, run: Run, node: LaunchNode) -> Absence:
         or why_died(package, run, node)
         or refusal(run, package)
         or _silent(run, node)
+        or _left_out(run, node)
         or Absence(f"roslaunch did not start it{quoted(run)}", "run roslaunch by hand and read its output")
     )
 
@@ -570,6 +558,16 @@ def _silent(run: Run, node: LaunchNode) -> Absence | None:
         why = f"{join_words(others)} came up instead: the script takes another name than roslaunch gives it"
         return Absence(why, "start the script itself, and leave sys.argv alone", of_script=True)
     return Absence("its script runs, but never registers as a node", hint, of_script=True)
+
+
+def _left_out(run: Run, node: LaunchNode) -> Absence | None:
+    """Left out by a condition that only roslaunch works out."""
+    at = node.condition
+    if at is None or quoted(run):
+        return None
+    where = f"line {at.line}{f' of {at.file}' * (at.file != node.file)}"
+    fix = f"remove {at.value} from {where}, or give its <arg> another default"
+    return Absence(f"{at.value} on {where} leaves it out", fix, citations=(at.place,))
 
 
 def _is(node: LaunchNode, process: str) -> bool:

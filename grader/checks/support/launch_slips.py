@@ -328,6 +328,21 @@ def later_fixes(file: LaunchFile, script: str) -> Iterator[str]:
     yield from (f'write type="{name}" {place}, not type="{kind}"' for kind, place in named if kind != name)
 
 
+def unset_arg_fixes(file: LaunchFile, told: str, given: Iterable[str] = ()) -> Iterator[str]:
+    """Yield what to write for each argument of the file that has no value, that is not `given` on the command line
+    (`a:=5`), and that is not told yet."""
+    names = {word.partition(":=")[0] for word in given}
+    for arg in file.unset_args:
+        written = f'<arg name="{arg.name}" default="…"/>'
+        # a name that is nearly that of an argument is told as that: `$(arg right), not $(arg slip)`
+        if written not in told and f"not $(arg {arg.name})" not in told and arg.name not in names:
+            yield (
+                f"on line {arg.line} of {arg.file} write {written}"
+                if arg.declared
+                else f"below <launch> in {arg.file} add {written}"
+            )
+
+
 def out_of_comment(line: int) -> str:
     return f"take the <node> on line {line} out of the comment: remove `<!--` before it and `-->` after it"
 
@@ -556,6 +571,9 @@ def right_remap(
     """Return the line of a node's only `<remap>`, with what to write there; else the node's, with where to look."""
     lines = [one for one in node.renaming if one.tag == "remap"]
     names = [name for name in published if name.rpartition("/")[0] in {node.namespace.rstrip("/"), ""}]
+    off = next((one for one in node.left_out if f"{node.namespace}{one.tag.lstrip('/')}" in published), None)
+    if off is not None:
+        return off, f"remove {off.value} from line {off.line}, or give its <arg> the other default"
     if not node.remaps:
         name = published[0].removeprefix(node.namespace) if len(published) == 1 else "…"
         tag = f'<remap from="{name}" to="{topic.removeprefix(node.namespace)}"/>'
@@ -563,6 +581,11 @@ def right_remap(
     if len(lines) != 1 or len(names) != 1:
         return node, "look at its <remap>: `from` is the name in the script, `to` the new one"
     name, to = names[0].rpartition("/")[2], topic.removeprefix(node.namespace)
+    old, new = (text.lstrip("/") for text in node.remaps[-1])
+    if name == new and old != to and names[0].startswith(node.namespace):
+        given = [one for one in node.by_args if one.tag == "to"]
+        at = given[0] if given else lines[0]
+        return at, f'on line {at.line} of {at.file}, write {at.value if given else "to"}="{to}"'
     if not names[0].startswith(node.namespace):  # its `to` begins with a slash: `from` is right
         name = next((first for first, second in node.remaps if second == names[0]), name)
     return lines[0], (

@@ -346,6 +346,10 @@ def _without_colon(package: PackageFacts, run: Run, verdict: Verdict) -> Verdict
                     node.place,
                 )
                 return verdict.explained(why, f"write {own} in place of {other}{where}", places, cause=why)
+            if off := next((one for one in node.left_out if one.tag == own), None):
+                why = f"{off.value} on line {off.line} of {off.file} leaves the <param> of {own} out"
+                fix = f"remove {off.value} from that line, or give its <arg> the other default"
+                return verdict.explained(why, fix, (off.place,), cause=why)
             hint = f'add <param name="{own}" value="…"/> to the <node> on line {node.line} of {node.file}'
             return verdict.explained(why, f"{hint}: {verdict.hint}", (node.place,), cause=why)
     return verdict
@@ -409,12 +413,15 @@ def explain_by_given_value(check: Check, package: PackageFacts, run: Run, verdic
         value, param = there[name], where_given(package, name)
         if param is None or value in ("", 0, 1) or value_text(value) != verdict.measured:
             continue
+        by_arg = param.by_arg or param
         place = f"line {param.line} of {param.file}"
-        hint = f"change the value on {place}: {verdict.hint}"
+        hint = f"change the value on line {by_arg.line} of {by_arg.file}: {verdict.hint}"
         if param.attribute == "name" and (inner := _QUOTED.fullmatch(param.value or "")):
             hint = f'on {place}, write value="{shown(inner[2])}": the quotes within are part of the text'
         why = f"{place} sets {name} to {value_text(value)}"
-        return verdict.explained(why, hint, (param.place,), cause=f"{param.file}:{param.line}")
+        if param.by_arg is not None:
+            why += f", which line {by_arg.line} of {by_arg.file} gives"
+        return verdict.explained(why, hint, (by_arg.place,), cause=f"{by_arg.file}:{by_arg.line}")
     return verdict
 
 

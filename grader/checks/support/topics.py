@@ -38,7 +38,7 @@ from grader.checks.support.text import (
 )
 from grader.evidence.events import MISFIT, UNHEARD, UNSENDABLE
 from grader.evidence.run import Channel, Run
-from grader.model.launch_file import LaunchNode
+from grader.model.launch_file import LaunchLine, LaunchNode
 from grader.model.message_definitions import fields_to_read
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
@@ -183,7 +183,10 @@ def _judge_misnamed(
         if node.remaps or (own and not near_names(topic, own)):
             message = f"{what}; the node publishes on {join_words(own or near or published)}"
             line, hint = right_remap(node, topic, own or [*published])
-            return of_node(message, measured=measured, hint=hint).about(citations=(line.place,))
+            verdict = of_node(message, measured=measured, hint=hint).about(citations=(line.place,))
+            # one <arg> may rename the topics of several nodes
+            by_arg = isinstance(line, LaunchLine) and line.tag == "to"
+            return verdict.based_on(cause=hint, charged_once=True) if by_arg else verdict
         near = near_names(topic, own) or near
     if not near:
         return None
