@@ -240,14 +240,12 @@ def _no_node(package: PackageFacts, file: LaunchFile, pkg: str, name: str) -> Ve
 
 
 def _add_node(package: PackageFacts, file: LaunchFile, pkg: str, name: str) -> str:
-    """Return where to add a node: below its neighbour of the same package where that is in a group, or has a namespace
-    or a remap of its own, which the new one then needs too."""
+    """Return where to add a node: below its neighbour of the same package where that is in a group, or has a remap of
+    its own, which the new one then needs too."""
     moved = [node for node in file.brings if node.pkg == pkg and node.renaming]
     beside, tag = (moved[-1] if moved else None), _node_tag(file, pkg, name)
     if beside is None or len({node.namespace for node in moved}) > 1:
         return f"below <launch>, add {tag}"
-    own = [line for line in beside.renaming if line.tag == "node"]
-    tag = tag.replace("/>", "".join(f' ns="{line.value}"' for line in own) + "/>")
     script = find_script(package, name)
     asked = {s.message for s in package.slips if script is not None and s.file == script.path}
     behind = [one for one in beside.renaming if one.tag == "remap" and one.line >= beside.line]
@@ -256,7 +254,8 @@ def _add_node(package: PackageFacts, file: LaunchFile, pkg: str, name: str) -> s
         for old, new in beside.remaps[len(beside.remaps) - len(behind) :]
         if old in asked and new.startswith("/")
     )
-    tag = f"{tag.removesuffix('/>')}>{remaps}</node>" if remaps else tag
+    spaces = "".join(f' ns="{line.value}"' for line in beside.renaming if line.tag == "node")
+    tag = f"{tag.removesuffix('/>')}{spaces}>{remaps}</node>" if remaps else tag
     where = f"line {beside.line}{f' of {beside.file}' * (beside.file != file.path)}"
     of_group = ", inside of its <group>" * any(line.tag == "group" for line in beside.renaming)
     return f"right below the <node> on {where}{of_group}, add {tag}"

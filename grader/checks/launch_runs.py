@@ -153,7 +153,7 @@ def _why_unconnected(
         return failed(message, hint="give the talker and the listener a <node> each")
     other = over_another_topic(run, params.topic, quoted(run))
     blamed = (
-        blame_renaming(package, run, file.brings, params.topic, other)
+        blame_renaming(package, run, file, file.brings, topic=params.topic, verdict=other)
         or blame_same_script(package, run, file.brings, params.topic, other)
         or blame_place(package, file, file.brings, params.topic, other)
     )
@@ -370,7 +370,7 @@ def _find_unnamed(
     missing = joined([lost for one in params.scripts if (lost := missing_node(package, file, one))])
     if missing is not None:
         there = [node for script in params.scripts for node in nodes_of_script(package, file, script)]
-        renaming = find_renaming(package, there, params.topic) if params.topic else None
+        renaming = find_renaming(package, there, params.topic, main=file.path) if params.topic else None
         hint = f"{missing.hint}; then in {file.path} {renaming.fix}" if renaming else missing.hint
         missing = missing.model_copy(update={"hint": hint})
         return missing.based_on(unjudged=missing.basis.unjudged or not found)
@@ -584,7 +584,7 @@ def _not_connected(
         return ended_by_itself(package, run, file, ended)
     other, nodes = over_another_topic(run, topic), [w.node for w in wanted]
     of_launch_file = blame_renaming(
-        package, run, nodes if len(nodes) > 1 else file.brings, topic, other
+        package, run, file, nodes if len(nodes) > 1 else file.brings, topic=topic, verdict=other
     ) or blame_place(package, file, nodes, topic, other)
     other = of_launch_file or other.based_on(unjudged=True)
     return other.based_on(unjudged=other.basis.unjudged and all(w.own for w in wanted))

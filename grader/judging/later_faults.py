@@ -582,17 +582,17 @@ def _later_in_file(criterion: Criterion, package: PackageFacts) -> Iterator[str]
 def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) -> Iterator[str]:
     """Yield what a launch file would be lost by next: what roslaunch said of it, and namespaces of the lab's nodes."""
     wanted, run = criterion.parameters, facts.runs.get(criterion.scenario or "")
-    file = find_launch(package, str(wanted.get("launch", "")))
+    file, topic = find_launch(package, str(wanted.get("launch", ""))), str(wanted.get("topic") or "")
     names = {PurePosixPath(script).name for script in texts_in(wanted.get("scripts"))}
     if file is None or file.fault is not None:
         return
     refused = refusal(run, package) if isinstance(run, Run) else None
-    if refused is not None and refused.refused != NOT_STARTED and not any(refusals(package, file)):
+    if refused and refused.refused != NOT_STARTED and not any(refusals(package, file)):
         yield f"{refused.hint}: {refused.why}"
     given = [word for start in facts.rubric.starts_of(criterion) for word in start.args]
     yield from unset_arg_fixes(file, refused.hint if refused else "", given)
     nodes = [one for one in file.brings if {one.type, f"{one.type}.py"} & names]
-    if (topic := wanted.get("topic")) and (renaming := find_renaming(package, nodes, str(topic))):
+    if topic and (renaming := find_renaming(package, nodes, topic, main=file.path)):
         yield f"in {file.path} {renaming.fix}"
 
 

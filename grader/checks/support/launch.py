@@ -83,6 +83,8 @@ _REFUSALS = (
      "$(find …) and pkg need a package's exact name, and a package of your own is handed in too"),
     (_UNSET.pattern, 'its <arg name="{0}"> has no default',
      'write <arg name="{0}" default="…"/>'),
+    (r"'ns' attribute must be set in order to use 'clear_params'", "clear_params needs an ns beside it",
+     "remove clear_params from the tag"),
     (r"Dollar signs '\$' cannot be inside of substitution args", "a $(…) stands in another one",
      "write the name itself in place of the inner $(…)"),
     (r"unknown machine \[([^\[\]\n]+)\]", "there is no <machine> of the name {0}",

@@ -83,16 +83,16 @@ class _Use(NamedTuple):
 
 
 def find_renaming(
-    package: PackageFacts, nodes: Sequence[LaunchNode], topic: str, run: Run | None = None
+    package: PackageFacts, nodes: Sequence[LaunchNode], topic: str, run: Run | None = None, *, main: str = ""
 ) -> Renaming | None:
     """Return what in the launch file gives the topic another name in these nodes. None unless it has the right one in
     all of them once that is put right, and the nodes have names of their own still. `run` shows which topics the
-    nodes had."""
+    nodes had; lines of other files than `main` are told with these."""
     uses = [use for node in nodes if (use := _use_of(package, node, topic, run))]
-    return _renaming_of(uses, topic)
+    return _renaming_of(uses, topic, main)
 
 
-def _renaming_of(uses: Sequence[_Use], topic: str) -> Renaming | None:
+def _renaming_of(uses: Sequence[_Use], topic: str, main: str) -> Renaming | None:
     wrong = [use for use in uses if use.topic() != topic]
     if not wrong:
         return None
@@ -104,7 +104,7 @@ def _renaming_of(uses: Sequence[_Use], topic: str) -> Renaming | None:
             if dropped is not spaces or not _is_right(uses, gone, topic):
                 gone |= {line for use in some for _, line in use.remaps(gone)}
             if gone and _is_right(uses, gone, topic):
-                return _described(uses, topic, gone)
+                return _described(uses, topic, gone, main)
     return _moved(uses, wrong, topic)
 
 
@@ -162,7 +162,7 @@ def _topics(run: Run, node: LaunchNode) -> set[str]:
     return {topic for topics in ends for topic, there in topics.items() if names & set(there)}
 
 
-def _described(uses: Sequence[_Use], topic: str, gone: Collection[LaunchLine | None]) -> Renaming:
+def _described(uses: Sequence[_Use], topic: str, gone: Collection[LaunchLine | None], main: str) -> Renaming:
     """Return what the lines that are to be `gone` make of the topic, and how to remove them."""
     why, fixes, lines = list[str](), list[str](), list[LaunchLine]()
     found = [line for use in uses for line in use.node.renaming if line in gone and line.tag not in RENAMES]
@@ -172,7 +172,7 @@ def _described(uses: Sequence[_Use], topic: str, gone: Collection[LaunchLine | N
         spaces = dict.fromkeys(node.namespace.strip("/") for node in moved if node.namespace != "/")
         why.append(f"puts its nodes in the namespace{'s' * (len(spaces) > 1)} {join_words(spaces)}")
         given = [f'ns="{value}"' for value in dict.fromkeys(line.value for line in found)]
-        fixes.append(f"{join_words(given)}{_in_lines(found)}")
+        fixes.append(f"{join_words(given)}{_in_lines(found, main)}")
         lines += found
     if remaps:
         names = join_words(dict.fromkeys(name for name, _, _ in remaps))
@@ -180,9 +180,9 @@ def _described(uses: Sequence[_Use], topic: str, gone: Collection[LaunchLine | N
         known = [line for _, _, line in remaps if line is not None]
         if known and all(line.tag == "args" for line in known):
             words = join_words(dict.fromkeys(f"{name}:={new}" for name, new, _ in remaps))
-            fixes.append(f"{words} from the args{_in_lines(known)}")
+            fixes.append(f"{words} from the args{_in_lines(known, main)}")
         else:
-            fixes.append(f"the <remap>{'s' * (len(set(known)) != 1)} of {names}{_in_lines(known)}")
+            fixes.append(f"the <remap>{'s' * (len(set(known)) != 1)} of {names}{_in_lines(known, main)}")
         lines += known
     places = sorted({(one.file, one.line) for one in (lines or moved)})
     cited = tuple(FileCitation(file=file, line=line) for file, line in places)
@@ -191,9 +191,11 @@ def _described(uses: Sequence[_Use], topic: str, gone: Collection[LaunchLine | N
     return Renaming(" and ".join(why), f"remove {' and '.join(fixes)}: {then}", cited[:8])
 
 
-def _in_lines(found: Sequence[LaunchLine]) -> str:
-    numbers = sorted({line.line for line in found})
-    return f" on {on_lines(numbers)}" if numbers else ""
+def _in_lines(found: Sequence[LaunchLine], main: str) -> str:
+    """Return the lines, with their file where it is another one than the launch file itself."""
+    numbers, files = sorted({line.line for line in found}), sorted({line.file for line in found})
+    of_file = f" of {join_words(files)}" if main and files != [main] else ""
+    return f" on {on_lines(numbers)}{of_file}" if numbers else ""
 
 
 def wrong_name(node: LaunchNode, name: str) -> Slip:
@@ -289,10 +291,16 @@ def over_another_topic(run: Run, topic: str, said: str = "") -> Verdict:
 
 
 def blame_renaming(
-    package: PackageFacts, run: Run, nodes: Sequence[LaunchNode], topic: str, verdict: Verdict
+    package: PackageFacts,
+    run: Run,
+    file: LaunchFile,
+    nodes: Sequence[LaunchNode],
+    *,
+    topic: str,
+    verdict: Verdict,
 ) -> Verdict | None:
     """Return the verdict with the lines of the launch file that give the topic another name; None where none do."""
-    renaming = find_renaming(package, nodes, topic, run) or _idle_remaps(run, nodes, topic)
+    renaming = find_renaming(package, nodes, topic, run, main=file.path) or _idle_remaps(run, nodes, topic)
     if renaming is None:
         return None
     message = f"{verdict.message}: the launch file {renaming.why}"
@@ -425,7 +433,7 @@ def _blame_scripts(
     for changed in (others, wrong) if len(uses) > 1 else ():
         right = [_Use(use.node, name) if use in changed else use for use in uses]
         named = [_named_in(package, use.node) for use in changed]
-        renaming = _renaming_of(right, topic)
+        renaming = _renaming_of(right, topic, file.path)
         if all(len(found) == 1 for found in named) and (renaming or _is_right(right, (), topic)):
             break
     else:
