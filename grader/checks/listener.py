@@ -427,7 +427,9 @@ def _by_number(
         return failed(message, hint=CALLBACK_HINT).about(said="".join(after[:1]))
     if len(missing) == len(probes) - 1 and missing[0] is not probes[0]:
         waits = python_or_cpp("wait_for_message(…)", "waitForMessage(…)")
-        hint = f"subscribe with a callback and {SPIN}; {waits} waits for one message only"
+        hint = (
+            f"print each message in a callback, and end with {SPIN}; {waits} would wait for one message only"
+        )
         return failed("only the first message is printed", hint=hint)
     value = missing[0].value
     first = significant(value) if isinstance(value, int) else repr(value)

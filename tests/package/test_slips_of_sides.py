@@ -37,6 +37,25 @@ def test_ranges_that_are_named_after_the_other_side(line: str, tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
+    ("left", "right", "fix"),
+    [
+        ("[:45]", "[:-45]", "on line 4, write `msg.ranges[-45:]` in place of `msg.ranges[:-45]`"),
+        ("[45:]", "[-45:]", "on line 3, write `msg.ranges[:45]` in place of `msg.ranges[45:]`"),
+        ("[:45]", "[-45:]", ""),
+        ("[:90]", "[90:]", ""),
+        ("[:-10]", "[n:]", ""),
+    ],
+)
+def test_ranges_of_one_side_that_have_those_of_the_other(
+    left: str, right: str, fix: str, tmp_path: Path
+) -> None:
+    text = f"from sensor_msgs.msg import LaserScan\ndef f(msg):\n    left = min(msg.ranges{left})\n"
+    (tmp_path / "a.py").write_text(f"{text}    right = min(msg.ranges{right})\n")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if "nearly all" in s.message]
+    assert [s.fix for s in slips] == ([fix] if fix else [])
+
+
+@pytest.mark.parametrize(
     ("line", "fix"),
     [
         ("SECTOR = int(math.radians(45))", "on line 1, write `SECTOR = 45`"),

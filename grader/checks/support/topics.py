@@ -255,7 +255,8 @@ def _judge_advertised(
     message = f"{what}, although it is advertised"
     if end := explain_error(package, run):
         return end.verdict(of_node, f"{message}: an error comes first: {end.cause}", measured="no message")
-    if slip := why_unreached(package, run) or run_slip(package, run, "queue-size", "rate-as-time"):
+    others = run_slip(package, run, "queue-size", "rate-as-time") or _not_yet(package, run)
+    if slip := why_unreached(package, run) or others:
         verdict = of_node(f"{message}: {slip.message}", measured="no message", hint=reach_hint(slip))
         return verdict.about(citations=(slip.place,))
     if deaf := unheard(run, package):
@@ -456,6 +457,17 @@ def explain_by_unheard_topic(check: Check, package: PackageFacts, run: Run, verd
 def why_unreached(package: PackageFacts, run: Run) -> PythonSlip | None:
     """Return why a script that runs does not come to its `publish(…)`, or to what it offers."""
     return run_slip(package, run, "never-reached", "never-called", "spin-in-loop", "stuck")
+
+
+def _not_yet(package: PackageFacts, run: Run) -> PythonSlip | None:
+    """Return the only line of the scripts that waits, where it lets more time pass than the run had."""
+    waits = run_slips(package, run, "rate-number")
+    pause_s = 1 / float(waits[0].message) if len(waits) == 1 else 0.0
+    if pause_s * 1e9 <= run.end_ns - run.start_ns:
+        return None
+    why = f"line {waits[0].line} of {waits[0].file} lets {pause_s:g} s pass before anything comes"
+    fix = f"let less time pass on line {waits[0].line} of {waits[0].file}"
+    return waits[0].model_copy(update={"message": why, "fix": fix})
 
 
 def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | None:

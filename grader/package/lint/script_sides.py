@@ -7,6 +7,7 @@ Nothing is executed. Python 3.8, standard library only.
 import ast
 import re
 
+from script_counters import signed
 from script_scans import index_in, is_ranges
 from script_tree import all_of, called_name, calls_in, dotted, slip, text_of
 
@@ -55,6 +56,40 @@ def named_sides(tree):
                 "on line %d, write `%s` in place of `%s`" % (line, right, text),
                 "side",
             )
+
+
+def overlapping_sides(tree):
+    """`right = min(ranges[:-45])` beside `left = min(ranges[:45])`: nearly all ranges, those to the left too."""
+    found = {}
+    for node in all_of(tree, ast.Assign):
+        reads = [
+            n for n in ast.walk(node.value) if isinstance(n, ast.Subscript) and isinstance(n.slice, ast.Slice)
+        ]
+        word = side_in(dotted(node.targets[0]))
+        if (
+            word
+            and len(reads) == 1
+            and is_ranges(reads[0].value)
+            and not ACTS.search(dotted(node.targets[0]))
+        ):
+            found[word] = (node, dotted(reads[0].value), *(signed(one) for one in ends_of(reads[0].slice)))
+    if len(found) < 2 or found["left"][1] != found["right"][1]:
+        return
+    for word, other in (("left", "right"), ("right", "left")):
+        (node, name, first, last), (_, _, begin, end) = found[word], found[other]
+        if not first and not begin and last is not None and last < 0 < (end or 0):
+            read, right = "[:%d]" % last, "[%d:]" % last
+        elif last is None and end is None and (begin or 0) < 0 < (first or 0):
+            read, right = "[%d:]" % first, "[:%d]" % first
+        else:
+            continue
+        message = "`%s%s` has nearly all ranges, those to the %s too" % (name, read, other)
+        fix = "on line %d, write `%s%s` in place of `%s%s`" % (node.lineno, name, right, name, read)
+        yield slip(node.lineno, "wrong-value", message, fix, "side")
+
+
+def ends_of(key):
+    return key.lower, key.upper
 
 
 def decides(value):
