@@ -63,6 +63,8 @@ def test_where_a_counter_goes_back_is_known(tmp_path, code, found):
          [("start-value", 3, "3")]),
         ("class A:\n    n: int = 3\na = A()\nwhile True:\n    pub.publish(a.n)\n    a.n += 1",
          [("start-value", 2, "3")]),
+        ("m = Int8(data=1)\nwhile True:\n    pub.publish(m)\n    m.data += 1", [("start-value", 1, "1")]),
+        ("m = Int8()\nwhile True:\n    pub.publish(m)\n    m.data += 1", []),
         ("n = count(1)\nwhile True:\n    pub.publish(next(n))", [("start-value", 1, "1")]),
         ("def f():\n    for n in range(1, 9):\n        yield n", [("start-value", 2, "1")]),
         ("for n in range(1, 9):\n    print(n)", []),

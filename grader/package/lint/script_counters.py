@@ -10,6 +10,7 @@ import builtins
 from script_tree import (
     LOOPS,
     all_of,
+    argument,
     called_name,
     calls_in,
     dotted,
@@ -189,9 +190,16 @@ def counter_starts(tree):
     changed = all_of(tree, ast.Assign, ast.AugAssign)
     counted = {dotted(t) for n in changed for t in increments(n)}
     for node in changed:
-        value = signed(node.value) if isinstance(node, ast.Assign) else None
-        if value is not None and id(node) not in later and dotted(node.targets[0]) in counted:
-            yield slip(node.lineno, "start-value", "%d" % value, name=dotted(node.targets[0]))
+        given, name = (
+            getattr(node, "value", None),
+            dotted(node.targets[0]) if isinstance(node, ast.Assign) else "",
+        )
+        if name + ".data" in counted and called_name(given)[:1].isupper():  # `msg = Int8(data=1)`
+            made = argument(given, 0, "data")
+            given, name = made[0] if made else None, name + ".data"
+        value = signed(given) if name else None
+        if value is not None and id(node) not in later and name in counted:
+            yield slip(node.lineno, "start-value", "%d" % value, name=name)
         number = added_number(node)
         if number not in (None, 1):
             yield slip(

@@ -10,6 +10,7 @@ standard library only; nothing is imported from ROOT.
 
 import ast
 import contextlib
+import functools
 import io
 import json
 import keyword
@@ -166,6 +167,7 @@ def numbers_of_modules(root, name, names, tree):
     return found
 
 
+@functools.lru_cache(maxsize=None)
 def numbers_in(path):
     """Return the numbers that a module gives its names, each once."""
     with contextlib.suppress(OSError, SyntaxError, ValueError, RecursionError, MemoryError):
