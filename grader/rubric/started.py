@@ -89,9 +89,13 @@ def _other_packages(rubric: WrittenRubric) -> Iterator[Fault]:
                 if name == owner:
                     fault = f"{name} is the package itself, and no package depends on itself: take it out"
                     yield (*criterion.at, "dependencies", number), fault
+    run = {(file, owner) for at, file, owner, _ in named if at[0] == "scenarios"}
     for at, file, owner, is_given in named:
         others = {other for _, same, other, is_said in named if same == file and other != owner and is_said}
-        if not is_given and others:
+        once = [one for *_, same, one, _ in named if (same, one) == (file, owner)] == [owner]
+        # Both packages may have a file of this name: then each is started, or asked for twice.
+        is_wrong = at[0] == "scenarios" and once and not any((file, other) in run for other in others)
+        if others and (is_wrong or not is_given):
             elsewhere = join_words(sorted(others))
             fault = (
                 f"is looked for in {owner}, and elsewhere it is in {elsewhere}: write package: {elsewhere}"

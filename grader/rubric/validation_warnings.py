@@ -374,7 +374,7 @@ def _hard(criterion: WrittenCriterion) -> Iterator[Fault]:
     for key in ("heading_tolerance_deg", "tolerance_deg"):
         if is_number(given.get(key)) and given[key] < CLOSE_DEG:
             yield (*at, key), f"{given[key]:g} is very strict: it is in degrees"
-    if check in {"ends-at", "path"} and is_number(tolerance_m) and tolerance_m < CLOSE_M:
+    if check in {"ends-at", "path"} and is_number(tolerance_m) and tolerance_m <= CLOSE_M:
         yield (*at, "tolerance_m"), f"{tolerance_m:g} m is very strict: no robot keeps it"
 
 
