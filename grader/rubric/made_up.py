@@ -347,8 +347,11 @@ def faults_of_sample(
     for path, message in faults:
         part = _at(written, path)
         names = join_words(sorted(names_in(part))) if is_place(part) or isinstance(part, str) else ""
-        if not is_place(_at(sample, path)):
+        placed = _at(sample, path)
+        if not is_place(placed):
             yield path, f"{message} (made up: {names})" if names else message
+        elif set(names_in(placed)) <= as_map(written.get(KEY)).keys():
+            yield path, f'is text, which may have values in it: write "{{{KEY}: {names}}}" in quotes'
 
 
 def _at(data: Any, path: KeyPath) -> Any:  # noqa: ANN401 - any part of a rubric

@@ -120,7 +120,7 @@ def _too_many_nodes(rubric: WrittenRubric) -> Iterator[Fault]:
         nodes, starts = as_map(scenario.get("until")).get("nodes"), starts_of(scenario)
         scripts = [start for start in starts if start.get("script") is not None]
         # A launch file, or an unknown program, may start any number of nodes.
-        of_scripts = all(start.get("script") or start.get("program") in PROGRAMS for start in starts)
+        of_scripts = all(start.get("script") or str(start.get("program")) in PROGRAMS for start in starts)
         if isinstance(nodes, int) and of_scripts and starts and nodes > len(scripts):
             fault = f"{name} starts {plural(len(scripts), 'script')} of the student's, and each is one node"
             yield ("scenarios", name, "until", "nodes"), fault

@@ -331,6 +331,8 @@ def wait_faults(rubric: WrittenRubric) -> Iterator[Fault]:
         topic, run = as_map(step.get("wait")).get("topic"), at[1]
         scenario = rubric.scenarios[str(run)]
         sent = [one for one in published_in(scenario) if one.get("topic") == topic]
+        if not sent or not isinstance(topic, str):
+            continue
         judged = [
             as_map(one.given.get(key))
             for one in rubric.criteria
@@ -343,7 +345,7 @@ def wait_faults(rubric: WrittenRubric) -> Iterator[Fault]:
         judged += [one.given for one in rubric.criteria if one.run in alike and one.check != "hears"]
         awaited = [text for _, text in texts_in((), scenario.get("until"))]
         named = any(one.get("topic") == topic or topic in one for one in judged) or topic in awaited
-        if sent and isinstance(topic, str) and not named and topic not in topics_of_programs(scenario):
+        if not named and topic not in topics_of_programs(scenario):
             told = f"the grader itself sends on {topic}, and its messages do not count"
             yield (*at, "wait", "topic"), f"{told}: name the one on which the node answers"
 

@@ -457,6 +457,8 @@ ODD = [
     "a/b",
     [None],
     {"field": [1]},
+    {"made_up": "number"},
+    [{"made_up": "number"}],
 ]
 
 
@@ -468,10 +470,12 @@ def test_what_is_no_value_of_its_key_is_refused_and_ends_nothing(examples: Path,
         data = yaml.safe_load(choice(files).read_text(encoding="utf-8"))
         part, key = choice(list(_places(data)))
         part[key] = choice(ODD)
+        if isinstance(made_up := data.setdefault("made_up", {}), dict):
+            made_up["number"] = {"from": 1, "to": 9}
         path = examples / "spoiled.yaml"
         path.write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
         with suppress(RubricError):
-            assert load_rubric(str(path)).rubric.criteria
+            assert isinstance(warnings_of(load_rubric(str(path)), path.name), list)
 
 
 def _places(value: object) -> Iterator[tuple[Any, Any]]:
