@@ -66,6 +66,8 @@ LEVEL = re.compile(
 """Where a level is asked for: other sentences may have an error in them, or warn of something."""
 VALUES = ("value", "values", "expect", "result")
 """Keys of texts that a node has to publish or to answer."""
+FEW = 10
+"""Of fewer values, each is drawn often."""
 FIELD = re.compile(r"^\s*([a-z]+\d*)\s+(\w+)\s*(?:#.*)?$", re.MULTILINE)
 """A field of a primitive type in a definition."""
 
@@ -76,6 +78,7 @@ def prose_warnings(rubric: WrittenRubric) -> Iterator[Fault]:
     yield from _sent_otherwise(rubric)
     yield from _unsaid_topic(rubric)
     yield from _shifted_factors(as_map(rubric.data.get("made_up")), handout)
+    yield from _said_values(as_map(rubric.data.get("made_up")), handout)
     for criterion in rubric.criteria:
         at, given, check = criterion.at, criterion.given, criterion.check
         yield from _shifted_numbers(criterion, rubric)
@@ -144,6 +147,21 @@ def _other_range(criterion: WrittenCriterion, handout: str) -> Iterator[Fault]:
         is_about = said and re.search(rf"\b{re.escape(field)}s?\b", sentence) and not said[3]
         if said and is_about and not {low, high} & {*map(float, said.groups()[:2])}:
             yield (*criterion.at, "min"), f"to max is {low:g} to {high:g}, and the handout has {said[0]}"
+
+
+def _said_values(made_up: dict[str, Any], handout: str) -> Iterator[Fault]:
+    """Yield values that are made up of so few that one which the handout has, as a default, often comes."""
+    said = {float(number) for number in PLAIN_NUMBER.findall(handout)}
+    for name, one in made_up.items():
+        low, high, step = (as_map(one).get(key, 1) for key in ("from", "to", "step"))
+        if "from" not in as_map(one) or not all(map(is_number, (low, high, step))) or step <= 0:
+            continue
+        found = sorted(
+            n for n in said if low <= n <= high and abs((n - low) / step - round((n - low) / step)) < 1e-6
+        )
+        if found and high - low < FEW * step:
+            fault = f"may be {found[0]:g}, which the handout has: a node that always uses that passes then"
+            yield ("made_up", name), fault
 
 
 def _shifted_factors(made_up: dict[str, Any], handout: str) -> Iterator[Fault]:
