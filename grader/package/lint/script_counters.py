@@ -190,24 +190,13 @@ def counter_starts(tree):
     changed = all_of(tree, ast.Assign, ast.AugAssign)
     counted = {dotted(t) for n in changed for t in increments(n)}
     for node in changed:
-        given, name = (
-            getattr(node, "value", None),
-            dotted(node.targets[0]) if isinstance(node, ast.Assign) else "",
-        )
-        if name + ".data" in counted and called_name(given)[:1].isupper():  # `msg = Int8(data=1)`
-            made = argument(given, 0, "data")
-            given, name = made[0] if made else None, name + ".data"
-        value = signed(given) if name else None
+        name, value = given_number(node, counted)
         if value is not None and id(node) not in later and name in counted:
             yield slip(node.lineno, "start-value", "%d" % value, name=name)
         number = added_number(node)
         if number not in (None, 1):
-            yield slip(
-                node.lineno,
-                "step-number",
-                "%d" % number,
-                name=dotted(getattr(node, "target", None) or node.targets[0]),
-            )
+            name = dotted(getattr(node, "target", None) or node.targets[0])
+            yield slip(node.lineno, "step-number", "%d" % number, name=name)
     for owner in all_of(tree, ast.ClassDef):  # `value: int = 1` of a dataclass
         for node in constants_in(owner.body):
             own = [name for name in counted if name.rpartition(".")[2] == dotted(node) != name]
@@ -216,15 +205,22 @@ def counter_starts(tree):
                 yield slip(node.lineno, "start-value", "%d" % value, name=dotted(node))
     for loop in loops:
         yield from added_first(loop.body)
-    sent = {
-        name
-        for call in calls_in(tree, "publish")
-        for n in ast.walk(call)
-        for name in [called_name(n)]
-        if name
-    }
+    made = (n for call in calls_in(tree, "publish") for n in ast.walk(call))
+    sent = set(map(called_name, made)) - {""}
     for function in (f for f in all_of(tree, ast.FunctionDef) if f.name in sent):
         yield from added_before_return(function)
+
+
+def given_number(node, counted):
+    """Return the name that an assignment gives a number, and the number: `n = 1`, or `msg = Int8(data=1)` of a counter
+    that is the message's; None in place of another value."""
+    if not isinstance(node, ast.Assign):
+        return "", None
+    name, given = dotted(node.targets[0]), node.value
+    if name + ".data" in counted and called_name(given)[:1].isupper():
+        made = argument(given, 0, "data")
+        return name + ".data", signed(made[0]) if made else None
+    return name, signed(given)
 
 
 def added_before_return(function):
