@@ -20,7 +20,7 @@ OF_GENERATION = re.compile(
     r"_generate_messages(?:_(?:cpp|py|eus|lisp|nodejs))?$|_gen(?:cpp|py|eus|lisp|nodejs)$"
 )
 """The targets that `generate_messages(…)` makes, behind the package's name."""
-LIKE_GENERATED = re.compile(r"_gen(?:erate[a-z]*)?(?:_\w+|cpp|py)?$|EXPORTED?_TARGETS?$")
+LIKE_GENERATED = re.compile(r"_gen(?!cfg|param)\w*$|EXPORTED?_TARGETS?$")
 """A name that means a target of `generate_messages(…)`, spelt right or not."""
 _FOLDERS = re.compile(r"^\$\{(?:CMAKE_CURRENT_SOURCE_DIR|PROJECT_SOURCE_DIR|CMAKE_SOURCE_DIR)\}/")
 _DEPTH_MAX = 20

@@ -169,6 +169,22 @@ def _calls_of_targets(package: PackageFacts, made: Sequence[CMakeCall], absent: 
     return f"delete what is built from them: the calls on {on_lines(sorted(lines))}" if lines else ""
 
 
+def _same_target(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    """Of two calls that make one target: the name of the later one's source is meant, where nothing has it."""
+    made = [c for c in cmake_calls(package, "add_executable", "add_library") if c.args]
+    same = [c for c in made if c.args[0] == found[1]]
+    if len(same) < 2:
+        return Explained(found.string, FIRST_ERROR_HINT)
+    why = f"the target {found[1]} is made twice, on line {same[0].line} and on line {same[1].line}"
+    stems = [PurePosixPath(word).stem for word in _sources(same[1])]
+    if len(stems) == 1 and stems[0] not in {c.args[0] for c in made}:
+        fix = f"on line {same[1].line}, write {stems[0]} in place of {found[1]}"
+        others = [c for c in cmake_calls(package, *OF_TARGETS[2:]) if c.args[:1] == (found[1],)]
+        below = sorted({c.line for c in others if c.line > same[1].line})
+        return Explained(why, f"{fix}, and so {on_lines(below)}" if below else fix)
+    return Explained(why, f"delete one of the two, or give it another name than {found[1]}")
+
+
 def _sources(call: CMakeCall) -> list[str]:
     return [word for word in call.args[1:] if posixpath.splitext(word)[1] in CPP_SUFFIXES]
 
@@ -491,6 +507,7 @@ _EXPLAINED: tuple[tuple[str, Explain], ...] = (
     ),
     (r"roslaunch_add_file_check\(\) path '([^']+)' was not found", _missing_launch),
     (r"Cannot find source file: (\S+)", _missing_source),
+    (r'cannot create target "([^"]+)" because another target', _same_target),
     (r"Could not find messages which '([^']+)' depends on", _message_of_another),
     (r"Messages depends on unknown pkg: ([\w-]+)", _unfound_dependency),
     (r"(Invalid declaration|is not a legal message|InvalidMsgSpec|MsgNotFound)", _no_definition),

@@ -358,7 +358,7 @@ def _no_address(found: re.Match[str], _package: PackageFacts, _lines: Sequence[s
     return Explained(found.string, hint)
 
 
-def _no_type(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+def no_type(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     """A service's type has two parts, and nothing else; a message's package has its messages."""
     scope, name = found["scope"], found["name"]
     own = [posixpath.basename(one.path).partition(".")[0] for one in package.interfaces]
@@ -519,8 +519,8 @@ CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
         _explain_undeclared,
     ),
     (r"invalid use of (?:non-static )?member function '([^']+)'", _no_call),
-    (r"'(?P<scope>[^']+)::(?P<name>\w+)' has not been declared", _no_type),
-    (r"'(?P<name>\w+)' is not a member of '(?P<scope>\w+_msgs)'(?!;)", _no_type),
+    (r"'(?P<scope>[^']+)::(?P<name>\w+)' has not been declared", no_type),
+    (r"'(?P<name>\w+)' is not a member of '(?P<scope>\w+_msgs)'(?!;)", no_type),
     (
         r"could not convert '.*operator=\(",
         plainly("a single `=` sets a value, and compares nothing", "write `==` on that line"),

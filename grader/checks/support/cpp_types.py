@@ -6,7 +6,14 @@ import posixpath
 import re
 from collections.abc import Sequence
 
-from grader.checks.support.cpp_errors import FIRST_ERROR_HINT, OF_ROS, Explain, Explained, plainly
+from grader.checks.support.cpp_errors import (
+    FIRST_ERROR_HINT,
+    OF_ROS,
+    Explain,
+    Explained,
+    no_type,
+    plainly,
+)
 from grader.installable import noetic_messages
 from grader.model.package import PackageFacts
 from grader.wording import join_words
@@ -17,6 +24,7 @@ _CLASS = (
 """What the compiler calls a message, or a pointer to one."""
 _FIELD = r"(?P<scope>\w+)::(?P<name>\w+)_<.*?>::_(?P<field>\w+)_type"
 _MESSAGE = r"'(?P<scope>\w+)::(?P<name>\w+?)(?:_<[^']*?>)?(?:::_(?P<field>\w+)_type)?'"
+_KIND = r"(?:template )?type(?:; did you mean '(?P<near>\w+)')?"
 _STRING = r"std::(?:__cxx11::)?(?:basic_)?string"
 _NUMBER = (
     r"'(?:std_msgs::(?:U?Int\d+|Float\d+|Bool)_<.*>::_data_type|geometry_msgs::\w+_<.*>::_\w_type|u?int\d+_t"
@@ -139,6 +147,15 @@ def _other_value(found: re.Match[str], package: PackageFacts, _lines: Sequence[s
     return Explained(why, f"on that line, write {given} in place of {wanted}, or give it a {wanted}")
 
 
+def _not_in_namespace(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
+    """Of `lab_msgs::Nums`; a message is a class whose name ends with `_`, which no one writes."""
+    if found["scope"] == package.name or found["scope"] in noetic_messages():
+        told = no_type(found, package, lines)
+        return told._replace(why=f"{_where(found)}{told.why}")
+    near = found["near"]
+    return Explained(found.string, f"write {near} in place of {found['name']}" if near else FIRST_ERROR_HINT)
+
+
 TYPE_ERRORS: tuple[tuple[str, Explain], ...] = (
     (
         r"cast from 'const char ?\*' to '(\w+)' loses precision",
@@ -162,6 +179,7 @@ TYPE_ERRORS: tuple[tuple[str, Explain], ...] = (
         _text_for_field,
     ),
     (rf"no match for 'operator=' \(operand types are {_MESSAGE} and '(?P<other>[^']+)'", _other_class),
+    (rf"'(?P<name>\w+)' in namespace '(?:::)?(?P<scope>\w+)' does not name a {_KIND}", _not_in_namespace),
     (r"conversion from '([^']+)' to non-scalar type '([^']+)' requested", _other_value),
     (
         rf"invalid initialization of reference of type '{_CLASS}' from expression of type '{_CLASS}'",
