@@ -43,6 +43,7 @@ OF_SYNTAX = {"python-syntax", "launch-syntax", "yaml-syntax"}
 """Of a line that could not be read, the copy shows for the first time what it says."""
 MADE_BY_BUILDS = {".msg", ".srv", ".action", ".c", ".cc", ".cpp", ".cxx"}
 _PLACE = re.compile(r"^line \d+ of [^:]+: ")
+TAG = re.compile(r"<(\w+)>[^<>]*</\1>")
 NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
@@ -311,7 +312,9 @@ def is_told(repair: Repair, hint: str) -> bool:
         word for word in _new_words(repair) if not word.endswith("depend")
     }  # one tag is as good as the other
     of_package = repair.kind in {"package-name", *OF_BUILDS} and repair.file in OF_PACKAGES
-    return of_package and new <= words_of(hint) and new != set()
+    # A line of the manifest says nothing of the same name in CMakeLists.txt.
+    of_file = TAG.sub(" ", hint) if PurePosixPath(repair.file).name == CMAKE else hint
+    return of_package and new <= words_of(of_file) and new != set()
 
 
 def _told(repairs: Iterable[Repair], verdict: Verdict) -> tuple[list[Repair], list[Repair]]:

@@ -181,7 +181,7 @@ def _same_target(found: re.Match[str], package: PackageFacts, _lines: Sequence[s
         fix = f"on line {same[1].line}, write {stems[0]} in place of {found[1]}"
         others = [c for c in cmake_calls(package, *OF_TARGETS[2:]) if c.args[:1] == (found[1],)]
         below = sorted({c.line for c in others if c.line > same[1].line})
-        return Explained(why, f"{fix}, and so {on_lines(below)}" if below else fix)
+        return Explained(why, f"{fix}, and the same on {on_lines(below)}" if below else fix)
     return Explained(why, f"delete one of the two, or give it another name than {found[1]}")
 
 
