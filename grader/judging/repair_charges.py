@@ -314,7 +314,9 @@ def is_told(repair: Repair, hint: str) -> bool:
     of_package = repair.kind in {"package-name", *OF_BUILDS} and repair.file in OF_PACKAGES
     # A line of the manifest says nothing of the same name in CMakeLists.txt.
     of_file = TAG.sub(" ", hint) if PurePosixPath(repair.file).name == CMAKE else hint
-    return of_package and new <= words_of(of_file) and new != set()
+    call = re.search(r"\b(find_package)\(", repair.message)
+    is_of_call = call is None or call[1] in of_file
+    return of_package and is_of_call and new <= words_of(of_file) and new != set()
 
 
 def _told(repairs: Iterable[Repair], verdict: Verdict) -> tuple[list[Repair], list[Repair]]:
