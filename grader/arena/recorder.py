@@ -41,6 +41,7 @@ from grader.evidence.events import PACKAGE_RUN, ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.files import make_folder, read_untrusted, temporary_folder
 from grader.model import SandboxMode
+from grader.model.generated_headers import surely_waits
 from grader.model.message_rate import RateBounds
 from grader.model.package import PackageFacts
 from grader.model.result import Progress
@@ -332,11 +333,12 @@ def _python_files(place: ProcessEnvironment, facts: PackageFacts) -> list[str]:
 
 
 def _headers_included(place: ProcessEnvironment, facts: PackageFacts) -> list[str]:
-    """Return the targets that make the headers of the workspace's own messages which C++ of the lab's packages
-    includes."""
+    """Return the targets that make the headers of the workspace's own messages which C++ of the lab's packages includes
+    without waiting for them, as far as the files show."""
     included = {
         header.partition("/")[0]
-        for one in (facts, *facts.also)
+        for one in facts.views()
+        if not surely_waits(one)
         for file in one.files
         for header in file.headers
     }

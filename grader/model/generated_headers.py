@@ -102,6 +102,16 @@ def unwaited_targets(
     return found
 
 
+def surely_waits(package: PackageFacts) -> bool:
+    """Return whether the files show that each source which includes such headers is of a target that waits for them:
+    then no build of it is a matter of luck."""
+    calls = package.cmake.calls if package.cmake is not None else ()
+    makers = {package.name, *(one.name for one in package.also)}
+    of_lab = {f.path for f in package.files if any(h.partition("/")[0] in makers for h in f.headers)}
+    named = {path for call in calls if call.name in MAKES_TARGETS for path in _sources(call, of_lab)}
+    return named == of_lab and not unwaited_targets(package, (), all_made=True)
+
+
 def reasons_of(found: Sequence[Unwaited]) -> list[str]:
     """Return what is wrong with these targets, those that wait for nothing together."""
     alone = [one for one in found if one.lost is None]

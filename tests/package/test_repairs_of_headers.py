@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from grader.model.generated_headers import surely_waits
 from grader.package.repairs import apply_repair, find_repairs
 from tests.package.repairing import CMAKE, CMAKELISTS, WANTED, package, repair_all
 from tests.package.trees import facts_of
@@ -115,9 +116,25 @@ def test_a_program_waits_for_what_makes_its_headers(tmp_path: Path, lines: str, 
     begin = f"{cmake}add_executable(a src/a.cpp)\ntarget_link_libraries(a ${{catkin_LIBRARIES}})\n"
     files = {"src/a.cpp": "#include <lab/Own.h>\n", "msg/Own.msg": "int8 a\n", CMAKELISTS: begin + lines}
     folder = package(tmp_path, files)
-    found = [one for one in find_repairs(folder, facts_of(folder), WANTED) if "headers" in one.message]
+    facts = facts_of(folder)
+    assert surely_waits(facts) == (after == "")
+    found = [one for one in find_repairs(folder, facts, WANTED) if "headers" in one.message]
     assert len(found) == (after != "")
     for one in found:
         apply_repair(folder, one)
         assert one.fix == fix or not fix
         assert (folder / CMAKELISTS).read_text() == begin + after
+
+
+@pytest.mark.parametrize(
+    ("source", "line", "waits"),
+    [
+        ("#include <lab/Own.h>\n", "file(GLOB all src/*.cpp)\nadd_executable(a ${all})\n", False),
+        ("#include <std_msgs/Int8.h>\n", "file(GLOB all src/*.cpp)\nadd_executable(a ${all})\n", True),
+        ("#include <lab/Own.h>\n", "", False),
+    ],
+    ids=["names-no-source", "of-ros", "no-target"],
+)
+def test_a_source_that_no_target_names_may_be_compiled_too_early(tmp_path, source, line, waits):
+    folder = package(tmp_path, {"src/a.cpp": source, "msg/Own.msg": "int8 a\n", CMAKELISTS: CMAKE + line})
+    assert surely_waits(facts_of(folder)) == waits
