@@ -24,6 +24,7 @@ from grader.checks.support.scripts import (
     is_elsewhere,
     paths_by_name,
     programs,
+    scripts_of_role,
 )
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite
@@ -213,7 +214,8 @@ def _name_missing(
     if made and build is not None and judge_build(package, build).status is not Status.PASS:
         why, hint = f"the build did not make the program {made}", BUILD_FIRST_HINT
     elif lost and PurePosixPath(lost).suffix and not made:
-        why, hint = f"there is no {lost} to run", add_hint(package, lost)
+        why = f"there is no {lost} to run"
+        hint = f"{add_hint(package, lost)}{or_rename(scripts_of_role(package, lost))}"
     elif lost and not made and package.cmake is not None:
         sources = [one for end in CPP_SUFFIXES for one in copies_of(package, f"{lost}{end}")]
         source = sources[0].path if sources else f"src/{lost}.cpp"
@@ -235,6 +237,11 @@ def _name_missing(
     message = re.sub("there (is no script|was nothing) to run", lambda _: why, verdict.message)
     told = verdict.model_copy(update={"message": message, "hint": hint})
     return told.based_on(unbuilt=hint == BUILD_FIRST_HINT)
+
+
+def or_rename(alike: Sequence[str]) -> str:
+    """Return what to put behind the hint that a script has to be written, where these may be meant to be it."""
+    return f", or rename the one that is meant to be it: {join_words(alike, 'or')}" if alike else ""
 
 
 def _stopped_build(build: Run, took: str) -> Verdict:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import PurePosixPath
 
-from grader.checks.build import judge_build
+from grader.checks.build import judge_build, or_rename
 from grader.checks.registry import check
 from grader.checks.support.exit_causes import syntax_hint
 from grader.checks.support.scripts import (
@@ -19,7 +19,7 @@ from grader.checks.support.scripts import (
     move_hint,
     names_script,
     paths_by_name,
-    script_of_role,
+    scripts_of_role,
     shebang_obstacles,
     syntax_fault,
 )
@@ -217,11 +217,11 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
     near += [p for n, p in names.items() if n == wanted.stem and p not in near]
     movable = [p for p in near if can_be_moved(p, path)]
     scripts = [p for n, p in names.items() if n.endswith(".py")]
-    alike = "" if movable else script_of_role(package, path)
-    meant = list(filter(None, [*movable, alike]))[:1]
+    alike = [] if movable else scripts_of_role(package, path)
+    meant = movable[:1] or (alike if len(alike) == 1 else [])
     there = dict.fromkeys([*near, *meant])
     seen = f"; {there_is(there)}" if there else ""
-    hint = add_hint(package, path)
+    hint = f"{add_hint(package, path)}{or_rename([] if meant else alike)}"
     if meant:
         moved, named = move_hint(package, meant[0], path), _where_named(package, meant[0])
         plain = len(movable) == 1 or PurePosixPath(meant[0]).name == wanted.name

@@ -20,7 +20,7 @@ from grader.checks.support.scripts import (
     move_hint,
     paths_by_name,
     programs,
-    script_of_role,
+    scripts_of_role,
 )
 from grader.checks.support.text import near_names, shown
 from grader.evidence.run import Run
@@ -200,7 +200,8 @@ def built_fixes(package: PackageFacts, file: LaunchFile, script: str) -> list[st
 
 def _program_meant(package: PackageFacts, name: str) -> str:
     """Return the name of the script that may be meant to be this one, if it is missing; else the name itself."""
-    other = "" if has_program(package, name) else script_of_role(package, name)
+    alike = [] if has_program(package, name) else scripts_of_role(package, name)
+    other = alike[0] if len(alike) == 1 else ""
     return PurePosixPath(other).name or name
 
 

@@ -92,12 +92,12 @@ def paths_by_name(package: PackageFacts) -> dict[str, str]:
     return {PurePosixPath(path).name: path for path in paths}
 
 
-def script_of_role(package: PackageFacts, path: str) -> str:
-    """Return the only script whose name has another word for what the name of `path` says that it is, or of several the
-    only one that is called by the word alone; "" if there is none."""
+def scripts_of_role(package: PackageFacts, path: str) -> list[str]:
+    """Return the scripts whose names have another word for what the name of `path` says that it is; of several, the
+    only one that is called by the word alone."""
     alike = [p for n, p in paths_by_name(package).items() if n.endswith(".py") and has_role_of(p, path)]
     plain = [p for p in alike if is_role(PurePosixPath(p).stem)]
-    return next((found[0] for found in (alike, plain) if len(found) == 1), "")
+    return plain if len(plain) == 1 else alike
 
 
 def can_be_moved(path: str, wanted: str) -> bool:
