@@ -123,6 +123,7 @@ class Parser(argparse.ArgumentParser):
             name = word.partition("=")[0]
             if name.startswith("--") and name not in self._option_string_actions:
                 meant = did_you_mean(name, self._option_string_actions) or self._without_option(name)
+                meant = meant or (" (a lab is given by --rubric)" if self._is_lab(name) else "")
                 message = f"unrecognized arguments: {word}{meant}"
                 break
         raise UsageError(message, hint=f"see {self.prog} --help")
@@ -135,6 +136,12 @@ class Parser(argparse.ArgumentParser):
                 return f" (write {action.metavar} without an option: {self.prog} {action.metavar})"
         return ""
 
+    def _is_lab(self, word: str) -> bool:
+        """Return whether a command that takes a lab by an option is given it otherwise: by another one, or by none."""
+        from grader.rubric.find import named_labs  # noqa: PLC0415 - slow to load
+
+        return "--rubric" in self._option_string_actions and (word == "--lab" or named_labs(word) != [])
+
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
@@ -146,7 +153,9 @@ class Parser(argparse.ArgumentParser):
         )
         found, rest = super().parse_known_args(args, namespace)
         if rest:
-            self.error(f"unrecognized arguments: {' '.join(rest)}")
+            lab = next(filter(self._is_lab, rest), "")
+            meant = f" (write --rubric {lab})" if lab else ""
+            self.error(f"unrecognized arguments: {' '.join(rest)}{meant}")
         return found, rest
 
     def format_help(self) -> str:

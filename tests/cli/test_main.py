@@ -66,6 +66,12 @@ def test_version(capsys):
             "unrecognized arguments: --evidence=x (write EVIDENCE without an option: grader export bag EVIDENCE)",
         ),
         (["export", "bag", "--rubric", "x"], "unrecognized arguments: --rubric"),
+        (["check", "x", "--lab", "y"], "unrecognized arguments: --lab (a lab is given by --rubric)"),
+        (
+            ["check", "x", "mcr2-basic-comms"],
+            "unrecognized arguments: mcr2-basic-comms (write --rubric mcr2-basic-comms)",
+        ),
+        (["check", "x", "y"], "unrecognized arguments: y"),
         (["chekc"], 'there is no command "chekc" (did you mean "check"?)'),
         (["rubric", "tset"], 'there is no command "rubric tset" (did you mean "test"?)'),
         (["rubric"], "the following arguments are required: COMMAND"),
