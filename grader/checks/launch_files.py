@@ -364,7 +364,8 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
         Begin the script with `#!/bin/bash`, `chmod +x` it, and write `<node pkg="<package>" type="<script>.sh"
         name="…" output="screen"/>`. `rosrun <package> <script>.sh` tries it alone.
     """
-    expected = f"a shell script in {params.launch} opens {params.urls[0]} in {params.program}, beside a node"
+    page, node = f"{params.urls[0]} in {params.program}", PurePosixPath(params.script).name
+    expected = f"a shell script in {params.launch} opens {page}, beside {node}"
     file = read_launch(package, params.launch)
     pages = _pages(run)
     measured = f"opened: {join_words(_shown_command(p) for p in pages)}" if pages else "nothing was opened"

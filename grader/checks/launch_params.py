@@ -34,7 +34,7 @@ from grader.checks.support.parameters import (
 from grader.checks.support.scripts import add_hint, find_script
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
-from grader.model.launch_file import LaunchFile, LaunchLoad, LaunchNode
+from grader.model.launch_file import LaunchFile, LaunchLoad, LaunchNode, LaunchParam
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, failed_or_blocked, passed
@@ -311,6 +311,20 @@ def _is_there(found: Mapping[str, Any], places: Iterable[str], wanted: Wanted) -
     return any(all(_fits(found.get(p + name), value) for name, value in wanted.items()) for p in places)
 
 
+def _renamed(again: Iterable[LaunchParam], missing: Iterable[str], wanted: Wanted) -> str:
+    """Return which of the lines of one name is to have which of the missing ones: by their values, where these say."""
+    left, found = list(missing), list[str]()
+    own = list(dict.fromkeys(p.name.rpartition("/")[2] for p in again))
+    for param in again:
+        fits = [name for name in (*own, *left) if param.value == str(wanted[name])]
+        if fits and fits[0] in own:
+            own.remove(fits[0])  # the others are the copies
+        elif fits:
+            left.remove(fits[0])
+            found.append(f"{fits[0]} on line {param.line}")
+    return f"write {join_words(found)}" if not left else f"write {join_words(missing)} for the others"
+
+
 def _wrong_value(
     file: LaunchFile, before: Mapping[str, Any], places: tuple[str, str], wanted: Wanted
 ) -> Verdict | None:
@@ -327,7 +341,7 @@ def _wrong_value(
         again = [p for p in file.params if names.count(p.name) > 1 and p.name.rpartition("/")[2] in wanted]
         if len(again) > 1:
             lines = on_lines(p.line for p in again)
-            hint = f"{lines} give the same name: write {join_words(missing)} for the others"
+            hint = f"{lines} give the same name: {_renamed(again, missing, wanted)}"
         cited = tuple(p.place for p in again)
         return failed(message, hint=hint, citations=cited)
     others = [name for name, value in wanted.items() if not _fits(before[place + name], value)]

@@ -256,10 +256,12 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
     """
     what = [
         *(PurePosixPath(s).name for s in params.scripts),
-        *params.nodes,
+        *(f"{name} ({origin})" for name, origin in params.nodes.items()),
         *params.programs,
     ]
     over = f", connected over {params.topic}" if params.topic else ""
+    given = join_words(f"{name} {value}" for name, value in params.params.items())
+    over += f", with {given}" if given else ""
     expected = f"{params.launch} brings up {join_words(what) or 'its nodes'} under the file's names{over}"
     file = read_launch(package, params.launch, (*params.scripts, *params.programs))
     if isinstance(file, Verdict):

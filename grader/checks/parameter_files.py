@@ -174,7 +174,7 @@ def _missing(
         hint = f"{nested}; then read them there in the script too" if is_read else nested
     elif shallow in found:
         readers = join_words(_readers(package, build, shallow, above))
-        hint = f"{moved}; then read it there in {readers} too" if readers else moved
+        hint = f"{moved}; then change {readers}, to read it there" if readers else moved
     return failed(f"{path} loads, but {describe_missing(found, name)}{more}", hint=hint)
 
 
@@ -226,9 +226,9 @@ def _column(name: str, shallow: str, keys: tuple[Key, ...], missing: list[str]) 
         return f"write `{parent}:` above line {own.line}, as far in, and indent {join_words(lasts)} by two more spaces"
     if beside is None:
         return f"indent {last} by two spaces more than {parent}, below it"
-    where = f"on line {own.line} " if own else ""
-    neighbour = f"{beside.path.rpartition('/')[2]} on line {beside.line}"
-    return f"indent {last} {where}by {plural(beside.indent, 'space')}, as {neighbour}, so that it is below {parent}"
+    where = f"line {own.line}" if own else f"the line of {last}"
+    neighbour = f"line {beside.line} ({beside.path.rpartition('/')[2]})"
+    return f"begin {where} with {plural(beside.indent, 'space')}, as {neighbour}, so that {last} is below {parent}"
 
 
 def _in_its_place(found: dict[str, object], name: str, path: str) -> Verdict | None:

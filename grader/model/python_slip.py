@@ -32,7 +32,8 @@ class PythonSlip(Placed, Record):
     says what is wrong on that line, and `name` is the function or variable that both are about:
 
     - `not-called`: `rate.sleep` or `rospy.is_shutdown` without brackets.
-    - `misspelt`: a name that the file does not define, next to one that it does.
+    - `misspelt`: a name that the file does not define, next to one that it does; or an exception that rospy does not
+      have, in an `except`.
     - `undefined`: why a name has no value where it is read.
     - `object`: why an object of a class lacks an attribute where it is read, or that the class is used in its place.
     - `outside-method`: a call in a class, but outside its methods, that uses an unknown name.

@@ -79,6 +79,7 @@ CASES = {
     "wide": ("if x\uff1a\n  pass\n", 1, "plain `:`"),
     "tabs": ("if 1:\n        x = 1\n\ty = 2\n", 3, "at a tab size of 8"),
     "tabs_of_4": ("def f():\n    x = 1\n\ty = 2\n", 3, "at a tab size of 4"),
+    "tabs_behind_spaces": ("if 1:\n    \tx = 1\n        y = 2\n", 3, "at a tab size of 8"),
     "tabs_and_more": ("if 1:\n        x = 1\n\tprint 'a'\n", 3, "at a tab size of 8"),
     "tabs_unindent": ("if 1:\n\tif 2:\n\t\tx = 1\n  y = 2\n", 4, "tabs and spaces are mixed"),
     "spaces_on_one_line": (

@@ -402,6 +402,19 @@ def test_an_exception_gets_the_name_that_is_used(caught: str, meant: str, tmp_pa
         ("counter = 0\nprint(unlike)\n", []),
         ("counter = Noone\n", ["write None instead of Noone"]),
         ("counter = Node()\n", []),
+        (
+            "import rospy\ntry:\n    pass\nexcept (ValueError, rospy.RosInterruptException):\n    pass\n",
+            ["write rospy.ROSInterruptException instead of rospy.RosInterruptException"],
+        ),
+        (
+            "import rospy as ros\ntry:\n    pass\nexcept ros.ROSInteruptException:\n    pass\n",
+            ["write ros.ROSInterruptException instead of ros.ROSInteruptException"],
+        ),
+        (
+            "try:\n    pass\nexcept rospy.exceptions.ROSException:\n    1\nexcept rospy.ServiceException:\n    2\n",
+            [],
+        ),
+        ("try:\n    pass\nexcept rospy.Broken:\n    pass\nexcept:\n    pass\n", []),
         ("if __naMe__ == '__main__':\n    pass\n", ["write `if __name__ == '__main__':`"]),
         ("try:\n    pass\nexcept Exception as error:\n    print(error, __file__)\n", []),
     ],

@@ -37,6 +37,11 @@ OLD_NAMES = {
 EXCEPTIONS = {name for name in dir(builtins) if name.endswith(("Error", "Exception", "Interrupt"))}
 OF_VARIABLES = ("name", "topic")
 """So ends the name of a variable that has a name for its value."""
+EXCEPTIONS_OF_ROSPY = (
+    "ROSException", "ROSInitException", "ROSInternalException", "ROSInterruptException", "ROSSerializationException",
+    "ROSTimeMovedBackwardsException", "ServiceException", "TransportException", "TransportInitError",
+    "TransportTerminated",
+)  # fmt: skip
 FITTING = {ast.ExceptHandler: EXCEPTIONS, ast.Expr: {"pass", "break", "continue", "return"}}
 """What a name is meant for by where it stands, besides names."""
 COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
@@ -99,6 +104,20 @@ def misspelt(tree):
             message, fix = why_unbound(node, tree, known)
         if message:
             yield slip(line, kind, message, fix, node.id)
+
+
+def misspelt_exceptions(tree):
+    """Exceptions of rospy that an `except` names and that are spelt otherwise: it fails only once something else has
+    gone wrong in its `try`, or the node is to end."""
+    for handler in all_of(tree, ast.ExceptHandler):
+        for node in getattr(handler.type, "elts", [handler.type]):
+            owner, _, name = dotted(node).rpartition(".")
+            if owner != "rospy" or name in EXCEPTIONS_OF_ROSPY:
+                continue
+            near = difflib.get_close_matches(name.lower(), map(str.lower, EXCEPTIONS_OF_ROSPY), 1, 0.85)
+            for meant in (one for one in EXCEPTIONS_OF_ROSPY if near == [one.lower()]):
+                fix = "write rospy.%s instead of rospy.%s" % (meant, name)
+                yield slip(node.lineno, "misspelt", "did you mean rospy.%s?" % meant, fix, "rospy." + name)
 
 
 def meant_for(node, tree, known, fitting, attributes):

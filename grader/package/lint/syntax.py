@@ -376,7 +376,7 @@ def syntax_fault(error, data):
         text=lines[line - 1] if known else "",
         opened=never_closed(data, line) if known else None,
         mixed=len(begins) > 1,
-        tab_size=tab_size(lines) if len(begins) > 1 else None,
+        tab_size=tab_size(lines) if len(begins) > 1 or isinstance(error, TabError) else None,
         odd=odd_line(lines) if len(begins) > 1 else None,
     )
 
