@@ -213,7 +213,7 @@ def open_source(
 
 def wanted_package(rubric: Rubric, asked: str) -> WantedPackage:
     """Return what the intake has to look for: the lab's packages, in place of the main one what was `asked` for."""
-    main, *others = (WantedPackage(name=name, files=files_of(rubric, name)) for name in rubric.package_names)
+    main, *others = (WantedPackage(name=name, paths=files_of(rubric, name)) for name in rubric.package_names)
     return replace(main, asked=asked, others=tuple(others))
 
 

@@ -29,16 +29,21 @@ USUAL_FOLDERS = frozenset({"src", "scripts", "nodes", "launch"})
 
 @dataclass(frozen=True, kw_only=True)
 class WantedPackage:
-    """The package that the lab asks for, and the names of the `files` that it asks for in it.
+    """The package that the lab asks for, and the `paths` of the files that it asks for in it.
 
     `asked` is the name of the package to grade in its place, from `--package`, or "". `others` are those that the lab
     asks for besides.
     """
 
     name: str
-    files: frozenset[str] = frozenset()
+    paths: frozenset[str] = frozenset()
     asked: str = ""
     others: tuple[WantedPackage, ...] = ()
+
+    @property
+    def files(self) -> frozenset[str]:
+        """The names of these files, without folders."""
+        return frozenset(PurePosixPath(path).name for path in self.paths)
 
     @property
     def each(self) -> tuple[WantedPackage, ...]:
@@ -301,7 +306,7 @@ def _rename(root: Path, packages: list[Candidate], wanted: WantedPackage, *, mod
     name = printable(wanted.asked or wanted.name)
     if not seen:
         told = f"It is the folder whose {MANIFEST} says <name>{name}</name>"
-        loose = loose_files(root, wanted.files, modes_known=modes_known)
+        loose = loose_files(root, wanted.paths, modes_known=modes_known)
         made = f"`catkin_create_pkg {name} std_msgs rospy` makes it, to hold {loose}"
         return f"{told}: {made}." if loose else f"{told}: was it handed in (and pushed)?"
     counts = {c: len(_files_of(c.folder, wanted.files)) for c in seen.values()}

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import islice
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from grader.files import read_untrusted
 from grader.intake.names import listing, printable
@@ -19,9 +19,15 @@ PRINTS = re.compile(rb"""[ \t]*print[ \t]+(?:["']|[A-Za-z_][\w.]*[ \t]*(?:[,%]|$
 """A line that begins with the `print` of Python 2."""
 
 
-def loose_files(root: Path, names: frozenset[str], *, modes_known: bool) -> str:
-    """Return where most of the lab's files lie, and what to do with them before they can be run: `publisher.py in
-    week1/`; "" for nowhere. `modes_known`: the disk tells which of them are executable."""
+def loose_files(root: Path, paths: frozenset[str], *, modes_known: bool) -> str:
+    """Return where most of the lab's files lie, with the folders of `paths` that they belong in, and what to do with
+    them before they can be run: `publisher.py in week1/`; "" for nowhere. `modes_known`: the disk tells which of them
+    are executable."""
+    wanted = {
+        PurePosixPath(path).name: str(PurePosixPath(path).parent) for path in sorted(paths, reverse=True)
+    }
+    wanted |= {name: "launch" for name, into in wanted.items() if name.endswith(".launch") and into == "."}
+    names = wanted.keys()
     found = {
         folder.path: sorted(names & {entry.name for entry in folder.others})
         for folder in islice(walk(root, tolerant=True), FOLDERS_LOOKED_AT)
@@ -31,7 +37,15 @@ def loose_files(root: Path, names: frozenset[str], *, modes_known: bool) -> str:
         return ""
     folder = root if path == "." else root / path
     where = "" if path == "." else f" in {printable(path)}/"
-    return "; ".join([listing(found[path]) + where, *_repairs(folder, found[path], modes_known=modes_known)])
+    belong = [_belong(found[path], wanted, into) for into in sorted({wanted[n] for n in found[path]} - {"."})]
+    return "; ".join(
+        [listing(found[path]) + where, *belong, *_repairs(folder, found[path], modes_known=modes_known)]
+    )
+
+
+def _belong(names: list[str], wanted: Mapping[str, str], folder: str) -> str:
+    inside = [name for name in names if wanted[name] == folder]
+    return f"{listing(inside)} {'belongs' if len(inside) == 1 else 'belong'} in the package's {printable(folder)}/"
 
 
 def _repairs(folder: Path, names: list[str], *, modes_known: bool) -> Iterator[str]:

@@ -295,22 +295,26 @@ def select_started(rubric: Rubric, only: Collection[str] | None = None) -> Rubri
 
 
 def files_of(rubric: Rubric, package: str) -> frozenset[str]:
-    """Return the names of the scripts, launch files and other files that the rubric asks for in one of its packages,
-    without folders."""
+    """Return the paths of the scripts, launch files and other files that the rubric asks for in one of its packages; of
+    a launch file, which may be in any folder, only the name."""
     starts = [p for s in rubric.scenarios.values() for p in s.start if rubric.package_of(p) == package]
-    paths = [path for p in starts for path in (p.script, p.launch, p.load)]
-    names = {PurePosixPath(path).name for path in paths if path is not None}
+    paths = {path for p in starts for path in (p.script, p.launch, p.load) if path is not None}
     criteria = [c for c in rubric.criteria if rubric.package_of(c) == package]
-    return frozenset(names.union(*(names_in(criterion) for criterion in criteria)))
+    return frozenset(paths.union(*(_paths_in(criterion) for criterion in criteria)))
 
 
 def names_in(criterion: Criterion) -> set[str]:
     """Return the names of the files that a criterion's parameters name, without folders."""
+    return {PurePosixPath(path).name for path in _paths_in(criterion)}
+
+
+def _paths_in(criterion: Criterion) -> set[str]:
+    """Return the paths of the files that a criterion's parameters name."""
     given = criterion.parameters
     scripts = given.get("scripts")
     paths = [given.get("path"), given.get("file"), given.get("launch")]
     paths += scripts if isinstance(scripts, list | tuple) else []
-    return {PurePosixPath(path).name for path in paths if isinstance(path, str)}
+    return {path for path in paths if isinstance(path, str)}
 
 
 def needs_package(loaded: LoadedRubric) -> bool:

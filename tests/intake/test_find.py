@@ -178,6 +178,14 @@ def test_an_empty_folder_of_a_package_that_is_needed_may_be_a_submodule(tmp_path
             "no package.xml",
             "makes it, to hold talker.py in week1/; talker.py is not executable: chmod +x it.",
         ),
+        (
+            {"week1/lab.launch": "x", "week1/set.py": "x"},
+            "no package.xml",
+            (
+                "makes it, to hold lab.launch, set.py in week1/; lab.launch belongs in the package's launch/; "
+                "set.py belongs in the package's src/; set.py is not executable"
+            ),
+        ),
         # However much git keeps beside it.
         (
             {**{f".git/objects/{n:03}/x": "" for n in range(300)}, "my/lab/week1/talker.py": "x"},
@@ -203,7 +211,9 @@ def test_an_empty_folder_of_a_package_that_is_needed_may_be_a_submodule(tmp_path
     ],
 )
 def test_what_has_the_labs_files_is_named(files, message, hint, tmp_path):
-    wanted = WantedPackage(name="lab1", files=frozenset({"talker.py", "listener.py"}))
+    wanted = WantedPackage(
+        name="lab1", paths=frozenset({"talker.py", "listener.py", "src/set.py", "lab.launch"})
+    )
     with pytest.raises(PackageNotFound) as caught:
         opened(write(tmp_path / "repo", files), tmp_path, package=wanted)
     assert message in caught.value.message
@@ -224,7 +234,7 @@ def test_what_has_the_labs_files_is_named(files, message, hint, tmp_path):
     ],
 )
 def test_without_any_manifest_the_only_folder_with_the_labs_files_is_taken(files, path, tmp_path):
-    wanted = WantedPackage(name="lab1", files=frozenset({"talker.py", "listener.py"}))
+    wanted = WantedPackage(name="lab1", paths=frozenset({"talker.py", "listener.py"}))
     found = opened(write(tmp_path / "repo", dict.fromkeys(files, "x")), tmp_path, package=wanted)
     assert (found.package.path, found.package.name) == (path, "lab1")
     assert "it was taken for the package lab1 because of the lab's files in it" in found.hints[0]
@@ -245,7 +255,7 @@ def test_without_any_manifest_the_only_folder_with_the_labs_files_is_taken(files
     ],
 )
 def test_no_folder_without_a_manifest_is_taken_where_another_may_be_meant(files, tmp_path):
-    wanted = WantedPackage(name="lab1", files=frozenset({"talker.py", "listener.py"}))
+    wanted = WantedPackage(name="lab1", paths=frozenset({"talker.py", "listener.py"}))
     with pytest.raises(PackageNotFound):
         opened(write(tmp_path / "repo", files), tmp_path, package=wanted)
 
@@ -253,12 +263,12 @@ def test_no_folder_without_a_manifest_is_taken_where_another_may_be_meant(files,
 def test_a_folder_of_another_package_is_not_taken_for_it_either(tmp_path):
     repo = write(tmp_path / "repo", {**tree(".", "other"), "week1/scripts/talker.py": "x"})
     with pytest.raises(PackageNotFound):
-        opened(repo / "week1", tmp_path, package=WantedPackage(name="lab1", files=frozenset({"talker.py"})))
+        opened(repo / "week1", tmp_path, package=WantedPackage(name="lab1", paths=frozenset({"talker.py"})))
 
 
 def test_what_another_copy_has_and_the_graded_one_has_not_is_named(tmp_path):
     files = {**tree("src/lab1", "lab1"), "lab1/scripts/talker.py": "", "src/lab1/scripts/listener.py": ""}
-    wanted = WantedPackage(name="lab1", files=frozenset({"talker.py", "listener.py"}))
+    wanted = WantedPackage(name="lab1", paths=frozenset({"talker.py", "listener.py"}))
     found = opened(write(tmp_path / "repo", files), tmp_path, package=wanted)
     assert found.package.path == "src/lab1"
     assert found.hints[-1] == (
@@ -289,7 +299,7 @@ def test_what_another_copy_has_and_the_graded_one_has_not_is_named(tmp_path):
 )
 def test_what_another_package_has_and_the_lab_s_own_has_not_is_named(beside, told, tmp_path):
     files = {**tree("lab1", "lab1"), **tree("week1", "week1"), "lab1/scripts/listener.py": "", **beside}
-    wanted = WantedPackage(name="lab1", files=frozenset({"talker.py", "listener.py", "lab.launch"}))
+    wanted = WantedPackage(name="lab1", paths=frozenset({"talker.py", "listener.py", "lab.launch"}))
     found = opened(write(tmp_path / "repo", files), tmp_path, package=wanted)
     assert list(found.hints) == told
 
@@ -483,7 +493,7 @@ def test_a_package_that_is_asked_for_is_taken_by_its_own_name(asked, path, tmp_p
     submission = opened(
         write(tmp_path / "repo", files),
         tmp_path,
-        package=WantedPackage(name="lab1", files=FILES, asked=asked),
+        package=WantedPackage(name="lab1", paths=FILES, asked=asked),
     )
     assert (submission.package.path, submission.package.name) == (path, asked)
 
@@ -508,7 +518,7 @@ def test_a_thousand_copies_are_chosen_from_in_no_time(tmp_path):
     copies = {f"c{i:04}/package.xml": manifest("lab1") for i in range(1000)}
     repo = write(tmp_path / "repo", {**copies, "c0030/src/numeric_talker.py": ""})
     begun = time.process_time()
-    submission = opened(repo, tmp_path, package=WantedPackage(name="lab1", files=FILES))
+    submission = opened(repo, tmp_path, package=WantedPackage(name="lab1", paths=FILES))
     assert submission.package.path == "c0030"
     assert len(submission.hints[0]) < 300
     assert time.process_time() - begun < 10
