@@ -156,7 +156,8 @@ def _file_fault(file: str, rubric: WrittenRubric) -> str:
     source = re.search(rf"\b{re.escape(path.stem)}\.(?:cpp|cc|cxx)\b", rubric.handout)
     if path.suffix == ".py" and source and path.name not in rubric.handout:
         return f"the handout has {source[0]}: write the name of its program, {path.stem}"
-    whole = _with_ending(file, rubric)
+    # with talker.cpp in the handout, `talker` is the C++ program beside talker.py
+    whole = "" if source and not path.suffix else _with_ending(file, rubric)
     told = f"the rubric names {whole} elsewhere: write it with its ending" if whole else ""
     return told or _in_other_folder(path, rubric)
 
