@@ -89,7 +89,7 @@ TOGETHER = {
     ),
     "sheffield-com2009-week1": (
         "publisher-not-executable+subscriber-name+manifest-malformed",
-        "chatter-float+subscriber-other-topic+launch-one-name+cmake-no-catkin-package",
+        "chatter-float+subscriber-other-topic+cmake-no-catkin-package",
         "rate-1hz+subscriber-bom",
         "launch-remapped-apart+layout-launch-capital+build-no-setup-py",
         "ok-manifest-format-1+publisher-not-anonymous",

@@ -64,6 +64,7 @@ from grader.checks.support.text import (
     SPIN,
     VALUE_SLOT,
     explain_arguments,
+    refused_options,
     shown,
 )
 from grader.evidence.events import STOPPED
@@ -80,6 +81,8 @@ OTHER_NAMES_SHOWN = 3
 """Names of the same script that are not defined either."""
 MAIN = "`if __name__ == '__main__':`"
 RUN_IT = "run it by itself with rosrun, and read what it prints last"
+BY_ROSCPP = -5
+"""With which roslaunch sees a program end that roscpp ends: SIGTRAP, which not every system's `signal` has."""
 RACES = ("publish() to a closed topic", "topic was closed during publish()")
 PRINTED_ERROR = re.compile(
     r"name '\w+' is not defined|has no attribute|unexpected keyword argument|missing \d+ required|takes \d+ positional"
@@ -177,9 +180,9 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
     printed = [line.line for _, line in run.lines(life.name) if line.line.strip()]
     # A signal of the grader's is no crash.
     if life.end is not None and life.end.signal is not None and life.end.stopped_by is None:
-        said = (known for line in printed for text, known in OF_ROSCPP.items() if text in line)
         ended = f"{signal_name(life.end.signal)} ended it"
-        return Ending(*(argument_not_given(ended, life.start.argv, package) or next(said, (ended, RUN_IT))))
+        lacking = argument_not_given(ended, life.start.argv, package)
+        return Ending(*(lacking or _said_by_roscpp(printed) or (ended, RUN_IT)))
     if (offline := _offline(code, printed)) or code == 0:
         return offline or _not_run(life, run, package) or _ran_to_the_end(printed, package)
     # roslaunch goes on printing after it has said why.
@@ -191,6 +194,18 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
     explained = explain_arguments(last, given)
     words, hint = (f"{words}; {explained[0]}", explained[1]) if explained else (words, RUN_IT)
     return Ending(f"it exited with code {code}{words}", hint)
+
+
+def explain_code(code: int, printed: Sequence[str], *, shown_by_roslaunch: bool) -> tuple[str, str]:
+    """Return why a node died that roslaunch started and that printed no traceback, and what to do."""
+    if code == BY_ROSCPP and (known := _said_by_roscpp(printed)):
+        return f"it died: {known[0]}", known[1]
+    hint = RUN_IT if shown_by_roslaunch else f'write output="screen" in the <node>: {RUN_IT}'
+    return f"it died with exit code {code}{refused_options(printed)}", hint
+
+
+def _said_by_roscpp(printed: Sequence[str]) -> tuple[str, str] | None:
+    return next((known for line in printed for text, known in OF_ROSCPP.items() if text in line), None)
 
 
 def _offline(code: int | None, printed: Sequence[str]) -> Ending | None:

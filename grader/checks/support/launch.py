@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.registry import Check
-from grader.checks.support.exit_causes import RUN_IT, explain_traceback, process_tracebacks, syntax_hint
+from grader.checks.support.exit_causes import explain_code, explain_traceback, process_tracebacks, syntax_hint
 from grader.checks.support.launch_slips import (
     PROGRAMS_OF,
     at_its_lines,
@@ -29,7 +29,7 @@ from grader.checks.support.scripts import (
     programs,
     shebang_obstacles,
 )
-from grader.checks.support.text import INIT, near_names, refused_options, shown
+from grader.checks.support.text import INIT, near_names, shown
 from grader.evidence.run import Run
 from grader.installable import install_hint, known_packages
 from grader.model.launch_file import SUBSTITUTION, LaunchFile, LaunchNode
@@ -488,8 +488,7 @@ def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | Non
         return Absence(why, syntax_hint(fault), of_script=True, citations=(fault.place,))
     if script is not None and code in NOT_EXECUTED and any(shebang_obstacles(script)):
         return not_started(script)
-    hint = RUN_IT if node.output == "screen" else f'write output="screen" in the <node>: {RUN_IT}'
-    why = f"it died with exit code {code}{refused_options(one.line for _, one in run.console)}"
+    why, hint = explain_code(code, console_lines(run), shown_by_roslaunch=node.output == "screen")
     recorder = _recorder_died(package, run, node) if node.pkg == "rosbag" else None
     return recorder or Absence(why, hint, of_script=True)
 
