@@ -26,6 +26,7 @@ class Pair(unittest.TestCase):
 
     def setUp(self):
         self.assertTrue(self.waits(self.answers.get_num_connections), "no node publishes on " + self.topic)
+        time.sleep(0.1)  # its publisher knows of this connection a moment later, and sends nothing before
         del self.heard[:]
 
     def waits(self, condition):
