@@ -6,12 +6,13 @@ import math
 from bisect import bisect
 from collections import Counter
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Annotated, NamedTuple
 
 from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
-from grader.checks.support.clocks import excused, no_clock, run_seconds, why_late
+from grader.checks.support.clocks import NEVER_LATE_S, excused, no_clock, run_seconds, why_late
 from grader.checks.support.conditions import Condition, is_called, true_spans
 from grader.checks.support.fields import (
     Reading,
@@ -38,7 +39,7 @@ from grader.evidence.events import NOT_OFFERED
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Status, Verdict, failed, failed_or_blocked, grade_again, passed
+from grader.model.verdict import Span, Status, Verdict, failed, failed_or_blocked, grade_again, passed
 from grader.wording import join_words, plural, significant
 
 ORDER_S = 0.1
@@ -47,6 +48,9 @@ ORDER_S = 0.1
 TURNED_MIN, TURNED_SHARE = 2, 0.2
 """A node does the opposite if it did so at least so often each way, and was right in no more than this share of its
 messages: what it publishes may be a little older than what it has just heard."""
+STALE_TIMES, STALE_S = 3, 1.0
+"""No busy machine explains what a node publishes if all that it was sent for so long (times `within_s`, and s) calls
+for the opposite."""
 
 
 class ReactsParams(Record):
@@ -124,6 +128,7 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
         or _early(causes, effects, own, run, params)
         or _unanswered(package, run, causes, params)
         or _never_caused(causes, run, params)
+        or _turned_round(answers, causes, effects, params)
         or _judge_unanswered(answers, run, params, instead)
         or passed(f"{plural(len(answers), 'time')}, {params.effect.words} follows {params.trigger.words}")
     )
@@ -249,8 +254,7 @@ def _early(
             message += f"; what changes is {beside}"
             hint = f"set {params.effect.field}, not {beside}"
     elif _is_turned_round(causes, effects, params):
-        message = f"{params.effect.words} comes without {params.trigger.words}, and not with it"
-        hint = "turn the condition around, or swap its two branches"
+        message, hint = _turned_words(params)
     verdict = failed(message, hint=hint, measured=f"{plural(len(too_early), 'message')} too early")
     return _unless_late(verdict, too_early[-1], (causes[0].time_ns, first_ns), run, params)
 
@@ -262,6 +266,39 @@ def _is_turned_round(causes: Sequence[Reading], effects: Sequence[Reading], para
     pairs = Counter((params.trigger.holds(cause), params.effect.holds(effect)) for cause, effect in known)
     right = pairs[True, True] + pairs[False, False]
     return min(pairs[True, False], pairs[False, True]) >= TURNED_MIN and right <= TURNED_SHARE * len(known)
+
+
+def _turned_words(params: ReactsParams) -> tuple[str, str]:
+    message = f"{params.effect.words} comes without {params.trigger.words}, and not with it"
+    return message, "turn the condition around, or swap its two branches"
+
+
+def _turned_round(
+    answers: Sequence[Answer], causes: Sequence[Reading], effects: Sequence[Reading], params: ReactsParams
+) -> Verdict | None:
+    """Return the loss of a node whose effect comes only when the cause is over, which may look like a late answer."""
+    in_time = any(one.after_s is not None and one.after_s <= params.within_s for one in answers)
+    if not answers or in_time or not _is_turned_round(causes, effects, params):
+        return None
+    since: list[int] = []
+    for before, one in pairwise((None, *causes)):
+        assert one is not None  # noqa: S101 - only the first of them is
+        goes_on = before is not None and params.trigger.holds(before) == params.trigger.holds(one)
+        since.append(since[-1] if goes_on else one.time_ns)
+    times = [one.time_ns for one in causes]
+    stale_ns = max(STALE_S, STALE_TIMES * params.within_s - ORDER_S) * 1e9
+    is_sure = any(
+        one.time_ns - since[at - 1] >= stale_ns
+        for one in effects
+        if (at := bisect(times, one.time_ns))
+        and params.effect.holds(one) != params.trigger.holds(causes[at - 1])
+    )
+    message, hint = _turned_words(params)
+    return failed(message, hint=hint).late(_due(answers, params)).if_repeated() if is_sure else None
+
+
+def _due(answers: Sequence[Answer], params: ReactsParams) -> list[Span]:
+    return [(one.at_ns, one.at_ns + round((params.within_s + ORDER_S) * 1e9)) for one in answers]
 
 
 def _between(effects: Sequence[Reading], span: tuple[int, int], run: Run, params: ReactsParams) -> list[int]:
@@ -476,7 +513,7 @@ def _judge_unanswered(
         return None
     reaction, times = f"{params.effect.words} {{}} {params.trigger.words}", plural(len(answers), "time")
     late = max((one.after_s for one in slow if one.after_s is not None), default=None)
-    due = [(one.at_ns, one.at_ns + round((params.within_s + ORDER_S) * 1e9)) for one in slow]
+    due = _due(slow, params)
     if late is None and len(slow) == len(answers):
         seen, hint, *fields = (f"; {instead[0]}", *instead[1:]) if instead else ("", hint)
         verdict = failed(f"{reaction.format('never follows')}, which came {times}{seen}", hint=hint).late(due)
@@ -489,4 +526,6 @@ def _judge_unanswered(
     since = next(number for number, one in enumerate(answers) if one in slow)
     if since and all(one.after_s is None for one in answers[since:]):
         verdict = verdict.stuck()
-    return excused(verdict, run, slow[0].at_ns, run.end_ns, why_late)
+    gross_s = params.within_s + NEVER_LATE_S * run.warp
+    is_gross = len(answers) > 1 and all((one.after_s or 0.0) > gross_s for one in answers)
+    return verdict if is_gross else excused(verdict, run, slow[0].at_ns, run.end_ns, why_late)
