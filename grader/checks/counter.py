@@ -209,8 +209,14 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
         why = f"{flags[0].file}, line {flags[0].line}: {flags[0].message}"
         verdict = verdict.explained(why, f"in {flags[0].file}, {flags[0].fix}", (flags[0].place,))
     for one in stepping(count, run, package) if wrong and verdict.status.is_lost else ():
-        why = f"line {one.line} of {one.file} adds {one.message} to `{one.name}`"
-        hint = f"on line {one.line} of {one.file}, add 1 to `{one.name}`, not {one.message}"
+        adds = (
+            f"makes `{one.name}(…)` go on by {one.message}"
+            if one.fix
+            else f"adds {one.message} to `{one.name}`"
+        )
+        why = f"line {one.line} of {one.file} {adds}"
+        fix = one.fix or f"add 1 to `{one.name}`, not {one.message}"
+        hint = f"on line {one.line} of {one.file}, {fix}"
         verdict = verdict.explained(why, hint, (one.place,))
     at = wrong[0] if wrong else Step(0, 0, 0, count.times_ns[0], count.times_ns[-1], 0, 0)
     measured = f"{plural(right, 'step')} of +1, {len(wrong)} others; {first_values(count.values)}"

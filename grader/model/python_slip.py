@@ -122,7 +122,8 @@ class PythonSlip(Placed, Record):
     - `frames`: two texts that are given next to each other, `message` and `name`, in a script that sends transforms.
     - `start-value`, `added-first`: where a counter, `name`, gets its first number, `message`, and where a loop adds one
       to it before it publishes (`fix`: which lines to move).
-    - `step-number`: where a number, `message`, that is not 1 is added to the variable `name`.
+    - `step-number`: where a number, `message`, that is not 1 is added to the variable `name`, or by `name(…)` each time
+      (`itertools.count`, `range`): then `fix` says what to write.
     - `reset-value`, `reset-limit`: where a counter goes back, to the number `message`, or when it reaches it (`name`:
       `range`, where it is that of a loop).
     - `sets-parameter`: where it sets a parameter.

@@ -129,6 +129,29 @@ def test_the_number_that_is_added_to_a_counter_is_known(tmp_path, line, number):
 
 
 @pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("n = itertools.count(0, 2)", [("2", "write 1 as the second value of `itertools.count(…)`")]),
+        ("n = itertools.count(step=2)", [("2", "write 1 as the `step` of `itertools.count(…)`")]),
+        ("n = count(start=0, step=-1)", [("-1", "write 1 as the `step` of `count(…)`")]),
+        (
+            "for n in range(0, 128, 2):\n    pub.publish(n)",
+            [("2", "write 1 as the third value of `range(…)`")],
+        ),
+        ("n = itertools.cycle(range(0, 128, 5))", [("5", "write 1 as the third value of `range(…)`")]),
+        ("for n in range(0, 128, 2):\n    say(n)", []),
+        ("n = itertools.count(0, 1)", []),
+        ("n = itertools.count(0, STEP)", []),
+        ("n = 'abc'.count('a', 2)", []),
+    ],
+)
+def test_the_step_of_an_endless_count_and_of_a_range_is_known(tmp_path, line, told):
+    (tmp_path / "a.py").write_text(f"{line}\n")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "step-number"]
+    assert [(s.message, s.fix) for s in slips] == told
+
+
+@pytest.mark.parametrize(
     ("body", "fix"),
     [
         ("if n < 127:\n n += 1\nelse:\n n = 0\npub.publish(n)", "move lines 3 to 6 below line 7"),

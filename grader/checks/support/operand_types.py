@@ -102,8 +102,15 @@ def _in_a_chain(message: str, source: str) -> tuple[str, str] | None:
 _EVENT_FIELDS = ("current_real", "current_expected", "last_real", "last_expected", "last_duration")
 
 
-def _of_timer(message: str) -> tuple[str, str] | None:
-    """Of a field that the event of a `rospy.Timer` has not."""
+def _of_timer(message: str, source: str) -> tuple[str, str] | None:
+    """Of a field that the event of a `rospy.Timer` has not, or has not in its first tick."""
+    unset = list(dict.fromkeys(re.findall(r"\b(?:\w+\.)+last_(?:real|expected|duration)\b", source)))
+    if "NoneType" in message and len(unset) == 1:
+        called = re.match(r"'NoneType' object has no attribute '(\w+)'", message)
+        hint = f"above that line, write `if {unset[0]} is None:`, and `return` in it"
+        if called and f"{unset[0]}.{called[1]}" in source:
+            hint = f"write `{unset[0].replace('.last_', '.current_')}`"
+        return f"`{unset[0]}` is None in the timer's first call", hint
     found = re.match(r"'TimerEvent' object has no attribute '(\w+)'", message)
     if found is None:
         return None
@@ -117,7 +124,7 @@ def explain_by_definition(found: Traceback, package: PackageFacts) -> tuple[str,
     source = found.own_frames[-1].source if found.own_frames else ""
     if (
         meaning := _method_in_text(found.message, source)
-        or _of_timer(found.message)
+        or _of_timer(found.message, source)
         or _in_a_chain(found.message, source)
     ):
         return meaning

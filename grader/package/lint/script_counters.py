@@ -69,17 +69,29 @@ def limits_of_ranges(tree):
         if limit is not None and not any(counted in map(dotted, ast.walk(n.left)) for n in remainders):
             yield slip(node.lineno, "reset-limit", "%d" % limit, name="range")
             yield from starts_of_range(node, bounds)
+            yield from step_of_call(node.iter, 2, "third")
     for node in all_of(tree, ast.Call, ast.YieldFrom):  # what `next(…)` goes through, again and again
         around = node.args[:1] if called_name(node) == "cycle" else [getattr(node, "value", None)]
         bounds = around[0].args[:2] if around and called_name(around[0]) == "range" else []
+        yield from step_of_call(around[0], 2, "third") if bounds else ()
         if bounds and whole(bounds[-1]) is not None:
             yield slip(node.lineno, "reset-limit", "%d" % whole(bounds[-1]), name="range")
         for one in starts_of_range(node, bounds):
             yield slip(node.lineno, "reset-value", one["message"])
             yield one
-        is_count = dotted(getattr(node, "func", None)) in ("itertools.count", "count") and node.args
-        if is_count and whole(node.args[0]) is not None:
-            yield slip(node.lineno, "start-value", "%d" % whole(node.args[0]), name="count")
+        if dotted(getattr(node, "func", None)) in ("itertools.count", "count"):
+            yield from step_of_call(node, 1, "second")
+            for start in (one for one in map(signed, argument(node, 0, "start")) if one is not None):
+                yield slip(node.lineno, "start-value", "%d" % start, name="count")
+
+
+def step_of_call(call, place, nth):
+    """Yield by which number `range(0, 128, 2)` or `count(0, 2)` goes on, where that is not 1."""
+    for step in argument(call, place, "step"):
+        what = "%s value" % nth if step in call.args else "`step`"
+        if signed(step) not in (None, 1):
+            fix = "write 1 as the %s of `%s(…)`" % (what, dotted(call.func))
+            yield slip(step.lineno, "step-number", "%d" % signed(step), fix, dotted(call.func))
 
 
 def starts_of_range(node, bounds):
