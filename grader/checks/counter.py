@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import Field
@@ -200,24 +201,7 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
         or passed(f"the counter goes up by one, {plural(right, 'time')}")
     )
     verdict = _of_clock(verdict, count, run, package, params)
-    left_out = slips_of(package, run, count.callerid, "published-in-part")
-    if wrong and any(is_written_as(one.name, params.topic) for one in left_out):
-        verdict = cite_slip(verdict, count, run, package, "published-in-part")
-    verdict = cite_slip(verdict, count, run, package, "no-effect", "set-in-loop")
-    flags = [s for s in slips_of(package, run, count.callerid, "wrong-value") if s.name == "stuck"]
-    if flags and any(step.change == 0 for step in wrong) and verdict.status.is_lost:
-        why = f"{flags[0].file}, line {flags[0].line}: {flags[0].message}"
-        verdict = verdict.explained(why, f"in {flags[0].file}, {flags[0].fix}", (flags[0].place,))
-    for one in stepping(count, run, package) if wrong and verdict.status.is_lost else ():
-        adds = (
-            f"makes `{one.name}(…)` go on by {one.message}"
-            if one.fix
-            else f"adds {one.message} to `{one.name}`"
-        )
-        why = f"line {one.line} of {one.file} {adds}"
-        fix = one.fix or f"add 1 to `{one.name}`, not {one.message}"
-        hint = f"on line {one.line} of {one.file}, {fix}"
-        verdict = verdict.explained(why, hint, (one.place,))
+    verdict = _with_lines(verdict, count, wrong, run, package, topic=params.topic)
     at = wrong[0] if wrong else Step(0, 0, 0, count.times_ns[0], count.times_ns[-1], 0, 0)
     measured = f"{plural(right, 'step')} of +1, {len(wrong)} others; {first_values(count.values)}"
     cited = (cite(run, params.topic, at.from_ns, at.to_ns),)
@@ -353,6 +337,27 @@ def _usual_fault(usual: float) -> str:
     if usual == 0:
         return "stays at one value"
     return f"counts in steps of {significant(usual)}" if usual > 0 else "counts down"
+
+
+def _with_lines(
+    verdict: Verdict, count: Count, wrong: Sequence[Step], run: Run, package: PackageFacts, *, topic: str
+) -> Verdict:
+    """Return the verdict with the lines of the script that make the steps wrong."""
+    left_out = slips_of(package, run, count.callerid, "published-in-part")
+    if wrong and any(is_written_as(one.name, topic) for one in left_out):
+        verdict = cite_slip(verdict, count, run, package, "published-in-part")
+    verdict = cite_slip(verdict, count, run, package, "no-effect", "set-in-loop")
+    flags = [s for s in slips_of(package, run, count.callerid, "wrong-value") if s.name == "stuck"]
+    if flags and any(step.change == 0 for step in wrong) and verdict.status.is_lost:
+        why = f"{flags[0].file}, line {flags[0].line}: {flags[0].message}"
+        verdict = verdict.explained(why, f"in {flags[0].file}, {flags[0].fix}", (flags[0].place,))
+    for one in stepping(count, run, package) if wrong and verdict.status.is_lost else ():
+        adds = f"adds {one.message} to `{one.name}`"
+        adds = f"makes `{one.name}(…)` go on by {one.message}" if one.fix else adds
+        fix = one.fix or f"add 1 to `{one.name}`, not {one.message}"
+        where = f"line {one.line} of {one.file}"
+        verdict = verdict.explained(f"{where} {adds}", f"on {where}, {fix}", (one.place,))
+    return verdict
 
 
 def _too_few(count: Count, steps: int, run: Run, package: PackageFacts, params: StepParams) -> Verdict | None:
