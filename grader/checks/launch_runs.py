@@ -262,7 +262,9 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
     over = f", connected over {params.topic}" if params.topic else ""
     given = join_words(f"{name} {value}" for name, value in params.params.items())
     over += f", with {given}" if given else ""
-    expected = f"{params.launch} brings up {join_words(what) or 'its nodes'} under the file's names{over}"
+    expected = (
+        f"{params.launch} brings up {join_words(what) or 'its nodes'} under the names in the file{over}"
+    )
     file = read_launch(package, params.launch, (*params.scripts, *params.programs))
     if isinstance(file, Verdict):
         # A file that cannot be read is charged by launch-xml, where scripts are asked for.

@@ -227,8 +227,9 @@ def _column(name: str, shallow: str, keys: tuple[Key, ...], missing: list[str]) 
     if beside is None:
         return f"indent {last} by two spaces more than {parent}, below it"
     where = f"line {own.line}" if own else f"the line of {last}"
-    neighbour = f"line {beside.line} ({beside.path.rpartition('/')[2]})"
-    return f"begin {where} with {plural(beside.indent, 'space')}, as {neighbour}, so that {last} is below {parent}"
+    neighbour = f"line {beside.line} (`{beside.path.rpartition('/')[2]}:`)"
+    told = f"begin {where} with {plural(beside.indent, 'space')}, as {neighbour}"
+    return f"{told}, so that `{last}:` is below `{parent}:`"
 
 
 def _in_its_place(found: dict[str, object], name: str, path: str) -> Verdict | None:

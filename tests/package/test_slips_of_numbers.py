@@ -160,6 +160,7 @@ def test_the_step_of_an_endless_count_and_of_a_range_is_known(tmp_path, line, to
         # moved, it would let the reset keep the last number from being published
         ("n = n + 1\npub.publish(n)\nif n >= 127:\n n = 0",
          "below line 6 write `else:`, and move line 3 into it"),
+        ("n += 1\npub.publish(n)\nsay('a')\nsay(n)\nrate.sleep()", "move line 3 below line 6"),
         ("n += 1\npub.publish(n)\nif n == 127:\n n = -1", "set `n` to -1 before the loop, as line 5 does"),
         ("n += 1\npub.publish(n)\nif n == 127:\n say(n)", "move line 3 below line 4"),
     ],

@@ -375,7 +375,8 @@ def _in_namespaces(file: LaunchFile, verdict: Verdict, nodes: Sequence[LaunchNod
     spaces = list(dict.fromkeys(node.namespace.strip("/") for node in nodes if node.namespace != "/"))
     found = [line for n in nodes for line in n.renaming if line.tag not in RENAMES]
     places = {(line.file, line.line) for line in found} or {(n.file or file.path, n.line) for n in nodes}
-    outside = f'write one <node> of each outside of <group ns="{spaces[0]}">'
+    types = join_words(dict.fromkeys(str(node.type or node.name) for node in nodes))
+    outside = f'write one more <node> for each of {types}, outside of <group ns="{spaces[0]}">'
     update = {
         "message": f"{verdict.message}: the launch file puts its nodes in the namespaces {join_words(spaces)}",
         "hint": f"{outside}: in it, {topic.lstrip('/')} becomes /{spaces[0]}{topic}",

@@ -6,6 +6,7 @@ Nothing is executed. Python 3.8, standard library only.
 
 import ast
 import builtins
+import itertools
 
 from script_tree import (
     LOOPS,
@@ -280,12 +281,15 @@ def added_first(body):
 
 
 def added_later(one, name, publishes, after):
-    """Return how to publish first and then add one, or, where an `if` below resets the counter, do that instead."""
+    """Return how to publish first, and log, and then add one, or, where an `if` below resets the counter, do that
+    instead."""
     lines = lines_from(one.lineno, one.end_lineno)
     reset = next((n for n in after if isinstance(n, ast.If) and name in reset_in(n) and not n.orelse), None)
     to = [signed(n.value) for n in all_of(reset, ast.Assign) if dotted(n.targets[0]) == name] if reset else []
     if len(to) != 1 or to[0] is None or isinstance(one, ast.If):
-        return "move %s below line %d" % (lines, publishes.end_lineno)
+        calls = itertools.takewhile(lambda n: isinstance(n, ast.Expr), after)
+        reads = [n for n in calls if any(dotted(part) == name for part in ast.walk(n))]
+        return "move %s below line %d" % (lines, (reads or [publishes])[-1].end_lineno)
     if to[0] < 0:
         return "set `%s` to %d before the loop, as line %d does" % (name, to[0], reset.lineno)
     return "below line %d write `else:`, and move %s into it" % (reset.end_lineno, lines)
