@@ -56,7 +56,9 @@ def file_places(criterion: CriterionResult) -> list[str]:
 
 
 def _cited_files(criterion: CriterionResult) -> list[FileCitation]:
-    return [c for c in criterion.citations[:CITATIONS_MAX] if isinstance(c, FileCitation)]
+    cited = [c for c in criterion.citations[:CITATIONS_MAX] if isinstance(c, FileCitation)]
+    lined = {c.file for c in cited if c.line is not None}
+    return [c for c in cited if c.line is not None or c.file not in lined]
 
 
 def hint_beside(criterion: CriterionResult, place: str) -> str:

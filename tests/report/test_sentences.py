@@ -10,12 +10,13 @@ import pytest
 from lxml import etree
 
 from grader.model.result import AppliedOverride, Automatic, ErrorInfo, GradingResult, HandedIn, Lateness, Note
-from grader.model.verdict import Status
+from grader.model.verdict import FileCitation, Status
 from grader.report.files import result_bytes
 from grader.report.junit import render_junit
 from grader.report.markdown import render_markdown
 from grader.report.sentences import late_words
 from grader.report.terminal import Terminal, open_console
+from grader.report.view import file_places
 from tests.report.hostile import result, rubric
 from tests.support.a_class import criterion
 
@@ -215,3 +216,8 @@ def test_junit_has_it_as_output_of_the_suite():
         "build: had more than 400 processes (over the limit)",
     ]
     assert etree.fromstring(render_junit(result())).find("testsuite/system-out") is None
+
+
+def test_a_file_is_named_with_its_lines_only_where_they_are_known():
+    cited = (FileCitation(file="a.yaml"), FileCitation(file="b.py"), FileCitation(file="a.yaml", line=5))
+    assert file_places(criterion("config", Status.FAIL, 0, 5, citations=cited)) == ["b.py", "a.yaml:5"]
