@@ -28,7 +28,7 @@ from grader.report.view import (
 from grader.rubric.model import Rubric
 from grader.wording import number, plural
 
-LIMIT = 500
+LIMIT = 1000
 TO_FIX, NOT_DECIDED = "To fix", "Not decided yet: no points are lost for good"
 INDENT = 2
 SOURCE_CHARS_MIN = 20
