@@ -304,6 +304,32 @@ def _without_comment_signs(hint: str, found: Mapping[str, tuple[int, int]]) -> s
 CATKIN_PACKAGE_ADDED = re.compile(r"add catkin_package\(\)( below the [^;]*)?")
 
 
+def cite_word_of_call(verdict: Verdict, build: Run) -> Verdict:
+    """Return the verdict; one on a script that a call names and that does not exist, with the line of its name, which
+    is often below the one on which the call begins."""
+    found = WORD_OF_CALL.search(verdict.message) if verdict.status.is_lost else None
+    begin = int(found["line"]) if found else 0
+    of_call = [one for one in verdict.citations if isinstance(one, FileCitation) and one.line == begin]
+    if found is None or not of_call:
+        return verdict
+    written = re.compile(rf"(?<![\w./-]){re.escape(found['path'])}(?![\w./-])")
+    for number, text in enumerate(build.file_lines(of_call[0].file)[begin - 1 : LINES_READ], begin):
+        code = text.partition("#")[0]
+        if written.search(code):
+            place = of_call[0].model_copy(update={"line": number})
+            update = {
+                "message": f"{verdict.message[: found.start('line')]}{number}{verdict.message[found.end('line') :]}",
+                "citations": tuple(place if one is of_call[0] else one for one in verdict.citations),
+            }
+            return verdict.model_copy(update=update)
+        if ")" in code:
+            break
+    return verdict
+
+
+WORD_OF_CALL = re.compile(r"\bline (?P<line>\d+): (?P<path>\S+) is named, but does not exist")
+
+
 def _cite_install(verdict: Verdict, package: PackageFacts, build: Run, called: str) -> Verdict:
     file = next((one.file for one in verdict.citations if isinstance(one, FileCitation)), CMAKE)
     place = commented_call(build.file_lines(file)[:LINES_READ], called)

@@ -50,6 +50,13 @@ _NO_MODULE = re.compile(
 )
 _NO_PARAMETER = re.compile(r"\((?P<file>[\w./-]+), line (?P<line>\d+)\): the parameter '[^']+' is not set")
 _CATCHES = re.compile(r"\s*except\s*(?::|.*\b(?:KeyError|Exception)\b)")
+_PLACE = re.compile(r"\((?P<file>[\w./-]+\.py), line \d+\)")
+_CONNECTS = re.compile(
+    r"""[^#'"]*\b(?:(?:smtplib\.)?SMTP(?:_SSL)?|requests\.(?:get|post|put)|urlopen)\(\s*['"]"""
+    r"(?!(?:https?://)?(?:localhost|127\.))"
+)
+"""A line of Python that connects to a machine that it names."""
+_CATCHES_ANY = re.compile(r"\s*except\b(?!\s*(?:rospy\.)?ROSInterruptException\b)")
 OF_ROS = ("use_sim_time", "rosdistro", "rosversion", "run_id")
 """Parameters that roscore or a run sets."""
 _READS_PARAMETER = re.compile(r"""\bget_param\(\s*(['"])(?P<name>[\w~/]+)\1\s*\)""")
@@ -378,6 +385,20 @@ def _with_next(verdict: Verdict, text: str) -> str:
         return f"{verdict.hint}; then {text}"
     hint = verdict.hint.replace(NOTHING_TO_DO, "For the rest, ", 1)
     return f"{text}. {hint[:1].upper()}{hint[1:]}"
+
+
+def name_connections(verdict: Verdict, facts: Facts) -> Verdict:
+    """Return the verdict; where a node ended at a question, its hint has the lines of its script that need the network
+    next, unless something there catches that."""
+    found, build = _PLACE.search(verdict.message), facts.runs.get(PACKAGE_RUN)
+    if found is None or build is None or "gets no input" not in verdict.message or not verdict.hint:
+        return verdict
+    lines = [line[:LINE_CHARS] for line in build.file_lines(found["file"])[:LINES_READ]]
+    places = [number for number, line in enumerate(lines, 1) if _CONNECTS.match(line)]
+    if not places or any(_CATCHES_ANY.match(line) for line in lines):
+        return verdict
+    told = f"leave out what connects to another machine on {on_lines(places)}, as a graded node is offline"
+    return verdict.model_copy(update={"hint": _with_next(verdict, told)})
 
 
 def name_other_lines(verdict: Verdict, facts: Facts) -> Verdict:

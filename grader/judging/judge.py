@@ -45,6 +45,7 @@ from grader.judging.cited_lines import (
     cite_quoted,
     cite_source,
     cite_unused_argument,
+    cite_word_of_call,
     show_lines,
 )
 from grader.judging.facts import NOT_RUN, Facts, is_other_rate, try_facts, views_of
@@ -54,6 +55,7 @@ from grader.judging.hint_additions import (
     compile_command,
     fill_slots,
     lab_names,
+    name_connections,
     name_other_imports,
     name_other_lines,
     name_other_parameters,
@@ -220,6 +222,7 @@ def _with_cited_lines(verdict: Verdict, criterion: Criterion, facts: Facts, used
     verdict = cite_source(verdict, criterion, facts, build, used.repairs if used else ())
     verdict = cite_unused_argument(verdict, criterion, facts, build)
     verdict = cite_commented_call(verdict, package, build)
+    verdict = cite_word_of_call(verdict, build)
     verdict = cite_find(verdict, criterion, package, build)
     return show_lines(cite_name(verdict, build), build)
 
@@ -338,7 +341,7 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
                 found = _of_the_build(criterion, facts, run, found)
         found = fill_slots(choose_hint_language(found, criterion, facts), criterion, facts.rubric)
         found = name_other_imports(name_other_lines(found, facts), criterion, facts)
-        found = name_other_parameters(found, criterion, facts)
+        found = name_connections(name_other_parameters(found, criterion, facts), facts)
         found = _with_package_name(found, criterion, facts)
         found = name_same_file(name_rospy(found, criterion, facts), criterion, facts)
         return _without_git(found, facts.package)

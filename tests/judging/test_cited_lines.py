@@ -17,6 +17,7 @@ from grader.judging.cited_lines import (
     cite_name,
     cite_source,
     cite_unused_argument,
+    cite_word_of_call,
     lost_fields,
     show_lines,
 )
@@ -459,6 +460,24 @@ def test_a_call_of_catkins_that_is_commented_out_is_named(call: str, cited: bool
     found = cite_commented_call(lost, package, build)
     assert (found.citations == (FileCitation(file="CMakeLists.txt", line=2),)) == cited
     assert ("is commented out on line 2" in found.message) == cited
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("catkin_install_python(PROGRAMS\n  src/b.py scr/a.py\n)\n", 2),
+        ("catkin_install_python(PROGRAMS scr/a.py\n  DESTINATION b)\n", 1),
+        ("catkin_install_python(PROGRAMS\n  # scr/a.py\n  ./scr/a.py.in\n  scr/a.py\n)\n", 4),
+        ("catkin_install_python(PROGRAMS ${S}\n)\n# scr/a.py\n", 1),
+        ("foreach(s a b)\n)\nx(scr/a.py)\n", 1),
+    ],
+)
+def test_a_script_that_a_call_names_is_shown_on_its_own_line(text: str, line: int) -> None:
+    build, _ = commented(text)
+    why = "CMakeLists.txt: line {}: scr/a.py is named, but does not exist; the script is src/a.py"
+    lost = partial(0.5, why.format(1), citations=(FileCitation(file="CMakeLists.txt", line=1),))
+    found = cite_word_of_call(lost, build)
+    assert (found.message, found.citations[0].line) == (why.format(line), line)  # type: ignore[union-attr]
 
 
 MANIFEST_LINES = (

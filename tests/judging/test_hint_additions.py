@@ -17,6 +17,7 @@ from grader.judging.hint_additions import (
     add_advice,
     choose_hint_language,
     fill_slots,
+    name_connections,
     name_other_imports,
     name_other_parameters,
     name_rospy,
@@ -512,3 +513,31 @@ def test_other_imports_from_the_same_wrong_module_are_named(line: str, other: st
         verdict, lab.criteria[0], try_facts(lab, build_runs({"runs": {"package": package}}))
     )
     assert found.hint == f"{verdict.hint}{added}"
+
+
+@pytest.mark.parametrize(
+    ("line", "lines"),
+    [
+        ("    s = smtplib.SMTP('smtp.example.org', 587)", "line 3"),
+        ("page = urlopen('http://example.org')\nrequests.get('https://example.org')", "lines 3 and 4"),
+        ("s = smtplib.SMTP('localhost', 25)", ""),
+        ("requests.get('http://127.0.0.1:8080/')", ""),
+        ("# s = smtplib.SMTP('smtp.example.org', 587)", ""),
+        ("requests.get(url)", ""),
+        ("try:\n    urlopen('http://example.org')\nexcept OSError:\n    pass", ""),
+        ("try:\n    urlopen('http://example.org')\nexcept rospy.ROSInterruptException:\n    pass", "line 4"),
+    ],
+)
+def test_what_needs_the_network_behind_a_question_is_named(line: str, lines: str) -> None:
+    lab = rubric(RATE, scenarios={"talker": SCENARIO})
+    package = {
+        "package": {"files": [SCRIPT]}, "attachments": {SCRIPT["path"]: f"#!\nname = input()\n{line}\n"},
+    }  # fmt: skip
+    facts = try_facts(lab, build_runs({"runs": {"package": package}}))
+    why = (
+        f"EOFError: EOF when reading a line ({SCRIPT['path']}, line 2): it waits for input, and a graded node"
+    )
+    verdict = failed(f"it ended: {why} gets no input", hint="write a value")
+    told = f"; then leave out what connects to another machine on {lines}, as a graded node is offline"
+    assert name_connections(verdict, facts).hint == f"write a value{told if lines else ''}"
+    assert name_connections(failed(f"it ended: {why}", hint="write a value"), facts).hint == "write a value"

@@ -357,7 +357,7 @@ def _replace_stray(files: Files, own: Sequence[str], path: str) -> bool:
             same = re.sub(r"[\\/]", "", given) == path.replace("/", "")
             if given not in own and (same or _is_about(PurePosixPath(given).name, name)):
                 why = f"{token.value} does not exist; the script is {path}"
-                change_word(files, token, path, why, f"write {path} instead of {token.value}", call=call)
+                change_word(files, token, path, why, f"write {path} instead of {token.value}")
                 return True
     return False
 
