@@ -21,7 +21,7 @@ from grader.intake.loose_files import loose_files
 from grader.intake.names import LONGEST_PACKAGE_NAME, brief, encodable, is_archive_name, listing, printable
 from grader.intake.tree import Folder, is_file, is_there, read_file, walk
 from grader.model.package import BUILD_SPACES, CMAKE, MANIFEST, meant_manifest
-from grader.wording import is_one_edit, name_package
+from grader.wording import is_one_edit, join_words, name_package
 
 COPIES_LOOKED_AT, FOLDERS_OF_A_COPY = 50, 300
 USUAL_FOLDERS = frozenset({"src", "scripts", "nodes", "launch"})
@@ -210,24 +210,36 @@ def _left_behind(chosen: Candidate, others: list[Candidate], wanted: WantedPacka
 
 
 def _in_another_package(chosen: Candidate, others: list[Candidate], wanted: WantedPackage) -> Iterator[str]:
-    """Yield where other packages have the lab's files that the one which is graded lacks; each begins with its name."""
+    """Yield where other packages have the lab's files that the one which is graded lacks; each begins with its name.
+    They are copied: those packages name them too, and would not build without them."""
     own = _files_of(chosen.folder, wanted.files)
     missing = wanted.files - own
     for other in others if missing else ():
         places = _places_of(other.folder, missing)
-        called = f'"{other.name}"'.encode()
         for name, path in sorted(places.items()):
             there = f"{printable(other.path)}/{printable(path)}, in another package"
-            fix = f"move it to {printable(chosen.path)}/{printable(path)}"
-            if name.endswith(".launch") and called in (
-                read_untrusted(other.folder / path, _LARGEST_BYTES) or b""
-            ):
-                fix += f', with pkg="{printable(chosen.name)}" in it'
+            fix = f"copy it to {printable(chosen.path)}/{printable(path)}"
+            if name.endswith(".launch"):
+                fix += _launch_changes(other, path, chosen, wanted)
             fix += (
                 "" if own else f", or grade {printable(other.path)} with --package {shlex.quote(other.name)}"
             )
             yield f"{printable(name)} is at {there}: {fix}"
         missing -= places.keys()
+
+
+def _launch_changes(other: Candidate, path: str, chosen: Candidate, wanted: WantedPackage) -> str:
+    """Return what to change in a launch file of another package: whose nodes it starts, and which are not there."""
+    text = read_untrusted(other.folder / path, _LARGEST_BYTES) or b""
+    if f'"{other.name}"'.encode() not in text:
+        return ""
+    scripts = frozenset(name.decode("utf-8", "replace") for name in _SCRIPT_STARTED.findall(text))
+    lacking = sorted(scripts - wanted.files - _files_of(chosen.folder, scripts))
+    without = f" and without its <node> of {join_words(map(printable, lacking))}" if lacking else ""
+    return f', with pkg="{printable(chosen.name)}" in it{without}'
+
+
+_SCRIPT_STARTED = re.compile(rb"""\btype\s*=\s*["']([\w.-]+\.py)["']""")
 
 
 def _files_of(folder: Path, names: frozenset[str], *, near: bool = False) -> frozenset[str]:

@@ -282,15 +282,27 @@ def test_what_another_copy_has_and_the_graded_one_has_not_is_named(tmp_path):
         (
             {"week1/scripts/talker.py": ""},
             [
-                "talker.py is at week1/scripts/talker.py, in another package: move it to lab1/scripts/talker.py"
+                "talker.py is at week1/scripts/talker.py, in another package: copy it to lab1/scripts/talker.py"
             ],
         ),
         (
             {"week1/launch/lab.launch": '<node pkg="week1"/>', "lab1/scripts/talker.py": ""},
             [
                 (
-                    "lab.launch is at week1/launch/lab.launch, in another package: move it to lab1/launch/lab.launch, "
+                    "lab.launch is at week1/launch/lab.launch, in another package: copy it to lab1/launch/lab.launch, "
                     'with pkg="lab1" in it'
+                )
+            ],
+        ),
+        (
+            {
+                "week1/launch/lab.launch": '<node pkg="week1" type="talker.py"/><node type="b.py"/><node type="a.py"/>',
+                **dict.fromkeys(("lab1/scripts/talker.py", "lab1/src/b.py", "week1/src/a.py"), ""),
+            },
+            [
+                (
+                    "lab.launch is at week1/launch/lab.launch, in another package: copy it to lab1/launch/lab.launch, "
+                    'with pkg="lab1" in it and without its <node> of a.py'
                 )
             ],
         ),
