@@ -466,7 +466,8 @@ class StepRunner:
         text, fits = None, True
         try:
             text = self._arena.place.type_text(call.type, "srv")
-            differs = other_fields(call.type, text, call.definition) if text and call.definition else ""
+            wanted = call.definition if text is not None else None
+            differs = other_fields(call.type, text or "", wanted) if wanted else ""
             if differs:
                 self._refuse(call, text, differs, fits=False)
                 return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from pathlib import PurePosixPath
@@ -157,13 +158,7 @@ def _not_there(package: PackageFacts, params: DefinitionParams) -> _Fault:
     wanted = PurePosixPath(params.file)
     near = closest(wanted.name, [PurePosixPath(one.path).name for one in package.interfaces], cutoff=0.7)
     other = next((one.path for one in package.interfaces if PurePosixPath(one.path).name == near), "")
-    asked = {(one.part, one.type, one.name) for one in params.wanted()}
-    same = [
-        one.path
-        for one in package.interfaces
-        if one.path.endswith(wanted.suffix) and {(f.part, f.type, f.name) for f in one.fields} == asked
-    ]
-    other = other or (same[0] if len(same) == 1 and asked else "")
+    other = other or _of_same_fields(package, params)
     seen = f"; there is {shown(other)}" if other else ""
     hint = (
         f"rename it to {params.file}"
@@ -173,9 +168,31 @@ def _not_there(package: PackageFacts, params: DefinitionParams) -> _Fault:
     return _Fault(f"there is no {params.file}{seen}", None, hint)
 
 
+def _of_same_fields(package: PackageFacts, params: DefinitionParams) -> str:
+    """Return the only other file of this kind whose fields are the handout's; "" where there is none, or several."""
+    asked = {(one.part, one.type, one.name) for one in params.wanted()}
+    alike = [one for one in package.interfaces if one.path.endswith(PurePosixPath(params.file).suffix)]
+    same = [one.path for one in alike if {(f.part, f.type, f.name) for f in one.fields} == asked]
+    return same[0] if len(same) == 1 and asked else ""
+
+
+def _empty(package: PackageFacts, params: DefinitionParams) -> _Fault:
+    """Of a file without a field: the handout's may be written in another place."""
+    if other := _of_same_fields(package, params):
+        fix = f"git mv -f {shlex.quote(other)} {shlex.quote(params.file)}"
+        return _Fault(f"it has no field: they are in {shown(other)}", None, fix)
+    kinds = PARTS[PurePosixPath(params.file).suffix]
+    parts = ([f"`{f.type} {f.name}{_value(f)}`" for f in params.wanted() if f.part == part] for part in kinds)
+    lines = [line for part in parts for line in ("`---`", *part)][1:]
+    return _Fault("it has no field", None, f"write into it, each on a line of its own: {join_words(lines)}")
+
+
 def _faults(
     found: Interface, wanted: list[InterfaceField], package: PackageFacts, params: DefinitionParams
 ) -> Iterator[_Fault]:
+    if found.fault is not None and found.fault.kind == "OtherParts" and not found.fields:
+        yield _empty(package, params)
+        return
     if found.fault is not None:
         yield _unreadable(found, found.fault, wanted)
         return

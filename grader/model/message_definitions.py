@@ -10,7 +10,7 @@ from pathlib import PurePosixPath
 
 from grader.model.file_fault import Fault
 from grader.model.package import Interface, InterfaceField
-from grader.wording import is_one_edit
+from grader.wording import is_one_edit, plural
 
 FIELDS_MAX = 500
 PARTS = {".msg": ("",), ".srv": ("request", "response"), ".action": ("goal", "result", "feedback")}
@@ -290,8 +290,8 @@ def other_fields(type_: str, found: str, wanted: str) -> str:
         for text in (found, wanted)
     )
     if len(there) != len(asked):
-        lines = "no line" if len(there) == 1 else f"{len(there) - 1} lines"
-        return f"it has {lines} `---` between its parts, not {len(asked) - 1}"
+        much = "no line `---`" if len(there) == 1 else f"{plural(len(there) - 1, 'line')} `---`"
+        return f"it has {much} between its parts" + (f", not {len(asked) - 1}" if len(there) > 1 else "")
     names = ("its request", "its response") if len(asked) > 1 else ("it",)
     for name, own, other in zip(names, there, asked, strict=False):
         if own != other:

@@ -211,9 +211,10 @@ def resolve(text: str) -> tuple[str, str, str]:
     if not program.startswith("/"):
         return posixpath.basename(program), "", f"`{program}` is not an absolute path"
     place = f"/{posixpath.normpath(program).lstrip('/')}"  # `//usr//bin/env` is no other file
-    if place not in _ENV:
-        return posixpath.basename(program), place, ""
-    return _behind_env(rest[0] if rest else "")
+    behind = _behind_env(rest[0] if rest else "") if place in _ENV else (posixpath.basename(place), place, "")
+    if program.endswith("/"):
+        return behind[0], "", f"`{program}` ends with a slash, as only a folder does"
+    return behind
 
 
 def _behind_env(argument: str) -> tuple[str, str, str]:

@@ -34,6 +34,7 @@ from grader.rubric.scenario import Call
             ["", f"{MISFIT}its request has int64 b, int64 a; the"],
         ),
         ("int64 a\nint64 b\n---\nint32 sum", "lab1/Add", ["", f"{MISFIT}its response has int32 sum; the"]),
+        ("# for the sum of int64 a\n", "lab1/Add", ["", f"{MISFIT}it has no line `---`"]),
     ],
     ids=[
         "other-fields",
@@ -43,6 +44,7 @@ from grader.rubric.scenario import Call
         "other-types",
         "other-order",
         "other-response",
+        "no-field",
     ],
 )
 def test_whose_definition_it_is_that_does_not_fit(

@@ -53,6 +53,8 @@ def test_usable_shebangs_of_python(text, interpreter):
         (b"#!", "", "nothing follows"),
         (b"#!python\n", "python", "not an absolute path"),
         (b"#!usr/bin/env python\n", "env", "not an absolute path"),
+        (b"#!/usr/bin/env/ python\n", "python", "`/usr/bin/env/` ends with a slash"),
+        (b"#!/usr/bin/python3/\n", "python3", "ends with a slash"),
     ],
 )
 @pytest.mark.usefixtures("none_found")

@@ -201,6 +201,10 @@ def _undivided(package: PackageFacts, kind: str, one: Exchange) -> Verdict | Non
     own = next((i for i in package.interfaces if f"/{i.path}".endswith(name)), None)
     if own is None or own.fault is None or own.fault.kind != "OtherParts":
         return None
+    if not own.fields:
+        fix = "write the handout's fields into it, with a line `---` between the request's and the response's"
+        cited = (FileCitation(file=own.path, line=None),)
+        return failed(f"{own.path} has no field", hint=fix, citations=cited)
     lines = [field.line for field in own.fields if field.name in one.request]
     below = f"below line {max(lines)}" if lines else "between the request's fields and the response's"
     place = FileCitation(file=own.path, line=max(lines, default=None))
