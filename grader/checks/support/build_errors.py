@@ -277,6 +277,8 @@ def _misplaced(call: str, package: PackageFacts, ending: str) -> Explained | Non
             fix = f"name {name} in {other}(…)" if mixed else f"write {other} instead of {call}"
             return Explained(f"{call}(…) names {name}, which is for {other}(…)", fix)
     there = [f.path for f in package.files if f.path.endswith(ending) and posixpath.dirname(f.path) != folder]
+    meant = {posixpath.basename(word) for word in named}
+    there.sort(key=lambda path: (posixpath.basename(path) not in meant, path.count("/")))
     if there:
         why = f"{call}(…) looks for {posixpath.basename(there[0])} in {folder}/, and it is {there[0]}"
         return Explained(why, f"make the folder {folder}/, if there is none, and move {there[0]} into it")

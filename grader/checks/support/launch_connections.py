@@ -271,10 +271,10 @@ def _connected(run: Run, topic: str) -> set[str]:
 
 def over_another_topic(run: Run, topic: str, said: str = "") -> Verdict:
     """Return why nodes that are there are not connected: other topics, other types, or an end that is missing."""
-    if others := _connected(run, topic):
+    publishers, subscribers = nodes_on(run, topic, "publishers"), nodes_on(run, topic, "subscribers")
+    if (others := _connected(run, topic)) and not (publishers and subscribers):
         message = f"the nodes are connected over {join_words(sorted(others))}, not over {topic}"
         return failed(message + said, hint=f"both have to use {topic}; look for a <remap> or a namespace")
-    publishers, subscribers = nodes_on(run, topic, "publishers"), nodes_on(run, topic, "subscribers")
     if publishers and subscribers:
         message = (
             f"{join_words(publishers)} and {join_words(subscribers)} are both on {topic}, but not connected"
@@ -299,7 +299,10 @@ def blame_renaming(
     topic: str,
     verdict: Verdict,
 ) -> Verdict | None:
-    """Return the verdict with the lines of the launch file that give the topic another name; None where none do."""
+    """Return the verdict with the lines of the launch file that give the topic another name; None where none do, or
+    where both ends have the right one."""
+    if all(nodes_on(run, topic, end) for end in ENDS):
+        return None
     renaming = find_renaming(package, nodes, topic, run, main=file.path) or _idle_remaps(run, nodes, topic)
     if renaming is None:
         return None

@@ -79,10 +79,13 @@ def is_product(path: str) -> bool:
 
 
 def path_in_package(package: PackageFacts, file: str) -> str | None:
-    """Return the longest of the package's paths with which an absolute path ends; None where there is none, or where it
-    lies in another of the lab's packages."""
+    """Return the longest of the package's paths with which a path ends; None where there is none, or where it lies in
+    another of the lab's packages. What stands behind the package's own name counts first: a folder may have it too."""
     if any(f"/{other.name}/" in file for other in package.also):
         return None
+    behind = f"/{file}".partition(f"/{package.name}/")[2]
+    if behind and any(f.path == behind for f in package.files):
+        return behind
     return max((f.path for f in package.files if f"/{file}".endswith(f"/{f.path}")), key=len, default=None)
 
 
