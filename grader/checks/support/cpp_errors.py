@@ -527,6 +527,10 @@ CPP_ERRORS: tuple[tuple[str, Explain], ...] = (
     ),
     (r"'(\w+)' (?:has not been declared|is not a class, namespace, or enumeration)", other_namespace),
     (
+        r"<lambda.* of 'constexpr' variable '([^']+)' is not literal",
+        plainly("{1} is a lambda, which before C++17 is no constant", "on that line, remove `constexpr`"),
+    ),
+    (
         r"base operand of '->' has non-pointer type",
         plainly("`->` is for pointers, and this is none", "on that line, write a dot in place of `->`"),
     ),
