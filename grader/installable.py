@@ -123,7 +123,7 @@ TUTORIALS = frozenset({"beginner_tutorials", "learning_joy", "my_package", "pack
 PYTHON_2 = {
     "ConfigParser": "configparser", "Queue": "queue", "SocketServer": "socketserver", "StringIO": "io",
     "Tkinter": "tkinter", "cPickle": "pickle", "commands": "subprocess", "httplib": "http.client",
-    "thread": "threading", "tkMessageBox": "tkinter.messagebox", "urllib2": "urllib.request",
+    "thread": "_thread", "tkMessageBox": "tkinter.messagebox", "urllib2": "urllib.request",
     "urlparse": "urllib.parse",
 }  # fmt: skip
 """Modules of Python 2 by their names, and what they are called in Python 3."""

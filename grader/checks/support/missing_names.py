@@ -314,7 +314,7 @@ def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | 
             f"write {inner[1]} instead of {inner[1]}.py",
         )
     asked, wanted = NO_MODULE.search(message), _FROM_PACKAGE.search(message)
-    if asked and (known := _module_of_others(asked[1], package)):
+    if asked and (known := _module_of_others(asked[1], package, found.innermost.source)):
         return known
     meant = unimported_module(found, package)
     near = near_names(asked[1], noetic_messages()) if asked and asked[1] not in known_packages() else ()
@@ -328,15 +328,17 @@ def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | 
     return (f"did you mean {meant}?", f"write {meant} instead of {asked[1]}") if asked and meant else None
 
 
-def _module_of_others(name: str, package: PackageFacts) -> tuple[str, str] | None:
+def _module_of_others(name: str, package: PackageFacts, source: str) -> tuple[str, str] | None:
     """Return the cause and the hint for a module of ROS 2, of Windows, of Python 2, of a tutorial's package, or for a
-    folder."""
+    folder. `source` is the line of the import: what it names so, the lines below it use."""
     if name in ROS_2:
         return f"{name} is from ROS 2", "this lab is for ROS 1: write the node with rospy"
     if name in WINDOWS:
         return f"{name} is only on Windows", f"write the script without {name}"
     if name in PYTHON_2:
-        return f"{name} is a Python 2 module", f"write {PYTHON_2[name]} instead of {name}"
+        bare = re.search(rf"^\s*import\b.*\b{name}\b(?!\s+as\b)", source)
+        right = f"`{PYTHON_2[name]} as {name}`" if bare else PYTHON_2[name]
+        return f"{name} is a Python 2 module", f"write {right} instead of {name}"
     if name in TUTORIALS - {package.name}:
         fix = f"write your package's name instead of {name}, or leave the line out"
         return "tutorials use that name for the reader's own package", fix
