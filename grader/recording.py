@@ -204,6 +204,8 @@ def record_other_runs(
         about = {REPAIRS: copies.dump_repairs(repairs)}
         with make_recorder(of_copy, only=scenarios, about=about) as again:
             again.record_all(lambda: None)
-            judge_recorded(again, job.evidence, job.rubric)
+            _, on_copy = judge_recorded(again, job.evidence, job.rubric)
+            if on_copy.doubtful_on_copy:
+                again.repeat(sorted(on_copy.doubtful_on_copy), job.evidence / copies.REPAIRED_AGAIN)
         recorder.recording.add(again.recording)
     return True

@@ -66,6 +66,7 @@ from grader.judging.hint_additions import (
 )
 from grader.judging.later_faults import add_later_faults
 from grader.judging.repeats_and_repairs import (
+    SplitRuns,
     apply_repaired_copy,
     drop_unrepeated_losses,
     launched_in,
@@ -109,6 +110,8 @@ class Judgement(NamedTuple):
     """The scenarios whose losses one run's timing could have made."""
     undecided: frozenset[str]
     """The scenarios that left a criterion inconclusive, for no lack of the machine's."""
+    doubtful_on_copy: frozenset[str] = frozenset()
+    """Of the repaired copy: the scenarios whose losses its one run's timing could have made."""
 
 
 def judge_all_runs(
@@ -118,7 +121,8 @@ def judge_all_runs(
     handed_out: Collection[str] = (),
 ) -> Judgement:
     """Judge the first runs, then what repeated runs and a repaired copy say besides."""
-    first, repeated, repaired = split_runs(runs)
+    split = split_runs(runs)
+    first, repeated, doubtful_on_copy = split.first, split.repeated, frozenset[str]()
     facts = _facts_as_recorded(rubric, runs, first)
     rubric = facts.rubric
     verdicts = judge_facts(rubric, facts, checks)
@@ -126,8 +130,14 @@ def judge_all_runs(
     if repeated:
         again = judge_facts(rubric, try_facts(rubric, {**first, **repeated}), checks)
         verdicts = drop_unrepeated_losses(rubric, verdicts, again, repeated.keys())
-    if repaired:
-        verdicts, uses = _with_repaired_copy(facts, checks, verdicts, first, repaired)
+    if split.repaired:
+        of_copy = try_facts(rubric, {**first, **split.repaired})
+        on_copy = judge_facts(rubric, of_copy, checks)
+        doubtful_on_copy = _doubtful_on_copy(rubric, verdicts, on_copy)
+        if later := split.repaired_again:
+            again = judge_facts(rubric, try_facts(rubric, {**first, **split.repaired, **later}), checks)
+            on_copy = drop_unrepeated_losses(rubric, on_copy, again, later.keys())
+        verdicts, uses = _with_repaired_copy(facts, of_copy, verdicts, on_copy, split)
     else:
         verdicts, uses = add_later_faults(charge_once(rubric, verdicts), rubric, facts), {}
     shown = {
@@ -152,7 +162,21 @@ def judge_all_runs(
     if package is not None:
         named = (name_unchanged_files(result, rubric, package, handed_out) for result in results)
         results = add_advice([with_own_name(one, rubric, package) for one in named], package, rubric)
-    return Judgement(leave_out(rubric, results), doubtful, _undecided(rubric, shown))
+    undecided = _undecided(rubric, shown)
+    return Judgement(leave_out(rubric, results), doubtful, undecided, doubtful_on_copy)
+
+
+def _doubtful_on_copy(
+    rubric: Rubric, verdicts: Mapping[str, Verdict], on_copy: Mapping[str, Verdict]
+) -> frozenset[str]:
+    """Return the scenarios whose losses one run of the copy could have made; what the first run lost in this way too
+    has been seen twice."""
+
+    def may_be_late(verdict: Verdict) -> bool:
+        return verdict.basis.timing and verdict.status is not Status.BLOCKED
+
+    names = (c for c in rubric.criteria if may_be_late(on_copy[c.id]) and not may_be_late(verdicts[c.id]))
+    return frozenset(c.scenario for c in names if c.scenario)
 
 
 def _undecided(rubric: Rubric, verdicts: Mapping[str, Verdict]) -> frozenset[str]:
@@ -172,15 +196,14 @@ def _undecided(rubric: Rubric, verdicts: Mapping[str, Verdict]) -> frozenset[str
 
 def _with_repaired_copy(
     facts: Facts,
-    checks: Mapping[str, Check],
+    of_copy: Facts,
     verdicts: Mapping[str, Verdict],
-    first: Mapping[str, Run],
-    repaired: Mapping[str, Run],
+    on_copy: Mapping[str, Verdict],
+    runs: SplitRuns,
 ) -> tuple[dict[str, Verdict], dict[str, Repaired]]:
     """Return the verdicts with what the runs of a repaired copy say besides, and the repairs that criteria rest on."""
-    rubric = facts.rubric
-    of_copy = try_facts(rubric, {**first, **repaired})
-    on_copy, repairs = judge_facts(rubric, of_copy, checks), repairs_of(rubric, repaired)
+    rubric, first, repaired = facts.rubric, runs.first, runs.repaired
+    repairs = repairs_of(rubric, repaired)
     # a build that goes on as far as what the machine lacks shows what the repaired line kept from being made
     shows = was_built(repaired) or any(
         v.basis.of_machine and verdicts[i].status.is_lost for i, v in on_copy.items()

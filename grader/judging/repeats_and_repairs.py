@@ -16,6 +16,7 @@ import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import PurePosixPath
 from types import MappingProxyType
+from typing import NamedTuple
 
 from pydantic import ValidationError
 
@@ -47,14 +48,26 @@ INSTALLING = re.compile(r"\bcatkin_install_python\b|\bPROGRAMS\b")
 Runs = dict[str, Run]
 
 
-def split_runs(runs: Mapping[str, Run]) -> tuple[Runs, Runs, Runs]:
-    """Return the first runs, the repeated ones and those of the repaired copy, each by scenario."""
-    first, repeated, repaired = Runs(), Runs(), Runs()
+class SplitRuns(NamedTuple):
+    """Runs by their scenarios."""
+
+    first: Runs
+    repeated: Runs
+    repaired: Runs
+    """Those of the repaired copy."""
+    repaired_again: Runs
+    """What is repeated of these."""
+
+
+def split_runs(runs: Mapping[str, Run]) -> SplitRuns:
+    """Return the first runs, the repeated ones, those of the repaired copy and what is repeated of these."""
+    split = SplitRuns({}, {}, {}, {})
     for name, run in runs.items():
         folder, _, scenario = name.rpartition("/")
-        found = repaired if folder.startswith("repaired") else repeated if folder else first
+        again = split.repaired_again if folder == "repaired-2" else split.repeated if folder else split.first
+        found = split.repaired if folder == "repaired-1" else again
         found[scenario] = run
-    return first, repeated, repaired
+    return split
 
 
 def drop_unrepeated_losses(

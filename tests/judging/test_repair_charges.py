@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from grader.judging import judge
+from grader.judging.judge import judge_all_runs
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation
@@ -77,6 +78,19 @@ def test_one_fault_is_charged_once_and_the_rest_earns_its_share() -> None:
         "judged on a copy with src/numeric_talker.py line 7 repaired: half of the points; "
     )
     assert found["executable"].repaired is None
+
+
+def test_what_one_run_of_the_copy_lost_and_the_next_one_did_not_costs_nothing() -> None:
+    late = {**GOOD_RUN, "topics": [], "graph": []}
+    first, on_time, slow = (
+        build_runs({"runs": {"talker": run}, "package": PACKAGE}) for run in (DIED, GOOD_RUN, late)
+    )
+    runs = first | on_copy(slow, TABS)
+    assert judge_all_runs(rubric(*ALL), runs).doubtful_on_copy == {"talker"}
+    assert not judge_all_runs(rubric(*ALL), first | on_copy(on_time, TABS)).doubtful_on_copy
+    for again, points in ((on_time, 5), (slow, 0)):
+        found = {c.id: c for c in judge(rubric(*ALL), {**runs, "repaired-2/talker": again["talker"]})}
+        assert [found[name].points for name in ("rate", "chatter", "node")] == [points, points, 0]
 
 
 @pytest.mark.parametrize("repair", [TABS, TOPIC])

@@ -58,8 +58,9 @@ def figures_of(rubric: Rubric, runs: Mapping[str, Run], criteria: Sequence[Crite
     scenario without nodes and one in which nothing was printed are not in it.
     """
     rubric = with_recorded_values(rubric, runs)
-    first, _, repaired = split_runs(runs)  # the runs of a repaired copy stand in the place of the first ones
-    facts, on_copy = (_try_make(try_facts, rubric, found) for found in (first, {**first, **repaired}))
+    split = split_runs(runs)  # the runs of a repaired copy stand in the place of the first ones
+    found = (split.first, {**split.first, **split.repaired})
+    facts, on_copy = (_try_make(try_facts, rubric, one) for one in found)
     known = facts.runs if facts else runs
     shown = {
         name: run for name, run in islice(known.items(), RUNS_MAX) if name in {*rubric.scenarios, PACKAGE_RUN}
