@@ -488,6 +488,10 @@ def test_a_message_with_the_name_of_its_class(text: str, fixes: list[str], tmp_p
         ("from json import rate\nrate = 10\nprint(rate)\n", ["unused-import"]),
         ("from nosuch import *\n", ["lacking-import"]),
         ("from . import nosuch\nimport os\n", []),
+        ("import rospy, nosuch, json, nosuch2\nrospy.spin(nosuch)\n", ["lacking-import", "lacking-import"]),
+        ("import os, nosuch as n\n", ["unused-import", "lacking-import"]),
+        ("import json, math\n", ["unused-import"]),
+        ("import json, math\nprint(math.pi)\n", []),
         ("try:\n    import nosuch\nexcept ImportError:\n    pass\n", []),
     ],
 )

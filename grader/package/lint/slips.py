@@ -320,12 +320,15 @@ def imports(tree):
     found = [n for n in all_of(tree, ast.Import, ast.ImportFrom) if id(n) not in tried]
     in_texts = reads_names_in_texts(tree)
     for node in found[:IMPORTS_LIMIT]:
-        listed = [alias.name for alias in node.names]
-        modules = listed if isinstance(node, ast.Import) else [node.module or ""]
-        module = modules[0].partition(".")[0]
         bound = [alias.asname or alias.name.partition(".")[0] for alias in node.names]
-        if len(modules) > 1 or getattr(node, "level", 0) or module in clocks.PLAIN_MODULES - {"numpy"}:
+        if isinstance(node, ast.Import):
+            asked = [(one.name.partition(".")[0], one.name, bound[i]) for i, one in enumerate(node.names)]
+        else:
+            asked = [((node.module or "").partition(".")[0], node.module or "", bound[0])]
+        asked = [one for one in asked if one[0] not in clocks.PLAIN_MODULES - {"numpy"}]
+        if not asked or getattr(node, "level", 0):
             continue
+        lacking = [one for one in asked if not is_there(one[0])]
         if not used.intersection(bound) and bound != ["*"] and "__all__" not in used and not in_texts:
             why = (
                 "the script gives `%s` a value of its own"
@@ -333,10 +336,9 @@ def imports(tree):
                 else "nothing in the script uses `%s`"
             )
             fix = "delete line %d: %s" % (node.lineno, why % "`, `".join(bound))
-            yield slip(node.lineno, "unused-import", module, fix, bound[0])
-        if not is_there(module):
-            whole = modules[0] if modules[0] != module else ""
-            yield slip(node.lineno, "lacking-import", module, whole, bound[0])
+            yield slip(node.lineno, "unused-import", (lacking or asked)[0][0], fix, bound[0])
+        for module, whole, name in lacking[:IMPORTS_LIMIT]:
+            yield slip(node.lineno, "lacking-import", module, whole if whole != module else "", name)
 
 
 def is_there(module):
