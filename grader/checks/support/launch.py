@@ -81,8 +81,9 @@ _REFUSALS = (
     (NO_FILE, "the file {0} that <rosparam> loads does not exist", "write $(find <package>)/config/{0}, and push it"),
     (NO_PACKAGE, "there is no package {0}",
      "$(find …) and pkg need a package's exact name, and a package of your own is handed in too"),
-    (_UNSET.pattern, 'its <arg name="{0}"> has no default',
-     'write <arg name="{0}" default="…"/>'),
+    (r"included file \[([^\[\]\n]+)\] requires the '(\w+)' arg to be set", "the <include> of {0} gives it no {1}",
+     'in the <include> of {0}, write <arg name="{1}" value="…"/>, with its value in place of …'),
+    (_UNSET.pattern, 'its <arg name="{0}"> has no default', 'write <arg name="{0}" default="…"/>'),
     (r"'ns' attribute must be set in order to use 'clear_params'", "clear_params needs an ns beside it",
      "remove clear_params from the tag"),
     (r"Dollar signs '\$' cannot be inside of substitution args", "a $(…) stands in another one",
@@ -101,8 +102,7 @@ _REFUSALS = (
      "write $(arg {1})"),
     (r"Unknown substitution command \[((?!find)[\w-]+)\]", "roslaunch does not know $({0})",
      'write $(arg {0}), with <arg name="{0}" default="…"/> above it'),
-    (r"Unknown substitution command \[([^\[\]\n]+)\]", "roslaunch does not know $({0})",
-     "write $(find <package>)/…"),
+    (r"Unknown substitution command \[([^\[\]\n]+)\]", "roslaunch does not know $({0})", "write $(find <package>)/…"),
     (r"'param' attribute must be set for .*\n+XML is <rosparam[^<>\n]*>\s*([\w/~]{1,64}):([^\s:<>]{1,64})\n",
      "the text in <rosparam> is one long word and no parameters: {0}:{1} has no space in it",
      "write a space behind each colon in <rosparam>: {0}: {1}"),
@@ -231,7 +231,7 @@ def refusal(run: Run, package: PackageFacts) -> Absence | None:
             noted = _substituted(package) if pattern == NO_PACKAGE or "substitution" in pattern else ()
             if special := _known_refusal(pattern, match, said, text, package):
                 return special._replace(citations=special.citations or noted)
-            cited = _declared(words[0], package) if pattern == _UNSET.pattern else _node_told(text, package)
+            cited = _declared(words[-1], package) if "arg to be set" in pattern else _node_told(text, package)
             return Absence(said, fix, citations=cited or noted, refused=pattern, about="".join(words[:1]))
     return None
 

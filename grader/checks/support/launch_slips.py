@@ -334,9 +334,10 @@ def unset_arg_fixes(file: LaunchFile, told: str, given: Iterable[str] = ()) -> I
     (`a:=5`), and that is not told yet."""
     names = {word.partition(":=")[0] for word in given}
     for arg in file.unset_args:
-        written = f'<arg name="{arg.name}" default="…"/>'
+        begins = f'<arg name="{arg.name}" '
+        written = f'{begins}default="…"/>'
         # a name that is nearly that of an argument is told as that: `$(arg right), not $(arg slip)`
-        if written not in told and f"not $(arg {arg.name})" not in told and arg.name not in names:
+        if begins not in told and f"not $(arg {arg.name})" not in told and arg.name not in names:
             yield (
                 f"on line {arg.line} of {arg.file} write {written}"
                 if arg.declared
