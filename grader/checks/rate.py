@@ -500,12 +500,11 @@ def _by_parameter(
     one: by the script's line, or because the node reads one that is the rate which was measured."""
     if params.cause is not None:
         pause = f"with {words_in(run, params.cause)}, wait {significant(1 / params.rate_hz)} s between two messages"
-        return verdict.model_copy(update={"hint": f"look at how the loop changes its rate: {pause}"})
+        verdict = verdict.model_copy(update={"hint": f"look at how the loop changes its rate: {pause}"})
+        return _by_slip(verdict, "keeps-rate", run, package, params) or verdict
     for channel in run.student_channels(params.topic):
-        slip, own = (
-            next(iter(slips_of(package, run, channel.callerid, "rate-parameter")), None),
-            channel.callerid,
-        )
+        own = channel.callerid
+        slip = next(iter(slips_of(package, run, own, "rate-parameter")), None)
         if slip is None:
             read = {e.topic or "" for _, e in run.actors if e.action == "read" and e.actor == own}
             there = params_on_server(run)

@@ -19,7 +19,7 @@ SlipKind = Literal[
     "float-index", "ranges-read", "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed",
     "printed-in-part", "published-in-part", "never-published", "takes-number", "typed-text", "goes-on",
     "no-argument", "read-late", "debugger", "drops-result", "returns-list", "fills", "catches", "no-result",
-    "stuck", "runs-out", "base-unmade", "rate-as-time", "frames", "step-number",
+    "stuck", "runs-out", "base-unmade", "rate-as-time", "frames", "step-number", "keeps-rate",
 ]  # fmt: skip
 
 
@@ -122,6 +122,7 @@ class PythonSlip(Placed, Record):
     - `frames`: two texts that are given next to each other, `message` and `name`, in a script that sends transforms.
     - `start-value`, `added-first`: where a counter, `name`, gets its first number, `message`, and where a loop adds one
       to it before it publishes (`fix`: which lines to move).
+    - `keeps-rate`: where a rate or a timer, `name`, is made once with what another function changes.
     - `step-number`: where a number, `message`, that is not 1 is added to the variable `name`, or by `name(…)` each time
       (`itertools.count`, `range`): then `fix` says what to write.
     - `reset-value`, `reset-limit`: where a counter goes back, to the number `message`, or when it reaches it (`name`:

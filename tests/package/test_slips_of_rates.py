@@ -224,3 +224,41 @@ def test_a_timer_that_runs_once(given: str, lines: list[int], tmp_path: Path) ->
     (tmp_path / "a.py").write_text(f"def tell(event):\n    pub.publish(1)\nrospy.Timer({given})\n")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "loop-left"]
     assert [s.line for s in slips if "oneshot" in s.fix] == lines
+
+
+SETS_IN_TWO = " def fast(self, req):\n  if req.data:\n   self.hz = 20\n  else:\n   self.hz = 5\n"
+SETS = " def fast(self, req):\n  self.hz = req.hz\n"
+MAKES = " def __init__(self, share):\n  self.rate = rospy.Rate(self.hz)\n"
+TIMES = " def __init__(self):\n  self.t = rospy.Timer(rospy.Duration(1 / self.hz), self.tick)\n"
+RUNS = " def run(self):\n  while True:\n   pub.publish(1)\n   self.rate.sleep()\n"
+ALL_IN_ONE = " def run(self):\n  r = rospy.Rate(20 if self.hz else 5)\n  while True:\n   r.sleep()\n"
+
+
+@pytest.mark.parametrize(
+    ("lines", "fixes"),
+    [
+        (MAKES + SETS_IN_TWO + RUNS, ["copy line 4 into the loop, to above line 13"]),
+        (SETS + ALL_IN_ONE, ["copy line 6 into the loop, to above line 8"]),
+        (TIMES + SETS, ["below line 6, write `self.t.shutdown()`, and copy line 4 to below that"]),
+        # it is changed in the loop alone, or with it, or made in the loop
+        (ALL_IN_ONE + "   self.hz = 5\n", []),
+        (MAKES + SETS + "  self.rate = rospy.Rate(self.hz)\n" + RUNS, []),
+        (SETS + " def run(self):\n  while True:\n   r = rospy.Rate(self.hz)\n   r.sleep()\n", []),
+        # another function does not know what it needs; it is changed in two places
+        (MAKES.replace("hz)", "hz * share)") + SETS + RUNS, []),
+        (TIMES + SETS_IN_TWO, []),
+    ],
+)
+def test_a_rate_that_is_made_once_and_changed_elsewhere_is_known(tmp_path, lines, fixes):
+    (tmp_path / "a.py").write_text(f"import rospy\nclass Arm:\n{lines}")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "keeps-rate"]
+    assert [s.fix for s in slips] == fixes
+
+
+def test_a_rate_of_a_global_number_that_a_service_changes_is_known(tmp_path):
+    lines = (
+        "hz = 5\ndef fast(req):\n global hz\n hz = 20\nrate = rospy.Rate(hz)\nwhile True:\n rate.sleep()\n"
+    )
+    (tmp_path / "a.py").write_text(f"import rospy\n{lines}")
+    (found,) = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "keeps-rate"]
+    assert (found.line, found.message) == (6, "`rate` is made once, on line 6, and keeps what `hz` is then")

@@ -16,7 +16,9 @@ from script_tree import (
     dotted,
     functions_in,
     is_call,
+    loop_around,
     names_in,
+    parents_of,
     published_type,
     slip,
     text_of,
@@ -71,6 +73,60 @@ def timers_once(tree):
             yield slip(
                 call.lineno, "loop-left", message, "on line %d, leave `oneshot=True` out" % call.lineno, named
             )
+
+
+def rates_made_once(tree):
+    """`rate = rospy.Rate(self.hz)` above the loop that sleeps by it, and a timer, which are made once with what another
+    function changes later."""
+    changed, every = (
+        changed_in_functions(tree),
+        [dotted(t) for n in all_of(tree, ast.Assign) for t in n.targets],
+    )
+    for node in (n for n in all_of(tree, ast.Assign) if is_call(n.value, "Rate", "Timer")):
+        name, own, line = dotted(node.targets[0]), function_around(node, tree), node.lineno
+        what = [
+            one
+            for one in changed
+            if one in names_in(node.value) and any(f is not own for f, _ in changed[one])
+        ]
+        again = sum(one == name or one.startswith(name + ".") for one in every) > 1
+        if again or len(what) != 1 or loop_around(node, tree) or line != node.end_lineno:
+            continue
+        slept = [n for n in calls_in(tree, "sleep") if dotted(n.func) == name + ".sleep"]
+        used = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)} - {"self", "rospy", what[0]}
+        # what is a function's own, another one does not know
+        stays = own is not None and bool(used)
+        fix = ""
+        if is_call(node.value, "Timer") and len(changed[what[0]]) == 1 and not stays:
+            places = (changed[what[0]][0][1], name, line)
+            fix = "below line %d, write `%s.shutdown()`, and copy line %d to below that" % places
+        elif len(slept) == 1 and loop_around(slept[0], tree):
+            apart = stays and function_around(slept[0], tree) is not own
+            fix = "" if apart else "copy line %d into the loop, to above line %d" % (line, slept[0].lineno)
+        if fix:
+            message = "`%s` is made once, on line %d, and keeps what `%s` is then" % (name, line, what[0])
+            yield slip(line, "keeps-rate", message, fix, name)
+
+
+def changed_in_functions(tree):
+    """Return the names that functions change and others know too, with each function and its statement's line:
+    attributes, and those that it declares `global`."""
+    found = {}
+    for function in (n for n in all_of(tree, ast.FunctionDef) if n.name != "__init__"):
+        inside = list(ast.walk(function))
+        known = {name for n in inside if isinstance(n, ast.Global) for name in n.names}
+        for node in (n for n in inside if isinstance(n, (ast.Assign, ast.AugAssign))):
+            for target in getattr(node, "targets", None) or [node.target]:
+                if isinstance(target, ast.Attribute) or dotted(target) in known:
+                    found.setdefault(dotted(target), []).append((function, node.end_lineno))
+    return found
+
+
+def function_around(node, tree):
+    """Return the function that a node is in, None outside of all."""
+    while node is not None and not isinstance(node, ast.FunctionDef):
+        node = parents_of(tree).get(node)
+    return node
 
 
 OF_RATES = re.compile(r"(?i:(?:^|_)(?:hz|rate|freq|frequency|fps))$|[a-z](?:Hz|Rate|Freq|Frequency)$")

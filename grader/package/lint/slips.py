@@ -68,7 +68,7 @@ def slips(tree, numbers=()):
     spell_plainly(tree)
     finders = (
         uncalled_and_asked, objects.names_of_objects, names.misspelt, names.misspelt_exceptions, rates.loop_rates,
-        rates.nanoseconds, rates.rates_for_times, rates.sleeps_within, rates.timers_once,
+        rates.nanoseconds, rates.rates_for_times, rates.sleeps_within, rates.timers_once, rates.rates_made_once,
         counters.resets, never_run, names.of_the_function_around,
         loops.never_reached, loops.loops_that_never_go_round, loops.waits_without_not,
         loops.stopped_loops, loops.lacking_loops, loops.published_before,
