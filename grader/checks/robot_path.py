@@ -35,10 +35,11 @@ from grader.checks.support.geometry import (
     turned_rad,
     winds,
 )
-from grader.checks.support.processes import GlobalName
+from grader.checks.support.processes import GlobalName, run_slips
 from grader.checks.support.topics import Sender, cite, nothing_sent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
+from grader.model.python_slip import PythonSlip
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, passed
 from grader.wording import join_words, significant
@@ -56,6 +57,8 @@ AWAY = 0.3
 """How far from a corner, as a share of what follows it, the robot is when its direction is looked at."""
 STOPS_AFTER_S = 1.0
 """The last velocity of a node that ends holds for so long."""
+NUMBER_SHARE = 0.1
+"""By so much a leg may differ from the number in the script that says how long it is."""
 SAME_TURN_DEG, OTHER_TURN_DEG, HALF_TURN_DEG = 2.0, 20.0, 170.0
 """A turn by so much more or less is another one; one of nearly half a circle has no side."""
 
@@ -124,14 +127,14 @@ def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
     if found is None:
         verdict = no_clock(run) or nothing_sent(package, run, params.topic, params.of or "student")
     else:
-        verdict = unreadable(found, params.topic) or _judge_track(found, run, params)
+        verdict = unreadable(found, params.topic) or _judge_track(found, package, run, params)
         verdict = tell_end(verdict, package, run)
     expected = f"a way through {join_words(map(spot, params.points))}, within {metres(params.tolerance_m)}"
     measured = verdict.measured or "no path"
     return verdict.about(expected=expected, measured=measured, citations=(cite(run, params.topic),))
 
 
-def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
+def _judge_track(found: Track, package: PackageFacts, run: Run, params: PathParams) -> Verdict:
     taken = relative(found.path) if params.relative else list(found.path)
     course = course_of(taken, params)
     figures = measured(taken, course, params.way)
@@ -149,11 +152,36 @@ def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
         or what_is_wrong(taken, params.way, course, mirror=params.relative)
     )
     verdict = failed(words.message, hint=words.hint, measured=figures)
+    verdict = _with_number(verdict, words.leg_m, taken, params.way, run_slips(package, run, "way-number"))
     nearly = followed(taken, params.way.points, 2 * params.tolerance_m + _drift_m(run, taken, params.way))
     if not nearly.done and not _strays_late(nearly, params.way):
         return verdict
     # a robot that only just strays may have strayed with a machine that was late itself
     return excused(verdict, run, run.start_ns, run.end_ns, lambda late: late.reason(LATE_MS, LATE_P95_MS))
+
+
+def _with_number(
+    verdict: Verdict,
+    leg_m: tuple[float, float] | None,
+    path: Sequence[Pose],
+    way: Way,
+    slips: Sequence[PythonSlip],
+) -> Verdict:
+    """Return the loss of a robot that drives each leg too short or too long with the one line that says how far, or how
+    long."""
+    asked_m, driven_m = leg_m or (0.0, 0.0)
+    speed = top_speeds(path)[0]
+    # Of legs that differ, the same line may be right for another one.
+    alike = all(abs(math.dist(*leg) - asked_m) <= NUMBER_SHARE * asked_m for leg in pairwise(way.points))
+    if not (asked_m and speed and alike):
+        return verdict
+    per_m = {"distance": 1.0, "time": 1 / speed}
+    found = [s for s in slips if abs(float(s.message) / per_m[s.fix] - driven_m) < NUMBER_SHARE * driven_m]
+    for one in found if len(found) == 1 else ():
+        where = f"line {one.line} of {one.file}"
+        fix = f"on {where}, write {significant(asked_m * per_m[one.fix])} in place of {one.message}"
+        verdict = verdict.explained(f"`{one.name}` is {one.message} on {where}", fix, (one.place,))
+    return verdict
 
 
 def course_of(taken: Sequence[Pose], params: PathParams) -> Course:
@@ -234,10 +262,11 @@ def _by_other_clock(run: Run, params: PathParams, course: Course) -> Words | Non
 
 
 class Words(NamedTuple):
-    """What is wrong with a path, and what to do."""
+    """What is wrong with a path, and what to do; `leg_m`: how long a leg is, and how far it drove there."""
 
     message: str
     hint: str
+    leg_m: tuple[float, float] | None = None
 
 
 class Way(NamedTuple):
@@ -422,7 +451,7 @@ def _too_far(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
         return None
     message = f"it drives {metres(beyond_m)} past {way.name(corner)}, {_after(path, path[first])}"
     hint = f"turn sooner: {significant(way.tolerance_m)} m are allowed; distance is speed times time"
-    return Words(message, hint)
+    return Words(message, hint, (length_along, length_along + beyond_m))
 
 
 def _too_early(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
@@ -436,7 +465,8 @@ def _too_early(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
     if along <= 0 or short_m <= way.tolerance_m or aside * _along(following, start, end)[1] <= 0:
         return None
     message = f"it leaves the path {metres(short_m)} before {way.name(course.reached)}, {_after(path, pose)}"
-    return Words(message, "drive all the way to the point before you turn: distance is speed times time")
+    hint = "drive all the way to the point before you turn: distance is speed times time"
+    return Words(message, hint, (short_m + along, along))
 
 
 def _ends_short(path: Sequence[Pose], way: Way, course: Course) -> Words:

@@ -19,7 +19,7 @@ SlipKind = Literal[
     "float-index", "ranges-read", "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed",
     "printed-in-part", "published-in-part", "never-published", "takes-number", "typed-text", "goes-on",
     "no-argument", "read-late", "debugger", "drops-result", "returns-list", "fills", "catches", "no-result",
-    "stuck", "runs-out", "base-unmade", "rate-as-time", "frames", "step-number", "keeps-rate",
+    "stuck", "runs-out", "base-unmade", "rate-as-time", "frames", "step-number", "keeps-rate", "way-number",
 ]  # fmt: skip
 
 
@@ -122,6 +122,8 @@ class PythonSlip(Placed, Record):
     - `frames`: two texts that are given next to each other, `message` and `name`, in a script that sends transforms.
     - `start-value`, `added-first`: where a counter, `name`, gets its first number, `message`, and where a loop adds one
       to it before it publishes (`fix`: which lines to move).
+    - `way-number`: the only line that gives a variable `name` its number, `message`, which is a `distance` or a `time`
+      by its name (`fix`).
     - `keeps-rate`: where a rate or a timer, `name`, is made once with what another function changes.
     - `step-number`: where a number, `message`, that is not 1 is added to the variable `name`, or by `name(…)` each time
       (`itertools.count`, `range`): then `fix` says what to write.

@@ -535,3 +535,23 @@ def test_a_publisher_whose_name_another_one_gets_is_known(tmp_path: Path) -> Non
     found = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "never-published"]
     message = "line 2 gives `pub` another publisher, so nothing is sent by this one"
     assert [(s.line, s.name, s.message) for s in found] == [(1, "a", message)]
+
+
+@pytest.mark.parametrize(
+    ("code", "told"),
+    [
+        ("SIDE = 2.0\ndrive(SIDE)\ndrive(SIDE)\n", [("2", "distance", "SIDE")]),
+        ("self.side_length = 1\n", [("1", "distance", "self.side_length")]),
+        ("DRIVE_TIME = 5\ndrive(DRIVE_TIME)\n", [("5", "time", "DRIVE_TIME")]),
+        ("DRIVE_TIME = 5\ndrive(DRIVE_TIME)\nturn(DRIVE_TIME)\n", []),
+        ("distance = 0.0\n", []),
+        ("distance = 1\ndistance += 1\n", []),
+        ("distance = 1 if far else 2\n", []),
+        ("SPEED = 0.2\nside = True\n", []),
+        ("inside = 3\n", []),
+    ],
+)
+def test_numbers_that_say_how_far_or_how_long_are_known(tmp_path, code, told):
+    (tmp_path / "a.py").write_text(code)
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "way-number"]
+    assert [(s.message, s.fix, s.name) for s in slips] == told

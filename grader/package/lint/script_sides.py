@@ -1,5 +1,5 @@
 """Finds names that say another side than their values have, for `slips.py`: ranges of a scan to the left that are
-called right, and frames that are given to each other's field.
+called right, and frames that are given to each other's field; and numbers whose names say how far or how long.
 
 Nothing is executed. Python 3.8, standard library only.
 """
@@ -209,3 +209,29 @@ def frames_named(tree):
         if sum(map(bool, words)) == 2 and called_name(call) not in LOOK_UPS:
             first, second = filter(None, words)
             yield slip(call.lineno, "frames", first, "", second)
+
+
+LENGTHS = re.compile(r"(?i)(?:^|_)(?:side|length|len|dist|distance|leg|edge|metres|meters)(?:_|$)")
+TIMES = re.compile(r"(?i)(?:^|_)(?:duration|time|secs|seconds)(?:_|$)")
+NUMBERS_LIMIT = 10
+
+
+def numbers_of_way(tree):
+    """`SIDE = 1.0` and `DRIVE_TIME = 5`, where that is the only line that gives the name a value, and a time is read in
+    one place: another one may be that of a turn. No slips."""
+    given, read = {}, {}
+    for node in all_of(tree, ast.Name, ast.Attribute):
+        name = dotted(node).rpartition(".")[2]
+        count = read if isinstance(node.ctx, ast.Load) else given
+        count[name] = count.get(name, 0) + 1
+    found = []
+    for node in all_of(tree, ast.Assign):
+        name, value = dotted(node.targets[0]), getattr(node.value, "value", None)
+        short = name.rpartition(".")[2]
+        what = "distance" if LENGTHS.search(short) else "time" if TIMES.search(short) else ""
+        is_once = (
+            given.get(short) == 1 and len(node.targets) == 1 and (what == "distance" or read.get(short) == 1)
+        )
+        if what and is_once and type(value) in (int, float) and 0 < value < 1e6:
+            found.append(slip(node.lineno, "way-number", "%.9g" % value, what, name))
+    yield from found[:NUMBERS_LIMIT]

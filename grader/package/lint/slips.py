@@ -87,7 +87,7 @@ def slips(tree, numbers=()):
         debuggers, script_results.results, rates.turns_taken_off, script_bases.unmade_bases, script_threads.waits,
         calls.locks_taken_twice, calls.values_out_of_order, calls.params_read_early, calls.arguments_out_of_order,
         calls.bare_decorators, scans.first_scans,
-        sides.named_sides, sides.overlapping_sides, sides.frames_swapped, sides.frames_named,
+        sides.named_sides, sides.numbers_of_way, sides.overlapping_sides, sides.frames_swapped, sides.frames_named,
         grids.rows_of_grids, script_results.unreturned_answers, goals.never_cancelled,
         script_results.swallowed_exceptions, callbacks.closed_before,
     )  # fmt: skip
