@@ -254,17 +254,7 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
         `roslaunch <package> <file>` prints in red what it could not start; `rosnode list`, `rostopic info
         <topic>` and `rosparam list` show what came up. `output="screen"` shows what a node prints.
     """
-    what = [
-        *(PurePosixPath(s).name for s in params.scripts),
-        *(f"{name} ({origin})" for name, origin in params.nodes.items()),
-        *params.programs,
-    ]
-    over = f", connected over {params.topic}" if params.topic else ""
-    given = join_words(f"{name} {value}" for name, value in params.params.items())
-    over += f", with {given}" if given else ""
-    expected = (
-        f"{params.launch} brings up {join_words(what) or 'its nodes'} under the names in the file{over}"
-    )
+    expected = _expected(params)
     file = read_launch(package, params.launch, (*params.scripts, *params.programs))
     if isinstance(file, Verdict):
         # A file that cannot be read is charged by launch-xml, where scripts are asked for.
@@ -281,6 +271,20 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
         verdict = verdict.based_on(cause=refused.why)
     citations = verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/graph"))
     return verdict.about(expected=expected, measured=_listed_nodes(run), citations=citations)
+
+
+def _expected(params: LaunchRunsParams) -> str:
+    what = [
+        *(PurePosixPath(s).name for s in params.scripts),
+        *(f"{name} ({origin})" for name, origin in params.nodes.items()),
+        *params.programs,
+    ]
+    over = f", connected over {params.topic}" if params.topic else ""
+    given = join_words(f"{name} {value}" for name, value in params.params.items())
+    over += f", with {given}" if given else ""
+    expected = (
+        f"{params.launch} brings up {join_words(what) or 'its nodes'} under the names in the file{over}"
+    )
 
 
 def _judge_nodes(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRunsParams) -> Verdict:

@@ -113,6 +113,11 @@ CASES = {
     "shebang-blank": Case({TALKER: "\n" + SCRIPT}, ["shebang"], "`#!` comes on line 2"),
     "tabs-of-8": Case(swapped(TALKER, ("        publisher.pub", "\tpublisher.pub")), ["python-syntax"],
         "tabs and spaces"),
+    "tabs-of-4-below-an-if": Case(
+        {TALKER: SCRIPT + "def f(n):\n    if n:\n\t\tn = 0\n    return n\n"},
+        ["python-syntax"],
+        f"replace the tabs: start line {SCRIPT.count(chr(10)) + 3} with 8 spaces",
+    ),
     "body-not-indented": Case(
         swapped(TALKER, ("\nmain()", "\nif __name__ == '__main__':\nmain()")),
         ["python-syntax"],

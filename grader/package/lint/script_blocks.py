@@ -3,7 +3,9 @@
 Python 3.8, standard library only.
 """
 
+import io
 import re
+import tokenize
 from itertools import takewhile
 
 LEAVES = re.compile(r"\s*(return|break|continue|raise)\b")
@@ -24,6 +26,15 @@ def is_code(text):
 
 def width_of(text):
     return len(text.expandtabs()) - len(text.expandtabs().lstrip())
+
+
+def blocks_of(text):
+    """Return of which kinds the words of a script are, with where its blocks begin and end; the text itself where its
+    lines fit into no blocks."""
+    try:
+        return [token.type for token in tokenize.generate_tokens(io.StringIO(text).readline)]
+    except (tokenize.TokenError, SyntaxError):
+        return text
 
 
 def lacks_head(lines, at):

@@ -24,7 +24,7 @@ from grader.line_slips.python import (
     without_texts,
 )
 from grader.line_slips.python_habits import DELETE_LINE
-from grader.package.lint.script_blocks import first_version, lacks_body, lacks_head
+from grader.package.lint.script_blocks import blocks_of, first_version, lacks_body, lacks_head
 from grader.package.lint.script_spellings import without_types
 from grader.package.python_repairs.lost_heads import lost_head_at
 from grader.package.python_repairs.python2 import as_python3
@@ -184,9 +184,10 @@ def _only_tabs(text: str, error: Error) -> bool:
 def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
     yield "merged", first_version(text)
     if error["kind"] in {"TabError", "IndentationError"}:
-        yield "tabs", _all_expanded(text, 8)
+        wide, narrow = _all_expanded(text, 8), _all_expanded(text, 4)
+        yield "tabs", narrow if blocks_of(narrow) == blocks_of(wide) else wide
         yield "tabs", _like_the_line_before(text, error["line"])
-        yield "tabs", _all_expanded(text, 4)
+        yield "tabs", narrow
     lines = text.split("\n")
     at = error["line"] - 1
     if not 0 <= at < len(lines):
