@@ -487,7 +487,9 @@ def _other_answer(
     hint = f"in the callback of {params.trigger.topic}, look at what you publish on {params.effect.topic}: "
     fix, wanted = f"{hint}{field} has to be {value_text(params.effect.value)}", params.effect.value
     last = next((one for one in reversed(effects) if one.time_ns < at_ns), came)
-    if last is not came and last.values == came.values:
+    if last is not came and all(one.values == came.values for one in effects):
+        fix += f", and it is {value_text(came.values[0])} in every message"
+    elif last is not came and last.values == came.values:
         fix += ", and it still has the value from before"
     beside = set_beside(own, came.time_ns, field or "", wanted, params.effect.tolerance)
     also = f", and {beside} is {value_text(wanted)}" if beside else ""
