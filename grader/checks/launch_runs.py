@@ -282,9 +282,7 @@ def _expected(params: LaunchRunsParams) -> str:
     over = f", connected over {params.topic}" if params.topic else ""
     given = join_words(f"{name} {value}" for name, value in params.params.items())
     over += f", with {given}" if given else ""
-    expected = (
-        f"{params.launch} brings up {join_words(what) or 'its nodes'} under the names in the file{over}"
-    )
+    return f"{params.launch} brings up {join_words(what) or 'its nodes'} under the names in the file{over}"
 
 
 def _judge_nodes(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRunsParams) -> Verdict:
