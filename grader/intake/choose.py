@@ -64,7 +64,18 @@ def choose_package(candidates: list[Candidate], wanted: WantedPackage) -> Choice
         return None
     chosen, known = choice.package, {choice.package.name, *(one.name for one in wanted.each)}
     others = [c for c in candidates if c.has_manifest and c.name not in known][:COPIES_LOOKED_AT]
-    return replace(choice, hints=(*choice.hints, *_in_another_package(chosen, others, wanted)))
+    hints = (*_name_taken(chosen, candidates, wanted), *_in_another_package(chosen, others, wanted))
+    return replace(choice, hints=(*choice.hints, *hints))
+
+
+def _name_taken(chosen: Candidate, candidates: list[Candidate], wanted: WantedPackage) -> Iterator[str]:
+    """Yield which package beside one that was asked for by another name has the lab's, beginning with it."""
+    if wanted.asked and chosen.name != wanted.name:
+        above = PurePosixPath(chosen.path).parent
+        for other in candidates:
+            if other.manifest == wanted.name and PurePosixPath(other.path).parent == above:
+                where = printable(other.path)
+                yield f"{wanted.name} is the name of {where} too: first move {where} out of this workspace"
 
 
 def _choose(candidates: list[Candidate], wanted: WantedPackage) -> Choice | None:

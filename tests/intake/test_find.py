@@ -510,6 +510,20 @@ def test_a_package_that_is_asked_for_is_taken_by_its_own_name(asked, path, tmp_p
     assert (submission.package.path, submission.package.name) == (path, asked)
 
 
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        ("week1", ["lab1 is the name of src/lab1 too: first move src/lab1 out of this workspace"]),
+        ("lab1", []),
+        ("other", []),
+    ],
+)
+def test_the_lab_s_name_is_told_where_a_package_beside_has_it(asked, told, tmp_path):
+    files = tree("src/lab1", "src/week1:week1", "later/src/other")
+    found = opened(write(tmp_path / "repo", files), tmp_path, package=WantedPackage(name="lab1", asked=asked))
+    assert [hint for hint in found.hints if "is the name of" in hint] == told
+
+
 def test_a_package_that_is_asked_for_and_is_not_there(tmp_path):
     repo = write(tmp_path / "repo", tree("a:lab_1", "lab1"))
     with pytest.raises(PackageNotFound, match=r"no package lab_2 .*: lab1, lab_1") as caught:
