@@ -128,6 +128,8 @@ def explain_number_of_values(message: str, source: str) -> Meaning | None:
     """Return what is wrong with the number of values for a message of several fields, or for one of one field that is
     not published there; None of any other exception."""
     found = re.match(r"Invalid number of arguments, args should be \[([^\]]+)\]", message)
+    if message.startswith("Invalid number of arguments, args should be [] "):
+        return "it has no field", "write the handout's fields into its .msg or .srv, and build again"
     fields = re.findall(r"\w+", found[1]) if found else []
     if len(fields) == 1 and "publish" not in source:
         return f"there is one field: {fields[0]}", f"give it one value: `{fields[0]}=…`"
@@ -138,8 +140,7 @@ def explain_number_of_values(message: str, source: str) -> Meaning | None:
 
 
 def _index(message: str, source: str, marked: tuple[int, int] | None) -> Meaning:
-    place = re.search(r"(?:Replacement index (\d+) out|^tuple index out) of range", message)
-    if place and re.search(r"\{\d*[^{}]*\}.*\.format\(", source):
+    if message.startswith("Replacement index") and re.search(r"\{\d*[^{}]*\}.*\.format\(", source):
         fix = "give `format(…)` as many values as the text has `{}` in it"
         return "the text has more `{}` in it than `format(…)` has values", fix
     found = _subscript(source, marked)

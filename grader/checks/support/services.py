@@ -197,8 +197,8 @@ def _in_other_order(found: Traceback, one: Exchange, package: PackageFacts) -> E
 
 def _undivided(package: PackageFacts, kind: str, one: Exchange) -> Verdict | None:
     """Return the verdict on a .srv file without its `---`, which belongs below the last field of the request."""
-    name = f"/{kind}.srv"
-    own = next((i for i in package.interfaces if f"/{i.path}".endswith(name)), None)
+    alike = [i for i in package.interfaces if f"/{i.path}".endswith(f"/{kind}.srv")]
+    own = min(alike, key=lambda one: one.path != f"srv/{kind}.srv", default=None)
     if own is None or own.fault is None or own.fault.kind != "OtherParts":
         return None
     if not own.fields:
