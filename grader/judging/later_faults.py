@@ -254,9 +254,8 @@ class Later:
                 yield Fix(f"{slip.fix} ({slip.file})", (slip.fix,))
         for slip in self._of("main-guard"):
             yield Fix(f"write {MAIN} on {_line(slip)}", (f"on {_line(slip)}, write {MAIN}",))
-        for slip in self._of("loop-left"):
-            if slip.name:
-                yield Fix(f"write `while not {slip.name}():` on {_line(slip)}", (slip.fix,))
+        for slip in (one for one in self._of("loop-left") if one.name):
+            yield Fix(f"write `while not {slip.name}():` on {_line(slip)}", (slip.fix,))
 
     def _built(self) -> Iterator[Fix]:
         """Sources of C++, and messages, that are not there: CMake asks for them only once it has found all packages."""
@@ -267,10 +266,12 @@ class Later:
         beside = f"{self._package.folder_beside}/"  # what lies there is right once the build files do
         there = [one.path.removeprefix(beside) for one in self._package.files if one.path.endswith(kinds)]
         for path in (one for one in named if not ("$" in one or one in there)):
-            near = near_names(path, there)
+            near = next(iter(near_names(path, there)), "")
+            moved = PurePosixPath(near).name == PurePosixPath(path).name and path.endswith(kinds[-3:])
             absent = f"add {path}, which is not there, and push it, since {CMAKE} names it"
-            if path not in self._verdict.message:
-                yield Fix(f"write {near[0]} instead of {path}" if near else absent)
+            fix = f"move {near} to {path}" if moved else f"write {near} instead of {path}" if near else absent
+            if path not in self._verdict.message and f"move {near} into" not in self._verdict.hint:
+                yield Fix(fix)
 
     def _function_at(self, slip: PythonSlip) -> int:
         """Return the line of the last `def` above the slip: what gives a name its value there is of use below it."""
@@ -294,8 +295,7 @@ class Later:
         return any(call.match(line[:LINE_CHARS]) for line in lines)
 
     def _text_of(self, slip: PythonSlip) -> str:
-        lines = self._lines(slip.file)
-        return lines[slip.line - 1] if slip.line <= len(lines) else ""
+        return next(iter(self._lines(slip.file)[slip.line - 1 : slip.line]), "")
 
     def _asked(self) -> set[tuple[str, int]]:
         """Return where scripts ask for input; nothing where the verdict is about it, or the grader types the answer."""

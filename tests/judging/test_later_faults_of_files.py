@@ -83,6 +83,10 @@ def test_messages_that_are_not_there_are_named_where_catkin_sees_no_package() ->
         hint = judge(asked, runs)[0].hint
         assert ("; then add msg/Note.msg, which is not there, and push it" in hint) == told
         assert "instead of msg/Note.msg" not in hint
+    runs = build_runs(
+        {"runs": {"package": built}, "package": {"cmake": cmake, "files": [{"path": "Note.msg"}]}}
+    )
+    assert judge(asked, runs)[0].hint.endswith("; then move Note.msg to msg/Note.msg")
 
 
 @pytest.mark.parametrize(

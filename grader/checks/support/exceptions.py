@@ -145,8 +145,7 @@ def _index(message: str, source: str, marked: tuple[int, int] | None) -> Meaning
         return "the text has more `{}` in it than `format(…)` has values", fix
     found = _subscript(source, marked)
     if found is None:
-        hint = f"check the length before you access an element: {NUMBER_OF_PARTS}"
-        return "the index is beyond the end", hint
+        return "the index is beyond the end", f"check the length before you use it: {NUMBER_OF_PARTS}"
     name, index = (shown(ast.unparse(part)) for part in (found.value, found.slice))
     if "assignment" in message:  # to what the script makes itself, and not to what comes in a message
         fix = f"make `{name}` as long as it has to be where it gets its value: an assignment adds no element"

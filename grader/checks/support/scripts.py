@@ -398,8 +398,7 @@ _WORD = re.compile(r"\w+")
 
 def lines_that_say(lines: Sequence[SourceLine], said: str) -> list[SourceLine]:
     """Return the lines whose strings are most of what was said; of a string, all words have to be in it."""
-    spoken = set(_WORD.findall(said))
-    spoken |= {word.rstrip("0123456789") for word in spoken}  # a count may stand right behind the text
+    spoken = {one for word in _WORD.findall(said) for one in (word, word.rstrip("0123456789"))}  # `text7`
 
     def alike(line: SourceLine) -> int:
         strings = [_WORD.findall(_FILLED_IN.sub(" ", found[2])) for found in _LITERAL.finditer(line.text)]
