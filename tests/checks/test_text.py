@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from grader.checks.support.scripts import SourceLine, lines_that_say
 from grader.checks.support.text import could_say, texts_of_cpp
 
 
@@ -39,3 +40,9 @@ def test_a_line_of_cpp_says_a_text(line: str, kind: str, text: str) -> None:
 )
 def test_whether_a_text_of_a_source_can_come_out_as_another(said: str, wanted: str, can: bool) -> None:
     assert could_say(said, wanted) is can
+
+
+@pytest.mark.parametrize("said", ["hello world 7", "hello world7", "hello world"])
+def test_a_count_right_behind_the_text_hides_no_line(said: str) -> None:
+    line = SourceLine("src/talker.cpp", 3, 'ss << "hello world" << count;')
+    assert lines_that_say([line, SourceLine("src/talker.cpp", 4, "pub.publish(msg);")], said) == [line]

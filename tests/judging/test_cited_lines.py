@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from grader.checks.actions import ASKED_TO_STOP
-from grader.checks.support.scripts import OF_INTERFACES, SourceLine, lines_making, lines_that_say
+from grader.checks.support.scripts import OF_INTERFACES, lines_making
 from grader.evidence.run import Run
 from grader.judging.cited_lines import (
     LINE_CHARS,
@@ -598,9 +598,3 @@ def test_a_text_has_no_place_in_a_message_of_numbers(
     assert (
         lost_fields([f"pub = Publisher('a', {was})", f"msg = {was}()", "msg.data = x"], slip, wanted) == told
     )
-
-
-@pytest.mark.parametrize("said", ["hello world 7", "hello world7", "hello world"])
-def test_a_count_right_behind_the_text_hides_no_line(said: str) -> None:
-    line = SourceLine("src/talker.cpp", 3, 'ss << "hello world" << count;')
-    assert lines_that_say([line, SourceLine("src/talker.cpp", 4, "pub.publish(msg);")], said) == [line]
