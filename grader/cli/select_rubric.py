@@ -13,15 +13,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.errors import UsageError
-from grader.intake.choose import (
+from grader.intake.candidates import (
     WORKSPACE_MARKS,
     Candidate,
     enclosing_package,
     find_nearest,
     find_packages,
-    is_slip,
     manifest_name,
 )
+from grader.intake.choose import is_slip
 from grader.intake.gitdir import repository_around
 from grader.intake.names import is_archive_name, listing, printable
 from grader.intake.open import is_recording

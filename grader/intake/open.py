@@ -17,17 +17,14 @@ from typing import NamedTuple, TypeVar
 
 from grader.errors import GraderError, OutputError, SubmissionError
 from grader.intake.archive import unpack
+from grader.intake.candidates import Candidate, enclosing_package, find_candidates, linked_candidate
 from grader.intake.choose import (
     POINTER,
-    Candidate,
     Choice,
     WantedPackage,
     choose_loose,
     choose_package,
     empty_beside,
-    enclosing_package,
-    find_candidates,
-    linked_candidate,
     not_found,
 )
 from grader.intake.git import Git, Repository

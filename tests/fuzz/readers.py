@@ -32,7 +32,7 @@ from grader.evidence.message_values import ServiceTypes
 from grader.evidence.reader import load_run, package_facts
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceStream
-from grader.intake.choose import manifest_name
+from grader.intake.candidates import manifest_name
 from grader.intake.limits import IntakeLimits
 from grader.intake.names import safe_name
 from grader.intake.open import open_submission

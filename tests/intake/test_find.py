@@ -9,7 +9,8 @@ import time
 import pytest
 
 from grader.errors import PackageNotFound, SubmissionError
-from grader.intake.choose import WantedPackage, enclosing_package, find_packages
+from grader.intake.candidates import enclosing_package, find_packages
+from grader.intake.choose import WantedPackage
 from tests.intake.samples import lab, manifest, opened, repository, write
 
 BROKEN = "<package><name>lab1</name><oops></package>"

@@ -181,7 +181,7 @@ def test_a_folder_of_a_hundred_thousand_files(tmp_path: Path) -> None:
 
 
 def test_thousands_of_folders_end_and_that_is_said(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr("grader.intake.choose.FOLDERS_LOOKED_AT", 20)
+    monkeypatch.setattr("grader.intake.candidates.FOLDERS_LOOKED_AT", 20)
     for number in range(50):
         (tmp_path / "many" / str(number)).mkdir(parents=True)
     with pytest.raises(UsageError, match="too many files"):
@@ -190,7 +190,7 @@ def test_thousands_of_folders_end_and_that_is_said(tmp_path: Path, monkeypatch) 
     (chosen,) = choose_all(tmp_path / "many", "leeds-comp3631-lab1")
     assert chosen.source == str(tmp_path / "many")
     write_package(tmp_path / "many" / "lab1")
-    monkeypatch.setattr("grader.intake.choose.FOLDERS_LOOKED_AT", 52)
+    monkeypatch.setattr("grader.intake.candidates.FOLDERS_LOOKED_AT", 52)
     (chosen,) = choose_all(tmp_path / "many", None)
     assert Path(chosen.source) == tmp_path / "many" / "lab1"
     assert package != Path(chosen.source)
