@@ -19,7 +19,7 @@ from grader.errors import HostError
 from grader.evidence.run import Run
 from grader.files import make_folder
 from grader.judging.judge import Judgement, judge_all_runs
-from grader.judging.repeats_and_repairs import REPAIRS, was_built
+from grader.judging.repeats_and_repairs import REPAIRED, REPAIRED_AGAIN, REPAIRS, REPEATED, was_built
 from grader.model.package import PackageFacts
 from grader.model.result import Progress
 from grader.model.submission import Submission
@@ -187,7 +187,7 @@ def record_other_runs(
     # those scenarios are run with the repaired copy, which shows as much
     doubtful = sorted(judgement.doubtful - set(scenarios))
     if doubtful:
-        recorder.repeat(doubtful, job.evidence / copies.REPEATED)
+        recorder.repeat(doubtful, job.evidence / REPEATED)
     if not repairs:
         return bool(doubtful)
     with copies.repaired_copy(job.submission, repairs) as copy:
@@ -197,7 +197,7 @@ def record_other_runs(
             job,
             submission=copy,
             facts=read_packages(copy, job.rubric.rubric.launch_commands),
-            evidence=job.evidence / copies.REPAIRED,
+            evidence=job.evidence / REPAIRED,
             options=replace(job.options, reused={}),  # earlier evidence is of the package as it is
             progress=copies.CopyProgress(job.progress),
         )
@@ -206,6 +206,6 @@ def record_other_runs(
             again.record_all(lambda: None)
             _, on_copy = judge_recorded(again, job.evidence, job.rubric)
             if on_copy.doubtful_on_copy:
-                again.repeat(sorted(on_copy.doubtful_on_copy), job.evidence / copies.REPAIRED_AGAIN)
+                again.repeat(sorted(on_copy.doubtful_on_copy), job.evidence / REPAIRED_AGAIN)
         recorder.recording.add(again.recording)
     return True

@@ -37,7 +37,6 @@ from grader.package.repairs.editing import read_data
 from grader.package.repairs.python import ros_clock, turn_sign
 from grader.rubric.model import Rubric
 
-REPAIRED, REPAIRED_AGAIN, REPEATED = "repaired-1", "repaired-2", "repeated-1"
 STEERS_WRONG, WARPED = "steers-wrong", "warped"
 REPAIRS_MAX = 4
 """So many lines of scripts and launch files are repaired, however many mistakes are on one."""

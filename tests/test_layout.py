@@ -22,8 +22,7 @@ NAMED = re.compile(r"(?<!`)`([\w./-]+)`(?!`)")
 """A path or a name in the text of a page or a docstring."""
 EXAMPLES = {
     *(".py", "a.py", "scripts/numeric_talker.py", "scripts/talker.py", "src/a.py", "src/nodes/a.py"),
-    *("../b/scripts/talker.py", "evidence/repaired-1/", "evidence/repaired-2/"),
-    *("evidence/repeated-1/",),
+    *("../b/scripts/talker.py", "evidence/repaired-1/", "evidence/repaired-2/", "evidence/repeated-1/"),
 }
 """What a submission, or a folder of results, may have in it."""
 OF_NO_MODULE = {"browser", "docs", "fresh", "fuzz", "hostile", "packaging"}

@@ -45,6 +45,9 @@ GENERATION = re.compile(
 # What only makes `rosrun` find a script: runs start it from its source anyway.
 INSTALLING = re.compile(r"\bcatkin_install_python\b|\bPROGRAMS\b")
 
+REPAIRED, REPAIRED_AGAIN, REPEATED = "repaired-1", "repaired-2", "repeated-1"
+"""The folders of the other runs: of the repaired copy, of the copy once more, of the package as it is once more."""
+
 Runs = dict[str, Run]
 
 
@@ -62,11 +65,10 @@ class SplitRuns(NamedTuple):
 def split_runs(runs: Mapping[str, Run]) -> SplitRuns:
     """Return the first runs, the repeated ones, those of the repaired copy and what is repeated of these."""
     split = SplitRuns({}, {}, {}, {})
+    others = {REPAIRED: split.repaired, REPAIRED_AGAIN: split.repaired_again, "": split.first}
     for name, run in runs.items():
         folder, _, scenario = name.rpartition("/")
-        again = split.repaired_again if folder == "repaired-2" else split.repeated if folder else split.first
-        found = split.repaired if folder == "repaired-1" else again
-        found[scenario] = run
+        others.get(folder, split.repeated)[scenario] = run
     return split
 
 
