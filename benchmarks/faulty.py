@@ -11,7 +11,7 @@ from benchmarks.figures import Found, Options, Row, spread
 from benchmarks.gradings import ROOT, folder_for
 from benchmarks.machine import timed
 from fixtures.make import declared, faulty_package, labs
-from grader.repaired_copy import REPAIRED, REPEATED
+from grader.judging.repeats_and_repairs import REPAIRED, REPEATED
 
 COUNT = 20
 BESIDE_ONE = 3
