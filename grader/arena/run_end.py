@@ -441,7 +441,7 @@ def _at_rest_since(live: RunState, now_s: float) -> float | None:
     if now_s < live.all_began_s + live.least_s:
         return None
     found = [rest for rest in rests if rest is not None]
-    since_s = max(live.graph_changed_s, live.last_start_s)
+    since_s = max(live.graph_changed_s, live.last_start_s, live.slowed_until_s)
     return max(since_s, *(rest.since_s for rest in found))
 
 

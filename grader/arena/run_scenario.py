@@ -296,7 +296,8 @@ class _ClockTrial:
             else:
                 self._set(1, "the node does not follow the simulated clock; the run goes on in real time")
         if self._topic:
-            self._arena.live.graph_changed_s = now_s  # what pauses now is not silent
+            # The run's end is looked for at other moments, too.
+            self._arena.live.slowed_until_s = now_s if self._is_over else self._began_s + self._length_s()
 
     def _begin(self, now_s: float) -> None:
         live = self._arena.live

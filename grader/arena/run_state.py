@@ -147,6 +147,8 @@ class RunState:
     """When the student's processes last did anything; `news_s`, anything besides sending messages."""
     news_s: float = 0.0
     graph_changed_s: float = 0.0
+    slowed_until_s: float = 0.0
+    """While the clock is slowed to see whether a node follows it, nothing that pauses is at rest."""
     graph_picture: object = None
     graphs: int = 0
 
