@@ -431,10 +431,8 @@ def name_other_imports(verdict: Verdict, criterion: Criterion, facts: Facts) -> 
         lines = enumerate(build.file_lines(file.path)[:LINES_READ], 1)
         for number, line in ((n, text[:LINE_CHARS].strip()) for n, text in lines if same.match(text)):
             fix = (right_import(line, package) or ("", ""))[1]
-            if not fix and wrong not in {
-                maker[1],
-                *noetic_messages(),
-            }:  # `import lab.msg`: no line can import it
+            # of `import lab.msg`, the first name alone is wrong
+            if not fix and wrong != maker[1] and wrong not in noetic_messages():
                 fix = f"write `{shown(line.replace(wrong, maker[1], 1))}`"
             if fix and (file.path, number) != (found["file"], int(found["line"])):
                 where = "" if file.path == found["file"] else f" of {file.path}"

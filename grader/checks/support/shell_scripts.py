@@ -20,8 +20,6 @@ _ENDS = {
     "break": "leaves the loop",
     "continue": "skips the rest",
 }
-
-
 Block = tuple[int, str]
 """The line with which an `if` or a loop begins: its number and text."""
 
