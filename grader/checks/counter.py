@@ -12,6 +12,7 @@ from grader.checks.support.clocks import time_between
 from grader.checks.support.counters import (
     LOST_GAP_SHARE,
     Count,
+    CounterParams,
     Step,
     WrapParams,
     Wrong,
@@ -29,7 +30,6 @@ from grader.checks.support.counters import (
 )
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.processes import (
-    OnTopic,
     by_copies,
     is_written_as,
     observed_until_ns,
@@ -54,22 +54,18 @@ SLOW = 1.5
 """From so many nominal periods between two values on, the values are few because the loop is slow."""
 
 
-class StartParams(OnTopic):
+class StartParams(CounterParams):
     """Where the counting begins."""
 
     start: int = 0
     """The first value that the counter has to publish."""
-    rate_hz: Annotated[float, Field(gt=0)] = 10.0
-    """The nominal rate, to tell a flood of messages from a counter."""
 
 
-class StepParams(OnTopic):
+class StepParams(CounterParams):
     """How the counter goes on."""
 
     maximum: int = 127
     """The last value before the wrap."""
-    rate_hz: Annotated[float, Field(gt=0)] = 10.0
-    """The nominal rate, to tell a flood of messages from a counter."""
     min_steps: Annotated[int, Field(ge=1)] = 10
     """How many steps have to be seen before it can be judged."""
 
@@ -95,10 +91,10 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
         Set the counter before the loop, publish it, and only then add one. `rostopic echo <topic>`, started
         before the node, shows the first value.
     """
-    expected = f"{params.start} is the first value on {params.topic}"
-    found = counts(run, params.topic)
+    expected = f"{params.start} is the first value {params.place}"
+    found = counts(run, params.topic, params.field)
     if not found:
-        return _nothing(package, run, params.topic).about(expected=expected)
+        return _nothing(package, run, params).about(expected=expected)
     first = found[0]
     verdict = _cite_start(judge_start(first, run, params), first, run, package, params)
     verdict = verdict if verdict.status is Status.PASS else _of_clock(verdict, first, run, package, params)
@@ -145,14 +141,14 @@ def _cite_start(
 def judge_start(first: Count, run: Run, params: StartParams) -> Verdict:
     """Judge the first value of the publisher that came first."""
     if begins_with(first, params.start):
-        return passed(f"{params.topic} begins with {params.start}")
+        return passed(f"{params.counter} begins with {params.start}")
     if run.foreign:
         message = f"{run.evidence} may have begun after the first message on {params.topic}"
         return inconclusive(message, hint="start the recording before the node")
     if may_have_missed_first(run, params.topic, first):
         return grade_again(f"the recorder missed the first messages on {params.topic}")
     hint = f"set the counter to {params.start} before the loop, and add one after publish(…), not before"
-    message = f"the first value on {params.topic} is {significant(first.values[0])}, not {params.start}"
+    message = f"the first value {params.place} is {significant(first.values[0])}, not {params.start}"
     verdict = failed(message, hint=hint)
     # Earlier values could have been lost in that time: another run has to show the same.
     return verdict.if_repeated() if _may_follow_others(run, first, params) else verdict
@@ -188,10 +184,10 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
         Add one to the counter in one place only, once each time around the loop. `rostopic echo <topic>`
         shows the values.
     """
-    expected = f"each value on {params.topic} is the one before plus one"
-    count = longest(run, params.topic)
+    expected = f"each value {params.place} is the one before plus one"
+    count = longest(run, params)
     if count is None:
-        return _nothing(package, run, params.topic).about(expected=expected)
+        return _nothing(package, run, params).about(expected=expected)
     steps = steps_to_judge(count, params.maximum)
     found = wrong_steps(count, run, maximum=params.maximum, rate_hz=params.rate_hz)
     wrong, right = found.steps, sum(s.change == 1 for s in steps)
@@ -231,9 +227,9 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
     low, high = params.minimum, params.maximum
     times = {1: "once", 2: "twice"}.get(params.wraps, f"{params.wraps} times")
     expected = f"…{high - 1}, {high}, {low}… (or …{high - 1}, {low}…), seen {times}"
-    count = longest(run, params.topic)
+    count = longest(run, params)
     if count is None:
-        return _nothing(package, run, params.topic).about(expected=expected)
+        return _nothing(package, run, params).about(expected=expected)
     verdict, seen = judge_wraps(count, run, package, params)
     early = added_early(count, run, package, low)
     # Added early, the counter comes back one too high: only then is that line the reason.
@@ -249,8 +245,9 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
     return verdict.about(expected=expected, measured=measured, citations=(cite(run, params.topic, *at),))
 
 
-def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
+def _nothing(package: PackageFacts, run: Run, params: CounterParams) -> Verdict:
     """There is no counter on the topic."""
+    topic = params.topic
     # What was lost may have had the numbers.
     if losses(run, topic):
         return grade_again(f"too little was recorded on {topic}", measured="no number")
@@ -258,7 +255,9 @@ def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
         if mixed := by_copies(package, run, topic, failed_or_blocked):
             return mixed.about(measured="no number")
         hint = "publish the counter itself, as an Int8"
-        return failed_or_blocked(f"{topic} carries no numbers", measured="no number", hint=hint)
+        if params.field != "data":
+            hint = f"set {params.field} to the counter in each message, as a whole number"
+        return failed_or_blocked(f"{params.counter} carries no numbers", measured="no number", hint=hint)
     return no_message(package, run, topic).about(measured="no message")
 
 
@@ -311,7 +310,9 @@ def _wrong(count: Count, found: Wrong, run: Run, params: StepParams) -> Verdict 
     return verdict.if_repeated() if count.is_single(found.own) else verdict
 
 
-def _of_clock(verdict: Verdict, count: Count, run: Run, package: PackageFacts, params: OnTopic) -> Verdict:
+def _of_clock(
+    verdict: Verdict, count: Count, run: Run, package: PackageFacts, params: CounterParams
+) -> Verdict:
     """Return that neither a clock nor chance is a counter, where the script has its values from them. A clock may even
     have passed: it skips only when it is late. Nor is what several publishers send."""
     if mixed := by_copies(package, run, params.topic, failed):

@@ -92,7 +92,8 @@ ROUNDED = 0.02
 VELOCITIES = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")
 PLACES = frozenset({"ends-at", "path", "stays-within"})
 """Checks of where a robot is."""
-COUNTED = frozenset({"minimum", "maximum", "start"})
+COUNTERS = frozenset({"counter-start", "counter-step", "counter-wrap"})
+COUNTED = ("start", "minimum", "maximum")
 """Of counters, the values that their field has."""
 STAMPED = "is_stamp"
 """Beside what a criterion says: its field has to be a stamp."""
@@ -115,6 +116,8 @@ def field_faults(rubric: WrittenRubric, known: Definitions) -> Iterator[Fault]:
             yield from _no_place(criterion, rubric)
         if criterion.check == "topic-type":
             yield from _other_type(criterion, rubric)
+        if criterion.check in COUNTERS:
+            yield from _counted(criterion, known, rubric)
         yield from _expected(criterion, known)
         yield from _reported(criterion, known)
         yield from _other_size(criterion, rubric)
@@ -261,7 +264,6 @@ def _judged_fields(
             is_known = any(_has_field(known.shape(kind), given.get("field")) for kind in types)
             # With a known type, the misfit of the value is told already.
             yield from () if is_known else quoted
-        yield from _counted(path, given, types)
     for key, inner in given.items():
         if isinstance(inner, dict):
             yield from _judged_fields((*path, key), inner, known, rubric, scenario)
@@ -277,20 +279,34 @@ def _no_place(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fa
         yield (*criterion.at, "topic"), fault
 
 
-def _counted(path: KeyPath, given: dict[str, Any], types: list[str]) -> Iterator[Fault]:
-    """Yield values of a counter that its field never has."""
-    for key in COUNTED & given.keys():
-        kinds = [kind.partition("/")[2].lower() for kind in types if kind.startswith("std_msgs/")]
-        wrong = [no_value(kind, given[key]) if integer_limits(kind) else "" for kind in kinds]
-        if wrong and all(wrong) and len(wrong) == len(types):
-            yield (*path, key), f"data of {types[0]} {wrong[0]}"
+def _counted(criterion: WrittenCriterion, known: Definitions, rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield fields that cannot count, and values of a counter that its field never has."""
+    at, given = criterion.at, criterion.given
+    name = str(given.get("field", "data"))
+    types = sorted({str(kind) for kind in types_of(str(given.get("topic")), rubric)})
+    shapes = [known.shape(kind) for kind in types]
+    if "field" not in given and shapes and all(shape and _lacks(shape, name) for shape in shapes):
+        yield (*at, "topic"), f"{types[0]} has no field data: say which field counts (field)"
+    found = [shape.field_at(name) for shape in shapes if shape and _has_field(shape, name, said=False)]
+    kinds = [field.type for field in found if field]
+    if "field" in given and kinds and not any(integer_limits(kind) or "float" in kind for kind in kinds):
+        yield (*at, "field"), f"{name} of {types[0]} is {kinds[0]}, which counts nothing"
+    for key in COUNTED if len(kinds) == len(types) else ():
+        wrong = [no_value(kind, given[key]) for kind in kinds if key in given and integer_limits(kind)]
+        if wrong and all(wrong):
+            yield (*at, key), f"{name} of {types[0]} {wrong[0]}"
 
 
-def _has_field(shape: Shape | None, path: object) -> bool:
+def _lacks(shape: Shape, name: str) -> bool:
+    return name not in {one.name for one in shape.types[shape.root.type]}
+
+
+def _has_field(shape: Shape | None, path: object, *, said: bool = True) -> bool:
+    """Return whether it has the field; `said` for one that it cannot have, which is a fault of its own."""
     try:
         return shape is not None and shape.field_at(str(path)) is not None
-    except Misfit:  # said elsewhere
-        return True
+    except Misfit:
+        return said
 
 
 def _quoted(path: KeyPath, value: object, topic: str = "", *, are_fields: bool = False) -> Iterator[Fault]:

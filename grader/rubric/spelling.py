@@ -203,7 +203,8 @@ def _last_word(path: KeyPath, text: str, rubric: WrittenRubric) -> str:
     if is_value and str(_judged(path, rubric).get("field")).endswith("frame_id"):
         return text
     is_field = text == path[-1] and not FIELDS.isdisjoint(path[2:-1]) and not _is_known_field(path, rubric)
-    return text.rpartition(".")[2].partition("[")[0] if is_field or _is_own_field(path, rubric) else ""
+    is_own = text != path[-1] and _is_own_field(path, rubric)
+    return text.rpartition(".")[2].partition("[")[0] if is_field or is_own else ""
 
 
 def _key(path: KeyPath) -> object:

@@ -9,9 +9,10 @@ from itertools import pairwise
 from statistics import median
 from typing import Annotated, Literal, NamedTuple
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from grader.checks.support.exit_causes import explain_early_end, explain_error
+from grader.checks.support.fields import FieldPath, NoField, values_at
 from grader.checks.support.processes import OnTopic, observed_until_ns, slips_of
 from grader.checks.support.recorder_losses import losses, whole_until_ns
 from grader.checks.support.text import loop_rate
@@ -171,24 +172,50 @@ def steps_to_judge(count: Count, maximum: int) -> tuple[Step, ...]:
     return count.steps[int(count.begins_astray) : len(count.steps) - (count.stuck - 1 if stays else 0)]
 
 
+class CounterParams(OnTopic):
+    """Where a counter is, and how fast it counts."""
+
+    field: FieldPath = "data"
+    """The field that counts, as `rostopic echo` shows it: `count`, `status.number`."""
+    rate_hz: Annotated[float, Field(gt=0)] = 10.0
+    """The nominal rate, to tell a flood of messages from a counter."""
+
+    @field_validator("field")
+    @classmethod
+    def _not_of_ros(cls, field: str) -> str:
+        if field.endswith("header.seq"):
+            raise ValueError(f"{field} is counted by ROS itself, whatever the node does: name another field")
+        return field
+
+    @property
+    def counter(self) -> str:
+        """What counts, in words: `/chatter`, or `number on /status`."""
+        return self.topic if self.field == "data" else f"{self.field} on {self.topic}"
+
+    @property
+    def place(self) -> str:
+        """Where its values are, in words: `on /chatter`, or `of number on /status`."""
+        return f"on {self.topic}" if self.field == "data" else f"of {self.counter}"
+
+
 @once_for_each_run
-def counts(run: Run, topic: str) -> tuple[Count, ...]:
-    """What the student's publishers counted on a topic, the earliest first; what is not a number is left out, and what
-    came after the recorder had lost something."""
+def counts(run: Run, topic: str, field: str = "data") -> tuple[Count, ...]:
+    """What the student's publishers counted in a field on a topic, the earliest first; what is not a number is left
+    out, and what came after the recorder had lost something."""
     until_ns = whole_until_ns(run, topic)
-    found = [_count(c, until_ns) for c in run.student_channels(topic)]
+    found = [_count(c, field, until_ns) for c in run.student_channels(topic)]
     return tuple(sorted((c for c in found if c is not None), key=lambda c: c.times_ns[0]))
 
 
-def longest(run: Run, topic: str) -> Count | None:
-    return max(counts(run, topic), key=lambda c: len(c.values), default=None)
+def longest(run: Run, params: CounterParams) -> Count | None:
+    return max(counts(run, params.topic, params.field), key=lambda c: len(c.values), default=None)
 
 
-def _count(channel: Channel, until_ns: int | None) -> Count | None:
+def _count(channel: Channel, field: str, until_ns: int | None) -> Count | None:
     rows: list[tuple[float, int, int]] = []
     without = 0
-    for message, value in zip(channel.messages, channel.data, strict=True):
-        number = _number(value)
+    for message, value in zip(channel.messages, channel.values, strict=True):
+        number = _number(value, field)
         if number is None:
             # It came, so it was not lost: rospy sends an empty one where a number does not fit.
             without += 1
@@ -200,11 +227,15 @@ def _count(channel: Channel, until_ns: int | None) -> Count | None:
     return Count(callerid=channel.callerid, values=values, times_ns=times, sequences=sequences)
 
 
-def _number(value: object) -> float | None:
-    """Return a number; text is none, even if it is written in digits."""
+def _number(message: object, field: str) -> float | None:
+    """Return the number in a field; text is none, even if it is written in digits."""
+    try:
+        values = values_at(message, field)
+    except NoField:
+        return None
     # In Python, true and false are the numbers 1 and 0.
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        return value
+    if len(values) == 1 and isinstance(values[0], int | float) and not isinstance(values[0], bool):
+        return values[0]
     return None
 
 
@@ -213,7 +244,7 @@ def first_values(values: Sequence[float]) -> str:
     return f"{from_start}, …" if len(values) > 4 else from_start
 
 
-class WrapParams(OnTopic):
+class WrapParams(CounterParams):
     """Where the counter wraps."""
 
     minimum: int = 0
@@ -222,8 +253,6 @@ class WrapParams(OnTopic):
     """The last value before the wrap; one less will do as well."""
     wraps: Annotated[int, Field(ge=1)] = 2
     """How often the wrap has to be seen."""
-    rate_hz: Annotated[float, Field(gt=0)] = 10.0
-    """The nominal rate, to tell a flood of messages from a counter."""
 
     @model_validator(mode="after")
     def _goes_up(self) -> WrapParams:

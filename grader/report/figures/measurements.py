@@ -65,7 +65,7 @@ Mark = tuple[int, str]
 
 def start_figures(run: Run, params: StartParams) -> Iterator[CounterFigure]:
     """Yield the beginning of the publisher that came first."""
-    for count in counters.counts(run, params.topic)[:1]:
+    for count in counters.counts(run, params.topic, params.field)[:1]:
         wrong = judge_start(count, run, params).status is Status.FAIL
         marks = (
             [(0, f"the first value is {significant(count.values[0])}, not {params.start}")] if wrong else []
@@ -73,24 +73,24 @@ def start_figures(run: Run, params: StartParams) -> Iterator[CounterFigure]:
         # a turn; one less is a value that came twice
         steps = [s for s in count.steps[:FIRST_VALUES] if s.change < -1]
         first = range(len(count.values))[:FIRST_VALUES]
-        yield _counter_figure(count, steps, marks, run=run, topic=params.topic, kept=first)
+        yield _counter_figure(count, steps, marks, run=run, topic=params.counter, kept=first)
 
 
 def step_figures(run: Run, params: StepParams) -> Iterator[CounterFigure]:
     """Yield the publisher that sent most."""
-    count = counters.longest(run, params.topic)
+    count = counters.longest(run, params)
     if count is None:
         return
     found = counters.wrong_steps(count, run, maximum=params.maximum, rate_hz=params.rate_hz)
     lost = {s.number for s in found.lost}
     marks = [(s.number, _step_text(s, flood=found.flood, lost=s.number in lost)) for s in found.steps]
     turns = [s for s in count.steps if s.change < -1]
-    yield _counter_figure(count, turns, [] if found.excused else marks, run=run, topic=params.topic)
+    yield _counter_figure(count, turns, [] if found.excused else marks, run=run, topic=params.counter)
 
 
 def wrap_figures(run: Run, package: PackageFacts, params: WrapParams) -> Iterator[CounterFigure]:
     """Yield the publisher that sent most."""
-    count = counters.longest(run, params.topic)
+    count = counters.longest(run, params)
     if count is None:
         return
     found = counters.turns_of(count, run, params)
@@ -100,7 +100,7 @@ def wrap_figures(run: Run, package: PackageFacts, params: WrapParams) -> Iterato
     if not found.bad and verdict.status is Status.FAIL and not verdict.basis.unjudged:
         # no turn is wrong, and it fails: there was none at all, which shows at the end
         marks = [(len(count.values) - 1, verdict.message)]
-    yield _counter_figure(count, found.good, marks, run=run, topic=params.topic)
+    yield _counter_figure(count, found.good, marks, run=run, topic=params.counter)
 
 
 def _step_text(step: Step, *, flood: bool, lost: bool) -> str:
