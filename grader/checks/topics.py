@@ -32,17 +32,11 @@ from grader.checks.support.topics import (
     topics_with,
 )
 from grader.evidence.run import Channel, Run, is_grader_node
-from grader.model.message_definitions import other_fields, parse_definition
+from grader.model.message_definitions import other_fields, sound_message
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Citation, Verdict, failed, inconclusive, passed
 from grader.wording import join_words, plural
-
-
-def _message_text(text: str | None) -> str | None:
-    for _ in parse_definition(text or "", ".msg"):
-        pass
-    return text
 
 
 class TopicTypeParams(OnTopic):
@@ -50,7 +44,7 @@ class TopicTypeParams(OnTopic):
 
     type: Annotated[TypeName, Refers("message")]
     """As `rostopic info` gives it: `std_msgs/Int8`."""
-    definition: Annotated[str | None, AfterValidator(_message_text)] = None
+    definition: Annotated[str | None, AfterValidator(sound_message)] = None
     """The handout's text of a `.msg` that students write themselves: fields, their types and their order
     have to be the same; null: only the type's name counts."""
 

@@ -280,6 +280,13 @@ def _other_parts(path: str, number: int, parts: tuple[str, ...]) -> Fault:
     return Fault(file=path, line=None, kind="OtherParts", message=message, cause=message, fix=fix)
 
 
+def sound_message(text: str | None) -> str | None:
+    """Return the text of a `.msg`. Raises ValueError where it is none."""
+    for _ in parse_definition(text or "", ".msg"):
+        pass
+    return text
+
+
 def other_fields(type_: str, found: str, wanted: str) -> str:
     """Return how the fields of a `.msg` or `.srv` text differ from those that are wanted: names, types, order.
 

@@ -18,7 +18,7 @@ from grader.evidence.definitions import Field, Types, parse
 from grader.evidence.message_values import ANGLES, CLOCKS, FORMS, NOW, MessageType
 from grader.model.message_definitions import DIVIDER, PARTS, integer_limits
 from grader.ros_env import ros_packages
-from grader.rubric.yaml_lines import KeyPath, WrittenRubric, as_map, services_in
+from grader.rubric.yaml_lines import KeyPath, WrittenRubric, as_map, parts_of, services_in
 from grader.wording import closest, did_you_mean, is_one_edit, join_words
 
 ALMOST = 0.87
@@ -255,6 +255,10 @@ def own_texts(rubric: WrittenRubric) -> Iterator[tuple[KeyPath, str, str, OwnTex
             if isinstance(one.get("definition"), str):
                 path = ("scenarios", name, *at, "definition")
                 yield path, str(one.get("type")), ".srv", OwnText(one["definition"], whole=True)
+        for at, kind, one in parts_of(scenario):
+            if kind == "publish" and isinstance(one.get("definition"), str):
+                path = ("scenarios", name, *at, "definition")
+                yield path, str(one.get("type")), ".msg", OwnText(one["definition"], whole=True)
 
 
 def _of_fields(file: PurePosixPath, given: dict[str, Any]) -> OwnText:

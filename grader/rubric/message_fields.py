@@ -17,6 +17,7 @@ from grader.model.message_definitions import (
     FULL_NAMES,
     PARTS,
     integer_limits,
+    other_fields,
     parse_definition,
     parse_interface,
 )
@@ -103,6 +104,7 @@ _NUMBER = re.compile(r"[-+]?\d+(\.\d*)?([eE][-+]?\d+)?")
 def field_faults(rubric: WrittenRubric, known: Definitions) -> Iterator[Fault]:
     """Yield fields that are not there, and values that they can never have."""
     yield from _no_types(rubric, known)
+    yield from _two_definitions(rubric)
     yield from _quoted_params(rubric)
     # Told only where the type of the topic shows nothing wrong: it says more, and which of the two it is.
     other_kinds = list(_other_kinds(rubric))
@@ -553,6 +555,15 @@ def _sent_fields(scenario: dict[str, Any], known: Definitions) -> Iterator[tuple
             yield at, fault
         elif shape is None and (part or kind.partition("/")[0] not in noetic_messages()):
             yield from _quoted(at, value, are_fields=True)
+
+
+def _two_definitions(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield texts of a definition that differ from an earlier one of the same type."""
+    first: dict[tuple[str, str], str] = {}
+    for path, type_, suffix, own in own_texts(rubric):
+        earlier = first.setdefault((type_, suffix), own.text) if own.whole else own.text
+        if earlier != own.text and other_fields(type_, own.text, earlier):
+            yield path, f"differs from the definition of {type_} above: write it once, with & and *"
 
 
 def _other_definitions(

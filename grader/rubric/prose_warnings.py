@@ -321,7 +321,7 @@ def _sent_otherwise(rubric: WrittenRubric) -> Iterator[Fault]:
         other = next((text for text in quoted if text.lower() == line.lower()), "")
         if other and line not in quoted:
             yield (*path, "line"), f"the handout has `{other}`"
-        if kind in {"call", "serve"}:
+        if kind in {"call", "serve", "publish"}:
             yield from _other_fields((*path, "definition"), one.get("definition"), handout)
         said = set(said_types(str(one.get("topic")), handout)) if kind == "publish" else set()
         if said and str(one.get("type")) not in said:

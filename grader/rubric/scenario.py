@@ -19,7 +19,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field
 
-from grader.model.message_definitions import parse_definition
+from grader.model.message_definitions import parse_definition, sound_message
 from grader.model.record import Record
 
 Seconds = Annotated[float, Field(ge=0)]
@@ -199,6 +199,9 @@ class Publish(Record):
     """The topic, with its slash: `/chatter`."""
     type: Annotated[str, Field(pattern=TYPE_PATTERN)]
     """A message type of ROS, of the student's package or of an installed one."""
+    definition: Annotated[str | None, AfterValidator(sound_message)] = None
+    """The handout's text of a `.msg` that students write themselves: the values have to fit it, and a package that
+    lacks one of its fields is judged with it repaired. Messages are sent by the student's own file."""
     value: Any = None
     """What each message holds."""
     values: tuple[Any, ...] = ()
@@ -512,6 +515,8 @@ class Scenario(Record):
         left_out |= {key: True for key in ("steps", "keeps", "serves") if not getattr(self, key)}
         if not any(call.definition for call in self.calls):
             left_out["calls"] = {"__all__": {"definition"}}
+        if self.steps and not any(step.publish and step.publish.definition for step in self.steps):
+            left_out["steps"] = {"__all__": {"publish": {"definition"}}}
         unset = {key for key in ("tests", "package") if not any(getattr(start, key) for start in self.start)}
         if unset:
             left_out["start"] = {"__all__": unset}

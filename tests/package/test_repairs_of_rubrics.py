@@ -52,6 +52,25 @@ def test_a_rubric_names_what_is_wanted() -> None:
     assert "/details/contact/phone" in wanted_of(load_rubric("eyantra-ros-basics").rubric).params
 
 
+def test_a_message_that_the_grader_sends_is_wanted_as_the_handout_defines_it(tmp_path: Path) -> None:
+    text = Path(TURTLE).with_name("two-packages.yaml").read_text(encoding="utf-8")
+    about = text.index("  - {id: definition"), text.index("  - {id: manifest")
+    sent = 'type: weather_msgs/Reading, definition: "float64 temperature", values'
+    text = text[: about[0]] + text[about[1] :].replace("points: 10", "points: 30", 1)
+    path = tmp_path / "lab.yaml"
+    path.write_text(text.replace("type: weather_msgs/Reading, values", sent), encoding="utf-8")
+    rubric = load_rubric(str(path)).rubric
+    ((file, fields),) = wanted_of(rubric).definitions
+    assert (file, [(one.type, one.name) for one in fields]) == (
+        "msg/Reading.msg",
+        [("float64", "temperature")],
+    )
+    alarm = rubric.scenarios["alarm"]
+    path.write_text(text, encoding="utf-8")
+    plain = load_rubric(str(path)).rubric.scenarios["alarm"]
+    assert plain.digest != alarm.digest
+
+
 SAME = (
     *(
         "bit-removed",

@@ -95,7 +95,7 @@ def wanted_of(rubric: Rubric, package: str = "") -> Wanted:
         package=package,
         started=tuple(started),
         launched=tuple(dict.fromkeys(launched)),
-        definitions=tuple(dict([*_of_services(rubric, package), *_definitions(criteria)]).items()),
+        definitions=tuple(dict([*_of_steps(rubric, package), *_definitions(criteria)]).items()),
         does=tuple(dict.fromkeys(_of_scripts(rubric, criteria))),
         **{field: tuple(names) for field, names in found.items()},
     )
@@ -110,15 +110,18 @@ def _definitions(criteria: Iterable[Criterion]) -> Iterator[tuple[str, tuple[Int
         yield file, tuple(parse_definition(text, PurePosixPath(file).suffix) if text else named)
 
 
-def _of_services(rubric: Rubric, package: str) -> Iterator[tuple[str, tuple[InterfaceField, ...]]]:
-    """Yield the definitions of the package's services that the grader itself calls, or offers."""
+def _of_steps(rubric: Rubric, package: str) -> Iterator[tuple[str, tuple[InterfaceField, ...]]]:
+    """Yield the definitions of the package's services that the grader itself calls, or offers, and of its messages that
+    the grader sends."""
     for scenario in rubric.scenarios.values():
         calls = [step.call for step in scenario.steps if step.call is not None]
-        named = [(one.type, one.definition) for one in (*scenario.calls, *calls)]
-        for kind, text in (*named, *((one.type, one.definition) for one in scenario.serves)):
+        sent = [step.publish for step in scenario.steps if step.publish is not None]
+        named = [(one.type, one.definition, "srv") for one in (*scenario.calls, *calls)]
+        named += [(one.type, one.definition, "srv") for one in scenario.serves]
+        for kind, text, folder in (*named, *((one.type, one.definition, "msg") for one in sent)):
             maker, _, name = kind.partition("/")
             if text and maker == package:
-                yield f"srv/{name}.srv", tuple(parse_definition(text, ".srv"))
+                yield f"{folder}/{name}.{folder}", tuple(parse_definition(text, f".{folder}"))
 
 
 def _of_scripts(rubric: Rubric, criteria: Sequence[Criterion]) -> Iterator[tuple[str, Doing, str]]:
