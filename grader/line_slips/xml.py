@@ -46,6 +46,10 @@ _ALIKE = 0.7
 _LINE_CHARS_MAX = 1_000
 _QUOTED = r"(?:\s+[\w:-]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))"
 
+_DOUBLE = '"'
+_VALUE = re.compile(r"(\s[\w:-]+\s*=\s*)(?:(\"[^\"]*\"|'[^']*')|([\w./$():~,+-]+?)([\"']?)(?=\s|[/?]?>|$))")
+"""An attribute's beginning, and its value: in quotes, or with at most the one at its end."""
+
 
 class Slip(NamedTuple):
     """What is wrong with a line, and the line as it should be."""
@@ -65,6 +69,7 @@ def slips_of(line: str, root: str) -> Iterator[Slip]:
         if found:
             changed = line[: found.start()] + found.expand(new) + line[found.end() :]
             yield Slip(why.format(*(found.groups() or ("",))), changed)
+    yield from _unquoted(line)
     yield from _misspelt(line, root)
 
 
@@ -99,6 +104,21 @@ _PATTERNS = (
     (r"<>([^<>]*</(NAMES)>)", r"<\2>\1", "the name of the tag is missing"),
 )  # fmt: skip
 """What a line has, what it should have, and the reason ({0}, {1}: the pattern's groups)."""
+
+
+def _unquoted(line: str) -> Iterator[Slip]:
+    """Yield the line with quotes around each value that has none, or only the one at its end."""
+    changed = _VALUE.sub(
+        lambda one: one[0] if one[2] else f"{one[1]}{one[4] or _DOUBLE}{one[3]}{one[4] or _DOUBLE}", line
+    )
+    if changed != line:
+        halves = any(one[4] for one in _VALUE.finditer(line))
+        why = (
+            "the quote before a value is missing"
+            if halves
+            else "the value of an attribute has no quotes around it"
+        )
+        yield Slip(why, changed)
 
 
 def _misspelt(line: str, root: str) -> Iterator[Slip]:

@@ -134,6 +134,8 @@ SLIPS = {
         ('name="talker"/>', "name=\"talker'/>", "a value ends with the quote with which it begins"),
         ('name="talker"/>', 'name:"talker"/>', "`=` belongs between `name` and its value"),
         ('name="talker"/>', 'name="talker"//>', "`/` is there twice"),
+        ('name="talker"/>', 'name=talker"/>', 'write `<node pkg="lab" type="talker.py" name="talker"/>`'),
+        ('type="talker.py" name="talker"/>', "type=talker.py name=talker/>", 'type="talker.py" name="talker"/>`'),
         ('name="talker"/>', 'name=="talker"" />', "`=` is there twice"),
         ('<node pkg="lab" type="t', '<node pkh="lab" type="t', "`<node>` has no attribute `pkh`"),
         ("</launch>", "</>", "the name of the closing tag is missing"),
