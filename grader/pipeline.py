@@ -51,7 +51,7 @@ from grader.recording import (
     record_other_runs,
 )
 from grader.report.files import write_reports
-from grader.report.hidden_criteria import hidden_ids
+from grader.report.view import hidden_ids
 from grader.results import EVIDENCE, Results, finish_killed
 from grader.ros_env import find_ros
 from grader.rubric.load import LoadedRubric, files_of, needs_package, origin_of

@@ -34,8 +34,8 @@ from grader.judging.settle import awarded, settle
 from grader.judging.summary import overall_status, total_fields
 from grader.model.result import Automatic, CriterionResult, GradingResult
 from grader.report.files import result_text
-from grader.report.hidden_criteria import hidden_ids, without_hidden
 from grader.report.sentences import RUBRIC_FROM
+from grader.report.view import hidden_ids, without_hidden
 from grader.results import EVIDENCE, RESULT, SIGNATURE, SUMS, load_result
 from grader.rubric.load import LoadedRubric
 from grader.wording import number, plural

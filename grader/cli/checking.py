@@ -30,10 +30,10 @@ from grader.files import atomic_write, check_writable, temporary_folder
 from grader.intake.gitdir import write_staged
 from grader.intake.names import safe_name
 from grader.model.result import GitStatus, GradingResult, Point, Progress, Silence
-from grader.report.hidden_criteria import hidden_ids, without_hidden
 from grader.report.losses import arrange
 from grader.report.terminal import fit_encoding, open_console
 from grader.report.text import line
+from grader.report.view import hidden_ids, without_hidden
 from grader.rubric.find import named_labs
 from grader.rubric.load import needs_ros
 from grader.student.git_status import advise, read_environment

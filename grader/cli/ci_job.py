@@ -18,22 +18,24 @@ from grader.cli.select_rubric import Chosen, choose_all, only, package_prefix
 from grader.errors import ExitCode, GraderError, RubricError, UsageError
 from grader.faults import fault_of
 from grader.files import temporary_folder
-from grader.integrations.ci_results import (
+from grader.integrations.ci_systems import (
     OF_CODE,
+    RUNNERS,
     JobResult,
+    JobSettings,
     JobStatus,
     add_forms,
     clear,
     describe_outcome,
     keep,
+    read_settings,
+    with_pass_mark,
 )
-from grader.integrations.ci_systems import RUNNERS, JobSettings, read_settings, with_pass_mark
 from grader.judging.summary import overall_status, total_fields
 from grader.model.result import GradingResult
-from grader.report.hidden_criteria import hidden_ids, without_hidden
 from grader.report.sentences import rubric_words, without_sandbox
 from grader.report.terminal import Terminal, open_console
-from grader.report.view import is_students_fault
+from grader.report.view import hidden_ids, is_students_fault, without_hidden
 from grader.results import RESULT, read_result
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric

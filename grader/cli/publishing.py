@@ -31,7 +31,7 @@ from grader.errors import ExitCode, NotSent, UsageError
 from grader.host_programs import git_user
 from grader.model.result import AUTHOR_CHARS
 from grader.portable import cores
-from grader.report.hidden_criteria import hidden_ids
+from grader.report.view import hidden_ids
 from grader.rubric.load import load_rubric
 from grader.untrusted_text import line, visible
 from grader.wording import first_few, number, plural

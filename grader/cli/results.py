@@ -1,6 +1,6 @@
 """What commands on existing results and evidence do.
 
-They verify, write reports, print what a file holds, and export bags. None of them needs ROS.
+They judge evidence again, verify, write reports, print what a file holds, and export bags. None of them needs ROS.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from grader.classes.batch.renew_results import (
     WrittenReports,
     figures_in,
     has_result,
+    judge_all,
     result_in,
     write_all,
     write_one,
@@ -26,7 +27,7 @@ from grader.classes.batch.renew_results import (
 from grader.classes.batch.run import INDEX
 from grader.cli.declare import STDOUT
 from grader.cli.display import exit_code, worst
-from grader.cli.output import report, say, say_beside
+from grader.cli.output import report, say, say_beside, write_document
 from grader.cli.select_rubric import package_prefix
 from grader.errors import EvidenceError, ExitCode, UsageError
 from grader.evidence.bag import export_bag
@@ -34,16 +35,18 @@ from grader.evidence.inspect import ChannelSummary, Inspection, ProcessSummary
 from grader.evidence.reader import load_evidence
 from grader.evidence.run import Run
 from grader.files import atomic_write
+from grader.judging import judge
+from grader.judging.summary import criteria_text, judged_text
 from grader.model.result import GradingResult
 from grader.model.verdict import FileCitation
 from grader.portable import cores
 from grader.report.class_page.page import write_class_page
 from grader.report.class_page.submissions import salt_in
 from grader.report.forms import FORMS, ReportInput
-from grader.report.hidden_criteria import without_hidden
 from grader.report.sentences import missing_hidden
 from grader.report.terminal import Terminal, emit, open_console
 from grader.report.text import line
+from grader.report.view import without_hidden
 from grader.results import RESULT, load_result
 from grader.rubric.find import named_labs
 from grader.rubric.load import LoadedRubric, load_rubric
@@ -297,3 +300,27 @@ def _prefix(result: GradingResult, given: str | None) -> str:
         missing = f"no package {package} with these files is here, so paths begin in it"
         say_beside(f"report: {missing}; give its folder with --prefix")
     return found or ""
+
+
+def judge_evidence(evidence: Sequence[Path], loaded: LoadedRubric, out: str) -> ExitCode:
+    """Judge one submission and write its criteria as JSON to the file `out`, or to stdout for `-`."""
+    criteria = judge(loaded.rubric, load_evidence(evidence), loaded.checks, loaded.handed_out)
+    write_document(out, lambda ascii_only: criteria_text(criteria, ascii_only=ascii_only))
+    return exit_code(criteria, loaded.rubric)
+
+
+def judge_submissions(folders: Sequence[Path], loaded: LoadedRubric, out: str, jobs: int) -> ExitCode:
+    """Judge several submissions and write a list of them. One that cannot be judged is reported and does not affect the
+    others. Return the exit code of the worst."""
+    order = {folder: index for index, folder in enumerate(folders)}
+    # workers end in any order
+    judged = sorted(judge_all(folders, loaded, jobs), key=lambda one: order[one.folder])
+    found = [(one.folder.name, one.error if one.criteria is None else one.criteria) for one in judged]
+    write_document(out, lambda ascii_only: judged_text(loaded.rubric, found, ascii_only=ascii_only))
+    for one in judged:
+        if one.criteria is None:
+            report(EvidenceError(one.error, hint=one.hint))
+    return worst(
+        ExitCode.NOT_GRADED if c is None else exit_code(c, loaded.rubric)
+        for c in (j.criteria for j in judged)
+    )

@@ -17,8 +17,14 @@ from grader.errors import GraderError, InternalError, SubmissionError
 from grader.faults import fault_of
 from grader.files import atomic_write, make_folder
 from grader.intake.source import Source, parse_source
-from grader.integrations.bundle import BundleSettings, ContainerLayout, LostModes, read_settings
-from grader.integrations.platform_exports import GRADESCOPE, PRAIRIELEARN
+from grader.integrations.platform_exports import (
+    GRADESCOPE,
+    PRAIRIELEARN,
+    BundleSettings,
+    ContainerLayout,
+    LostModes,
+    read_settings,
+)
 from grader.model.result import GradingResult, Silence
 from grader.report.terminal import Terminal, open_console
 from grader.report.text import json_text, line

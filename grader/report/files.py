@@ -13,8 +13,8 @@ from grader.files import atomic_write
 from grader.model.figure import Figures
 from grader.model.result import GradingResult
 from grader.report.forms import FORMS, ReportInput
-from grader.report.hidden_criteria import without_hidden
 from grader.report.text import visible
+from grader.report.view import without_hidden
 from grader.rubric.model import Rubric
 from grader.untrusted_text import clipped, json_text, text_limit
 

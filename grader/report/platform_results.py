@@ -23,9 +23,8 @@ from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import FileCitation, Status
 from grader.report import sentences
 from grader.report.findings import repository_path
-from grader.report.hidden_criteria import hidden_ids
 from grader.report.text import json_text, line, text_limit
-from grader.report.view import is_students_fault, not_graded, of_points, places, points_of
+from grader.report.view import hidden_ids, is_students_fault, not_graded, of_points, places, points_of
 from grader.rubric.model import Rubric
 from grader.wording import number
 

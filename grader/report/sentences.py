@@ -19,9 +19,8 @@ from grader.model.result import (
     Note,
 )
 from grader.model.verdict import Status
-from grader.report.hidden_criteria import hidden_ids
 from grader.report.losses import Loss, ReportView, missing_file, without_bit
-from grader.report.view import not_graded, points_of
+from grader.report.view import hidden_ids, not_graded, points_of
 from grader.rubric.made_up import as_text
 from grader.rubric.model import Rubric
 from grader.wording import join_words, number, plural

@@ -40,12 +40,11 @@ from grader.model.verdict import Status
 from grader.package.facts import read_files
 from grader.package.reading import LEFT_OUT
 from grader.report.files import result_text
-from grader.report.hidden_criteria import without_hidden
 from grader.report.losses import arrange
 from grader.report.sentences import points_line
 from grader.report.terminal import TO_FIX, Terminal, emit, fit_encoding, open_console
 from grader.report.text import line
-from grader.report.view import points_of
+from grader.report.view import points_of, without_hidden
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
 from grader.wording import first_few, number

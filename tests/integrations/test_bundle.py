@@ -18,7 +18,7 @@ import pytest
 
 from grader.cli.main import run
 from grader.integrations import platform_exports
-from grader.integrations.bundle import wheel
+from grader.integrations.platform_exports import wheel
 from grader.rubric.find import rubrics_folder
 from tests.rubric.own_checks.samples import GREETING, OWN, TESTS, write_rubric
 
@@ -110,7 +110,7 @@ def test_the_wheel_is_installed_by_pip_and_exports_the_same_again(tmp_path) -> N
     target = tmp_path / "site"
     pip = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-compile", "--target", str(target)]
     subprocess.run([*pip, str(tmp_path / name)], check=True)
-    ask = "import sys; from grader.integrations.bundle import wheel; sys.stdout.buffer.write(wheel()[1])"
+    ask = "import sys; from grader.integrations.platform_exports import wheel; sys.stdout.buffer.write(wheel()[1])"
     again = subprocess.run(
         [sys.executable, "-c", ask],
         env={"PYTHONPATH": str(target)},

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from grader.errors import OutputError
-from grader.integrations.ci_results import clear, keep
+from grader.integrations.ci_systems import clear, keep
 from grader.rubric.load import load_rubric
 
 

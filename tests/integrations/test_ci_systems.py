@@ -6,8 +6,15 @@ import pytest
 
 from grader.cli.display import exit_code
 from grader.errors import ExitCode, SubmissionError, UsageError
-from grader.integrations.ci_results import JobStatus, points_to_pass
-from grader.integrations.ci_systems import FAILING, PassMark, read_pass_mark, read_settings, with_pass_mark
+from grader.integrations.ci_systems import (
+    FAILING,
+    JobStatus,
+    PassMark,
+    points_to_pass,
+    read_pass_mark,
+    read_settings,
+    with_pass_mark,
+)
 from grader.rubric.load import load_rubric
 from tests.support.a_class import criterion
 

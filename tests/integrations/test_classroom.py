@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.model.result import ErrorInfo
-from grader.report.hidden_criteria import without_hidden
 from grader.report.platform_results import JSON_BYTES_MAX, render_classroom
+from grader.report.view import without_hidden
 from tests.integrations.reporter import reporter
 from tests.report.hostile import result, rubric
 from tests.support.a_class import criterion

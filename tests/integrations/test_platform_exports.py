@@ -11,8 +11,13 @@ import pytest
 
 from grader.errors import HostError
 from grader.integrations.autograde import ID, PLATFORMS, REPORTS, grade_upload
-from grader.integrations.bundle import SETTINGS_FILE, BundleSettings, ContainerLayout
-from grader.integrations.platform_exports import GRADESCOPE, PRAIRIELEARN
+from grader.integrations.platform_exports import (
+    GRADESCOPE,
+    PRAIRIELEARN,
+    SETTINGS_FILE,
+    BundleSettings,
+    ContainerLayout,
+)
 from grader.model.result import ErrorInfo
 from grader.model.verdict import Status
 from grader.results import read_result

@@ -10,7 +10,7 @@ import pytest
 
 from grader.checks import CHECKS
 from grader.checks.support.text import CAUSES, LOOP, in_language, init, publisher, set_param
-from grader.integrations.bundle import Bundle, add_lab
+from grader.integrations.platform_exports import Bundle, add_lab
 from grader.judging import judge
 from grader.judging.facts import Facts, try_facts
 from grader.judging.hint_additions import (

@@ -14,7 +14,7 @@ from grader.judging.summary import overall_status, passed, total_points
 from grader.model.result import CriterionResult, ErrorInfo, GradingResult, HandedIn, Override
 from grader.model.verdict import Status
 from grader.report.files import result_bytes
-from grader.report.hidden_criteria import without_hidden
+from grader.report.view import without_hidden
 from grader.rubric.model import Rubric
 from tests.report.hostile import result as any_result
 from tests.support.a_class import criterion

@@ -12,13 +12,12 @@ from grader.judging.settle import settle, unsettled
 from grader.judging.summary import leave_out, overall_status, reached_pass_mark, total_fields, total_points
 from grader.model.result import CriterionResult, GradingResult, Override
 from grader.model.verdict import Status, Verdict
-from grader.report.hidden_criteria import without_hidden
 from grader.report.junit import render_junit
 from grader.report.losses import arrange
 from grader.report.markdown import render_markdown
 from grader.report.platform_results import render_classroom, render_gradescope
 from grader.report.terminal import Terminal, open_console
-from grader.report.view import points_of
+from grader.report.view import points_of, without_hidden
 from grader.rubric.model import Rubric
 from tests.report.hostile import result
 from tests.support.rubrics import rubric

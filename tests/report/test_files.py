@@ -12,17 +12,17 @@ from grader.classes.review.guard import REPORTS as SHOWN_IN_REVIEW
 from grader.cli.display import REPORTS as SHOWN_AT_THE_END
 from grader.errors import HostError, OutputError
 from grader.files import atomic_write, check_writable
-from grader.integrations.ci_results import REPORT_NAMES
+from grader.integrations.ci_systems import REPORT_NAMES
 from grader.model.repair import Repair
 from grader.model.result import ErrorInfo, Repaired
 from grader.model.verdict import FileCitation, Mistake, Status
 from grader.report.files import result_bytes, write_reports
 from grader.report.forms import FORMS
-from grader.report.hidden_criteria import without_hidden
 from grader.report.losses import arrange
 from grader.report.markdown import render_markdown
 from grader.report.sentences import repair_words
 from grader.report.terminal import Terminal, open_console
+from grader.report.view import without_hidden
 from grader.results import RESULT, RESULT_FILES
 from tests.report.hostile import result, rubric
 from tests.support.a_class import criterion

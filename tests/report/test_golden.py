@@ -20,8 +20,8 @@ from grader.model.result import GradingResult
 from grader.model.verdict import Status
 from grader.report.files import result_bytes
 from grader.report.forms import FORMS, ReportInput
-from grader.report.hidden_criteria import without_hidden
 from grader.report.terminal import Terminal, open_console
+from grader.report.view import without_hidden
 from tests.report import hostile
 from tests.report.hostile import ESCAPES
 from tests.report.worst import COMMANDS, DOCS, FORMULA, LINKS, WIDE, figures, rubric, worst

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.integrations.bundle import Bundle, add_lab
+from grader.integrations.platform_exports import Bundle, add_lab
 from grader.rubric.load import load_rubric, read_beside_rubric
 from tests.rubric.samples import faults, spoiled
 

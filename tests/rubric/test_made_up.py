@@ -16,11 +16,11 @@ from grader.errors import EvidenceError
 from grader.judging import judge
 from grader.model.verdict import Status
 from grader.report.files import result_bytes
-from grader.report.hidden_criteria import for_student
 from grader.report.html.page import render_html
 from grader.report.markdown import render_markdown
 from grader.report.sentences import made_up_words
 from grader.report.terminal import render_terminal
+from grader.report.view import for_student
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.rubric.made_up import MadeUp, tell_made_up, with_recorded_values, with_values
 from grader.rubric.schema import rubric_schema

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.integrations.bundle import Bundle, add_lab
+from grader.integrations.platform_exports import Bundle, add_lab
 from grader.rubric.consistency import scenario_faults
 from grader.rubric.fault_words import model_faults
 from grader.rubric.load import load_rubric

@@ -33,7 +33,6 @@ LOADED = (
         "cli/checking",
         "cli/commands",
         "cli/declare",
-        "cli/judging",
         "cli/results",
         "cli/explanation",
         "cli/main",

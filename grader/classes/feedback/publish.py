@@ -32,8 +32,7 @@ from grader.model.version import PUBLISHED as FORMAT
 from grader.model.version import UPDATE
 from grader.report.files import result_bytes
 from grader.report.forms import FORMS, ReportInput
-from grader.report.hidden_criteria import for_student
-from grader.report.view import is_students_fault, not_graded
+from grader.report.view import for_student, is_students_fault, not_graded
 from grader.results import RESULT, read_result
 from grader.rubric.load import LoadedRubric
 from grader.wording import did_you_mean, join_words, number, plural

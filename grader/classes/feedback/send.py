@@ -30,7 +30,7 @@ from grader.intake.names import safe_name
 from grader.model.batch import Publication, Sent, SentState
 from grader.model.version import SENT, UPDATE
 from grader.portable import BINARY, CLOEXEC, NOFOLLOW
-from grader.report.hidden_criteria import hidden_ids
+from grader.report.view import hidden_ids
 from grader.results import read_result
 from grader.rubric.load import LoadedRubric
 from grader.workers import WorkerEnded, run_each

@@ -228,7 +228,7 @@ def judge(
     """Judge recorded evidence again, without ROS."""
     with loading():
         from grader.classes.batch.renew_results import submissions_in
-        from grader.cli.judging import judge_evidence, judge_submissions
+        from grader.cli.results import judge_evidence, judge_submissions
         from grader.portable import cores
         from grader.rubric.load import load_rubric
     loaded = load_rubric(rubric)

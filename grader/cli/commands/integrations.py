@@ -22,7 +22,7 @@ from grader.model import SandboxMode
 from grader.model.version import ALL
 
 if TYPE_CHECKING:
-    from grader.integrations.bundle import BundleSettings
+    from grader.integrations.platform_exports import BundleSettings
 
 Shell = Literal["bash", "zsh", "fish"]
 FORMATS = tuple(one.short for one in ALL)
@@ -120,7 +120,7 @@ def _settings(
     minutes: int, package: str | None, sandbox: SandboxMode, *, assume_executable: bool
 ) -> "BundleSettings":
     with loading():
-        from grader.integrations.bundle import BundleSettings
+        from grader.integrations.platform_exports import BundleSettings
     modes: Literal["lost", "granted"] = "granted" if assume_executable else "lost"
     return BundleSettings(rubric="", minutes=minutes, sandbox=sandbox, modes=modes, package=package or "")
 

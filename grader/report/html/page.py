@@ -19,7 +19,6 @@ from grader.model.figure import Figure, Figures
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import FileCitation, Status
 from grader.report import losses, sentences
-from grader.report.hidden_criteria import hidden_ids
 from grader.report.html.figures import Drawer, Drawn, code_places
 from grader.report.html.shell import environment, policy, prose, script, style
 from grader.report.losses import Loss
@@ -28,6 +27,7 @@ from grader.report.view import (
     commands_in,
     file_places,
     headline,
+    hidden_ids,
     hint_beside,
     not_graded,
     of_points,
