@@ -8,20 +8,19 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.clocks import time_between
 from grader.checks.support.counters import (
     LOST_GAP_SHARE,
     Count,
     CounterParams,
     Step,
     WrapParams,
-    Wrong,
     added_early,
     cite_early,
     cite_slip,
     counts,
     first_values,
     judge_flood,
+    judge_steps,
     judge_wraps,
     longest,
     stepping,
@@ -44,10 +43,9 @@ from grader.checks.support.topics import (
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.verdict import Status, Verdict, failed, failed_or_blocked, grade_again, inconclusive, passed
-from grader.wording import NOTHING_TO_DO, join_words, plural, seconds, significant
+from grader.wording import NOTHING_TO_DO, plural, seconds, significant
 
 CONNECT_NS = 1_000_000_000
-LARGEST = 2.0**64
 LOOP_PERIODS = 2
 """How long a loop may have published nothing when the run ends, in its own periods."""
 SLOW = 1.5
@@ -192,7 +190,7 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
     found = wrong_steps(count, run, maximum=params.maximum, rate_hz=params.rate_hz)
     wrong, right = found.steps, sum(s.change == 1 for s in steps)
     verdict = (
-        _wrong(count, found, run, params)
+        judge_steps(count, found, run, params)
         or _too_few(count, len(steps), run, package, params)
         or passed(f"the counter goes up by one, {plural(right, 'time')}")
     )
@@ -283,33 +281,6 @@ def _recorder_was_late(run: Run, topic: str, callerid: str) -> bool:
     return registered is not None and connected is not None and connected - registered > CONNECT_NS
 
 
-def _wrong(count: Count, found: Wrong, run: Run, params: StepParams) -> Verdict | None:
-    if not found.steps or found.excused:
-        return None
-    if found.flood:
-        drops = f"drops most values: {plural(len(found.steps), 'skip')}"
-        return judge_flood(params.topic, drops, params.rate_hz)
-    if not found.own:
-        missing = sum(int(min(s.change, LARGEST)) - 1 for s in found.lost)
-        message = f"{plural(missing, 'value')} of {params.topic} were lost on the way, with a gap in time"
-        return inconclusive(message, hint="grade again when the machine is less busy")
-    first, usual = found.own[0], count.usual_step()
-    after = time_between(run, count.times_ns[0], first.to_ns)
-    comes = f"after {significant(first.before)} comes {significant(first.after)}"
-    place = f"{comes} (value {first.number + 1}, {after} after the first)"
-    # Where nearly all steps are alike, that step says more than the first wrong one.
-    if usual not in {None, 1}:
-        message = _usual_fault(usual or 0.0)
-    else:
-        kinds: dict[float, str] = {0: "repeats a value", -1: "goes back"}
-        message = join_words(dict.fromkeys(kinds.get(s.change, "skips values") for s in found.own))
-    hint = "add one to the counter in one place only, once each time around the loop"
-    if usual == 0:
-        hint = "set the counter before the loop, and add one each time around it: nothing inside the loop may reset it"
-    verdict = failed(f"the counter {message}: {place}", hint=hint)
-    return verdict.if_repeated() if count.is_single(found.own) else verdict
-
-
 def _of_clock(
     verdict: Verdict, count: Count, run: Run, package: PackageFacts, params: CounterParams
 ) -> Verdict:
@@ -332,12 +303,6 @@ def _of_clock(
     seen = "" if verdict.status is Status.PASS else f"; {verdict.message}"
     hint = "set a counter before the loop, publish it, and add one to it each time around the loop"
     return failed(message + seen, hint=hint, citations=(slip.place,))
-
-
-def _usual_fault(usual: float) -> str:
-    if usual == 0:
-        return "stays at one value"
-    return f"counts in steps of {significant(usual)}" if usual > 0 else "counts down"
 
 
 def _with_lines(

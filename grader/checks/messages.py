@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 
 from grader.checks.registry import check
 from grader.checks.support.clocks import ASK_AGAIN, WATCHED_S, clocks_at, time_between, wrong_growth
+from grader.checks.support.counters import wrong_count
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.fields import (
     MOVED,
@@ -37,10 +38,12 @@ from grader.checks.support.fields import (
 from grader.checks.support.processes import OnTopic, early_end, is_flood, observed_until_ns, slips_of
 from grader.checks.support.recorder_losses import losses
 from grader.checks.support.text import (
+    COUNT,
     NUMBER,
     OTHER_WORDS_SHARE,
     SECONDS,
     code_of,
+    growing,
     in_one_line,
     in_words,
     message_pattern,
@@ -73,8 +76,8 @@ UNFILLED = ("%s", "%d", "%f", "{}", "{0}")
 class MessageParams(OnTopic):
     """The text of each message."""
 
-    template: Annotated[str, Field(min_length=1), refuse_others(SECONDS)]
-    """The whole text, in which `{seconds}` stands for a time that grows: `hello world {seconds}`."""
+    template: Annotated[str, Field(min_length=1), refuse_others(SECONDS, COUNT)]
+    """The whole text, where `{seconds}` is a time that grows, and `{count}` goes up by one: `hello world {seconds}`."""
 
 
 @check("message", params=MessageParams, messages_only=True, heeds_losses=True)
@@ -83,7 +86,7 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
 
     What it checks
         That every message on the topic has the handout's words, and a time in seconds that increases from
-        message to message.
+        message to message, or a count of the messages.
 
     Why it matters on a robot
         Programs that read the messages rely on their form, and measurements without the right time cannot
@@ -97,11 +100,11 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
         though at 1 Hz it grows as fast as one. A right time in other words than the handout's earns half.
 
     How to fix
-        Build the text each time around the loop: `"hello world %s" % rospy.get_time()`. `rostopic echo
+        Build the text each time around the loop: `"hello world %s" % rospy.get_time()`, or `% count`. `rostopic echo
         <topic>` shows what is sent.
     """
     heard = [c for c in run.student_channels(params.topic) if c.messages]
-    grows = ", with seconds that count up like the clock" if SECONDS in params.template else ""
+    grows = growing(params.template)
     expected = f"each message on {params.topic} is '{in_words(params.template)}'{grows}"
     if not heard or not all(isinstance(text, str) for c in heard for text in c.data):
         return _no_text(package, run, heard, params).about(expected=expected)
@@ -110,6 +113,7 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
         # Words first: a time can be read only where it stands in its place.
         _misfit(package, run, heard, params)
         or _wrong_time(package, run, heard, params)
+        or wrong_count(run, heard, params.topic, params.template)
         or passed(f"all {count} messages on {params.topic} are '{in_words(params.template)}'{grows}")
     )
     measured = f"{in_one_line(heard[0].data[0])!r} to {in_one_line(heard[0].data[-1])!r} ({plural(count, 'message')})"
@@ -138,18 +142,19 @@ def _misfit(
     count = sum(len(c.data) for c in heard)
     found = loose.fullmatch(text)
     part = in_one_line(found[1]) if found and found.groups() else ""
-    wanted = in_words(params.template)
+    said = f"{in_one_line(text)!r}, not '{in_words(params.template)}'"
+    what, unit = ("time", " in seconds") if SECONDS in params.template else ("count", "")
     # Placeholders first: they, too, are not a number where the time belongs.
     if any(mark in text for mark in UNFILLED):
         message = f"a message reads {in_one_line(text)!r}: its placeholder was never filled in"
     elif more := _behind(part):
-        message = f"a message has {more!r} after the time: {in_one_line(text)!r}, not '{wanted}'"
+        message = f"a message has {more!r} after the {what}: {said}"
     elif part.startswith(("<function ", "<bound method ", "<built-in ")):
-        message = f"a message says {part!r} where the time belongs: a function without its brackets `()` is no number"
+        message = f"a message says {part!r} where the {what} belongs: a function without its brackets `()` is no number"
     elif part:
-        message = f"a message says {part!r} where the time in seconds belongs: {in_one_line(text)!r}, not '{wanted}'"
+        message = f"a message says {part!r} where the {what}{unit} belongs: {said}"
     else:
-        message = f"a message reads {in_one_line(text)!r}, not '{wanted}'"
+        message = f"a message reads {said}"
     message += f" ({len(wrong)} of {count} are wrong)" if len(wrong) < count else ""
     cited = cite(run, params.topic, at_ns, at_ns)
     hint = f"publish {code_of(params.template)}"
@@ -186,14 +191,12 @@ def _behind(part: str) -> str:
 def _wrong_time(
     package: PackageFacts, run: Run, heard: Sequence[Channel], params: MessageParams
 ) -> Verdict | None:
-    if SECONDS not in params.template:
-        return None
     pattern = message_pattern(params.template, NUMBER)
     longest = [c for c in heard if len(c.messages) >= ENOUGH]
     if not longest:
-        return _too_few(package, run, heard, params)
-    for channel in longest:
-        told = [float(found[1]) for text in channel.data if (found := pattern.fullmatch(text))]
+        return _too_few(package, run, heard, params) if growing(params.template) else None
+    for channel in longest if SECONDS in params.template else ():
+        told = [float(found["seconds"]) for text in channel.data if (found := pattern.fullmatch(text))]
         clocks = clocks_at(run, channel.times_ns)
         if not clocks:
             return grade_again("the time in the messages cannot be judged: the run's /clock was not recorded")
@@ -240,14 +243,15 @@ def _watched_ns(run: Run, heard: Sequence[Channel]) -> int:
 def _too_few(package: PackageFacts, run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdict:
     """Too little came: the node's own fault where it died, or was watched long enough."""
     few = f"only {plural(sum(len(c.messages) for c in heard), 'message')} came on {params.topic}"
-    why = "too few to see the time grow"
+    timed = SECONDS in params.template
+    why = f"too few to see the {'time' if timed else 'count'} grow"
     # What the recorder lost is not the node's fault.
     if losses(run, params.topic):
         return grade_again(f"{few}: {why}")
     if end := explain_early_end(package, run):
         return end.verdict(failed_or_blocked, f"{few} before the node ended ({end.cause}): {why}")
     if _watched_ns(run, heard) >= WATCHED_S * 1e9:
-        return failed_or_blocked(f"{few}: {why}", hint=f"publish in the loop; {ASK_AGAIN}")
+        return failed_or_blocked(f"{few}: {why}", hint="publish in the loop" + f"; {ASK_AGAIN}" * timed)
     return grade_again(f"{few} while it was watched: {why}")
 
 

@@ -547,13 +547,13 @@ class Later:
         if len(said) != 1:
             types = {one.message for one in self._of("publisher-type")}
             no_text = bool(types) and "String" not in types
-            if not said and (no_text or self._lacks_words(template.partition(SECONDS)[0])):
+            if not said and (no_text or self._lacks_words(template.partition("{")[0])):
                 yield Fix(f"publish `{code}`", (f"`{code}`",))
             return
         text = said[0].message
-        if text in {SAID_VALUE, SAID_DATA} and self._lacks_words(template.partition(SECONDS)[0]):
+        if text in {SAID_VALUE, SAID_DATA} and self._lacks_words(template.partition("{")[0]):
             yield Fix(f"publish `{code}` on {_line(said[0])}")
-        sample = template.replace(SECONDS, "1234567890.25")
+        sample = template.replace(SECONDS, "1234567890.25").replace("{count}", "12")
         if len(self._of("publisher")) > 1:  # it may be another topic's
             if not could_say(text, sample):
                 yield Fix(f"publish `{code}`", (f"`{code}`",))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
+from grader.checks.messages import MessageParams
 from grader.checks.support.fields import near_texts
 from grader.model.verdict import Status, Verdict
 from tests.checks.examples import judge_runs
@@ -88,3 +91,9 @@ def test_texts_that_are_a_slip_of_the_right_one_are_sought_in_the_script(
     values: list[object], wanted: object, near: tuple[str, ...]
 ) -> None:
     assert near_texts(values, wanted) == near
+
+
+@pytest.mark.parametrize("word", ["{counter}", "{}", "{number}", "%d"])
+def test_another_word_in_braces_is_refused(word: str) -> None:
+    with pytest.raises(ValidationError, match=re.escape(": write {seconds} or {count}")):
+        MessageParams(topic="/chatter", template=f"hello {word}")

@@ -11,23 +11,27 @@ from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field, field_validator, model_validator
 
+from grader.checks.support.clocks import time_between
 from grader.checks.support.exit_causes import explain_early_end, explain_error
 from grader.checks.support.fields import FieldPath, NoField, values_at
 from grader.checks.support.processes import OnTopic, observed_until_ns, slips_of
 from grader.checks.support.recorder_losses import losses, whole_until_ns
-from grader.checks.support.text import loop_rate
+from grader.checks.support.text import COUNT, NUMBER, loop_rate, message_pattern
 from grader.evidence.run import Channel, Run, once_for_each_run
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.record import Record
 from grader.model.verdict import Status, Verdict, failed, failed_or_blocked, grade_again, inconclusive, passed
-from grader.wording import plural, significant
+from grader.wording import join_words, plural, significant
 
 FLOOD_FACTOR, FLOOD_HZ = 3, 500
 """Times the nominal rate, and real messages a second."""
 SYSTEMATIC_SHARE = 0.05
 STUCK_COUNT = 5
 LEAST_AFTER_START = 3
+LARGEST = 2.0**64
+NEVER = 2**64
+"""As a maximum: no counter comes so far."""
 LOST_GAP_SHARE = 0.75
 """Of the time that lost values would have taken: a longer gap is a machine that stood still for longer."""
 STALL_PERIODS = 2
@@ -163,6 +167,68 @@ def wrong_steps(count: Count, run: Run, *, maximum: int, rate_hz: float) -> Wron
     lost = tuple(s for s in skips if count.was_lost_in_transit(s, s.change))
     numbers = {s.number for s in lost}
     return Wrong(wrong, own=tuple(s for s in wrong if s.number not in numbers), lost=lost)
+
+
+def judge_steps(count: Count, found: Wrong, run: Run, params: CounterParams) -> Verdict | None:
+    """Return the verdict on steps that are not +1; None where there are none."""
+    if not found.steps or found.excused:
+        return None
+    if found.flood:
+        drops = f"drops most values: {plural(len(found.steps), 'skip')}"
+        return judge_flood(params.topic, drops, params.rate_hz)
+    if not found.own:
+        missing = sum(int(min(s.change, LARGEST)) - 1 for s in found.lost)
+        message = f"{plural(missing, 'value')} of {params.topic} were lost on the way, with a gap in time"
+        return inconclusive(message, hint="grade again when the machine is less busy")
+    first, usual = found.own[0], count.usual_step()
+    after = time_between(run, count.times_ns[0], first.to_ns)
+    comes = f"after {significant(first.before)} comes {significant(first.after)}"
+    place = f"{comes} (value {first.number + 1}, {after} after the first)"
+    # Where nearly all steps are alike, that step says more than the first wrong one.
+    if usual not in {None, 1}:
+        message = _usual_fault(usual or 0.0)
+    else:
+        kinds: dict[float, str] = {0: "repeats a value", -1: "goes back"}
+        message = join_words(dict.fromkeys(kinds.get(s.change, "skips values") for s in found.own))
+    hint = "add one to the counter in one place only, once each time around the loop"
+    if usual == 0:
+        hint = "set the counter before the loop, and add one each time around it: nothing inside the loop may reset it"
+    verdict = failed(f"the counter {message}: {place}", hint=hint)
+    return verdict.if_repeated() if count.is_single(found.own) else verdict
+
+
+def _usual_fault(usual: float) -> str:
+    if usual == 0:
+        return "stays at one value"
+    return f"counts in steps of {significant(usual)}" if usual > 0 else "counts down"
+
+
+def wrong_count(run: Run, channels: Sequence[Channel], topic: str, template: str) -> Verdict | None:
+    """Return the verdict on texts whose `{count}` does not go up by one; None where each one's does, or the template
+    has no such place."""
+    if COUNT not in template:
+        return None
+    pattern, params = message_pattern(template, NUMBER), CounterParams(topic=topic)
+    for channel in channels:
+        rows = zip(channel.data, channel.messages, strict=True)
+        told = [(float(found["count"]), m) for text, m in rows if (found := pattern.fullmatch(text))]
+        count = Count(
+            callerid=channel.callerid,
+            values=tuple(number for number, _ in told),
+            times_ns=tuple(m.log_time_ns for _, m in told),
+            sequences=tuple(m.sequence for _, m in told),
+        )
+        # A text is not bounded as a number's type is: nothing makes the count begin again.
+        fall = next((s for s in count.steps if s.change < -1), None)
+        if fall is not None:
+            message = (
+                f"the counter begins again: after {significant(fall.before)} comes {significant(fall.after)}"
+            )
+            return failed(message, hint="set the counter once, before the loop, and reset it nowhere")
+        steps = wrong_steps(count, run, maximum=NEVER, rate_hz=params.rate_hz)
+        if (verdict := judge_steps(count, steps, run, params)) is not None:
+            return verdict
+    return None
 
 
 def steps_to_judge(count: Count, maximum: int) -> tuple[Step, ...]:

@@ -26,11 +26,13 @@ NAMES_MAX, NAME_CHARS_MAX = 1_000, 60
 """Of names that students may give by the thousand: so many are looked at, and so much of each."""
 SHOWN_CHARS = 160
 SHOWN_BEFORE_CHARS = 10_000
-SECONDS = "{seconds}"
+SECONDS, COUNT = "{seconds}", "{count}"
 VALUE = "{value}"
 PLACE = "{number}"
-PLACES = frozenset({SECONDS, VALUE, PLACE})
-"""What stands for a time, a message or a number in the texts that rubrics ask for."""
+PLACES = frozenset({SECONDS, COUNT, VALUE, PLACE})
+"""What stands for a time, a count, a message or a number in the texts that rubrics ask for."""
+PLACED = re.compile(r"\{(seconds|count)\}")
+GROWING = {SECONDS: "seconds that count up like the clock", COUNT: "a number that goes up by one each time"}
 # `\d` would take the digits of other scripts, too.
 NUMBER = r"[-+]?[0-9]+(?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?"
 
@@ -102,12 +104,15 @@ OTHER_PLACES = re.compile(r"%[-+ 0]*[\d.]*[dfs](?!\w)|\\[dwsS][+*]?|\.\*|\{:[^{}
 """What stands for a value in Python's texts and in regular expressions."""
 
 
-def refuse_others(place: str) -> AfterValidator:
-    """Return what refuses a text with another word in braces that is meant to be `place`."""
+def refuse_others(*places: str) -> AfterValidator:
+    """Return what refuses a text with another word in braces that is meant to be one of `places`."""
+    place = " or ".join(places)
 
     def checked(template: str) -> str:
         for word in re.findall(r"\{(?:[A-Za-z_]\w*)?\}", template):
-            if word != place and (not word.isupper() or word.lower() in PLACES):  # `{INFO}` may be printed
+            if word not in places and (
+                not word.isupper() or word.lower() in PLACES
+            ):  # `{INFO}` may be printed
                 raise ValueError(f"{word} stands for nothing here: write {place}")
         if other := OTHER_PLACES.search(template):
             raise ValueError(f"{other[0]} stands for itself here, as the other letters do: write {place}")
@@ -123,10 +128,20 @@ def words_pattern(words: str) -> str:
 
 
 def message_pattern(template: str, value: str) -> re.Pattern[str]:
-    """Return the whole text: the template's words, and `value` (a regular expression) where it says `{seconds}`."""
-    first, *others = template.strip().split(SECONDS)
-    inner = "".join(f"({value}){words_pattern(words)}" for words in others)
+    """Return the whole text: the template's words, and `value` (a regular expression) where it says `{seconds}` or
+    `{count}`, in groups of these names, which the first of each has."""
+    first, *others = PLACED.split(template.strip())
+    inner, named = "", set[str]()
+    for name, words in zip(others[::2], others[1::2], strict=True):
+        inner += f"({'' if name in named else f'?P<{name}>'}{value}){words_pattern(words)}"
+        named.add(name)
     return re.compile(rf"\s*{words_pattern(first)}{inner}\s*", re.DOTALL)
+
+
+def growing(template: str) -> str:
+    """Return what grows from message to message, as the end of a sentence; "" for nothing."""
+    found = [words for place, words in GROWING.items() if place in template]
+    return f", with {' and '.join(found)}" if found else ""
 
 
 def line_pattern(template: str, value: str, *, alone: bool = False) -> re.Pattern[str]:
@@ -139,7 +154,7 @@ def line_pattern(template: str, value: str, *, alone: bool = False) -> re.Patter
 
 def in_words(template: str) -> str:
     """Return the template as a student reads it: `hello world <seconds>`."""
-    return template.replace(SECONDS, "<seconds>").replace(VALUE, "<message>")
+    return PLACED.sub(r"<\1>", template).replace(VALUE, "<message>")
 
 
 Language = Literal["python", "cpp"]
@@ -399,12 +414,20 @@ def refused_options(lines: Iterable[str]) -> str:
     return f": {shorten(said, 200)}" if said else ""
 
 
-TIMED = python_or_cpp(" % rospy.get_time()", " with ros::Time::now().toSec() for %s")
+FILLED = {
+    "seconds": ("rospy.get_time()", "ros::Time::now().toSec()"),
+    "count": ("count", "count"),
+}
+"""What a template's places are filled in with, in Python and C++."""
 
 
 def code_of(template: str) -> str:
     """Return the expression that makes such a text."""
-    return f'"{template.replace(SECONDS, "%s")}"{TIMED if SECONDS in template else ""}'
+    text, values = f'"{PLACED.sub("%s", template)}"', [FILLED[name] for name in PLACED.findall(template)]
+    if not values:
+        return text
+    python, cpp = (", ".join(each) for each in zip(*values, strict=True))
+    return text + python_or_cpp(f" % ({python})" if values[1:] else f" % {python}", f" with {cpp} for %s")
 
 
 NO_INPUT = f"write {VALUE_SLOT} in place of `input()`"
