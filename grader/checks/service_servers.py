@@ -7,9 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
+from grader.checks.support.clocks import clock_slack_s, run_seconds
 from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.fields import differences, fields_text
 from grader.checks.support.processes import (
@@ -66,6 +67,16 @@ class ServiceAnswersParams(Record):
     """One entry for each call of the scenario, in order: the fields that matter, and their values."""
     tolerance: Annotated[float, Field(ge=0)] = 1e-6
     """How much numbers may differ."""
+    within_s: Annotated[float, Field(gt=0)] | None = None
+    """How long an answer may take, by the run's clock; null: as long as the call waits."""
+    least_s: Annotated[float, Field(ge=0)] = 0.0
+    """How long an answer has to take at least, where the callback sleeps or moves the robot, by the run's clock."""
+
+    @model_validator(mode="after")
+    def _in_order(self) -> ServiceAnswersParams:
+        if self.within_s is not None and self.least_s > self.within_s:
+            raise ValueError(f"least_s, {self.least_s:g}, is more than within_s, {self.within_s:g}")
+        return self
 
 
 @check("service", params=ServiceParams)
@@ -113,8 +124,9 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
 
     How it is measured
         The grader calls the service once it is offered and compares each field that the rubric names:
-        numbers within a tolerance, text exactly. Other fields do not matter. Of several calls, each that
-        is answered as it should be earns its share.
+        numbers within a tolerance, text exactly. Other fields do not matter. If the lab says how long an
+        answer takes, it is timed from the call to the answer. Of several calls, each that is answered as it
+        should be earns its share.
 
     How to fix
         The callback takes the request and ends with `return <Type>Response(…)` on every way through it;
@@ -134,7 +146,9 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
         answered = f"{params.service} answers {plural(len(pairs), 'call')} as it should"
         verdict = _judge_uncalled(made, package, run, params) or passed(answered)
     call = wrong[0] if wrong else next(reversed(made), None)
-    expected = join_words(f"call {n}: {fields_text(w)}" for n, w in enumerate(params.expect, 1))
+    expected = join_words(
+        f"call {n}: {fields_text(w)}" for n, w in enumerate(params.expect, 1)
+    ) + _times_text(params)
     measured = verdict.measured or _measured_text(call)
     return verdict.about(expected=expected, measured=measured, citations=(_citation(call, run),))
 
@@ -184,7 +198,7 @@ def _fault(
         return other_type(run, params.service, one) or no_answer(package, run, params.service, one)
     found = list(differences(one.response, wanted, params.tolerance))
     if not found:
-        return None
+        return _at_wrong_time(one, run, params)
     message = (
         f"{params.service}, called with {fields_text(one.request)}, answers {join_words(map(str, found))}"
     )
@@ -194,6 +208,32 @@ def _fault(
         return failed(f"{message}: the script never sets {unset.fix}", hint=hint, citations=(unset.place,))
     verdict = failed(message, hint=f"see what the callback computes: {by_hand(params.service, one)}")
     return verdict.of_value(nan=any(one.nan for one in found))
+
+
+def _times_text(params: ServiceAnswersParams) -> str:
+    """Return how long an answer may take, as the end of a sentence; "" where nothing is said of it."""
+    least = f", after {params.least_s:g} s or more" * (params.least_s > 0)
+    return least + ("" if params.within_s is None else f", within {params.within_s:g} s")
+
+
+def _at_wrong_time(one: Exchange, run: Run, params: ServiceAnswersParams) -> Verdict | None:
+    """Return what is wrong with how long a right answer took, None if nothing is."""
+    if one.answered_ns is None:
+        return None
+    to_s = run_seconds(run) or (lambda time_ns: time_ns / 1e9)
+    took_s = to_s(one.answered_ns) - to_s(one.at_ns)
+    asked = f"{params.service}, called with {fields_text(one.request)}, answers after {took_s:.2f} s"
+    # A fast clock goes in steps, and a call may come just before one.
+    slack_s, late_s = clock_slack_s(run), params.within_s
+    if took_s + slack_s < params.least_s:
+        hint = f"let the callback return only when it has done its work, after {params.least_s:g} s or more"
+        return failed(f"{asked}, not after {params.least_s:g} s or more", hint=hint)
+    if late_s is not None and took_s > late_s + slack_s:
+        verdict = failed(
+            f"{asked}, not within {late_s:g} s", hint="look for a sleep or a wait in the callback"
+        )
+        return verdict.if_repeated()
+    return None
 
 
 def _exchanged(pairs: Sequence[tuple[Exchange, dict[str, Any]]], params: ServiceAnswersParams) -> str:

@@ -19,6 +19,7 @@ from grader.rubric.yaml_lines import (
     as_map,
     as_maps,
     given_steps,
+    services_in,
     starts_of,
 )
 from grader.wording import significant
@@ -241,6 +242,19 @@ def within_faults(about: WrittenCriterion) -> Iterator[Fault]:
         yield at, f"{fault}: let the step after it wait for longer"
     if about.check in {"reacts", "ends-at"} and most_s is not None and within_s >= most_s:
         yield at, f"{about.run} lasts {most_s:g} s at most: what comes later is not seen"
+
+
+def answer_faults(about: WrittenCriterion) -> Iterator[Fault]:
+    """Yield times that an answer takes, and that are longer than the calls wait for it."""
+    asked = [one for _, part, one in services_in(about.scenario) if part == "request"]
+    limits = [
+        one.get("limit_s") or ANSWER_S for one in asked if one.get("service") == about.given.get("service")
+    ]
+    numbers = [limit_s for limit_s in limits if is_number(limit_s)]
+    for key in ("least_s", "within_s") if about.check == "service-answers" and numbers else ():
+        if is_number(takes_s := about.given.get(key)) and takes_s > max(numbers) * warp_of(about.scenario):
+            waits = f"a call waits {max(numbers):g} s for its answer: give it a longer limit_s"
+            yield (*about.at, key), waits
 
 
 def stretch_faults(about: WrittenCriterion) -> Iterator[Fault]:

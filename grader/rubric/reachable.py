@@ -15,6 +15,7 @@ from grader.checks.support.conditions import Condition
 from grader.checks.support.fields import PATH_PARTS, Reading, is_number
 from grader.rubric.definitions import is_form
 from grader.rubric.durations import (
+    answer_faults,
     early_faults,
     late_faults,
     longest_s,
@@ -82,6 +83,7 @@ def reach_faults(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator
         others = [one for one in criteria if one is not about and one.run == about.run]
         yield from often_faults(about)
         yield from within_faults(about)
+        yield from answer_faults(about)
         if about.run not in watched:
             yield from early_faults(about)
         yield from stretch_faults(about)

@@ -409,7 +409,8 @@ def _too_short(one: Reference, check: Check, scenario: dict[str, Any]) -> Iterat
     if scenario.get("clock", "real") != "real":
         # Behind a warped clock, how late the machine is would be 20 times as much.
         if hasattr(check.params, "rate_bounds"):
-            yield "rates are judged in real time: give the criterion a scenario with clock: real"
+            steps = "rates are judged in real time, and a fast clock goes in steps of 0.05 s"
+            yield f"{steps}: give the criterion a scenario with clock: real"
         return
     if not isinstance(one.value, int | float) or len(known) <= len(lasting):
         return

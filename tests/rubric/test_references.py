@@ -357,8 +357,8 @@ def test_what_names_only_what_is_there_loads(tmp_path: Path) -> None:
         pytest.param(
             "    start:\n      - {name: talker",
             "    clock: warped\n    start:\n      - {name: talker",
-            "32: criteria[1].with.min_window_s: rates are judged in real time: "
-            "give the criterion a scenario with clock: real",
+            "32: criteria[1].with.min_window_s: rates are judged in real time, "
+            "and a fast clock goes in steps of 0.05 s: give the criterion a scenario with clock: real",
             id="rate-with-a-fast-clock",
         ),
         pytest.param(
