@@ -255,7 +255,8 @@ def _nothing(package: PackageFacts, run: Run, params: CounterParams) -> Verdict:
         hint = "publish the counter itself, as an Int8"
         if params.field != "data":
             hint = f"set {params.field} to the counter in each message, as a whole number"
-        return failed_or_blocked(f"{params.counter} carries no numbers", measured="no number", hint=hint)
+        verdict = failed_or_blocked(f"{params.counter} carries no numbers", measured="no number", hint=hint)
+        return verdict.based_on(misfit=True)
     return no_message(package, run, topic).about(measured="no message")
 
 

@@ -124,7 +124,8 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
 def _no_text(package: PackageFacts, run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdict:
     if heard:
         message = f"{params.topic} carries {heard[0].type}, not text that could be compared"
-        return failed_or_blocked(message, hint="publish std_msgs/String", measured=heard[0].type)
+        verdict = failed_or_blocked(message, hint="publish std_msgs/String", measured=heard[0].type)
+        return verdict.based_on(misfit=True)
     return no_message(package, run, params.topic)
 
 

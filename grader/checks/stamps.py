@@ -156,7 +156,8 @@ def _nothing_to_judge(
         return no_field(read[0], channels)
     kinds = join_words({channel.type for channel in channels})
     message = f"{params.field} of {params.topic} ({kinds}) is neither a header nor a time"
-    return failed_or_blocked(message, hint=f"make {params.field} a std_msgs/Header, or a time")
+    verdict = failed_or_blocked(message, hint=f"make {params.field} a std_msgs/Header, or a time")
+    return verdict.based_on(misfit=True)
 
 
 def _zero(found: Sequence[Stamp], params: StampsParams) -> Verdict | None:

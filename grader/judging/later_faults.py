@@ -13,9 +13,6 @@ from typing import NamedTuple
 
 from grader.checks.support.console_output import probes_on
 from grader.checks.support.exit_causes import MAIN, syntax_hint
-from grader.checks.support.launch import NOT_STARTED, refusal
-from grader.checks.support.launch_connections import find_renaming
-from grader.checks.support.launch_slips import find_launch, later_fixes, refusals, unset_arg_fixes
 from grader.checks.support.missing_names import name_slip
 from grader.checks.support.scripts import CPP_SUFFIXES, SYNTAX, cmake_calls, lines_making
 from grader.checks.support.text import (
@@ -39,6 +36,12 @@ from grader.evidence.run import Run
 from grader.installable import PYTHON_2
 from grader.judging.cited_lines import LINE_CHARS, LINES_READ, LOOPS, OF_DATA, PLACES, loop_spins, lost_fields
 from grader.judging.facts import Facts, is_other_rate, names_started, scripts_of, sources_of
+from grader.judging.later_launch_faults import (
+    OF_LAUNCHES,
+    criterion_of_file,
+    later_in_launch,
+    later_launch_faults,
+)
 from grader.judging.repeats_and_repairs import text_as_handed_in
 from grader.model.package import CMAKE, PackageFacts
 from grader.model.python_slip import PythonSlip
@@ -53,8 +56,13 @@ ASKS = re.compile(r"[^#'\"]*\b(?:raw_)?input\s*\(")
 SLEEPS_FOR = re.compile(r"[^#'\"]*\brospy\.sleep\(\s*\)")
 PLAIN_NUMBER = re.compile(r"\s*(\w+)\s*=\s*[\d.]+\s*(?:#|$)")
 MAKES_RATE = re.compile(r"\s*([\w.]+)\s*=\s*rospy\.Rate\(")
-OF_LAUNCHES = ("launch-runs", "launch-connects")
 OF_CALLBACKS = ("callback-called", "callback-values")
+OF_COUNTERS = {
+    "counter-start": (),
+    "counter-step": ("step-number", "set-in-loop", "no-effect"),
+    "counter-wrap": ("compared", "reset-early"),
+}
+"""Slips by which a counter is not as each of these checks asks."""
 OF_TOPICS = ("hears", "topic-type")
 """Checks that say by themselves that a node is on another topic, and not of which type."""
 INTERFACES = {"add_message_files": "msg/", "add_service_files": "srv/", "add_action_files": "action/"}
@@ -103,30 +111,18 @@ def add_later_faults(
         if package is None or criterion.visibility != "visible" or not is_lost:
             continue
         told = later.setdefault(verdict.blocked_by or criterion.id, [])
-        if verdict.blocked_by and criterion.check == "launch-xml":
-            told += [Fix(f"for {criterion.id}, {one}") for one in _later_in_file(criterion, package)]
-        elif verdict.blocked_by and criterion.check == "launch-runs":
-            own = _of_its_file(criterion, verdicts, rubric)
-            for one in _later_in_launch(criterion, package, facts):
-                fix = Fix(one if own else f"for {criterion.id}, {one}")
-                later.setdefault(own or verdict.blocked_by, []).append(fix)
-        elif criterion.check in OF_LAUNCHES and (
-            file := find_launch(package, str(criterion.parameters["launch"]))
-        ):
-            given = [word for start in rubric.starts_of(criterion) for word in start.args]
-            told += map(Fix, unset_arg_fixes(file, verdict.hint, given))
+        if criterion.check in OF_LAUNCHES:
+            told += map(Fix, later_launch_faults(criterion, verdict, package, facts))
+            if verdict.blocked_by and criterion.check == "launch-runs":
+                own = criterion_of_file(criterion, verdicts, rubric)
+                for one in later_in_launch(criterion, package, facts):
+                    fix = Fix(one if own else f"for {criterion.id}, {one}")
+                    later.setdefault(own or verdict.blocked_by, []).append(fix)
         elif verdict.basis.unjudged or verdict.basis.of_machine or criterion.check in OF_TOPICS:
             own_later = Later(criterion, verdict, package, facts, moved)
             told += own_later.syntax(handed_in or package)
             told += [one.as_handed_in(repairs) for one in own_later.faults()]
     return {name: _with_later(verdict, later.get(name, ())) for name, verdict in verdicts.items()}
-
-
-def _of_its_file(launched: Criterion, verdicts: Mapping[str, Verdict], rubric: Rubric) -> str | None:
-    """Return the criterion that is lost by the launch file itself: what comes next in the file is told there."""
-    file = launched.parameters.get("launch")
-    of_file = (c.id for c in rubric.criteria if c.scenario is None and c.parameters.get("launch") == file)
-    return next((i for i in of_file if verdicts[i].status.is_lost and not verdicts[i].blocked_by), None)
 
 
 def _with_later(verdict: Verdict, later: Iterable[Fix]) -> Verdict:
@@ -191,7 +187,7 @@ class Later:
         by_check = {
             "rate": self._rate, "node-name": self._node_name, "hears": self._heard, "topic-type": self._published,
             "build": self._built, "build-and-run": self._built, "message": self._message, "logs": self._logged,
-            "copies": self._copied,
+            "copies": self._copied, **dict.fromkeys(OF_COUNTERS, self._counted),
         }  # fmt: skip
         if not self._ran:
             yield from self._names()
@@ -537,6 +533,17 @@ class Later:
             words.strip().casefold() in " ".join(line.split()).casefold() for line in lines
         )
 
+    def _counted(self) -> Iterator[Fix]:
+        """Yield what is wrong with a counter; where it is added to too early, that comes before what it is reset by."""
+        first = str(self._wanted.get("start", self._wanted.get("minimum", 0)))
+        starts = {slip.name: slip.message for slip in self._of("start-value")}
+        early = [slip for slip in self._of("added-first") if starts.get(slip.name, first) == first]
+        others = self._of(*OF_COUNTERS[self._criterion.check])
+        named = {slip.name for slip in early}
+        for slip in (*early, *(one for one in others if one.fix and one.name not in named)):
+            place = f"in {slip.file}" if "line" in slip.fix else f"on {_line(slip)}"
+            yield Fix(f"{place}, {slip.fix}", (slip.fix,))
+
     def _message(self) -> Iterator[Fix]:
         template = str(self._wanted.get("template", ""))
         said = list({one.message: one for one in self._of("publishes")}.values())
@@ -570,30 +577,6 @@ class Later:
             yield Fix(f"log {text!r}, which no line of {join_words(sorted(self._paths))} does")
         elif len(said) == 1 and "{" not in said[0].message and text not in said[0].message:
             yield Fix(f"log {text!r} on {_line(said[0])}, not {said[0].message!r}")
-
-
-def _later_in_file(criterion: Criterion, package: PackageFacts) -> Iterator[str]:
-    """Yield what a launch file would be lost by once the scripts that it lacks are written."""
-    file = find_launch(package, str(criterion.parameters.get("launch", "")))
-    scripts = texts_in(criterion.parameters.get("scripts"))
-    yield from (fix for script in scripts if file is not None for fix in later_fixes(file, script))
-
-
-def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) -> Iterator[str]:
-    """Yield what a launch file would be lost by next: what roslaunch said of it, and namespaces of the lab's nodes."""
-    wanted, run = criterion.parameters, facts.runs.get(criterion.scenario or "")
-    file, topic = find_launch(package, str(wanted.get("launch", ""))), str(wanted.get("topic") or "")
-    names = {PurePosixPath(script).name for script in texts_in(wanted.get("scripts"))}
-    if file is None or file.fault is not None:
-        return
-    refused = refusal(run, package) if isinstance(run, Run) else None
-    if refused and refused.refused != NOT_STARTED and not any(refusals(package, file)):
-        yield f"{refused.hint}: {refused.why}"
-    given = [word for start in facts.rubric.starts_of(criterion) for word in start.args]
-    yield from unset_arg_fixes(file, refused.hint if refused else "", given)
-    nodes = [one for one in file.brings if {one.type, f"{one.type}.py"} & names]
-    if topic and (renaming := find_renaming(package, nodes, topic, main=file.path)):
-        yield f"in {file.path} {renaming.fix}"
 
 
 def _line(slip: PythonSlip) -> str:

@@ -80,7 +80,9 @@ class Requirements:
             f'pkg="{self._criteria[required].parameters.get("name")}"' in found.hint
             and not verdict.basis.unjudged
         )
-        if not verdict.status.is_lost or is_unmade(verdict) or is_named:
+        # messages came, only too fast or too slow
+        is_other = found.basis.misfit and not verdict.basis.unjudged and self._is_of_rate(required)
+        if not verdict.status.is_lost or is_unmade(verdict) or is_named or is_other:
             return False  # a program that the build did not make is no reason for the build to fail
         if same_run and self._criteria[required].check == "topic-type" and OTHER_TYPE.search(found.message):
             return True  # its process ended of the wrong type
@@ -119,8 +121,12 @@ class Requirements:
         check = self._checks.get(one.check)
         if check is None:
             return False
-        rate = criterion.check in OF_CONNECTIONS and hasattr(check.params, "rate_bounds")
+        rate = criterion.check in OF_CONNECTIONS and self._is_of_rate(required)
         return rate or (check.of_lives and not self._is_below(required, criterion))
+
+    def _is_of_rate(self, required: str) -> bool:
+        check = self._checks.get(self._criteria[required].check)
+        return check is not None and hasattr(check.params, "rate_bounds")
 
     def _is_below(self, required: str, criterion: Criterion) -> bool:
         """Return whether the criterion asks for a private name of the node that the required one names."""

@@ -153,6 +153,8 @@ class Basis(Record):
     """What is absent is made by the build alone."""
     silent: bool = False
     """A process was there and alive, and only something that is absent explains it."""
+    misfit: bool = False
+    """Messages came, and nothing in them can be judged: whatever their rate is, that does not explain it."""
     timing: bool = False
     """A loss that one run's timing could have made: it counts only if it is seen twice."""
     of_machine: bool = False

@@ -135,6 +135,11 @@ class Count(Record):
         # A few messages close together are a burst, not a flood.
         return len(self.steps) > 20 and len(self.steps) >= least_hz * span_s
 
+    def turns_alike(self, times: int) -> bool:
+        """Return whether it goes back from one value to one other so often, and else up by one: nothing was dropped."""
+        others = [(s.before, s.after) for s in self.steps if s.change != 1]
+        return len(others) >= times and len(set(others)) == 1
+
     def usual_step(self) -> float | None:
         """Return the step that at least four of five are; None where there is none."""
         changes = Counter(s.change for s in self.steps)
@@ -476,7 +481,7 @@ def whose_turn(step: Step, count: Count, run: Run, params: WrapParams) -> Litera
     # No loss makes a value larger or smaller than those that were sent.
     if step.after > high or step.after < low:
         return "program"
-    if count.is_flood(run, params.rate_hz):
+    if count.is_flood(run, params.rate_hz) and not count.turns_alike(params.wraps):
         return "flood"
     jump = (high - step.before) + (step.after - low) + 1
     return "lost" if count.was_lost_in_transit(step, jump) else "program"

@@ -81,7 +81,10 @@ def unreadable(found: Track, topic: str) -> Verdict | None:
     """Return the verdict where the messages tell of no path."""
     if found.misfit:
         hint = f"rostopic info {topic} shows their type"
-        return failed_or_blocked(f"the messages on {topic} {found.misfit}", measured=found.misfit, hint=hint)
+        verdict = failed_or_blocked(
+            f"the messages on {topic} {found.misfit}", measured=found.misfit, hint=hint
+        )
+        return verdict.based_on(misfit=True)
     if found.fault:
         hint = "print what you publish: a division by zero, or a square root of a negative number?"
         return failed(f"the messages on {topic} {found.fault}", measured=found.fault, hint=hint)

@@ -149,7 +149,8 @@ def no_field(missing: Reading, channels: Iterable[Channel]) -> Verdict:
     if all(value is None for value in channel.values):
         return grade_again(f"{what} cannot be read")
     hint = f"rostopic echo {channel.topic} shows the fields"
-    return failed_or_blocked(f"{what} do not fit: {missing.fault}", measured=missing.fault, hint=hint)
+    verdict = failed_or_blocked(f"{what} do not fit: {missing.fault}", measured=missing.fault, hint=hint)
+    return verdict.based_on(misfit=True)
 
 
 def bounds_text(low: float | None, high: float | None) -> str:

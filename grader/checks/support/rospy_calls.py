@@ -387,6 +387,10 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
     sent = next(iter(calls_in_line(frame.source, "publish")), None)
     owner = ast.unparse(sent.func.value) if sent is not None and isinstance(sent.func, ast.Attribute) else ""
     slips = [s for s in package.slips if frame.file.endswith(f"/{s.file}")]
+    lost = [s for s in slips if s.kind == "never-published" and f"gives `{owner}` another" in s.message]
+    if lost:
+        told = lost[0].message.replace("this one", f"the one of line {lost[0].line}")
+        return told, lost[0].fix
     types = {s.line: s.message for s in slips if s.kind == "publisher-type"}
     owners = {s.name: s for s in slips if s.kind == "publisher" and s.line in types}
     texts = [n for n in calls_in_line(frame.source, "str") if len(n.args) == 1]

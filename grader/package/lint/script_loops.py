@@ -365,10 +365,14 @@ def called_own(node, functions):
 
 def publishes_twice(tree):
     """Loops that publish on one topic more than once in each of their turns, and sleep once at most."""
+    made = [n.targets[0] for n in all_of(tree, ast.Assign) if is_call(n.value, "Publisher")]
+    names = [dotted(n) for n in made]
+    several = {name for name in names if names.count(name) > 1}  # each was to be another topic's
     for loop in all_of(tree, *LOOPS):
         by_publisher = {}
         for one in loop.body:
-            if isinstance(one, ast.Expr) and called_name(one.value) == "publish":
+            sent = isinstance(one, ast.Expr) and called_name(one.value) == "publish"
+            if sent and dotted(one.value.func).rpartition(".")[0] not in several:
                 by_publisher.setdefault(ast.dump(one.value.func), []).append(one)
         many = next((same for same in by_publisher.values() if len(same) > 1), None)
         if many is None:
