@@ -155,11 +155,8 @@ def _missing(
         return failed(f"{name} has no value", hint=f"write a value after `{name.rpartition('/')[2]}:`")
     if slip := _in_its_place(found, name, path):
         return slip
-    more = (
-        f", and {plural(len(missing) - 1, 'more name is', 'more names are')} missing"
-        if len(missing) > 1
-        else ""
-    )
+    is_or_are = "is" if len(missing) == 2 else "are"
+    more = f", and {join_words(missing[1:])} {is_or_are} missing, too" if len(missing) > 1 else ""
     above, _, last = name.rpartition("/")
     shallow = f"{above.rpartition('/')[0]}/{last}"
     moved = _column(name, shallow, keys, missing)

@@ -23,7 +23,14 @@ from grader.checks.support.parameters import (
     text_of,
     without_system_params,
 )
-from grader.checks.support.processes import GlobalName, first_interrupt_ns, lives, named_at, not_started
+from grader.checks.support.processes import (
+    GlobalName,
+    first_interrupt_ns,
+    lives,
+    named_at,
+    not_started,
+    run_slips,
+)
 from grader.checks.support.text import get_param, log_param, near_names, set_param, shown
 from grader.checks.support.topics import cite, no_node, run_slip
 from grader.evidence.events import ParamEvent
@@ -281,6 +288,10 @@ def _never_set(
         return failed(
             f"{params.name} is never set: {spare.message}", hint=hint, citations=(spare.place, *setting)
         )
+    copied = [s for s in run_slips(package, run, "changes-copy") if absolute_name(s.message) == params.name]
+    if copied and not others:
+        why = f"line {copied[0].line} of {copied[0].file} changes `{copied[0].name}`, which is the script's own copy"
+        return failed(f"{params.name} is never set: {why}", hint=copied[0].fix, citations=(copied[0].place,))
     instead = f"; the node sets {join_words(others)}" if others else ""
     cited = named_at(package, run, "sets-parameter", next(iter(others))) if len(others) == 1 else ()
     hint = f"write {set_param(params.name, params.value)}"

@@ -1,5 +1,5 @@
-"""Chooses the lab's package among those that are found, and says what is there instead where it is not: another package,
-or the lab's files in none, with what keeps them from being run there."""
+"""Chooses the lab's package among those that are found, and says what is there instead where it is not: another
+package, or the lab's files in none, with what keeps them from being run there."""
 
 from __future__ import annotations
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 from grader.checks.support.console_output import probes_on
 from grader.checks.support.exit_causes import MAIN, syntax_hint
 from grader.checks.support.missing_names import name_slip
+from grader.checks.support.parameters import absolute_name
 from grader.checks.support.scripts import CPP_SUFFIXES, SYNTAX, cmake_calls, lines_making
 from grader.checks.support.text import (
     IN_OWN_WORDS,
@@ -187,7 +188,7 @@ class Later:
         by_check = {
             "rate": self._rate, "node-name": self._node_name, "hears": self._heard, "topic-type": self._published,
             "build": self._built, "build-and-run": self._built, "message": self._message, "logs": self._logged,
-            "copies": self._copied, **dict.fromkeys(OF_COUNTERS, self._counted),
+            "copies": self._copied, "params-set": self._set, **dict.fromkeys(OF_COUNTERS, self._counted),
         }  # fmt: skip
         if not self._ran:
             yield from self._names()
@@ -532,6 +533,11 @@ class Later:
         return bool(lines) and not any(
             words.strip().casefold() in " ".join(line.split()).casefold() for line in lines
         )
+
+    def _set(self) -> Iterator[Fix]:
+        found, wanted = self._of("sets-parameter"), str(self._wanted.get("name", ""))
+        if len(found) == 1 and absolute_name(found[0].message) != wanted:
+            yield Fix(f"set {wanted} on {_line(found[0])}, not {found[0].message}")
 
     def _counted(self) -> Iterator[Fix]:
         """Yield what is wrong with a counter; where it is added to too early, that comes before what it is reset by."""

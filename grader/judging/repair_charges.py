@@ -79,8 +79,9 @@ def charge_repairs(
             nearest = min(asking, key=lambda c: (_lines_away(first[c.id], repair), is_other[c.id]))
             charges[repair] = {nearest.id}
             continue
-        own = [c for c in rubric.criteria if repair.kind == "node-name" and _names(c, repair)]
-        if any(first[c.id].status.is_lost and c.id not in better for c in own):
+        own = [c.id for c in rubric.criteria if repair.kind == "node-name" and _names(c, repair)]
+        own = [name for name in own if first[name].status.is_lost]
+        if own and better.isdisjoint(own):
             continue  # the criterion of the name says by itself what is wrong with it
         failed_by_it = [c for c in criteria_of_runs if c.id not in better and fails_in(first[c.id], repair)]
         if repair.kind in OF_SYNTAX and failed_by_it:

@@ -275,7 +275,8 @@ def _is_of_words(repair: Repair) -> bool:
     """Return whether the repair changes no more than what a line prints: its `%`, or the `f` in front of its text."""
     prints = re.search(r"\b(?:print|log\w+|write)\s*\(", repair.before) is not None
     no_f = prints and re.sub(r"""\bf(?=["'])""", "", repair.after, count=1) == repair.before
-    return no_f or repair.before.replace("+", "%", 1) == repair.after
+    told, right = (re.sub(r"""%[sdf]|["'\s]""", "", text) for text in (repair.before, repair.after))
+    return no_f or (prints and told == right) or repair.before.replace("+", "%", 1) == repair.after
 
 
 def _only_installs(repair: Repair) -> bool:

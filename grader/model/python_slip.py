@@ -19,7 +19,8 @@ SlipKind = Literal[
     "float-index", "ranges-read", "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed",
     "printed-in-part", "published-in-part", "never-published", "takes-number", "typed-text", "goes-on",
     "no-argument", "read-late", "debugger", "drops-result", "returns-list", "fills", "catches", "no-result",
-    "stuck", "runs-out", "base-unmade", "rate-as-time", "frames", "step-number", "keeps-rate", "way-number",
+    "stuck", "runs-out", "base-unmade", "rate-as-time", "frames", "changes-copy", "step-number", "keeps-rate",
+    "way-number",
 ]  # fmt: skip
 
 
@@ -130,6 +131,8 @@ class PythonSlip(Placed, Record):
     - `reset-value`, `reset-limit`: where a counter goes back, to the number `message`, or when it reaches it (`name`:
       `range`, where it is that of a loop).
     - `sets-parameter`: where it sets a parameter.
+    - `changes-copy`: where a map that was read from the parameter server, `name`, gets another value for the parameter
+      `message`, and nothing sets that map there.
     - `ranges-read`: which ranges of a scan it reads there (`90`, `-30:`, `n//2-9:` with `n` for their count); only
       where it reads no others.
     - `argument-text`: where an argument of the command line is kept as a text; `fix` is the line with a number in its

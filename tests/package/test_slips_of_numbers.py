@@ -537,6 +537,31 @@ def test_a_publisher_whose_name_another_one_gets_is_known(tmp_path: Path) -> Non
     assert [(s.line, s.name, s.message) for s in found] == [(1, "a", message)]
 
 
+def test_two_publishers_of_one_name_do_not_publish_twice(tmp_path: Path) -> None:
+    made = "pub = rospy.Publisher('a', String)\npub = rospy.Publisher('b', Int8)\n"
+    text = (
+        f"{made}while not rospy.is_shutdown():\n    pub.publish('a')\n    pub.publish(1)\n    rate.sleep()\n"
+    )
+    (tmp_path / "a.py").write_text(text)
+    assert not [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "publish-twice"]
+
+
+@pytest.mark.parametrize(
+    ("code", "told"),
+    [
+        ("d = rospy.get_param('/a')\nd['b']['c'] = 1\n", ["/a/b/c"]),
+        ("self.d = rospy.get_param('a')\nself.d['b'] = 1\n", ["a/b"]),
+        ("d = rospy.get_param('/a')\nd['b'] = 1\nrospy.set_param('/a', d)\n", []),
+        ("d = rospy.get_param('/a')\nd['b'] = 1\nrospy.set_param('/a/b', d['b'])\n", []),
+        ("d = rospy.get_param('~a')\nd['b'] = 1\n", []),
+        ("d = {}\nd['b'] = 1\n", []),
+    ],
+)
+def test_a_map_of_parameters_that_only_the_script_changes(code: str, told: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(code)
+    assert [s.message for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "changes-copy"] == told
+
+
 @pytest.mark.parametrize(
     ("code", "told"),
     [

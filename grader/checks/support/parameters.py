@@ -476,6 +476,16 @@ def is_printed(value: object, lines: Sequence[Line]) -> bool:
     return len(parts) > 1 and all(is_printed(part, lines) for part in parts)
 
 
+def _beside(wrong: str, names: Sequence[str]) -> str:
+    """Return which of the parameters on the server is meant by a name that is not there."""
+    above, _, last = absolute_name(wrong).rpartition("/")
+    beside = [name for name in names if above and name.rpartition("/")[0] == above]
+    meant = [name for name in beside if name.rpartition("/")[2] in re.split(r"[_-]", last)]
+    if len(meant) == 1:
+        return f"write {get_param(meant[0])}; {above} has {join_words(beside)}"
+    return "write the name as rosparam list shows it, one key for each level: get_param('details')['name']['first']"
+
+
 def explain_failure(package: PackageFacts, run: Run) -> Ending | None:
     """Return an error that ended the node, or its last traceback."""
     ended = early_end(run)
@@ -506,7 +516,7 @@ def explain_failure(package: PackageFacts, run: Run) -> Ending | None:
         return end._replace(cause=f"{end.cause}: {last} is not there but in {deeper[0]}", hint=hint)
     near = near_names(last, parts - {last})
     seen = f"; {there_is(near)}" if near else ""
-    hint = "write the name as rosparam list shows it, one key for each level: get_param('details')['name']['first']"
+    hint = _beside(key[1], names)
     return end._replace(cause=f"{end.cause}: nothing is named {key[1]} there{seen}", hint=hint)
 
 

@@ -353,6 +353,22 @@ def _other_kind(found: Traceback) -> Meaning | None:
     return why, f"give {field[1]} a {number}: `{kind}(…)`"
 
 
+def _sender(source: str) -> tuple[ast.Call | None, str]:
+    """Return the call on a line that publishes, and the name of its publisher."""
+    sent = next(iter(calls_in_line(source, "publish")), None)
+    return sent, ast.unparse(sent.func.value) if sent and isinstance(sent.func, ast.Attribute) else ""
+
+
+def _replaced_publisher(found: Traceback, package: PackageFacts) -> Meaning | None:
+    """Return that the publisher's variable was given another topic's before a message of the first one is sent."""
+    _, owner = _sender(found.innermost.source)
+    for slip in package.slips if "must be" in found.message else ():
+        is_here = slip.kind == "never-published" and found.innermost.file.endswith(f"/{slip.file}")
+        if is_here and owner and f"gives `{owner}` another" in slip.message:
+            return slip.message.replace("this one", f"the one of line {slip.line}"), slip.fix
+    return None
+
+
 _WIDTH = re.compile(r"exceeds specified width \[(u?)int(\d+)\]|unsigned integer type (u)int(\d+)$")
 _BOUNDS = re.compile(r"format requires (-?\d+) <= number <= (\d+)$")
 
@@ -380,17 +396,12 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
         return f"`{made[1]}` is the service's type, and its response has another type", fix
     frame = found.innermost
     wants_text = "must be of type bytes or an ascii string" in found.message
-    swapped = _swapped_values(found, package) or _other_kind(found)
+    swapped = _swapped_values(found, package) or _other_kind(found) or _replaced_publisher(found, package)
     if swapped or (not wants_text and "integer type" not in found.message):
         return swapped or _out_of_range(found.message)
     kind, other = ("string", "numbers") if wants_text else ("whole number", "strings")
-    sent = next(iter(calls_in_line(frame.source, "publish")), None)
-    owner = ast.unparse(sent.func.value) if sent is not None and isinstance(sent.func, ast.Attribute) else ""
+    sent, owner = _sender(frame.source)
     slips = [s for s in package.slips if frame.file.endswith(f"/{s.file}")]
-    lost = [s for s in slips if s.kind == "never-published" and f"gives `{owner}` another" in s.message]
-    if lost:
-        told = lost[0].message.replace("this one", f"the one of line {lost[0].line}")
-        return told, lost[0].fix
     types = {s.line: s.message for s in slips if s.kind == "publisher-type"}
     owners = {s.name: s for s in slips if s.kind == "publisher" and s.line in types}
     texts = [n for n in calls_in_line(frame.source, "str") if len(n.args) == 1]

@@ -5,7 +5,7 @@ For `slips.py`. Nothing is executed. Python 3.8, standard library only.
 
 import ast
 
-from script_names import USES_LIMIT, given_names
+from script_names import USES_LIMIT, given_names, key_of
 from script_tree import (
     LOOPS,
     all_of,
@@ -88,6 +88,27 @@ def unsent_messages(tree):
             message = "`%s` is filled in, and never used after that" % name
             fix = how_to_send(name, kind.rpartition(".")[2], last, around, tree)
             yield slip(last, "wrong-value", message, fix, "unsent")
+
+
+def changed_copies(tree):
+    """Yield where a map of parameters that `get_param` returned gets another value, and nothing sets the map."""
+    read, sent = {}, set()
+    for call in calls_in(tree, "set_param"):
+        sent |= {dotted(n) for one in call.args[1:] for n in ast.walk(one)}
+    for node in all_of(tree, ast.Assign):
+        names = argument(node.value, 0, "param_name") if is_call(node.value, "get_param") else []
+        if names and text_of(names[0]) and not text_of(names[0]).startswith("~"):
+            read[dotted(node.targets[0])] = text_of(names[0])
+    for node in all_of(tree, ast.Assign) if read else ():
+        keys, target = [], node.targets[0]
+        while isinstance(target, ast.Subscript):
+            keys, target = [text_of(key_of(target)), *keys], target.value
+        name = dotted(target)
+        if keys and all(keys) and name in read and name not in sent:
+            path = "/".join([read[name].rstrip("/"), *keys])
+            value = name + "".join("['%s']" % key for key in keys)
+            fix = "below line %d, write `rospy.set_param('%s', %s)`" % (node.lineno, path, value)
+            yield slip(node.lineno, "changes-copy", path, fix, name)
 
 
 def is_of_messages(module):
