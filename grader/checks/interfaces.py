@@ -18,10 +18,13 @@ from grader.model.message_definitions import (
     BUILT_IN,
     FULL_NAMES,
     PARTS,
+    WRITE_ALL,
+    as_written,
     exchanged_parts,
     lacking_field,
     parse_definition,
     refuse_unknown,
+    whole_definition,
 )
 from grader.model.package import Interface, InterfaceField, PackageFacts
 from grader.model.record import Record
@@ -181,16 +184,14 @@ def _empty(package: PackageFacts, params: DefinitionParams) -> _Fault:
     if other := _of_same_fields(package, params):
         fix = f"git mv -f {shlex.quote(other)} {shlex.quote(params.file)}"
         return _Fault(f"it has no field: they are in {shown(other)}", None, fix)
-    kinds = PARTS[PurePosixPath(params.file).suffix]
-    parts = ([f"`{f.type} {f.name}{_value(f)}`" for f in params.wanted() if f.part == part] for part in kinds)
-    lines = [line for part in parts for line in ("`---`", *part)][1:]
-    return _Fault("it has no field", None, f"write into it, each on a line of its own: {join_words(lines)}")
+    lines = whole_definition(params.wanted(), PurePosixPath(params.file).suffix)
+    return _Fault("it has no field", None, WRITE_ALL.format(join_words(f"`{line}`" for line in lines)))
 
 
 def _faults(
     found: Interface, wanted: list[InterfaceField], package: PackageFacts, params: DefinitionParams
 ) -> Iterator[_Fault]:
-    if found.fault is not None and found.fault.kind == "OtherParts" and not found.fields:
+    if not found.fields and (found.fault is None or found.fault.kind == "OtherParts"):
         yield _empty(package, params)
         return
     if found.fault is not None:
@@ -287,8 +288,7 @@ def _differs(
             yield _Fault(message, apart.line, "--- separates the parts: put the field into the other part")
         else:
             kind = "constant" if wanted.value is not None else "field"
-            type_ = "" if wanted.type else f"{_type_for(wanted.value or '')} "
-            yield _Fault(f"there is no {kind} {name}", None, f"add the line `{type_}{line}`")
+            yield _Fault(f"there is no {kind} {name}", None, f"add the line `{as_written(wanted)}`")
     elif (wanted.value is None) != (found.value is None):
         kinds = ("constant", "field") if wanted.value is None else ("field", "constant")
         message = f"{name} is a {kinds[0]} (line {found.line}), but the handout asks for a {kinds[1]}"
@@ -300,16 +300,6 @@ def _differs(
         message = f"{name} is {shown(found.value or '')} (line {found.line}), not {wanted.value}"
         fix = f"write `{found.type} {line}`" if not wanted.type else f"write `{line}`"
         yield _Fault(message, found.line, fix)
-
-
-def _type_for(value: str) -> str:
-    """Return a type that fits a constant where the handout leaves it open."""
-    if value in {"True", "False"}:
-        return "bool"
-    try:
-        return "int32" if float(value).is_integer() else "float64"
-    except ValueError:
-        return "string"
 
 
 def _plain(type_: str, package: str) -> str:

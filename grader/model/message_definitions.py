@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import PurePosixPath
 
@@ -20,6 +20,7 @@ NOT_FINITE = {".inf": math.inf, "+.inf": math.inf, "-.inf": -math.inf, ".nan": m
 DIVIDER = re.compile(r"^---.*$", re.MULTILINE)
 """ROS looks at the first three signs of a line alone: `-----` divides, and an indented `---` does not."""
 DIVIDING = "---"
+WRITE_ALL = "write into it, each on a line of its own: {}"
 RULE = "=" * 80
 """Before the types that a full definition brings along, behind its own."""
 BUILT_IN = {*(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)), "bool", "float32", "float64",
@@ -171,6 +172,29 @@ def lacking_field(
         return None
     likest = [*lacking] if len(lacking) == 1 else get_close_matches(line[1], lacking, n=1, cutoff=0.5)
     return lacking[likest[0]] if likest else None
+
+
+def constant_type(value: str) -> str:
+    """Return a type that fits a constant where the handout leaves it open."""
+    if value in {"True", "False"}:
+        return "bool"
+    try:
+        return "int32" if float(value).is_integer() else "float64"
+    except ValueError:
+        return "string"
+
+
+def as_written(field: InterfaceField) -> str:
+    """Return the line of a definition that makes a field, or a constant."""
+    value = "" if field.value is None else f"={field.value}"
+    return f"{field.type or constant_type(field.value or '')} {field.name}{value}"
+
+
+def whole_definition(fields: Iterable[InterfaceField], suffix: str) -> list[str]:
+    """Return the lines of a definition with these fields, with `---` between its parts."""
+    own = list(fields)
+    parts = ([as_written(one) for one in own if one.part == part] for part in PARTS[suffix])
+    return [line for part in parts for line in (DIVIDING, *part)][1:]
 
 
 def corrected_line(text: str, path: str) -> str:

@@ -142,7 +142,7 @@ def _where_and_how(repair: Repair) -> tuple[str, str]:
         below = len(new) > 1 and new[0] == repair.before and repair.line is not None
         named = re.match(
             r"(delete|replace the tabs: start|start|indent|write|make|remove the `#` of|in place of|"
-            r"below(?: the \S+ on)?) lines? \d|write the keys in levels",
+            r"below(?: the \S+ on)?) lines? \d|write the keys in levels|write into it|at the end of",
             repair.fix,
         )
         if below and not named:

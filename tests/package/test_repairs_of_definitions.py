@@ -227,6 +227,28 @@ CASES = {
          CMAKELISTS: SERVICE_CMAKE}, ["build-line"], "below line 1 add `---`",
         asking(definitions=(("srv/Two.srv", TWO_FIELDS),)), {"srv/Two.srv": "int64 a\n---\nint64 sum\n"},
     ),
+    "own-service-that-is-empty": Case(
+        {**SERVICE, "srv/Two.srv": "# A sum.\n", TALKER: SCRIPT + "from lab.srv import Two\n",
+         CMAKELISTS: SERVICE_CMAKE}, ["build-line"], "srv/Two.srv: write into it, each on a line of its own: `int64 a`",
+        asking(definitions=(("srv/Two.srv", TWO_FIELDS),)), {"srv/Two.srv": "# A sum.\nint64 a\n---\nint64 sum\n"},
+    ),
+    "own-message-without-a-field-and-a-constant": Case(
+        {**OWN, "msg/Level.msg": "string[] names\nint8 b\n", CMAKELISTS: GENERATED}, ["build-line"] * 2,
+        "add the line `float64 level`",
+        asking(definitions=(("msg/Level.msg", LEVEL_FIELDS),),
+               constants=(("msg/Level.msg", tuple(parse_definition("int32 OFF=0", ".msg"))),)),
+        {"msg/Level.msg": "float64 level\nstring[] names\nint8 b\nint32 OFF=0\n"},
+    ),
+    "own-message-with-another-field": Case(
+        {**OWN, "msg/Level.msg": "float64 depth\nstring[] names\nint8 b\n", CMAKELISTS: GENERATED}, [],
+        wanted=asking(definitions=(("msg/Level.msg", LEVEL_FIELDS),)),
+    ),
+    "own-action-without-its-feedback": Case(
+        {"src/go.py": "from lab.msg import GoAction\n", "action/Go.action": "int32 n\n---\nbool there\n",
+         CMAKELISTS: ACTION_CMAKE}, ["build-line"], "at the end of the file, write a line `---`, and `int32 left`",
+        asking(definitions=(("action/Go.action", GO_FIELDS),)),
+        {"action/Go.action": "int32 n\n---\nbool there\n---\nint32 left\n"},
+    ),
     "own-action-with-fields-mixed": Case(
         {"src/go.py": "from lab.msg import GoAction\n", "action/Go.action": "int32 n\nint32 left\nbool there\nint8 s\n",
          CMAKELISTS: ACTION_CMAKE}, [], wanted=asking(definitions=(("action/Go.action", GO_FIELDS),)),

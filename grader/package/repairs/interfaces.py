@@ -23,12 +23,15 @@ from grader.model.message_definitions import (
     DIVIDING,
     FULL_NAMES,
     PARTS,
+    WRITE_ALL,
+    as_written,
     corrected_line,
     exchanged_parts,
     integer_limits,
     lacking_field,
     meant_field,
     parse_interface,
+    whole_definition,
 )
 from grader.model.package import CMAKE, INTERFACE_FOLDERS, Interface, InterfaceField, PackageFacts
 from grader.package.cmake_parse import commands_of, read_calls
@@ -266,9 +269,10 @@ _WITHOUT_ROSCPP = {"catkin", "rospy", "std_srvs", GENERATION, "message_runtime"}
 def define_as_asked(files: Files, package: PackageFacts, wanted: Wanted) -> None:
     """Put the parts of a service or an action, and the fields of a part, into the order of the handout where they have
     changed places, and between parts the `---` that are missing; give fields the handout's types where others cannot
-    stand for them."""
+    stand for them; write those that are not there where no other could be meant."""
     for path, fields in wanted.definitions:
         _write_lacking(files, path, fields)
+        _add_absent(files, path, [*fields, *dict(wanted.constants).get(path, ())])
         text = files.text(path)
         if text is None or all(one.path != path for one in package.interfaces):
             continue
@@ -295,6 +299,38 @@ def _write_lacking(files: Files, path: str, fields: Sequence[InterfaceField]) ->
         lines[own.fault.line - 1] = f"{meant.type} {meant.name}{comment[0] if comment else ''}"
         fix = f"write `{meant.type} {meant.name}`"
         files.change("build-line", path, "\n".join(lines), f"{path}: {own.fault.cause}", fix)
+
+
+def _add_absent(files: Files, path: str, fields: Sequence[InterfaceField]) -> None:
+    """Write the handout's fields and constants that are not there, where the file has none of its own beside them."""
+    text, parts = files.text(path) or "", PARTS[PurePosixPath(path).suffix]
+    own = parse_interface(text.encode(), path)
+    there = {(one.part, one.name) for one in own.fields}
+    asked = {(one.part, one.name) for one in fields}
+    if files.text(path) is None or not there <= asked or (own.fault and own.fault.kind != "OtherParts"):
+        return
+    lines = text.split("\n")
+    if not there:
+        notes = [line for line in lines if line.strip() and not DIVIDER.match(line)]
+        whole = whole_definition(fields, PurePosixPath(path).suffix)
+        fix = WRITE_ALL.format(join_words(f"`{line}`" for line in whole))
+        files.change("build-line", path, "\n".join([*notes, *whole, ""]), f"{path} has no field", fix)
+        return
+    for part in parts[len(DIVIDER.findall(text)) + 1 :]:
+        new = [as_written(one) for one in fields if one.part == part]
+        lines = [*"\n".join(lines).rstrip().split("\n"), DIVIDING, *new, ""]
+        below = f", and {join_words(f'`{line}`' for line in new)} below it" if new else ""
+        fix = f"at the end of the file, write a line `{DIVIDING}`{below}"
+        files.change("build-line", path, "\n".join(lines), f"{path}: the {part} is missing", fix)
+    there |= {(one.part, one.name) for one in parse_interface("\n".join(lines).encode(), path).fields}
+    for one in (field for field in fields if (field.part, field.name) not in there):
+        before = [f.name for f in fields[: fields.index(one)] if f.part == one.part]
+        read = parse_interface("\n".join(lines).encode(), path).fields
+        above = [f.line for f in read if f.part == one.part and f.name in before]
+        top = [0, *(at for at, line in enumerate(lines, 1) if DIVIDER.match(line))]
+        lines.insert(max(above, default=top[parts.index(one.part)]), as_written(one))
+        message, fix = f"{path}: there is no field {one.path}", f"add the line `{as_written(one)}`"
+        files.change("build-line", path, "\n".join(lines), message, fix)
 
 
 def _move_parts(files: Files, path: str, text: str, places: Mapping[str, str]) -> None:

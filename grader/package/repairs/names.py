@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import Any, Literal
 
-from grader.model.message_definitions import parse_definition
+from grader.model.message_definitions import constant_type, parse_definition
 from grader.model.package import InterfaceField, PackageFacts
 from grader.model.record import Record
 from grader.model.repair import RepairKind, as_code
@@ -34,6 +34,8 @@ class Wanted(Record):
     """Services and actions that it asks."""
     definitions: tuple[tuple[str, tuple[InterfaceField, ...]], ...] = ()
     """Files of messages, services and actions, with the fields that they have to define."""
+    constants: tuple[tuple[str, tuple[InterfaceField, ...]], ...] = ()
+    """These files, with the constants that they have to define beside the fields."""
     nodes: tuple[str, ...] = ()
     plain: tuple[str, ...] = ()
     """Nodes that must not be anonymous."""
@@ -96,6 +98,7 @@ def wanted_of(rubric: Rubric, package: str = "") -> Wanted:
         started=tuple(started),
         launched=tuple(dict.fromkeys(launched)),
         definitions=tuple(dict([*_of_steps(rubric, package), *_definitions(criteria)]).items()),
+        constants=tuple(_constants(criteria)),
         does=tuple(dict.fromkeys(_of_scripts(rubric, criteria))),
         **{field: tuple(names) for field, names in found.items()},
     )
@@ -108,6 +111,18 @@ def _definitions(criteria: Iterable[Criterion]) -> Iterator[tuple[str, tuple[Int
         parts = ((*path.rpartition("."), str(kind)) for path, kind in types.items())
         named = (InterfaceField(part=part, type=kind, name=name, line=0) for part, _, name, kind in parts)
         yield file, tuple(parse_definition(text, PurePosixPath(file).suffix) if text else named)
+
+
+def _constants(criteria: Iterable[Criterion]) -> Iterator[tuple[str, tuple[InterfaceField, ...]]]:
+    for given in (one.parameters for one in criteria if one.check == "definition"):
+        values = ((*path.rpartition("."), str(value)) for path, value in given.get("constants", {}).items())
+        yield (
+            given["file"],
+            tuple(
+                InterfaceField(part=part, type=constant_type(value), name=name, value=value, line=0)
+                for part, _, name, value in values
+            ),
+        )
 
 
 def _of_steps(rubric: Rubric, package: str) -> Iterator[tuple[str, tuple[InterfaceField, ...]]]:
