@@ -228,10 +228,13 @@ def _further(faults: Sequence[_RawFault]) -> Iterator[str]:
     last, found = 0, list[str]()
     for raw in faults:
         right = corrected(raw.text, raw.message, raw.column)
-        if not right or raw.line is None or raw.line <= last:
+        reason = reason_of(raw.message, raw.text, column=raw.column)
+        alone = raw.kind == "TabError" or _COPIED in reason.why  # whatever the other lines say
+        if not (right or alone) or raw.line is None or raw.line <= last:
             break
         last = raw.line
-        found.append(f"line {raw.line}: write {as_code(printable(right.strip()))}")
+        words = f"write {as_code(right.strip())}" if right else f"{reason.why}: {reason.fix}"
+        found.append(f"line {raw.line}: {printable(words)}")
     yield from found[1:FURTHER_SHOWN]
     if len(found) > FURTHER_SHOWN:
         yield f"{plural(len(found) - FURTHER_SHOWN, 'more line')} in the same way"

@@ -254,9 +254,13 @@ def test_faults_have_line_and_plain_cause(tmp_path):
         ("print 1, \\\n  2\nprint 3\n", "line 1: write `print(...)`"),
         ("print 1\n  x = 2\nprint 3\n", "line 1: write `print(1)`"),
         ("if x: print 1\nprint(2)\n", ""),
+        ("if x:\n        a = 1\n\tb = 2\nprint a\nprint b\n", "; line 4: write `print(a)`; line 5: write `print(b)`"),
+        ("x = \u2018a\u2019\nif x:\n    a = 1\n\tb = 2\n",
+         "; line 4: tabs and spaces are mixed in the indentation: use four spaces everywhere"),
         ("a = 1\n" * 30_000 + "print 1\nprint 2\n", "line 30001: write `print(1)`"),
     ],
-    ids=["print", "colon", "many", "statement of two lines", "another kind", "one line", "too long"],
+    ids=["print", "colon", "many", "statement of two lines", "another kind", "one line", "tabs first", "tabs later",
+         "too long"],
 )  # fmt: skip
 def test_further_lines_of_one_kind_are_told_too(tmp_path, text, hint):
     (tmp_path / "a.py").write_text(text)

@@ -189,7 +189,10 @@ def further_errors(lines, error):
         line = getattr(error, "lineno", None)
         if line is None or not 0 < line <= len(lines):
             return
-        lines[line - 1] = in_its_place(lines, line - 1)
+        if isinstance(error, TabError):
+            lines[:] = [one.expandtabs(tab_size(lines) or 8) for one in lines]
+        else:
+            lines[line - 1] = in_its_place(lines, line - 1)
         try:
             compile("\n".join(lines), "script", "exec", dont_inherit=True)
         except (SyntaxError, ValueError, OverflowError, RecursionError, MemoryError) as next_one:
