@@ -39,6 +39,10 @@ NO_LAB = "ModuleNotFoundError: No module named 'lab'"
         ("from beginner_tutorials.srv import Add, AddResponse",
          "ModuleNotFoundError: No module named 'beginner_tutorials'",
          "write `from lab.srv import Add, AddResponse`"),
+        ("import beginner_tutorials.msg as m", "ModuleNotFoundError: No module named 'beginner_tutorials'",
+         "write `import lab.msg as m`"),
+        ("import std_msg.msg as m", "ModuleNotFoundError: No module named 'std_msg'",
+         "write `import std_msgs.msg as m`"),
         # the build has made some of them, and not these
         ("from lab.msg import Reading", "ImportError: cannot import name 'Reading' from 'lab.msg' (/d/__init__.py)",
          "list Reading.msg in add_message_files(…)"),
@@ -59,7 +63,7 @@ def test_a_class_that_the_build_makes_is_imported_from_its_module(tmp_path, sour
     }
     end = explained(tmp_path, files, ("node.py", 1, source), error=error)
     assert end.hint == hint
-    assert end.unbuilt == (not hint.startswith("write `from"))
+    assert end.unbuilt == (not hint.startswith(("write `from", "write `import")))
 
 
 @pytest.mark.parametrize(

@@ -402,6 +402,8 @@ def test_an_exception_gets_the_name_that_is_used(caught: str, meant: str, tmp_pa
         ("counter = 0\nprint(unlike)\n", []),
         ("counter = Noone\n", ["write None instead of Noone"]),
         ("counter = Node()\n", []),
+        ("import queue\nq = Queue(3)\n", ["write queue.Queue instead of Queue"]),
+        ("import queue\nq = Queue.Queue(3)\n", ["write queue instead of Queue"]),
         (
             "import rospy\ntry:\n    pass\nexcept (ValueError, rospy.RosInterruptException):\n    pass\n",
             ["write rospy.ROSInterruptException instead of rospy.RosInterruptException"],

@@ -322,8 +322,11 @@ def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | 
     if wanted and wanted[1] in noetic_messages().get(wanted[2], ()):
         near = (wanted[2],)
     if near:
-        name = wanted[1] if wanted else "…"
-        return f"messages come from {near[0]}.msg", f"write `from {near[0]}.msg import {name}`"
+        line = f"from {near[0]}.msg import {wanted[1] if wanted else '…'}"
+        source = found.innermost.source.strip()
+        if asked and re.match(r"import [\w.]+( as \w+)?$", source):
+            line = source.replace(asked[1], near[0], 1)
+        return f"messages come from {near[0]}.msg", f"write `{line}`"
     meant = meant or (nearest_module(asked[1], package.own_modules) if asked else "")
     return (f"did you mean {meant}?", f"write {meant} instead of {asked[1]}") if asked and meant else None
 
@@ -336,16 +339,26 @@ def _module_of_others(name: str, package: PackageFacts, source: str) -> tuple[st
     if name in WINDOWS:
         return f"{name} is only on Windows", f"write the script without {name}"
     if name in PYTHON_2:
-        bare = re.search(rf"^\s*import\b.*\b{name}\b(?!\s+as\b)", source)
-        right = f"`{PYTHON_2[name]} as {name}`" if bare else PYTHON_2[name]
-        return f"{name} is a Python 2 module", f"write {right} instead of {name}"
+        return f"{name} is a Python 2 module", _as_in_python_3(name, source)
     if name in TUTORIALS - {package.name}:
         fix = f"write your package's name instead of {name}, or leave the line out"
+        if package.interfaces and re.match(r"\s*import ", source):
+            own = re.sub(rf"\b{name}\b", package.name or "", source.strip())
+            fix = f"write `{own}`"
         return "tutorials use that name for the reader's own package", fix
     if any(file.path.startswith(f"{name}/") for file in package.files):
         why = f"{name}/ is a folder of the package, and Python looks for modules in the script's own folder"
         return why, "put the module's file into the folder of the script, and import it by its own name"
     return None
+
+
+def _as_in_python_3(name: str, source: str) -> str:
+    """Return what to write for a module of Python 2 in this line."""
+    if brought := re.match(rf"\s*from\s+{name}\s+import\s+([\w, ]+)", source):
+        return f"write `from {PYTHON_2[name]} import {brought[1].strip()}`"
+    bare = re.search(rf"^\s*import\b.*\b{name}\b(?!\s+as\b)", source)
+    right = f"`{PYTHON_2[name]} as {name}`" if bare else PYTHON_2[name]
+    return f"write {right} instead of {name}"
 
 
 def _own_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:

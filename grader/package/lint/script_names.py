@@ -92,7 +92,8 @@ def misspelt(tree):
         elif near and not (node.id in MODULES and near in imported):  # there the import has it wrong
             guards = near == "__name__" and is_guard(node, tree)
             kind, message = "misspelt", "did you mean %s?" % near
-            near = "if __name__ == '__main__':" if guards else near
+            near = "if __name__ == '__main__':" if guards else of_module(near, node, tree, imported)
+            message = message if guards else "did you mean %s?" % near
             fix = "write `%s`" % near if guards else "write %s instead of %s" % (near, node.id)
         elif node.id not in known and (argument := unread_argument(node, tree)):
             kind, message = "misspelt", "the argument of `%s` is called `%s`" % argument
@@ -239,6 +240,17 @@ def meant_at_most(name, own):
     if name[:1].isupper():  # a class is not meant by a variable with a name like it
         own = {one for one in own if one[:1].isupper() or one.lower() == name.lower()}
     return {one for one in own if not is_of_series(name, one)}
+
+
+def of_module(near, node, tree, imported):
+    """Return the name that is meant: where a class is meant by the name of its module, behind that one's name."""
+    is_module = isinstance(parents_of(tree).get(node), ast.Attribute)
+    is_class = near in imported and near in NAMED_LIKE_CLASSES and node.id == near.capitalize()
+    return "%s.%s" % (near, node.id) if is_class and not is_module else near
+
+
+NAMED_LIKE_CLASSES = ("queue", "decimal")
+"""Modules with a class of their name in capitals: `queue.Queue`."""
 
 
 def spelt_alike(name, own, attributes):
