@@ -227,7 +227,8 @@ def _renamed(
     others: Mapping[tuple[str, str], InterfaceField],
     package: str,
 ) -> dict[tuple[str, str], InterfaceField]:
-    """Return the fields under other names, where a part has as many of them as it lacks, of the same types in order."""
+    """Return the fields under other names: where a part has as many others as it lacks, of the same types in order; or
+    where all of its types are right, in order, and some are under the name of another field."""
     lacking = [one for one in wanted if one.value is None and (one.part, one.name) not in there]
     found = {}
     for part in dict.fromkeys(one.part for one in lacking):
@@ -236,6 +237,13 @@ def _renamed(
         types = [[_plain(one.type, package) for one in group] for group in (own, given)]
         if types[0] == types[1] and not {one.name for one in given} & {one.name for one in wanted}:
             found.update({(a.part, a.name): b for a, b in zip(own, given, strict=True)})
+        whole = [
+            [f for f in group if f.part == part and f.value is None] for group in (wanted, there.values())
+        ]
+        kinds = [[_plain(one.type, package) for one in group] for group in whole]
+        if kinds[0] == kinds[1] and len({*kinds[0]}) > 1 and types[0] != types[1]:
+            pairs = zip(*whole, strict=True)
+            found.update({(a.part, a.name): b for a, b in pairs if a.name != b.name})
     return found
 
 

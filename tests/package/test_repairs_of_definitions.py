@@ -276,6 +276,10 @@ CASES = {
         ["build-line"], "write `float64 level`", asking(definitions=(("msg/Level.msg", LEVEL_FIELDS),)),
         {"msg/Level.msg": "float64 level\nstring[] names\nint16 b\n"},
     ),
+    "own-message-with-other-fields-besides": Case(
+        {**OWN, "msg/Level.msg": "string level\nstring[] others\nint8 b\n", CMAKELISTS: GENERATED},
+        [], wanted=asking(definitions=(("msg/Level.msg", LEVEL_FIELDS),)),
+    ),
     "own-message-with-two-damaged-lines": Case(
         {**OWN, "msg/Level.msg": "float64\n[] names  # of all\nint8 b\n", CMAKELISTS: GENERATED},
         ["build-line"] * 2, "`float64` on line 1 is not a field: it has a type, and no name",

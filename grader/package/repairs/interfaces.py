@@ -362,8 +362,11 @@ def _move_fields(files: Files, own: Interface, fields: Sequence[InterfaceField])
 
 
 def _change_types(files: Files, own: Interface, fields: Sequence[InterfaceField], package: str) -> None:
-    """Give the fields the types of the handout's `fields` where theirs cannot stand for these."""
-    types = {(one.part, one.name): one.type for one in fields}
+    """Give the fields the types of the handout's `fields` where theirs cannot stand for these, and all are there: with
+    other fields it would not be the handout's definition either, and what the programs do with their own would fail."""
+    types = {(one.part, one.name): one.type for one in fields if one.value is None}
+    if not types.keys() <= {(one.part, one.name) for one in own.fields}:
+        return
     for one in own.fields:
         asked = types.get((one.part, one.name), "")
         if one.value is None and asked and _cannot_stand_for(one.type, asked, own.path, package):
