@@ -19,6 +19,7 @@ from grader.checks.support.fields import (
     ROUNDING,
     FieldPath,
     Reading,
+    begins_later,
     bounds_text,
     differences,
     has_hole,
@@ -482,12 +483,13 @@ def _in_order(
             verdict = _in_another_order(found, params)
             break
         if here is None:
+            if number and (told := begins_later(found, params.values, params.is_at)):
+                first = value_text(params.values[0])
+                verdict = failed(f"{what} {told}", hint=f"publish {first} first").if_repeated()
+                break
             before = f" after {value_text(params.values[number - 1])}" if number else ""
-            came = (
-                f"what comes{' then' if number else ''} is {_values(found[at:])}"
-                if found[at:]
-                else "no more comes"
-            )
+            came = f"what comes{' then' if number else ''} is {_values(found[at:])}"
+            came = came if found[at:] else "no more comes"
             message = f"{what} is never {value_text(value)}{before}: {came}"
             ending = None if found[at:] else explain_early_end(package, run)
             if ending is not None and not ending.by_itself:

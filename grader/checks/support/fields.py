@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Annotated, Any, NamedTuple, Protocol, TypeGuard
 
@@ -430,6 +430,18 @@ def _kinds(got: object, wanted: object) -> str:
 def fields_text(value: Mapping[str, Any]) -> str:
     """Return a request's or an answer's fields on one line."""
     return shown(", ".join(f"{name}: {value_text(one)}" for name, one in value.items())) or "nothing"
+
+
+def begins_later(
+    found: Sequence[Reading], values: Sequence[object], is_at: Callable[[Reading, object], bool]
+) -> str:
+    """Return how a topic begins, where all of these values come in order but the first; "" where they do not. The first
+    may come at the end, where the same values begin again."""
+    rest = iter(found)
+    if len(values) < 3 or not all(any(is_at(one, value) for one in rest) for value in values[1:]):
+        return ""
+    begins = value_text(found[0].values[0])
+    return f"is not {value_text(values[0])} before {value_text(values[1])}: it begins with {begins}"
 
 
 def value_text(value: object) -> str:
