@@ -66,6 +66,7 @@ def choose_repairs(
     # an `input()` waits for ever in a run in which nothing is typed
     typed = any(scenario.typed_to for scenario in rubric.scenarios.values())
     counting = [one for one in found if rubric.share_of(one.kind) > 0 and (typed or not one.asks_input)]
+    counting = [one.of_typing() if typed else one for one in counting]
     built, launched = built or not needs_build(facts), launched_in(facts)
 
     def uses(name: str, one: Repair) -> bool:

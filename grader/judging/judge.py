@@ -51,6 +51,7 @@ from grader.judging.cited_lines import (
 from grader.judging.facts import NOT_RUN, Facts, is_other_rate, try_facts, views_of
 from grader.judging.hint_additions import (
     add_advice,
+    allow_typing,
     choose_hint_language,
     compile_command,
     fill_slots,
@@ -364,7 +365,8 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
                 found = _of_the_build(criterion, facts, run, found)
         found = fill_slots(choose_hint_language(found, criterion, facts), criterion, facts.rubric)
         found = name_other_imports(name_other_lines(found, facts), criterion, facts)
-        found = name_connections(name_other_parameters(found, criterion, facts), facts)
+        found = allow_typing(name_other_parameters(found, criterion, facts), criterion, facts)
+        found = name_connections(found, facts)
         found = _with_package_name(found, criterion, facts)
         found = name_same_file(name_rospy(found, criterion, facts), criterion, facts)
         return _without_git(found, facts.package)

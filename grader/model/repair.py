@@ -64,6 +64,11 @@ MOVING: frozenset[RepairKind] = frozenset({"file-name", "exchanged-files"})
 """Kinds whose `before` and `after` are paths."""
 
 
+ASKED = "put a value in the code in place of `raw_input(…)`: a node cannot ask for input"
+TYPED = "write `input` in place of `raw_input`"
+"""The fix of a `raw_input(…)` to which the grader types the answer."""
+
+
 class Repair(Record):
     """One mistake, and how it is repaired. Logic is never repaired, but for one clock and the sign of one turn."""
 
@@ -84,6 +89,10 @@ class Repair(Record):
     """How it is repaired by hand: a command, or the line as it should be."""
     asks_input: bool = Field(default=False, exclude_if=lambda value: not value)
     """Whether the repaired line waits for typed input. Only there if it does."""
+
+    def of_typing(self) -> Repair:
+        """Return the repair for a lab in which the grader types what scripts ask for."""
+        return self.model_copy(update={"fix": self.fix.replace(ASKED, TYPED)})
 
     def with_paths(self, path: Callable[[str], str]) -> Repair:
         """Return the repair with other paths of the file, and of what it is renamed to."""

@@ -9,12 +9,14 @@ from typing import Any
 import pytest
 
 from grader.checks import CHECKS
+from grader.checks.support.exceptions import SLIPS
 from grader.checks.support.text import CAUSES, LOOP, in_language, init, publisher, set_param
 from grader.integrations.platform_exports import Bundle, add_lab
 from grader.judging import judge
 from grader.judging.facts import Facts, try_facts
 from grader.judging.hint_additions import (
     add_advice,
+    allow_typing,
     choose_hint_language,
     fill_slots,
     name_connections,
@@ -26,6 +28,7 @@ from grader.judging.hint_additions import (
 )
 from grader.judging.judge import judge_files
 from grader.model.package import PackageFacts
+from grader.model.repair import ASKED, TYPED, Repair
 from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation, Status, failed, machine_lacks
 from grader.package.facts import read_package
@@ -236,6 +239,21 @@ def test_a_program_that_reads_what_is_typed_is_told_unless_a_step_types_it(tmp_p
         criterion(),
     )
     assert add_advice([criterion()], package, rubric(CMAKE_CHECK)) == (criterion(),)
+
+
+def test_raw_input_is_to_be_input_where_a_step_types_the_answer(tmp_path) -> None:
+    cause, fix = SLIPS["name 'raw_input' is not defined"]
+    package, start = facts(tmp_path), [{"name": "asks", "script": "ask"}]
+    for steps, said in (
+        ([], (cause, fix)),
+        ([{"type": {"process": "asks", "line": "12"}}], ("`raw_input` is Python 2", TYPED)),
+    ):
+        lab = rubric(CMAKE_CHECK, scenarios={"talker": {**SCENARIO, "start": start, "steps": steps}})
+        asked = lab.criteria[0].model_copy(update={"scenario": "talker"})
+        found = allow_typing(failed(cause, hint=fix), asked, Facts(rubric=lab, runs={}, package=package))
+        assert (found.message, found.hint) == said
+    repair = Repair(kind="python-syntax", file="a.py", line=1, before="", after="", message="", fix=ASKED)
+    assert repair.of_typing().fix == TYPED
 
 
 def test_an_angle_that_no_run_has_shown_to_be_wrong_is_told(tmp_path) -> None:

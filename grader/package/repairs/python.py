@@ -21,7 +21,7 @@ from grader.line_slips.python import COMMENTED_OUT, OUT_OF_BLOCK
 from grader.line_slips.python_habits import DELETE_LINE, MERGED, Reason
 from grader.model.package import INTERFACE_FOLDERS, PackageFacts
 from grader.model.record import Record
-from grader.model.repair import Repair, RepairKind, as_code
+from grader.model.repair import ASKED, Repair, RepairKind, as_code
 from grader.package.python import TOO_FAR_IN, reason_of
 from grader.package.repairs.editing import KEEP_ONE, Files, emptied_lines
 from grader.wording import is_one_edit, join_words, numbers_text, on_lines, plural
@@ -457,8 +457,7 @@ WORDS: dict[Cause, tuple[str, str]] = {
      "end the first line of each block with `:` in place of `{{`, and delete each `}}` that ends a block"),
     "global": (BELOW, "move `global {names}` up, as the first line of the function, and nowhere else in it"),
     "outside": (BELOW, "delete line {line}: outside a function, `global` does nothing"),
-    "old-name": ("{place}: {word} is Python 2",
-     "put a value in the code in place of `raw_input(…)`: a node cannot ask for input"),
+    "old-name": ("{place}: {word} is Python 2", ASKED),
     "import": ("{place} uses {word}, which is not imported", ""),
     "module": ("{place}: {word}", ""),
     "other-module": ("{place}: {word} has no `init_node`: rospy is meant",
