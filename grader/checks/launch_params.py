@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import PurePosixPath
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import AfterValidator
 
 from grader.checks.launch_files import missing_node
 from grader.checks.registry import LaunchName, check
@@ -275,6 +277,17 @@ def params_misplaced(run: Run, file: LaunchFile, nodes: Iterable[str], wanted: W
     """
     verdicts = [_of_node(run, file, node, wanted) for node in nodes]
     return None if None in verdicts else verdicts[0]
+
+
+def _below_node(name: str) -> str:
+    if name.startswith(("/", "~")):
+        meant = re.split(r"[/~]", name)[-1]
+        raise ValueError(f'"{name}" is looked for below the node and beside it: write {meant}')
+    return name
+
+
+NodeParam = Annotated[str, AfterValidator(_below_node)]
+"""A parameter's name as its node knows it."""
 
 
 def params_in_place(run: Run, nodes: Iterable[str], wanted: Wanted) -> list[str]:

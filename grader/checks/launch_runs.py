@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple
 from pydantic import AfterValidator, Field
 
 from grader.checks.launch_files import missing_node
-from grader.checks.launch_params import params_in_place, params_misplaced
+from grader.checks.launch_params import NodeParam, params_in_place, params_misplaced
 from grader.checks.registry import DependencyName, LaunchName, ProgramName, check
 from grader.checks.support.launch import (
     NOTHING_STARTS,
@@ -218,7 +218,7 @@ class LaunchRunsParams(Record):
     """Names of nodes that have to come up, each with the package that it comes from."""
     programs: tuple[ProgramName, ...] = ()
     """Programs of other packages that have to run, under any name: `turtlesim/turtlesim_node`."""
-    params: Annotated[dict[str, int | float | str], Field(default_factory=dict)]
+    params: Annotated[dict[NodeParam, int | float | str], Field(default_factory=dict)]
     """Parameters and their values; they have to be where the node of the first program reads them."""
 
 

@@ -294,6 +294,9 @@ def _gates(rubric: WrittenRubric) -> Iterator[Fault]:
         if isinstance(name, str) and name not in known:
             near = did_you_mean(name, known)
             yield ("gates", index, "criterion"), f'there is no criterion "{name}"{near}'
+        elif isinstance(name, str) and known[name].get("bonus") is not None:
+            fault = f'"{name}" is a bonus, which nobody has to reach: name a criterion with points'
+            yield ("gates", index, "criterion"), fault
         elif isinstance(name, str) and known[name].get("visibility") == "hidden":
             fault = f'"{name}" is hidden: students could not see why points are missing'
             yield ("gates", index, "criterion"), fault
@@ -303,6 +306,21 @@ def _gates(rubric: WrittenRubric) -> Iterator[Fault]:
         if isinstance(at_most, int | float) and at_most >= TOTAL_POINTS:
             fault = f"{at_most:g} keeps nothing away: the rubric has {TOTAL_POINTS} points"
             yield ("gates", index, "at_most"), fault
+        elif is_number(at_most) and at_most >= (left := _most_without(str(name), rubric)):
+            fault = f"{at_most:g} keeps nothing away: without {name} there are {left:g} points at most"
+            yield ("gates", index, "at_most"), fault
+
+
+def _most_without(name: str, rubric: WrittenRubric) -> float:
+    """Return how many points there are without a criterion; all of them where its own are not known."""
+    in_groups = {
+        one
+        for group in as_map(rubric.data.get("groups")).values()
+        for one in as_list(as_map(group).get("criteria"))
+    }
+    bonus = sum(one.data["bonus"] for one in rubric.criteria if is_number(one.data.get("bonus")))
+    own = [one.data.get("points") for one in rubric.criteria if one.id == name and name not in in_groups]
+    return TOTAL_POINTS + bonus - (own[0] if own and is_number(own[0]) else 0)
 
 
 def _late(rubric: WrittenRubric) -> Iterator[Fault]:

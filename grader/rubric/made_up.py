@@ -386,6 +386,14 @@ def made_up_faults(data: Mapping[str, Any]) -> Iterator[Fault]:
             run = criterion.data.get("scenario") or "a criterion without a scenario"
             yield path, f'{run} gives programs no "{name}": they could not know it'
     yield from _no_names(others, ())
+    for place, start in WrittenRubric(data).starts():
+        for number, text in as_texts(start.get("args")):
+            name, _, value = text.partition(":=")
+            if value in declared and re.match(r"_[A-Za-z]", name):
+                yield (
+                    (*place, "args", number),
+                    f'"{value}" is the name of a made-up value: write {name}:={{made_up: {value}}}',
+                )
     yield from (
         ((KEY, name), "is used nowhere: remove it, or use it") for name in declared if name not in used
     )

@@ -336,7 +336,11 @@ def _quoted_params(rubric: WrittenRubric) -> Iterator[Fault]:
         if criterion.check in {"param-value", "params-set"}:
             given.append(((*at, "value"), asked.get("name"), asked.get("value")))
         elif criterion.check == "launch-runs":
-            given += [((*at, "params", key), key, one) for key, one in as_map(asked.get("params")).items()]
+            written = [((*at, "params", key), key, one) for key, one in as_map(asked.get("params")).items()]
+            given += written
+            for path, _, one in written:
+                if isinstance(one, str) and _NUMBER.fullmatch(one):
+                    yield path, f'"{one}" in quotes is text, and roslaunch reads a number: write {one}'
     # `/node/rate` and `node/rate` are one parameter.
     numbers = {str(name).strip("/") for _, name, value in given if is_number(value)}
     for at, param, value in given:
@@ -436,9 +440,9 @@ def types_of(topic: str, rubric: WrittenRubric, run: dict[str, Any] | None = Non
         yield from (one.get("type") for one in published_in(scenario) if one.get("topic") == topic)
 
 
-def said_types(topic: str, handout: str) -> Iterator[str]:
-    """Yield the types of ROS's that the handout says the topic has: `/scan, a sensor_msgs/LaserScan`, or `a
-    geometry_msgs/Twist on /cmd_vel`."""
+def said_types(topic: str, handout: str, *, of_service: bool = False) -> Iterator[str]:
+    """Yield the types of ROS's that the handout says the topic, or the service, has: `/scan, a sensor_msgs/LaserScan`,
+    or `a geometry_msgs/Twist on /cmd_vel`."""
     name, kind, tick = re.escape(topic), r"(\w+)/([A-Z]\w*)", "`?"
     of_other = (
         rf"(?!\w|{tick}(?:\s+messages?)?\s+(?:on|to)\s+{tick}/)"  # "/level as a std_msgs/Bool on /full"
@@ -447,7 +451,7 @@ def said_types(topic: str, handout: str) -> Iterator[str]:
     before = rf"{kind}{tick}(?:\s+messages?)?\s+on\s+(?:the\s+topic\s+)?{tick}{name}{tick}(?![\w/])"
     for pattern in (rf"(?<![\w/]){after}", before):
         for package, message in re.findall(pattern, handout) if topic.startswith("/") else ():
-            if message in noetic_messages().get(package, ()):
+            if of_service != (message in noetic_messages().get(package, ())):
                 yield f"{package}/{message}"
 
 

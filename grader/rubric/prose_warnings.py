@@ -327,6 +327,15 @@ def _sent_otherwise(rubric: WrittenRubric) -> Iterator[Fault]:
         if said and str(one.get("type")) not in said:
             fault = f"the handout says that {one['topic']} carries {join_words(sorted(said))}"
             yield (*path, "type"), fault
+    services = [(path, one) for path, _, one in rubric.parts() if one.get("service") is not None]
+    services += [(one.at, one.given) for one in rubric.criteria if one.check == "service"]
+    for path, one in services:
+        said = set(said_types(str(one["service"]), handout, of_service=True)) if "service" in one else set()
+        if said and str(one.get("type")) not in said:
+            yield (
+                (*path, "type"),
+                f"the handout says that {one['service']} is of type {join_words(sorted(said))}",
+            )
 
 
 def _other_types(at: KeyPath, given: dict[str, Any], handout: str) -> Iterator[Fault]:

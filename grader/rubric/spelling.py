@@ -145,6 +145,8 @@ def _named_once(rubric: WrittenRubric, folder: Path) -> Iterator[tuple[KeyPath, 
             word, known = (text, topics) if text.startswith("/") else (last, sorted(words))
             alike = [one for one in known if is_slip(word, one) and _count(one, one, texts) > 1]
             alike += [one for one in re.findall(r"`[/~]?(\w+)`", handout) if is_slip(last, one)]
+            if text.startswith("/"):
+                alike += [one for one in re.findall(r"(?<![\w/])/[\w/]*\w", handout) if is_slip(text, one)]
             yield path, text, next(iter(alike), "")
         # The last word is there more than once, and the whole name is not: a folder or namespace may be the slip.
         elif re.search(r"[/.]", text) and _count(text, text, texts) == 1:

@@ -20,7 +20,7 @@ from grader.rubric.prose_warnings import prose_warnings
 from grader.rubric.simulators import TRUE_POSE, robot_of, topics_of_programs
 from grader.rubric.started import argument_warnings
 from grader.rubric.step_faults import count_causes
-from grader.rubric.value_warnings import value_warnings
+from grader.rubric.value_warnings import early_waits, value_warnings
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
@@ -81,6 +81,7 @@ def warnings(rubric: WrittenRubric) -> Iterator[Fault]:
     yield from _numbers_as_text(rubric)
     yield from _silent_anyway(rubric)
     yield from _launched_nodes(rubric)
+    yield from early_waits(rubric)
     for criterion in rubric.criteria:
         yield from _hard(criterion)
         yield from _easy(criterion)

@@ -57,6 +57,27 @@ def value_warnings(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterat
         yield from _of_another_run(criterion, rubric)
 
 
+def early_waits(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield waits behind a step whose effect they are for, and that are over before: so many messages have come by
+    then."""
+    rates = {
+        one.given.get("topic"): rate_hz
+        for one in rubric.criteria
+        if one.check == "rate" and "cause" not in one.given and is_number(rate_hz := one.given.get("rate_hz"))
+    }
+    for name, scenario in rubric.scenarios.items():
+        passed_s, acted = 0.0, False
+        for n, step in as_maps(scenario.get("steps") if scenario.get("clock") != "warped" else ()):
+            wait = as_map(step.get("wait"))
+            acted |= not wait
+            passed_s += wait["seconds"] if is_number(wait.get("seconds")) else 0
+            topic, least = wait.get("topic"), wait.get("messages", 1)
+            came = int(passed_s * rates.get(topic, 0))
+            if acted and is_number(least) and 0 < least <= came and wait.get("new") is not True:
+                fault = f"about {came} messages have come on {topic} before this step: write new: true"
+                yield ("scenarios", name, "steps", n, "wait", "messages"), fault
+
+
 def _set_otherwise(criterion: WrittenCriterion) -> Iterator[Fault]:
     """Yield parameters that the scenario sets to one value, and that should have another one."""
     name, value = criterion.given.get("name"), criterion.given.get("value")

@@ -557,6 +557,30 @@ def test_the_handout_says_which_type_a_topic_has(tmp_path: Path) -> None:
     assert faults(path) == [f"lab.yaml:{fault}"]
 
 
+def test_a_name_of_the_handout_or_of_a_made_up_value_is_a_slip(tmp_path: Path) -> None:
+    text = THERMOSTAT.replace("[20, 17, 23]", "[20, {made_up: low}, 23]")
+    path, made_up = tmp_path / "lab.yaml", "made_up: {low: {from: 1, to: 17}}\n"
+    path.write_text(text.replace("{topic: /heater,", "{topic: /heatr,") + made_up, encoding="utf-8")
+    fault = 'nothing else in the rubric names /heatr (did you mean "/heater"?)'
+    assert faults(path)[0].startswith(f"lab.yaml:22: criteria[1].with.topic: {fault}")
+    path.write_text(text.replace("control.py}", 'control.py, args: ["_l:=low"]}') + made_up, encoding="utf-8")
+    fault = '"low" is the name of a made-up value: write _l:={made_up: low}'
+    assert faults(path) == [f"lab.yaml:12: scenarios.warm.start[0].args[0]: {fault}"]
+
+
+def test_a_service_of_another_type_than_in_the_handout_is_a_warning(tmp_path: Path) -> None:
+    path = tmp_path / "lab.yaml"
+    text = THERMOSTAT.replace("ends it.", "ends it. The service /cool, a std_srvs/Trigger, turns it off.")
+    for kind, told in (
+        ("Trigger", []),
+        ("Empty", ["the handout says that /cool is of type std_srvs/Trigger"]),
+    ):
+        call = f"      - call: {{service: /cool, type: std_srvs/{kind}}}\ncriteria"
+        path.write_text(text.replace("criteria", call, 1), encoding="utf-8")
+        found = warnings_of(load_rubric(str(path)), path.name)
+        assert [one.partition("call.type: ")[2] for one in found] == told
+
+
 def test_a_title_may_speak_of_an_error_that_is_no_level(examples: Path) -> None:
     title = ("battery", "title: It says that the battery is low", "title: It says how large the error is")
     path = _spoiled(examples, *title)
