@@ -318,7 +318,7 @@ def _most_without(name: str, rubric: WrittenRubric) -> float:
         for group in as_map(rubric.data.get("groups")).values()
         for one in as_list(as_map(group).get("criteria"))
     }
-    bonus = sum(one.data["bonus"] for one in rubric.criteria if is_number(one.data.get("bonus")))
+    bonus: float = sum(one.data["bonus"] for one in rubric.criteria if is_number(one.data.get("bonus")))
     own = [one.data.get("points") for one in rubric.criteria if one.id == name and name not in in_groups]
     return TOTAL_POINTS + bonus - (own[0] if own and is_number(own[0]) else 0)
 
