@@ -14,6 +14,7 @@ from graphlib import TopologicalSorter
 from pathlib import PurePosixPath
 
 from grader.checks.support.text import IN_PLACE_OF_ALL, texts_in
+from grader.model.message_definitions import PARTS
 from grader.model.package import CMAKE, MANIFEST
 from grader.model.repair import Repair, advice_on, messages_of, place_of
 from grader.model.result import CriterionResult
@@ -96,6 +97,11 @@ def charge_repairs(
         other = [name for name in counting if name not in misnamed]
         charges[repair] = set((counting if named else other or counting)[:1])
         misnamed |= charges[repair] if named else set()
+    # A field's new name in the code is no mistake beside that in its definition, whose fix names the file.
+    for defined in [one for one in charges if PurePosixPath(one.file).suffix in PARTS]:
+        files = re.split(r"[,\s]+", defined.fix)
+        in_code = [one for one in charges if one.kind == "missing-call" and one.file in files]
+        charges |= dict.fromkeys(in_code, charges[defined])
     return charges
 
 

@@ -10,6 +10,7 @@ import pytest
 from grader.evidence.run import Run
 from grader.judging import judge
 from grader.judging.judge import judge_all_runs
+from grader.judging.repair_charges import charge_repairs
 from grader.judging.repeats_and_repairs import (
     drop_unrepeated_losses,
     is_used_by,
@@ -335,3 +336,18 @@ def test_a_build_that_two_lines_stop_names_the_one_that_it_is_charged_with() -> 
     assert cmake.hint == "write project(lab1)"
     assert build.message == install.message
     assert build.hint == f"CMakeLists.txt line 3: {install.fix}"
+
+
+def test_a_field_and_its_name_in_the_code_are_one_mistake() -> None:
+    about = {"line": 2, "before": "float64 rigth", "after": "float64 right", "message": "a misspelt field"}
+    field = Repair(
+        kind="build-line", file="msg/Wheels.msg", fix="write right, and right in src/talker.py", **about
+    )
+    code = field.model_copy(update={"kind": "missing-call", "file": "src/talker.py"})
+    lost = {
+        name: failed("wrong", hint=field.fix, citations=(FileCitation(file=file, line=2),))
+        for name, file in (("node", field.file), ("rate", code.file))
+    }
+    asked = rubric(*(one for one in ALL if one["id"] in lost))
+    needs = {"node": (field,), "rate": (field, code)}
+    assert charge_repairs(asked, lost, needs.keys(), needs) == {field: {"node"}, code: {"node"}}

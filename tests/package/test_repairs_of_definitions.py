@@ -253,6 +253,14 @@ CASES = {
         {"src/go.py": "from lab.msg import GoAction\n", "action/Go.action": "int32 n\nint32 left\nbool there\nint8 s\n",
          CMAKELISTS: ACTION_CMAKE}, [], wanted=asking(definitions=(("action/Go.action", GO_FIELDS),)),
     ),
+    "own-action-with-a-misspelt-field": Case(
+        {"src/go.py": "from lab.msg import GoAction, GoResult\ngoal.thre = 1\nGoResult(thre=goal.thre)\nthre = left\n",
+         "action/Go.action": "int32 n\n---\nbool thre  # thre or not\n---\nint32 left\n", CMAKELISTS: ACTION_CMAKE},
+        ["build-line", "missing-call"], "write `bool there`, and there in src/go.py",
+        asking(definitions=(("action/Go.action", GO_FIELDS),)),
+        {"action/Go.action": "int32 n\n---\nbool there  # thre or not\n---\nint32 left\n",
+         "src/go.py": "goal.there = 1\nGoResult(there=goal.there)\nthre = left\n"},
+    ),
     "own-action-with-another-number": Case(
         {"src/go.py": "from lab.msg import GoAction\n",
          "action/Go.action": "int8 n\n---\nbool there\n---\nint32 left\n",

@@ -268,8 +268,9 @@ _WITHOUT_ROSCPP = {"catkin", "rospy", "std_srvs", GENERATION, "message_runtime"}
 
 def define_as_asked(files: Files, package: PackageFacts, wanted: Wanted) -> None:
     """Put the parts of a service or an action, and the fields of a part, into the order of the handout where they have
-    changed places, and between parts the `---` that are missing; give fields the handout's types where others cannot
-    stand for them; write those that are not there where no other could be meant."""
+    changed places, and between parts the `---` that are missing; give fields the handout's names where theirs are
+    nearly these, and its types where others cannot stand for them; write those that are not there where no other could
+    be meant."""
     for path, fields in wanted.definitions:
         _write_lacking(files, path, fields)
         _add_absent(files, path, [*fields, *dict(wanted.constants).get(path, ())])
@@ -282,6 +283,7 @@ def define_as_asked(files: Files, package: PackageFacts, wanted: Wanted) -> None
         elif places := exchanged_parts(own.fields, fields):
             _move_parts(files, path, text, places)
         else:
+            own = _correct_names(files, package, own, fields)
             _change_types(files, own, fields, package.name or "")
             _move_fields(files, own, fields)
 
@@ -359,6 +361,33 @@ def _move_fields(files: Files, own: Interface, fields: Sequence[InterfaceField])
         message = f"{own.path}: the fields{where} are in a different order: {join_words(names, 'then')}"
         fix = f"order them as the handout does: {join_words(asked, 'then')}"
         files.change("build-line", own.path, "\n".join(lines), message, fix)
+
+
+def _correct_names(
+    files: Files, package: PackageFacts, own: Interface, fields: Sequence[InterfaceField]
+) -> Interface:
+    """Give the fields the names of the handout's `fields` where theirs are nearly these, and the code the same ones.
+    Returns the definition with its new names."""
+    asked = {(one.part, one.name) for one in fields}
+    lacking = asked - {(one.part, one.name) for one in own.fields}
+    for one in own.fields:
+        meant = [name for part, name in lacking if part == one.part and is_near(one.name, name)]
+        if one.value is not None or len(meant) != 1 or (one.part, one.name) in asked:
+            continue
+        (name,) = meant
+        lines = (files.text(own.path) or "").split("\n")
+        lines[one.line - 1] = re.sub(rf"(?<=\s){one.name}\b", name, lines[one.line - 1], count=1)
+        # As an attribute, and by its name in a call: what else is called so is no field.
+        use = re.compile(rf"(?:(?<=\.)|(?<=->)){one.name}\b|(?<=[(,\s]){one.name}(?==[^=])")
+        texts = {f.path: files.text(f.path) or "" for f in package.files if is_own(f.path)}
+        using = [path for path, text in texts.items() if path.endswith((".py", *CPP)) and use.search(text)]
+        fix = f"write `{one.type} {name}`" + (f", and {name} in {join_words(using)}" if using else "")
+        message = f"line {one.line} of {own.path} calls it {one.name}, but the handout calls it {name}"
+        files.change("build-line", own.path, "\n".join(lines), message, fix)
+        for path in using:
+            why = f"{path} uses the field {one.name}, which the handout calls {name}"
+            files.change("missing-call", path, use.sub(name, texts[path]), why)
+    return parse_interface((files.text(own.path) or "").encode(), own.path)
 
 
 def _change_types(files: Files, own: Interface, fields: Sequence[InterfaceField], package: str) -> None:
