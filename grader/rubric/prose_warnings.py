@@ -151,7 +151,11 @@ def _other_range(criterion: WrittenCriterion, handout: str) -> Iterator[Fault]:
 
 def _said_values(made_up: dict[str, Any], handout: str) -> Iterator[Fault]:
     """Yield values that are made up of so few that one which the handout has, as a default, often comes."""
-    said = {float(number) for number in PLAIN_NUMBER.findall(handout)}
+    # A factor of a formula is no default: `w * base / 2`.
+    said = {
+        float(number)
+        for number in PLAIN_NUMBER.findall(re.sub(r"[*/]\s*[\d.]+\b|\b[\d.]+\s*\*", "", handout))
+    }
     for name, one in made_up.items():
         low, high, step = (as_map(one).get(key, 1) for key in ("from", "to", "step"))
         if "from" not in as_map(one) or not all(map(is_number, (low, high, step))) or step <= 0:

@@ -43,6 +43,13 @@ CLIENT = """\
     serves: [{service: /get, type: rospy_tutorials/AddTwoInts, answer: {sum: 8}}]
     until: {ended: [client]}"""
 
+WHEELS = """\
+  turns:
+    title: Turns
+    start: [{name: wheels, script: wheels.py}]
+    steps: [publish: {topic: /turn, type: std_msgs/Float64, value: {made_up: turn}}, wait: {topic: /right}]
+made_up: {turn: {from: 1, to: 3}, right: {product: [turn, 0.5]}}"""
+
 
 @pytest.mark.parametrize(
     ("handout", "scenarios", "asked"),
@@ -66,6 +73,9 @@ CLIENT = """\
         ("asks /get and prints twice the sum", CLIENT,
          ["check: prints, with: {process: client, text: '{number}', numbers: [8]}, scenario: four",
           "check: prints, with: {process: client, text: '{number}', numbers: [16]}, scenario: eight"]),
+        # a factor of a formula is no value that a node may always use
+        ("wheels hears /turn, in radians a second, and publishes turn / 2 on /right", WHEELS,
+         ["check: field-equals, with: {topic: /right, field: data, value: {made_up: right}}, scenario: turns"]),
         # a robot without wheels
         ("a quadrotor starts: the node maps publishes geometry_msgs/Twist on /cmd_vel",
          GROWS.replace("/map", "/cmd_vel"),
