@@ -169,7 +169,7 @@ def _write_error_result(fault: GraderError, context: GradingContext) -> str:
     """
     submission = context.submission
     if submission is None and (known := identify(context.source, context.submission_id)):
-        submission = SubmissionInfo(id=known[0], source=known[1], commit=None, digest="", package="")
+        submission = SubmissionInfo.unopened(*known)
     if submission is None:
         return ""
     folder = context.out / submission.id

@@ -20,6 +20,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 from fixtures.make import declared, faulty_package
 from scripts.terminal_picture import draw_terminal
 from tests.browser.ground import chromium, missing
+from tests.report.class_page.made_up import FIRST, LAST
 
 ROOT = Path(__file__).resolve().parent.parent
 LAB = "leeds-comp3631-lab1"
@@ -27,33 +28,6 @@ CORRECT = ROOT / "reference_solutions" / LAB
 IMAGES = ROOT / "docs" / "images"
 BYTES_MAX = 220_000
 CLASS = 60
-FIRST = (
-    "Ada",
-    "Björn",
-    "Chen",
-    "Dilara",
-    "Emeka",
-    "Fatima",
-    "Grace",
-    "Hiro",
-    "Inés",
-    "Jakub",
-    "Łucja",
-    "Mehmet",
-)
-LAST = (
-    "Achebe",
-    "Bauer",
-    "Costa",
-    "Dubois",
-    "Eriksen",
-    "Fischer",
-    "García",
-    "Haddad",
-    "Ivanov",
-    "Jensen",
-    "Kim",
-)
 OFTEN = (
     "talker-not-executable",
     "listener-not-executable",

@@ -267,7 +267,7 @@ def _result(
     entry: Entry, labs: tuple[CriterionResult, ...], points: float, *, settled: bool
 ) -> GradingResult:
     return GradingResult(
-        submission=SubmissionInfo(id=entry.id, source="", commit=None, digest="", package=""),
+        submission=SubmissionInfo.unopened(entry.id),
         rubric=RubricInfo(id="course", version="", digest=""),
         status="graded" if settled else "inconclusive",
         points=points,

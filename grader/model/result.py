@@ -299,6 +299,11 @@ class SubmissionInfo(Record):
     name: str = ""
     """The student's name; only there if the roster has one."""
 
+    @classmethod
+    def unopened(cls, name: str, source: str = "", package: str = "") -> Self:
+        """Return what is known of a submission called `name` whose files were not read."""
+        return cls(id=name, source=source, commit=None, digest="", package=package)
+
     @model_serializer(mode="wrap")
     def _without_no_name(self, dump: SerializerFunctionWrapHandler) -> dict[str, str | None]:
         data: dict[str, str | None] = dump(self)

@@ -134,8 +134,7 @@ class Grading:
             # at the start nobody has seen a result yet, and a save does not repair the machine
             if isinstance(error, UsageError) or (error.blame != "submission" and not self._begun):
                 raise
-            name, source = identify(self.source) or (Path(self.source).name, self.source)
-            about = SubmissionInfo(id=name, source=source, commit=None, digest="", package="")
+            about = SubmissionInfo.unopened(*(identify(self.source) or (Path(self.source).name, self.source)))
             result = error_result(error, about, self.rubric)
         self._begun = True
         undecided = not self.options.static_only and any(c.status.is_retryable for c in result.criteria)

@@ -94,9 +94,7 @@ class BatchFolder:
     def empty_result(self, entry: Entry, kind: str, message: str) -> GradingResult:
         """Return a result of status `error` that says why there is no other one, by one of the keys of `HINTS`."""
         return GradingResult(
-            submission=SubmissionInfo(
-                id=safe_name(entry.id), source=entry.source, commit=None, digest="", package=""
-            ),
+            submission=SubmissionInfo.unopened(safe_name(entry.id), entry.source),
             rubric=self.run.rubric,
             status="error",
             points=0.0,

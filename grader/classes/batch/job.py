@@ -192,13 +192,7 @@ def _fetch(job: GradingJob, folder: Path) -> Obtained:
 
 def _attempt(job: GradingJob) -> GradingContext:
     """Return what the result of a submission that could not be fetched says."""
-    about = SubmissionInfo(
-        id=safe_name(job.entry.id),
-        source=without_password(job.entry.source),
-        commit=None,
-        digest="",
-        package="",
-    )
+    about = SubmissionInfo.unopened(safe_name(job.entry.id), without_password(job.entry.source))
     return GradingContext(
         source=about.source,
         submission_id=about.id,

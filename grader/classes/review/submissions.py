@@ -479,8 +479,7 @@ class Mask:
 
     def result(self, result: GradingResult, title: str) -> GradingResult | None:
         """Return the result under another name."""
-        package = result.submission.package
-        info = SubmissionInfo(id=title, source="", commit=None, digest="", package=self.text(package))
+        info = SubmissionInfo.unopened(title, package=self.text(result.submission.package))
         return self.record(result.model_copy(update={"submission": info}))
 
     def _data(self, data: Any) -> Any:  # noqa: ANN401 - JSON
