@@ -4,7 +4,7 @@ language the nodes are written that a verdict is about."""
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from pathlib import PurePosixPath
@@ -38,7 +38,7 @@ from grader.model.verdict import Verdict, failed, failed_or_blocked, inconclusiv
 from grader.rubric.message_fields import said_types
 from grader.rubric.model import Criterion, Rubric
 from grader.rubric.scenario import Scenario, Start
-from grader.wording import NOTHING_TO_DO, join_words
+from grader.wording import NOTHING_TO_DO, is_one_edit, join_words
 
 NOT_RUN = "not_run"
 REACTS = "reacts"
@@ -438,3 +438,23 @@ RATE_SHARE = 0.05
 def is_other_rate(slip: PythonSlip, hz: float) -> bool:
     """Return whether the rate that a script asks for is plainly not the lab's."""
     return abs(float(slip.message) - hz) > RATE_SHARE * hz
+
+
+def wrong_rates(numbers: Sequence[PythonSlip], hz: float, texts: Sequence[str]) -> list[PythonSlip]:
+    """Return which lines ask for another rate than `hz`, where that is plain: all of a script ask for the same one, or
+    its one rate is made twice, once as it should be. `texts` are the lines."""
+    wrong = [one for one in numbers if is_other_rate(one, hz)]
+    names = {text.partition("=")[0].strip() for text in texts}
+    agree = len({(one.file, one.message) for one in wrong}) == 1
+    return wrong if agree and (len(wrong) == len(numbers) or len(names) == 1) else []
+
+
+def misspelt_sleeps(lines: Sequence[str], rate: str) -> dict[str, list[int]]:
+    """Return the lines, from 1, that call what a Rate of this name does not have, and `sleep` is meant: `Sleep`."""
+    found: dict[str, list[int]] = {}
+    call = re.compile(rf"(?:^|[^\w]){re.escape(rate.rpartition('.')[2])}\.(\w+)\b")
+    for number, line in enumerate(lines if rate else (), 1):
+        word = next(iter(call.findall(line)), "sleep")
+        if word != "sleep" and (word.lower() == "sleep" or is_one_edit(word.lower(), "sleep")):
+            found.setdefault(word, []).append(number)
+    return found

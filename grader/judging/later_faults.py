@@ -36,7 +36,7 @@ from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.installable import PYTHON_2
 from grader.judging.cited_lines import LINE_CHARS, LINES_READ, LOOPS, OF_DATA, PLACES, loop_spins, lost_fields
-from grader.judging.facts import Facts, is_other_rate, names_started, scripts_of, sources_of
+from grader.judging.facts import Facts, misspelt_sleeps, names_started, scripts_of, sources_of, wrong_rates
 from grader.judging.later_launch_faults import (
     OF_LAUNCHES,
     criterion_of_file,
@@ -318,18 +318,16 @@ class Later:
         if len(pauses) == 1 and self._lacks_words(".sleep()"):  # no Rate is ever slept by
             numbers = pauses
         # A rate that changes within the run is not the one that its loop is made with.
-        changes = self._wanted.get("cause") is not None
-        if (
-            not changes
-            and len({(one.file, one.message) for one in numbers}) == 1
-            and is_other_rate(numbers[0], hz)
-        ):
-            ask = "ask" if len(numbers) > 1 else "asks"
-            where = f"{on_lines(sorted(one.line for one in numbers))} of {numbers[0].file}"
-            yield Fix(f"make it {significant(hz)} Hz on {where}, which {ask} for {numbers[0].message} Hz")
+        of_loop = [] if self._wanted.get("cause") is not None else numbers
+        if wrong := wrong_rates(of_loop, hz, [self._text_of(one) for one in of_loop]):
+            ask = "ask" if len(wrong) > 1 else "asks"
+            where = f"{on_lines(sorted(one.line for one in wrong))} of {wrong[0].file}"
+            yield Fix(f"make it {significant(hz)} Hz on {where}, which {ask} for {wrong[0].message} Hz")
+        of_self = {(s.file, s.line) for s in self._of("misspelt", "undefined") if "self." in s.fix}
         for slip in self._of("not-called"):
             if "sleep" in slip.name:
-                yield Fix(f"on {_line(slip)}, {slip.fix}")
+                owner = "self." if (slip.file, slip.line) in of_self else ""
+                yield Fix(f"on {_line(slip)}, {slip.fix.replace(slip.name, owner + slip.name, 1)}")
         for slip in self._of("loop-left") if not self._ran else ():
             if not slip.name:
                 yield Fix(f"{slip.fix}, since {slip.message}", (slip.fix,))
@@ -340,6 +338,8 @@ class Later:
     def _rate_of_lines(self, path: str, lines: Sequence[str], hz: str) -> Iterator[Fix]:
         """Yield what keeps the loop of a script that never ran from sleeping."""
         rate = next((found[1] for line in lines if (found := MAKES_RATE.match(line))), "")
+        for word, numbers in misspelt_sleeps(lines, rate).items():
+            yield Fix(f"write `sleep` instead of `{word}` on {on_lines(numbers)} of {path}")
         for number, line in enumerate(lines, 1):
             if rate and SLEEPS_FOR.match(line):
                 yield Fix(f"write `{rate}.sleep()` on line {number} of {path}: rospy.sleep() needs a time")

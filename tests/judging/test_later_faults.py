@@ -473,6 +473,18 @@ def test_a_question_that_is_not_there_in_python_3_is_told_once() -> None:
     assert "asks for input" not in hint
 
 
+def test_the_wrong_one_of_two_rates_and_a_misspelt_sleep_are_told() -> None:
+    rates, made = [slip("rate-number", "10", 1), slip("rate-number", "2", 2)], "%s = Rate(10)\n%s = Rate(2)\n"
+    told = [hint_of("node", DIES, TALKER, *rates, source=made % two) for two in (("r", "r"), ("r", "s"))]
+    assert f"; then make it 10 Hz on line 2 of {FILE}, which asks for 2 Hz" in told[0]
+    assert "make it" not in told[1]
+    hint = hint_of("node", DIES, TALKER, source="r = rospy.Rate(10)\nr.Sleep()\nr.remaining()\n")
+    assert f"; then write `sleep` instead of `Sleep` on line 2 of {FILE} and " in hint
+    slips = [slip("misspelt", "", name="rate", fix="write `self.rate` instead of rate")]
+    slips.append(slip("not-called", "", name="rate.sleep", fix="write `rate.sleep()`"))
+    assert "write `self.rate.sleep()`" in hint_of("node", DIES, TALKER, *slips)
+
+
 def test_what_a_machine_lacks_does_not_hide_what_is_the_students() -> None:
     console = {
         **DIES["console"][0],
