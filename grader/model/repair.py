@@ -156,7 +156,12 @@ def _where_and_how(repair: Repair) -> tuple[str, str]:
         )
         if below and not named:
             return repair.file, f"below line {repair.line}, {repair.fix}"
-        return repair.file if named else place_of(repair), repair.fix
+        # the place has the line already
+        return (
+            (repair.file, repair.fix)
+            if named
+            else (place_of(repair), repair.fix.removeprefix(f"on line {repair.line}, "))
+        )
     code = join_words(map(as_code, added))
     # Where a line is added, the line beside it is the first or the last of the new ones, unchanged.
     replaced, script = repair.before not in (new[0], new[-1]), repair.file.endswith(".py")

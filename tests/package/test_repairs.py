@@ -144,6 +144,13 @@ NAMES_OF_FILES = {
         {TALKER: ASKS, "src/listener.py": OFFERS}, ["exchanged-files"], "",
         asking(does=((TALKER, "server", "/add"),), scripts=BOTH), {TALKER: OFFERS, "src/listener.py": ASKS},
     ),
+    "script-with-a-word-behind-the-labs": Case(
+        {TALKER: None, "src/talker_pub.py": SCRIPT.replace("'numeric_chatter'", "'beeps'")},
+        ["file-name"], "", asking(does=TWO_ENDS, topics=()),
+    ),
+    "script-with-the-labs-word-that-hears": Case(
+        {"src/listener_pub.py": SCRIPT}, [], "", asking(does=TWO_ENDS, scripts=BOTH),
+    ),
     "one-file-twice": Case(
         {TALKER: HEARS, "src/listener.py": HEARS}, [], "", asking(does=TWO_ENDS, scripts=BOTH),
     ),

@@ -199,6 +199,12 @@ def _meant_script(package: PackageFacts, wanted: Wanted, name: str, others: set[
     does_it = {path: done for path, done in found.items() if does and topics <= done}
     called = [path for path in does_it if topics and has_role_of(path, name)]
     meant = [path for path, done in does_it.items() if nodes & done] or called
+    if not meant:  # `talker_pub.py` for `talker.py`, whatever its topic is called
+        kinds, word = {kind for kind, _ in topics}, PurePosixPath(name).stem.casefold()
+        folders = {PurePosixPath(path).parent for path, *_ in wanted.does if PurePosixPath(path).name == name}
+        alike = [PurePosixPath(path) for path, done in found.items() if kinds & {kind for kind, _ in done}]
+        words = {path: re.split(r"[_-]", path.stem.casefold()) for path in alike if path.parent in folders}
+        meant = [str(path) for path, parts in words.items() if word in parts]
     return meant[0] if len(meant) == 1 else ""
 
 
