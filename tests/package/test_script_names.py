@@ -238,6 +238,8 @@ COUNTERS = {
     "below-alone": (f"{LOOP}    p.publish(c)\nc += 1\n", ("no-effect", 4, "indent line 4 like the lines of that loop")),
     "below-another": (f"{LOOP}    p.publish(1)\nc += 1\n", None),
     "two-sleeps": (f"{LOOP}    p.publish(c)\n    r.sleep()\n    rospy.sleep(1)\n", ("sleep-twice", 5, "delete line 5")),
+    "three-sleeps": (f"{LOOP}    r.sleep()\n    p.publish(c)\n    r.sleep()\n    rospy.sleep(1)\n",
+                     ("sleep-twice", 6, "delete lines 5 and 6")),
     "sleeps-apart": (f"{LOOP}    r.sleep()\n    p.publish(c)\n    r.sleep()\n", ("sleep-twice", 5, "delete line 5")),
     "sleeps-between-topics": (f"{LOOP}    p.publish(c)\n    r.sleep()\n    q.publish(c)\n    r.sleep()\n",
                               ("sleep-twice", 6, "delete line 6")),

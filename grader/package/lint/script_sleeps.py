@@ -94,8 +94,8 @@ def sleeps_in_if(loop):
 
 
 def sleeps_twice(tree):
-    """Loops that wait twice in each of their turns, once maybe in a function that they call, and publish once on each
-    topic."""
+    """Loops that wait twice or more in each of their turns, once maybe in a function that they call, and publish once
+    on each topic."""
     functions = functions_in(tree)
     for loop in all_of(tree, *LOOPS):
         body = loop.body
@@ -106,11 +106,20 @@ def sleeps_twice(tree):
         body = [one for n in body for one in (called[n].body if called[n] else [n])]
         at = [i for i, n in enumerate(body) if isinstance(n, ast.Expr) and called_name(n.value) == "sleep"]
         own = [body[i].lineno for i in at if body[i] in called or len(loop.body) == 1]
-        if len(at) != 2 or not own:
+        surplus = own if len(own) < len(at) else own[1:]
+        if len(at) < 2 or len(at) - len(surplus) != 1:
             continue
-        parts = body[at[0] + 1 : at[1]], body[: at[0]] + body[at[1] + 1 :]
+        parts = [body[at[i] + 1 : at[i + 1]] for i in range(len(at) - 1)]
+        parts.append(body[at[-1] + 1 :] + body[: at[0]])
         sent = [{ast.dump(n.func) for one in part for n in calls_in(one, "publish")} for part in parts]
-        if any(sent) and sent[0].isdisjoint(sent[1]):
-            lines = tuple(sorted(body[i].lineno for i in at))
-            message = "the loop sleeps on line %d and again on line %d" % lines
-            yield slip(own[-1], "sleep-twice", message, "delete line %d" % own[-1])
+        if any(sent) and sum(map(len, sent)) == len(set().union(*sent)):
+            lines = sorted(body[i].lineno for i in at)
+            again = "line %d" % lines[1] if len(lines) == 2 else "lines %s" % _numbers(lines[1:])
+            deleted = "line %d" % surplus[0] if len(surplus) == 1 else "lines %s" % _numbers(surplus)
+            message = "the loop sleeps on line %d and again on %s" % (lines[0], again)
+            yield slip(surplus[-1], "sleep-twice", message, "delete %s" % deleted)
+
+
+def _numbers(lines):
+    """Return `4, 5 and 6`."""
+    return " and ".join([", ".join(map(str, lines[:-1])), str(lines[-1])])
