@@ -19,6 +19,7 @@ from grader.checks.support.fields import (
     ROUNDING,
     FieldPath,
     Reading,
+    as_numbers,
     begins_later,
     bounds_text,
     differences,
@@ -475,8 +476,9 @@ def _in_order(
     found: Sequence[Reading], package: PackageFacts, run: Run, params: FieldEqualsParams
 ) -> Verdict:
     """Whether the values come one after the other; where one does not, what comes in its place, or why nothing does."""
-    at, what = 0, f"{params.field} of {params.topic}"
-    verdict = passed(f"{what} is {params.words}")
+    at, what, sent, found = 0, f"{params.field} of {params.topic}", found, as_numbers(found, params.values)
+    text = failed(f"{what} is text: {_values(sent)}", hint="publish numbers, and no text")
+    verdict = text if found is not sent else passed(f"{what} is {params.words}")
     for number, value in enumerate(params.values):
         here = next((n for n in range(at, len(found)) if params.is_at(found[n], value)), None)
         if here is None and len(found) == len(params.values):  # none is missing: each has its place
@@ -506,7 +508,7 @@ def _in_order(
     else:
         verdict = _said_again(found, params) or verdict
     cited = (_span(run, found, params),)
-    return verdict.about(expected=f"{what} {params.words}", measured=_values(found), citations=cited)
+    return verdict.about(expected=f"{what} {params.words}", measured=_values(sent), citations=cited)
 
 
 def _said_again(found: Sequence[Reading], params: FieldEqualsParams) -> Verdict | None:

@@ -432,6 +432,19 @@ def fields_text(value: Mapping[str, Any]) -> str:
     return shown(", ".join(f"{name}: {value_text(one)}" for name, one in value.items())) or "nothing"
 
 
+def as_numbers(found: Sequence[Reading], values: Sequence[object]) -> Sequence[Reading]:
+    """Return the readings with numbers in place of texts where numbers are asked for, and each text is one: that the
+    type is another one says another criterion. Otherwise they are returned as they are."""
+    texts = [one for reading in found for one in reading.values]
+    asked = all(isinstance(one, int | float) and not isinstance(one, bool) for one in values)
+    if not asked or not all(isinstance(one, str) and _PLAIN_NUMBER.fullmatch(one.strip()) for one in texts):
+        return found
+    return [one._replace(values=tuple(map(float, one.values))) for one in found]
+
+
+_PLAIN_NUMBER = re.compile(r"[+-]?\d{1,15}(?:\.\d{0,9})?")
+
+
 def begins_later(
     found: Sequence[Reading], values: Sequence[object], is_at: Callable[[Reading, object], bool]
 ) -> str:
