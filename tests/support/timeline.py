@@ -46,16 +46,31 @@ def build_runs(timeline: Mapping[str, Any]) -> dict[str, Run]:
     Raises ValueError (pydantic's ValidationError among them) for unknown keys and values that do not fit.
     """
     runs: dict[str, Run] = {}
-    for name, line in parse_timeline(timeline).items():
-        stream = BytesIO()
-        writer = EvidenceStream(stream, **_about(name, line))
-        _record(line, writer)
-        writer.finish()
-        stream.seek(0)
+    for name, data in _written(timeline):
+        stream = BytesIO(data)
         stream.name = f"{name}.mcap"  # citations name the file
         run = load_run(stream)
         runs[run.scenario] = run
     return runs
+
+
+WRITTEN: dict[str, tuple[tuple[str, bytes], ...]] = {}
+"""The files of each timeline, by its text: one of five is asked for again."""
+
+
+def _written(timeline: Mapping[str, Any]) -> tuple[tuple[str, bytes], ...]:
+    """Return the file of each run."""
+    key = repr(timeline)
+    if key not in WRITTEN:
+        found = []
+        for name, line in parse_timeline(timeline).items():
+            stream = BytesIO()
+            writer = EvidenceStream(stream, **_about(name, line))
+            _record(line, writer)
+            writer.finish()
+            found.append((name, stream.getvalue()))
+        WRITTEN[key] = tuple(found)
+    return WRITTEN[key]
 
 
 def write_runs(timeline: Mapping[str, Any], folder: Path) -> list[Path]:
