@@ -25,7 +25,7 @@ from grader.evidence.events import CATKIN_MAKE, PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.judging import repair_charges
 from grader.model.package import PackageFacts
-from grader.model.repair import OF_LOGIC, Repair
+from grader.model.repair import AT_THE_END, OF_LOGIC, Repair
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import FileCitation, Status, Verdict, cited_lines
 from grader.rubric.model import Criterion, Rubric
@@ -248,7 +248,9 @@ def concerns(
         sleeps = repair.before.endswith(".sleep") and repair.after == f"{repair.before}()"
         words = repair.kind == "missing-call" and _is_of_words(repair)
         of_others = AT_ANY_RATE if sleeps else OF_ANY_WORDS if words else set[str]()
-        return criterion.check not in of_others and is_used_by(
+        at_end = repair.message.endswith(AT_THE_END)
+        is_other = criterion.check in of_others or (at_end and criterion.check != "node-lives")
+        return not is_other and is_used_by(
             rubric.scenarios[criterion.scenario], repair, rubric, built=built, launched=launched
         )
     if repair.kind == "package-name" and repair.file in repair_charges.OF_PACKAGES:

@@ -67,7 +67,7 @@ SLIPS = {
                         "NULL": "None", "nullptr": "None", "nil": "None", "none": "None", "this": "self",
                         "printf": "print", "cout": "print(…)", "Pass": "pass", "Break": "break",
                         "Continue": "continue"}.items()},
-    **{f"'{kind}' object has no attribute 'data'": (f"it is the {kind} inside the message", "leave out `.data` here")
+    **{f"'{kind}' object has no attribute 'data'": (f"it is a plain {kind}, and no message", "leave out `.data` here")
        for kind in ("int", "float", "str", "bool")},
     **{f"{said} 'publish'{rest}": ("`publish` belongs to what `rospy.Publisher(…)` returns",
        "write that name in front of it: `pub.publish(…)`")

@@ -139,6 +139,8 @@ def callbacks(tree):
                 what += " and its `callback_args`" if name == "Subscriber" and values > 1 else ""
                 message, fix = wrong_callback(own, node, tree, isinstance(meant, ast.Attribute), values)
                 number = "1 argument" if least == 1 else "%d arguments" % least
+                if isinstance(meant, ast.Attribute) and not least and own.args.args:
+                    number = "only `self`"
                 message = message or "`%s` takes %s, but ROS passes it %s" % (own.name, number, what)
                 yield slip(own.lineno, "callback-values", message, fix, own.name)
 

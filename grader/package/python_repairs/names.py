@@ -16,6 +16,7 @@ from difflib import get_close_matches
 from functools import lru_cache
 from string import digits
 
+from grader.model.repair import AT_THE_END
 from grader.package.lint.script_names import is_value, meant_at_most
 from grader.package.lint.script_results import misnamed_targets
 from grader.package.python_repairs.syntax import (
@@ -170,6 +171,10 @@ def with_methods(text: str) -> Iterator[Step]:
         elif name in {*read, "__init__"} and (_lacks_self(method) or _takes_only_the_message(tree, method)):
             comma = ", " if method.args.args else ""
             line, why = f"{head[0]}self{comma}{line[head.end() :]}", WITHOUT_SELF % name
+            calls = (
+                n for n in nodes_in(tree) if isinstance(n, ast.Call) and last_name(n.func) == "on_shutdown"
+            )
+            why += AT_THE_END if name in {last_name(given) for call in calls for given in call.args} else ""
         after = "\n".join([*lines[:at], line, *lines[at + 1 :]])
         for step in step_to("argument", method.lineno, text, after, why):
             yield step
