@@ -23,10 +23,10 @@ from grader.model.verdict import (
 )
 
 FAMILIES = (
-    "package_files", "cmake", "build", "executable", "node", "topics", "messages", "reacts", "stamps", "interfaces",
-    "transform", "rate", "counter", "listener", "console", "logs", "files_left", "launch_files", "launch_runs",
-    "launch_params", "parameter_files", "parameters", "service_servers", "service_clients", "actions", "rostest",
-    "two_copies", "robot_path", "ends_at", "stays_within",
+    "package_files", "cmake", "build", "executable", "node", "topics", "messages", "field_values", "reacts", "stamps",
+    "interfaces", "transform", "rate", "counter", "listener", "console", "logs", "files_left", "launch_files",
+    "launch_runs", "launch_params", "parameter_files", "parameters", "service_servers", "service_clients", "actions",
+    "rostest", "two_copies", "robot_path", "ends_at", "stays_within",
 )  # fmt: skip
 # The stable name of docs/how-to/own-checks.md, which checks of courses import.
 unjudged = failed_or_blocked

@@ -138,11 +138,17 @@ def callbacks(tree):
                 what = OTHER_VALUES.get(name, "the %s" % VALUES.get(name, "message"))
                 what += " and its `callback_args`" if name == "Subscriber" and values > 1 else ""
                 message, fix = wrong_callback(own, node, tree, isinstance(meant, ast.Attribute), values)
-                number = "1 argument" if least == 1 else "%d arguments" % least
-                if isinstance(meant, ast.Attribute) and not least and own.args.args:
-                    number = "only `self`"
+                number = number_taken(own, isinstance(meant, ast.Attribute))
                 message = message or "`%s` takes %s, but ROS passes it %s" % (own.name, number, what)
                 yield slip(own.lineno, "callback-values", message, fix, own.name)
+
+
+def number_taken(own, bound):
+    """Return how many values a function takes, in words; `bound` if it is an object's."""
+    least, _ = takes(own, bound)
+    if bound and not least and own.args.args:
+        return "only `self`"
+    return "1 argument" if least == 1 else "%d arguments" % least
 
 
 SETS_UP = ("init_node", "Publisher", "Subscriber", "spin")
