@@ -12,6 +12,8 @@ from itertools import chain
 
 LISTED_MAX = 6
 PART_CHARS_MIN = 3
+AT_THE_END = " (rospy calls it when the node ends)"
+"""How the message of a repair ends that only the end of a node shows."""
 NOTHING_TO_DO = "nothing for you to do: "
 ON_THE_MACHINE = f"{NOTHING_TO_DO}tell your instructor. On the grading machine: "
 """How every hint begins that only the instructor can follow: grading again changes nothing before."""

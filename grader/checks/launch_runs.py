@@ -13,6 +13,7 @@ from grader.checks.launch_params import NodeParam, params_in_place, params_mispl
 from grader.checks.registry import DependencyName, LaunchName, ProgramName, check
 from grader.checks.support.launch import (
     NOTHING_STARTS,
+    died,
     is_exact,
     node_slips,
     nodes_up,
@@ -99,15 +100,18 @@ def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParam
     file = read_launch(package, params.launch)
     if isinstance(file, Verdict):
         return file.about(expected=expected)
-    found = list(connected_nodes(package, run, params.topic))
-    nodes = run.student_nodes()
+    pairs, nodes = list(connected_nodes(package, run, params.topic)), run.student_nodes()
+    dead = [Wanted(one, own=True) for one in file.brings if died(run, one) is not None]
+    gone = {name for one in dead for name in nodes_up(run, one.node)}
+    found = [pair for pair in pairs if gone.isdisjoint(pair)]
     verdict = (
         not_run(run)
         or _names_missing(nodes, file, params)
+        or (_judge_deaths(package, run, dead, "came up, but then") if pairs and not found else None)
         or (None if found else _why_unconnected(package, file, run, params))
         or passed(f"roslaunch connects {found[0][0]} and {found[0][1]} over {params.topic}")
     )
-    up = [name for name in params.nodes if f"/{name.lstrip('/')}" in nodes] if params.nodes else nodes[:2]
+    up = [name for name in params.nodes or nodes[:2] if f"/{name.lstrip('/')}" in set(nodes) - gone]
     # A connection needs two nodes, also where the lab names none.
     share = len(up) / (len(params.nodes) or 2) / 2 + (0.5 if found else 0.0)
     verdict = verdict.in_part(share if up else 0.0, _came_up(up, connected=bool(found)))

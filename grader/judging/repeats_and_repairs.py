@@ -25,11 +25,12 @@ from grader.evidence.events import CATKIN_MAKE, PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.judging import repair_charges
 from grader.model.package import PackageFacts
-from grader.model.repair import AT_THE_END, OF_LOGIC, Repair
+from grader.model.repair import OF_LOGIC, Repair
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import FileCitation, Status, Verdict, cited_lines
 from grader.rubric.model import Criterion, Rubric
 from grader.rubric.scenario import Scenario
+from grader.wording import AT_THE_END
 
 REPAIRS = "repairs"
 AT_ANY_RATE = {"node-name", "node-lives", "topic-type"}

@@ -29,8 +29,6 @@ HALVING = frozenset({
 DEFAULT_SHARES: dict[RepairKind, float] = {kind: 0.5 if kind in HALVING else 1.0 for kind in KINDS}
 """Which share of its points a criterion keeps that passes on a copy with a repair of this kind. The criterion that asks
 for what was repaired loses its own points. A rubric's `repairs` can say otherwise."""
-AT_THE_END = " (rospy calls it when the node ends)"
-"""How the message of a repair ends that only the end of a node shows."""
 BY_HAND: dict[RepairKind, str] = {
     "executable-bit": f"not executable: {chmod_hint(None, 'FILE')}",
     "encoding": "not saved as UTF-8: in the editor, save it with the encoding UTF-8",

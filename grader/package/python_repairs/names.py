@@ -16,7 +16,6 @@ from difflib import get_close_matches
 from functools import lru_cache
 from string import digits
 
-from grader.model.repair import AT_THE_END
 from grader.package.lint.script_names import is_value, meant_at_most
 from grader.package.lint.script_results import misnamed_targets
 from grader.package.python_repairs.syntax import (
@@ -29,7 +28,7 @@ from grader.package.python_repairs.syntax import (
     tree_of,
     with_line,
 )
-from grader.wording import is_one_edit, plural
+from grader.wording import AT_THE_END, is_one_edit, plural
 
 OF_PYTHON = (
     "abs", "float", "format", "input", "int", "len", "max", "min", "print", "range", "round", "sorted", "str", "sum",
