@@ -62,7 +62,7 @@ def loaded(namespace: str, names: str, node: str = "") -> dict[str, str | bytes]
         Case(
             loaded('ns="/robot"', RIGHT),
             ["parameter-name"],
-            'on line 3, delete ns="/robot"',
+            'line 3: delete ns="/robot"',
             wanted=NESTED,
             after={LAUNCHED: '<rosparam file="$(find lab)/config/my.yaml"/>'},
         ),
