@@ -37,21 +37,12 @@ from grader.checks.support.fields import (
 )
 from grader.checks.support.processes import OnTopic
 from grader.checks.support.recorder_losses import losses
-from grader.checks.support.text import (
-    shown,
-)
+from grader.checks.support.text import shown
 from grader.checks.support.topics import SYSTEM_TOPICS, Sender, cite, nothing_sent, sent_by
 from grader.evidence.run import Run
 from grader.model.message_definitions import NOT_FINITE
 from grader.model.package import PackageFacts
-from grader.model.verdict import (
-    EvidenceCitation,
-    Verdict,
-    failed,
-    failed_or_blocked,
-    grade_again,
-    passed,
-)
+from grader.model.verdict import EvidenceCitation, Verdict, failed, failed_or_blocked, grade_again, passed
 from grader.wording import join_words, plural, significant
 
 VALUES_SHOWN = 4
