@@ -296,9 +296,8 @@ def _uncited(verdict: Verdict, repairs: Sequence[Repair], told: Collection[Repai
         is_new = one.line is not None and (one.file, one.line) not in cited
         cited.add((one.file, one.line))
         if is_new and not (one in told and one.file in with_lines):
-            yield FileCitation(
-                file=one.file, line=one.line if one.before else None
-            )  # an empty file has no line
+            line = one.line if one.before else None  # an empty file has no line
+            yield FileCitation(file=one.file, line=line)
 
 
 def _at_its_line(copy: Verdict) -> str:

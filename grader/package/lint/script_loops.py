@@ -32,6 +32,7 @@ from script_tree import (
     statements_of,
     walk,
 )
+from script_unsent import replaced_names
 from script_values import CLOCKS
 
 CALLED_BACK = {"Subscriber": "callback", "Service": "handler"}
@@ -365,9 +366,7 @@ def called_own(node, functions):
 
 def publishes_twice(tree):
     """Loops that publish on one topic more than once in each of their turns, and sleep once at most."""
-    made = [n.targets[0] for n in all_of(tree, ast.Assign) if is_call(n.value, "Publisher")]
-    names = [dotted(n) for n in made]
-    several = {name for name in names if names.count(name) > 1}  # each was to be another topic's
+    several = {name for name, *_ in replaced_names(tree)}  # each was to be another topic's
     for loop in all_of(tree, *LOOPS):
         by_publisher = {}
         for one in loop.body:

@@ -45,6 +45,14 @@ def unused_publishers(tree):
 
 def replaced_publishers(tree):
     """Yield each `pub = Publisher(…)` whose name another publisher gets in the same block, before anything uses it."""
+    for name, line, topic, below in replaced_names(tree):
+        message = "line %d gives `%s` another publisher, so nothing is sent by this one" % (below, name)
+        fix = "on line %d, give it another name than `%s`, and publish with each of the two" % (below, name)
+        yield slip(line, "never-published", message, fix, topic)
+
+
+def replaced_names(tree):
+    """Yield the name of each such publisher, its line and topic, and the line of the other one."""
     blocks = [n.body for n in walk(tree) if isinstance(getattr(n, "body", None), list)]
     for body in blocks:
         made = {}
@@ -55,10 +63,7 @@ def replaced_publishers(tree):
                 del made[used]
             topics = argument(one.value, 0, "name") if name and is_call(one.value, "Publisher") else []
             if topics and first and first[1] != text_of(topics[0]):
-                message = "line %d gives `%s` another publisher, so nothing is sent by this one"
-                fix = "on line %d, give it another name than `%s`, and publish with each of the two"
-                says = (one.lineno, name)
-                yield slip(first[0], "never-published", message % says, fix % says, first[1])
+                yield (name, *first, one.lineno)
             if topics:
                 made[name] = one.lineno, text_of(topics[0])
 
