@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.model.package import INTERFACE_FOLDERS, CMakeCall, PackageFacts
+from grader.model.package import CMAKE, INTERFACE_FOLDERS, CMakeCall, CMakeFacts, PackageFacts
 from grader.wording import join_words
 
 GENERATE = "generate_messages"
@@ -31,7 +31,8 @@ class Unwaited(NamedTuple):
     """A target that `call` makes, a header that it includes by `source`, and what makes such headers, as it is written.
 
     `lost` is the call of `add_dependencies` for it, where there is one, and `absent` what that names although there is
-    no such target. `above` is the call below which its dependencies count.
+    no such target. `above` is the call below which its dependencies count. `commented` is the call that would be right,
+    where it is in a comment.
     """
 
     target: str
@@ -42,15 +43,18 @@ class Unwaited(NamedTuple):
     lost: CMakeCall | None
     absent: tuple[str, ...]
     above: CMakeCall
+    commented: CMakeCall | None
 
     @property
     def line(self) -> CMakeCall:
         """The call to look at."""
-        return self.lost or self.call
+        return self.commented or self.lost or self.call
 
     @property
     def fix(self) -> str:
         """What to write, and where."""
+        if self.commented is not None:
+            return f"remove the `#` on line {self.commented.line}"
         if self.lost is None:
             below = f"{self.above.name}(…) on line {self.above.line}"
             return f"below the {below}, write add_dependencies({self.target} {self.exported})"
@@ -65,15 +69,15 @@ class Unwaited(NamedTuple):
 def unwaited_targets(
     package: PackageFacts,
     known: Collection[str],
-    calls: Sequence[CMakeCall] | None = None,
+    cmake: CMakeFacts | None = None,
     *,
     all_made: bool = False,
 ) -> list[Unwaited]:
     """Return the targets that include headers of definitions handed in, by themselves or by the package's own headers,
-    and that nothing makes wait for what makes these. `known` are ROS's packages of messages; `calls`
-    stand for those of the package's `CMakeLists.txt`; `all_made`: as if each definition were named there."""
-    if calls is None:
-        calls = package.cmake.calls if package.cmake is not None else ()
+    and that nothing makes wait for what makes these. `known` are ROS's packages of messages; `cmake`
+    stands for the package's `CMakeLists.txt`; `all_made`: as if each definition were named there."""
+    cmake = cmake or package.cmake
+    calls, commented = (cmake.calls, cmake.commented) if cmake is not None else ((), ())
     makers = {package.name: _headers_made(package, calls, all_made=all_made)}
     for one in package.also:
         makers[one.name] = _headers_made(one, one.cmake.calls if one.cmake else (), all_made=all_made)
@@ -98,7 +102,8 @@ def unwaited_targets(
             if not any(_makes(word, maker, package.name) for word in reached)
         }
         if missing:
-            found.append(_describe(call, calls, missing, package.name, known))
+            new = _describe(call, calls, missing, package.name, known)
+            found.append(new._replace(commented=_find_commented(new, commented, missing, package.name)))
     return found
 
 
@@ -121,6 +126,11 @@ def reasons_of(found: Sequence[Unwaited]) -> list[str]:
         include = "which it includes" if len(alone) == 1 else "which they include"
         targets = join_words(one.target for one in alone)
         whys.append(f"nothing in {alone[0].call.file} makes {targets} wait for {headers}, {include}")
+    whys += [
+        f"the add_dependencies({one.target} …) on line {one.commented.line} is commented out"
+        for one in found
+        if one.commented is not None
+    ]
     for one in found:
         if one.lost is not None:
             line = f"line {one.lost.line} of {one.lost.file}"
@@ -257,4 +267,16 @@ def _describe(
         lost=lost,
         absent=tuple(absent),
         above=max((call, *above), key=lambda one: one.line),
+        commented=None,
     )
+
+
+def _find_commented(
+    one: Unwaited, commented: Sequence[CMakeCall], makers: Collection[str], own: str
+) -> CMakeCall | None:
+    """Return the call in a comment that would make the target wait for these makers."""
+    for call in commented if one.lost is None and one.above.file == CMAKE else ():
+        is_right = all(any(_makes(word, maker, own) for word in call.args[1:]) for maker in makers)
+        if call.args[:1] == (one.target,) and call.line > one.above.line and is_right:
+            return call
+    return None

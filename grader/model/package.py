@@ -126,6 +126,8 @@ class CMakeFacts(Record):
     fault: Fault | None = None
     last_line: int | None = None
     stopped_line: int | None = None
+    commented: tuple[CMakeCall, ...] = Field(default=(), exclude_if=lambda value: not value)
+    """The calls of `add_dependencies` in comments of one line, as the parser reads them."""
 
     @property
     def executables(self) -> tuple[Executable, ...]:

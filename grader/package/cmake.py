@@ -81,6 +81,7 @@ def refine_cmake(
         calls=(*_without_left_out(calls), *rest),
         last_line=facts.last_line,
         stopped_line=reached if stopped else None,
+        commented=facts.commented,
     )
 
 

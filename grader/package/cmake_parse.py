@@ -48,6 +48,9 @@ _NESTING_MAX = 50
 _WORK_MAX = 20_000_000
 _BLOCKS = ("if", "foreach", "while", "function", "macro", "block")
 _MIDDLE = ("else", "elseif")
+_COMMENTED = re.compile(r"[ \t]*#[# \t]*add_dependencies[ \t]*\(([^()#]*)\)\s*(?:#|$)", re.IGNORECASE)
+_COMMENTED_MAX = 50
+_COMMENTED_CHARS_MAX = 400
 _HALVES_MAX = 20
 _HALF_LINES_MAX = 40
 _LINK_CHARS_MAX = 4_095
@@ -98,7 +101,15 @@ def read_calls(data: bytes, folder: Path, name: str) -> CMakeFacts:
         calls=tuple(reader.calls),
         fault=fault or reader.fault,
         last_line=tree[-1].line if tree and fault is None else None,
+        commented=tuple(islice(_commented(data.decode(errors="replace"), name), _COMMENTED_MAX)),
     )
+
+
+def _commented(text: str, name: str) -> Iterator[CMakeCall]:
+    for line, written in enumerate(text.split("\n"), 1):
+        if found := _COMMENTED.match(written[:_COMMENTED_CHARS_MAX]):
+            words = found[1].replace("${PROJECT_NAME}", name).split()
+            yield CMakeCall(name="add_dependencies", args=tuple(words), file=CMAKE, line=line)
 
 
 class _Reader:

@@ -77,6 +77,7 @@ def test_a_program_waits_for_the_headers_that_it_includes(
 
 TO_OWN = "${${PROJECT_NAME}_EXPORTED_TARGETS}"
 TO_END = "endforeach()\nadd_dependencies(a lab_gencpp)\n"
+OF_OTHER = "add_dependencies(a lab_gencpp)\nadd_executable(c src/a.cpp)\n"
 BOTH = f"add_dependencies(a2 {TO_OWN}) and add_dependencies(b2 {TO_OWN})"
 WAITS = {
     "misspelt": (
@@ -104,6 +105,19 @@ WAITS = {
         "foreach(t a b)\n  add_executable(${t}2 src/a.cpp)\n" + TO_END,
         f"foreach(t a b)\n  add_executable(${{t}}2 src/a.cpp)\nadd_dependencies(${{t}}2 {TO_OWN})\n{TO_END}",
         f"below the foreach(…) loop around line 10, write {BOTH}",
+    ),
+    "commented-out": (
+        "#add_dependencies(a ${PROJECT_NAME}_generate_messages_cpp)\n",
+        "add_dependencies(a ${PROJECT_NAME}_generate_messages_cpp)\n",
+        "remove the `#` on line 9",
+    ),
+    "commented-out-of-another": (
+        f"{OF_OTHER}# add_dependencies(b lab_gencpp)\n# add_dependencies(c std_msgs_gencpp)\n",
+        (
+            f"{OF_OTHER}add_dependencies(c {TO_OWN})\n"
+            "# add_dependencies(b lab_gencpp)\n# add_dependencies(c std_msgs_gencpp)\n"
+        ),
+        f"below the add_executable(…) on line 10, write add_dependencies(c {TO_OWN})",
     ),
     "right": ("add_dependencies(a ${PROJECT_NAME}_generate_messages_cpp)\n", "", ""),
 }

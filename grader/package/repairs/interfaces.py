@@ -151,8 +151,8 @@ def _delete(files: Files, call: Command, why: str) -> None:
 def wait_for_headers(files: Files, package: PackageFacts, name: str) -> None:
     """Make programs wait for the headers of definitions that were handed in, which they include and nothing makes them
     wait for."""
-    calls = read_calls(cmake_text(files).encode(), files.folder, name).calls
-    found = unwaited_targets(package, noetic_messages(), calls, all_made=True)
+    cmake = read_calls(cmake_text(files).encode(), files.folder, name)
+    found = unwaited_targets(package, noetic_messages(), cmake, all_made=True)
     found = [one for one in found if {one.line.file, one.above.file} == {CMAKE}]
     if not found:
         return
@@ -168,11 +168,14 @@ def wait_for_headers(files: Files, package: PackageFacts, name: str) -> None:
 
 def _place_changed(one: Unwaited) -> int:
     """Return the line of the call that is changed, or below which one is written."""
-    return one.above.line if one.lost is None else one.lost.line
+    return (one.commented or one.lost or one.above).line
 
 
 def _wait_by(text: str, one: Unwaited, name: str) -> str:
     """Return the text of `CMakeLists.txt` with which a target waits for the headers that it includes."""
+    if one.commented is not None:
+        lines, at = text.split("\n"), one.commented.line - 1
+        return "\n".join([*lines[:at], lines[at].lstrip("# \t"), *lines[at + 1 :]])
     commands = {command.line: command for command in commands_of(text.encode()) or ()}
     target = words_of(commands[one.call.line])[0].value
     if one.lost is None or one.lost.line < one.above.line:
