@@ -275,20 +275,20 @@ def read_package(
     *,
     hints: tuple[str, ...] = (),
     commands: Collection[tuple[str, tuple[str, ...]]] = (),
-    others: tuple[str, ...] = (),
+    beside: Iterable[SourcePackage] = (),
 ) -> PackageFacts:
     """Return the facts of one package, as they are before a build (`with_build_facts`).
 
     A parser reads `CMakeLists.txt`, and this Python looks at the sources, in a process of its own. `commands` are
-    launch files with the arguments that scenarios give them, `others` the names of other packages.
+    launch files with the arguments that scenarios give them, `beside` the other packages of the submission.
     """
     entries = read_files(package)
-    with ThreadPoolExecutor(1) as beside:
+    with ThreadPoolExecutor(1) as executor:
         sources = [entry.path for entry in entries if _to_check(entry.file)]
-        asked = beside.submit(check_syntax, package.folder, sources)
+        asked = executor.submit(check_syntax, package.folder, sources)
         # the parsers are slow to load, and are loaded while the child reads the scripts
         from grader.package.cmake import read_cmake  # noqa: PLC0415
-        from grader.package.launch import read_launch_files  # noqa: PLC0415
+        from grader.package.launch import Beside, read_launch_files  # noqa: PLC0415
         from grader.package.manifest import read_manifest  # noqa: PLC0415
 
         manifest, manifest_fault = read_manifest(package.folder)
@@ -296,7 +296,15 @@ def read_package(
         names = (manifest.name if manifest else package.name, package.name)
         readable = [(entry.file.path, entry.path) for entry in _readable(entries)]
         needed = (one.name for one in manifest.dependencies) if manifest else ()
-        launch_files = read_launch_files(package.folder, readable, names, commands, {*others, *needed})
+        packages = {
+            one.name: Beside(posixpath.relpath(one.path, package.path), one.folder, one.executable)
+            for one in beside
+            if one.name not in names
+        }
+        others = tuple(sorted(packages)[:OTHERS_MAX])
+        launch_files = read_launch_files(
+            package.folder, readable, names, commands, {*others, *needed}, beside=packages
+        )
         report = asked.result()
     files = tuple(entry.file for entry in entries)
     texts = _texts(package.folder, files)
@@ -323,12 +331,10 @@ def read_package(
 
 def read_packages(submission: Submission, commands: Collection[tuple[str, tuple[str, ...]]]) -> PackageFacts:
     """Return the facts of a submission's main package, with those of the others; `commands` as in `read_package`."""
-    names = {one.name for one in (*submission.packages, *submission.also, submission.package)}
+    packages = (*submission.packages, *submission.also, submission.package)
 
     def read(one: SourcePackage, hints: tuple[str, ...] = ()) -> PackageFacts:
-        return read_package(
-            one, hints=hints, commands=commands, others=tuple(sorted(names - {one.name})[:OTHERS_MAX])
-        )
+        return read_package(one, hints=hints, commands=commands, beside=packages)
 
     facts = read(submission.package, submission.hints)
     also = tuple(map(read, submission.also))

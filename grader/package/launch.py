@@ -24,6 +24,16 @@ _COMMENTED_MAX = 50
 _TYPE = re.compile(r"""\btype\s*=\s*["']([^"'\s]{1,200})["']""")
 _SUFFIXES = (".launch", ".launch.xml", ".test")
 
+
+class Beside(NamedTuple):
+    """Another package of the submission: the path to its folder from that of the package that is read, the folder, and
+    its regular files."""
+
+    way: str
+    folder: Path
+    paths: Collection[str]
+
+
 Remaps = tuple[tuple[str, str], ...]
 
 
@@ -47,14 +57,26 @@ def read_launch_files(
     names: Iterable[str] = (),
     commands: Collection[tuple[str, tuple[str, ...]]] = (),
     others: Collection[str] = (),
+    *,
+    beside: Mapping[str, Beside] | None = None,
 ) -> tuple[LaunchFile, ...]:
     """Return each launch file; `paths` are pairs of the name to show and the path on disk relative to `folder`.
 
-    `names` are the package's own, as `$(find …)` calls it, `others` those of packages that are there besides ROS's.
+    `names` are the package's own, as `$(find …)` calls it, `others` those of packages that are there besides ROS's;
+    `beside` are the submission's other packages by name, whose launch files may be included.
     After them come the files of `commands`, by their names, as roslaunch reads them with these arguments.
     """
     places, own = dict(paths), tuple(dict.fromkeys(names))
-    library = _Library(places, lambda path: read_markup(folder, places[path]), others)
+    beside = beside or {}
+    inside = {
+        f"{one.way}/{path}": (one.folder, path)
+        for one in beside.values()
+        for path in one.paths
+        if path.endswith((*_SUFFIXES, ".xml"))
+    }
+    inside |= {shown: (folder, path) for shown, path in paths}
+    ways = {name: one.way for name, one in beside.items()}
+    library = _Library(places, lambda path: read_markup(*inside[path]), others, ways, inside)
     launched = (
         _record(path, library.parsed(path), library, own, given)
         for name, given in commands
@@ -84,10 +106,17 @@ class _Library:
     """The package's files as launch files, each parsed once."""
 
     def __init__(
-        self, paths: Collection[str], read: Callable[[str], bytes | Fault], others: Collection[str] = ()
+        self,
+        paths: Collection[str],
+        read: Callable[[str], bytes | Fault],
+        others: Collection[str] = (),
+        ways: Mapping[str, str] | None = None,
+        included: Collection[str] | None = None,
     ) -> None:
         self.paths = paths
         self.others = frozenset(others)
+        self.ways = ways or {}
+        self._included = paths if included is None else included
         self._read = read
         self._parsed: dict[str, _Parsed] = {}
         self._tags = 0
@@ -108,7 +137,7 @@ class _Library:
         return _parse(data, path)
 
     def find(self, path: str) -> tuple[etree._Element | None, Fault | None]:
-        if path not in self.paths:
+        if path not in self._included:
             return None, None
         found = self.parsed(path)
         return found.element, found.fault
@@ -146,7 +175,9 @@ def _record(
     if wanted(parsed.element):
         _walk(parsed.element, (), nodes, includes)
     args = dict(one.split(":=", 1) for one in given)
-    loaded = load(parsed.element, Scope(file=path, own=own, args=args), library.find, library.others)
+    loaded = load(
+        parsed.element, Scope(file=path, own=own, args=args), library.find, library.others, library.ways
+    )
     return LaunchFile(
         path=path,
         root=parsed.root,

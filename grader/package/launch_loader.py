@@ -1,4 +1,4 @@
-"""What `roslaunch` makes of a launch file with all that it includes of the same package; nothing is executed.
+"""What `roslaunch` makes of a launch file with all that it includes of the same submission; nothing is executed.
 
 `Scope` is what a tag sees where it stands: arguments, namespace, remaps, and `$(…)` as far as it is literal.
 """
@@ -57,7 +57,7 @@ Remaps = tuple[tuple[str, str], ...]
 
 
 class Find(Protocol):
-    """Gives the root of a launch file of the package by its path, or its fault; neither where there is no such file."""
+    """Gives the root of a launch file by its path from the package, or its fault; neither where there is no such."""
 
     def __call__(self, path: str, /) -> tuple[etree._Element | None, Fault | None]: ...
 
@@ -83,10 +83,16 @@ class Loaded:
         return self.work > WORK_MAX
 
 
-def load(root: etree._Element, scope: Scope, find: Find, others: frozenset[str] = frozenset()) -> Loaded:
-    """Walk the file. `find` gives the root of another launch file of the package by its path, or its fault; `others`
-    are packages that are there besides ROS's."""
-    loader = _Loader(find, others)
+def load(
+    root: etree._Element,
+    scope: Scope,
+    find: Find,
+    others: frozenset[str] = frozenset(),
+    ways: Mapping[str, str] | None = None,
+) -> Loaded:
+    """Walk the file. `find` gives the root of another launch file by its path, or its fault; `others`
+    are packages that are there besides ROS's; `ways` are the paths to the submission's other packages, by name."""
+    loader = _Loader(find, others, {**(ways or {}), **dict.fromkeys(scope.own, "")})
     if wanted(root, scope):
         loader.walk(root, scope, 0)
     return loader.loaded
@@ -144,9 +150,10 @@ def _condition(element: etree._Element) -> str:
 
 
 class _Loader:
-    def __init__(self, find: Find, others: frozenset[str]) -> None:
+    def __init__(self, find: Find, others: frozenset[str], ways: Mapping[str, str]) -> None:
         self.loaded = Loaded()
         self._find = find
+        self._ways = ways
         self._others = others
 
     def walk(self, parent: etree._Element, scope: Scope, depth: int) -> None:
@@ -286,9 +293,12 @@ class _Loader:
             self.loaded.params.append(LaunchParam(**given, attribute="param"))
 
     def _include(self, element: etree._Element, scope: Scope, depth: int) -> None:
-        path = scope.own_path(scope.get(element, "file") or "")
+        written = scope.get(element, "file") or ""
+        path = scope.own_path(written)
+        of_package = {"own": scope.own, "way": scope.way}
+        if path is None and (beside := self._find_beside(written)) is not None:
+            path, of_package = beside
         if path is None:
-            written = scope.get(element, "file") or ""
             if slip := self._misnamed_package(scope, written):
                 message = f"it includes a file of the package {slip}, which is called {scope.own[0]}"
                 fix = f'write file="{written.replace(slip, scope.own[0], 1)}"'
@@ -310,7 +320,19 @@ class _Loader:
             fix = f"first fix {path}{advice}" if fault else f"write {path}, or push it"
             self.loaded.faults.append(_fault(element, scope, f"it includes {path}, and {reason}", fix))
         elif wanted(root, scope):
-            self.walk(root, _included(element, scope, path), depth + 1)
+            self.walk(root, _included(element, scope, path).model_copy(update=of_package), depth + 1)
+
+    def _find_beside(self, path: str) -> tuple[str, dict[str, Any]] | None:
+        """Return the path to a launch file of another package of the submission, if it is there, with the
+        part of its scope that is of that package."""
+        found = _FOUND.fullmatch(path.strip())
+        inside = _plain(found[2]) if found is not None and found[1] in self._ways else None
+        if found is None or inside is None:
+            return None
+        way = self._ways[found[1]]
+        whole = f"{way}/{inside}" if way else inside
+        there = self._find(whole) != (None, None)
+        return (whole, {"own": (found[1],), "way": way}) if there else None
 
     def _misnamed_package(self, scope: Scope, path: str) -> str:
         """Return the package that `$(find …)/…` names for this one: a slip of its name; or, where this package has the
@@ -421,6 +443,8 @@ class Scope(Record):
 
     file: str
     own: tuple[str, ...]
+    way: str = ""
+    """From the folder of the package that is read to that of the package which has the file, if it is another."""
     namespace: str = "/"
     args: Mapping[str, str] = Field(default_factory=dict)
     places: Mapping[str, LaunchLine] = Field(default_factory=dict)
@@ -471,7 +495,8 @@ class Scope(Record):
     def own_path(self, path: str) -> str | None:
         """Return the package's own path behind `$(find <package>)/…`, None for any other."""
         found = _FOUND.fullmatch(path.strip())
-        return _plain(found[2]) if found and found[1] in self.own else None
+        inside = _plain(found[2]) if found and found[1] in self.own else None
+        return f"{self.way}/{inside}" if self.way and inside else inside
 
     def misspelt_package(self, path: str) -> str:
         """Return the package's name in `$(find …)/…` where it differs in capitals or dashes alone, else ""."""
@@ -485,7 +510,7 @@ class Scope(Record):
             case ["arg", name] if name in self.args:
                 return self.args[name]
             case ["dirname"] if self.own:
-                folder = PurePosixPath(self.file).parent.as_posix()
+                folder = PurePosixPath(self.file.removeprefix(f"{self.way}/")).parent.as_posix()
                 return f"$(find {self.own[0]})" + ("" if folder == "." else f"/{folder}")
             case ["optenv", _, *default] if default:
                 return " ".join(default)

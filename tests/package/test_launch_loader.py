@@ -8,7 +8,7 @@ import pytest
 
 from grader.model.launch_file import LaunchFile
 from grader.model.package import PackageFacts
-from grader.package.launch import parse_launch, read_launch_files
+from grader.package.launch import Beside, parse_launch, read_launch_files
 from grader.package.launch_loader import _is_slip
 
 
@@ -62,6 +62,34 @@ def test_names(tmp_path: Path, body: str, names: list[str]) -> None:
 def test_own_nodes_stay_as_written(tmp_path: Path) -> None:
     file = one(tmp_path, '<arg name="n" default="pub"/><node name="$(arg n)"/>')
     assert [n.name for n in file.nodes] == ["$(arg n)"]
+
+
+@pytest.mark.parametrize(
+    ("written", "text", "nodes"),
+    [
+        ("$(find msgs)/launch/b.launch", '<node name="n" pkg="pkg" type="n.py"/>', ["/h/n"]),
+        ("$(find msgs)/launch/b.launch", '<include file="$(dirname)/c.launch"/>', ["/h/c"]),
+        ("$(find msgs)/launch/b.launch", '<include file="$(find msgs)/launch/c.launch"/>', ["/h/c"]),
+        ("$(find msgs)/launch/b.launch", '<include file="$(find pkg)/launch/own.launch"/>', ["/h/own"]),
+        ("$(find msgs)/launch/b.launch", '<include file="$(dirname)/own.launch"/>', []),
+        ("$(find msgs)/../msgs/launch/b.launch", '<node name="n"/>', []),
+        ("$(find other)/launch/b.launch", '<node name="n"/>', []),
+    ],
+)
+def test_includes_of_another_package(tmp_path: Path, written: str, text: str, nodes: list[str]) -> None:
+    own = {
+        "launch/a.launch": f'<include file="{written}" ns="h"/>',
+        "launch/own.launch": '<node name="own"/>',
+    }
+    other = {"launch/b.launch": text, "launch/c.launch": '<node name="c"/>'}
+    for folder, files in (("pkg", own), ("msgs", other)):
+        for path, body in files.items():
+            (tmp_path / folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / folder / path).write_text(f"<launch>{body}</launch>")
+    beside = {"msgs": Beside("../msgs", tmp_path / "msgs", list(other))}
+    found = read_launch_files(tmp_path / "pkg", [(p, p) for p in own], ("pkg",), beside=beside)
+    assert [one.path for one in found] == list(own)
+    assert [node.full_name for node in found[0].brings] == nodes
 
 
 @pytest.mark.parametrize(
