@@ -203,8 +203,8 @@ def counter_starts(tree):
     changed = all_of(tree, ast.Assign, ast.AugAssign)
     counted = {dotted(t) for n in changed for t in increments(n)}
     for node in changed:
-        name, value = given_number(node, counted)
-        if value is not None and id(node) not in later and name in counted:
+        given = given_numbers(node, counted) if id(node) not in later else ()
+        for name, value in ((n, v) for n, v in given if v is not None and n in counted):
             yield slip(node.lineno, "start-value", "%d" % value, name=name)
         number = added_number(node)
         if number not in (None, 1):
@@ -224,16 +224,18 @@ def counter_starts(tree):
         yield from added_before_return(function)
 
 
-def given_number(node, counted):
-    """Return the name that an assignment gives a number, and the number: `n = 1`, or `msg = Int8(data=1)` of a counter
-    that is the message's; None in place of another value."""
-    if not isinstance(node, ast.Assign):
-        return "", None
-    name, given = dotted(node.targets[0]), node.value
-    if name + ".data" in counted and called_name(given)[:1].isupper():
-        made = argument(given, 0, "data")
-        return name + ".data", signed(made[0]) if made else None
-    return name, signed(given)
+def given_numbers(node, counted):
+    """Yield the names that an assignment gives numbers, and the numbers: `n = 1`, `n, last = 1, 127`, or
+    `msg = Int8(data=1)` of a counter that is the message's; None in place of another value."""
+    for target in node.targets if isinstance(node, ast.Assign) else ():
+        names, values = (getattr(part, "elts", [part]) for part in (target, node.value))
+        for one, given in zip(names, values) if len(names) == len(values) else ():  # noqa: B905 - Python 3.8
+            name = dotted(one)
+            if name + ".data" in counted and called_name(given)[:1].isupper():
+                made = argument(given, 0, "data")
+                yield name + ".data", signed(made[0]) if made else None
+            else:
+                yield name, signed(given)
 
 
 def added_before_return(function):
