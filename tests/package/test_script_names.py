@@ -404,6 +404,16 @@ def test_an_exception_gets_the_name_that_is_used(caught: str, meant: str, tmp_pa
         ("counter = 0\nprint(unlike)\n", []),
         ("counter = Noone\n", ["write None instead of Noone"]),
         ("counter = Node()\n", []),
+        (
+            "from queue import queue\nq = queue(3)\n",
+            ["write `from queue import Queue`, and Queue instead of queue on line 2"],
+        ),
+        ("from queue import queue\nq = queue.Queue(3)\n", ["write `import queue`"]),
+        (
+            "from threading import thread as t\nt(target=f)\nf = 1\n",
+            ["write `from threading import Thread as t`"],
+        ),
+        ("from queue import Queue\nq = Queue(3)\n", []),
         ("import queue\nq = Queue(3)\n", ["write queue.Queue instead of Queue"]),
         ("import queue\nq = Queue.Queue(3)\n", ["write queue instead of Queue"]),
         (

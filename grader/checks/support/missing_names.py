@@ -104,7 +104,8 @@ def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
     if wrong := _KEYWORD.search(found.message):
         return _other_argument(wrong[1], of_node="init_node" in found.message)
     is_import = found.kind in IMPORT_ERRORS
-    return (_own_module(found, package) or _other_module(found, package)) if is_import else None
+    finders = (_own_module, _class_of_module, _other_module) if is_import else ()
+    return next(filter(None, (find(found, package) for find in finders)), None)
 
 
 def _call_of_ros_2(name: str, source: str) -> tuple[str, str] | None:
@@ -288,6 +289,14 @@ def unimported_module(found: Traceback, package: PackageFacts) -> str:
     if asked is None or asked[1] in known_packages() or asked[1] not in unused:
         return ""
     return next((s.name for s in own if s.kind == "undefined" and s.fix == IMPORT % s.name), "")
+
+
+def _class_of_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
+    """Return the class, or the module, that is meant by a name of another case: `from queue import queue`."""
+    file, line = found.innermost.file, found.innermost.line
+    slips = (s for s in package.slips if s.kind == "misspelt" and s.line == line)
+    meant = next((s for s in slips if file.endswith(f"/{s.file}")), None)
+    return (meant.message, meant.fix) if meant and _FROM_PACKAGE.search(found.message) else None
 
 
 def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:

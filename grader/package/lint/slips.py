@@ -68,8 +68,8 @@ def slips(tree, numbers=()):
     spell_plainly(tree)
     finders = (
         uncalled_and_asked, objects.names_of_objects, names.misspelt, names.misspelt_exceptions, rates.loop_rates,
-        rates.nanoseconds, rates.rates_for_times, rates.sleeps_within, rates.timers_once, rates.rates_made_once,
-        counters.resets, never_run, names.of_the_function_around,
+        classes_of_modules, rates.nanoseconds, rates.rates_for_times, rates.sleeps_within, rates.timers_once,
+        rates.rates_made_once, counters.resets, never_run, names.of_the_function_around,
         loops.never_reached, loops.loops_that_never_go_round, loops.waits_without_not,
         loops.stopped_loops, loops.lacking_loops, loops.published_before,
         sleeps.sleepless_loops, sleeps.sleeps_twice, loops.publishes_twice, callbacks.callbacks,
@@ -380,6 +380,31 @@ def without_effect(tree):
                 fix = "write `%s = %s`" % (name, right)
                 fix = "write `%s =` in place of `%s ==`" % (name, name) if "..." in right else fix
                 yield slip(node.lineno, "compared", "`%s ==` compares and gives no value" % name, fix)
+
+
+CLASSES = {"queue": ("Queue",), "decimal": ("Decimal",), "threading": ("Thread", "Lock", "Event", "Timer")}
+"""Of modules of Python, classes that beginners import in lower case."""
+
+
+def classes_of_modules(tree):
+    """`from queue import queue`: the class is meant, or the module where what it has is taken of it below."""
+    named = [n for n in all_of(tree, ast.Name) if isinstance(n.ctx, ast.Load)]
+    owners = {id(n.value) for n in all_of(tree, ast.Attribute)}
+    for node in (n for n in all_of(tree, ast.ImportFrom) if n.module in CLASSES and len(n.names) == 1):
+        one = node.names[0]
+        meant = next((c for c in CLASSES[node.module] if c.lower() == one.name), None)
+        uses = [n for n in named if n.id == (one.asname or one.name)]
+        if meant is None or (any(id(n) in owners for n in uses) and one.name != node.module):
+            continue
+        fix = "write `import %s`" % node.module
+        if not all(id(n) in owners for n in uses) or one.asname or not uses:
+            alias = " as %s" % one.asname if one.asname else ""
+            fix = "write `from %s import %s%s`" % (node.module, meant, alias)
+            lines = sorted({n.lineno for n in uses if id(n) not in owners}) if not one.asname else []
+            where = ", ".join(map(str, lines))
+            fix += ", and %s instead of %s on line %s" % (meant, one.name, where) if lines else ""
+        message = "the module %s has a class `%s`" % (node.module, meant)
+        yield slip(node.lineno, "misspelt", message, fix, one.name)
 
 
 OF_NAMES = (names.misspelt, objects.names_of_objects, objects.hidden_names, imports)
