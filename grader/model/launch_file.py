@@ -29,6 +29,8 @@ class LaunchLine(Placed, Record):
     value: str
     file: str
     line: int
+    by_arg: LaunchLine | None = Field(default=None, exclude_if=lambda value: value is None)
+    """Where its `ns` is only a `$(arg …)`: the `<arg>` that gives it, by its `default` or `value`."""
 
 
 class LateRemap(LaunchLine):

@@ -483,7 +483,9 @@ class Scope(Record):
         if not namespace:
             return self
         whole = namespace if namespace.startswith("/") else f"{self.namespace}{namespace}"
-        noted = () if element is None else (_line(element, self, namespace),)
+        given = self.place_of(element.get("ns")) if element is not None else None
+        line = _line(element, self, namespace) if element is not None else None
+        noted = (line.model_copy(update={"by_arg": given}),) if line is not None else ()
         inner = _SLASHES.sub("/", f"/{whole[:_VALUE_CHARS_MAX]}/")
         return self.model_copy(update={"namespace": inner, "renaming": (*self.renaming, *noted)})
 

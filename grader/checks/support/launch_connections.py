@@ -217,8 +217,11 @@ def wrong_name(node: LaunchNode, name: str) -> Slip:
         then = "the names of two namespaces are joined" if len(lines) > 1 else f"then {own} is {name}"
         fixes.insert(0, f'remove ns="{at.value}" on line {at.line}: {then}')
     elif len(lines) == 1:
-        at = lines[0]
-        fixes.insert(0, f'on line {at.line}, write ns="{space.strip("/")}", not ns="{at.value}"')
+        at, value = lines[0].by_arg or lines[0], lines[0].value
+        attribute = at.value if at is not lines[0] else "ns"
+        fixes.insert(
+            0, f'on line {at.line}, write {attribute}="{space.strip("/")}", not {attribute}="{value}"'
+        )
     else:
         before = "take the <node> out of its groups, and " if lines else ""
         fixes.insert(0, f"on line {node.line}, {before}{adds}")
