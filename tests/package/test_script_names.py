@@ -442,6 +442,24 @@ def test_a_name_that_is_not_there_and_one_that_is_spelt_alike(tmp_path, text, to
 
 
 @pytest.mark.parametrize(
+    ("begin", "fixes"),
+    [
+        ("def f():", ["above line 2, write `n = 0`"]),
+        ("def f(n):", []),
+        ("n = 0\ndef f():", []),
+        ("def f():\n    n = 0", []),
+        ("def f():\n    for n in a: pass", []),
+        ("def f():\n    global n", []),
+        ("def f():\n    while True:\n        s += 'a'", ["above line 4, write `n = 0`"]),
+    ],
+)
+def test_a_variable_that_is_only_added_to(tmp_path, begin, fixes):
+    (tmp_path / "a.py").write_text(f"{begin}\n    while True:\n        n = n + 1\n        print(n)\na = []\n")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.fix for s in slips if s.kind == "undefined"] == fixes
+
+
+@pytest.mark.parametrize(
     ("code", "fixes"),
     [
         ("buffer.lookup_transform(odom, laser, rospy.Time(0))", ["'odom'", "'laser'"]),

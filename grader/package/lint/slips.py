@@ -68,8 +68,8 @@ def slips(tree, numbers=()):
     spell_plainly(tree)
     finders = (
         uncalled_and_asked, objects.names_of_objects, names.misspelt, names.misspelt_exceptions, rates.loop_rates,
-        classes_of_modules, rates.nanoseconds, rates.rates_for_times, rates.sleeps_within, rates.timers_once,
-        rates.rates_made_once, counters.resets, never_run, names.of_the_function_around,
+        classes_of_modules, never_begun, rates.nanoseconds, rates.rates_for_times, rates.sleeps_within,
+        rates.timers_once, rates.rates_made_once, counters.resets, never_run, names.of_the_function_around,
         loops.never_reached, loops.loops_that_never_go_round, loops.waits_without_not,
         loops.stopped_loops, loops.lacking_loops, loops.published_before,
         sleeps.sleepless_loops, sleeps.sleeps_twice, loops.publishes_twice, callbacks.callbacks,
@@ -405,6 +405,28 @@ def classes_of_modules(tree):
             fix += ", and %s instead of %s on line %s" % (meant, one.name, where) if lines else ""
         message = "the module %s has a class `%s`" % (node.module, meant)
         yield slip(node.lineno, "misspelt", message, fix, one.name)
+
+
+def never_begun(tree):
+    """Variables of a function that it only adds to: `n = n + 1` in a loop, where nothing gives `n` its first value."""
+    shared = names.bound_names(tree) | {name for n in all_of(tree, ast.Global) for name in n.names}
+    for function in all_of(tree, ast.FunctionDef):
+        own = list(names.walk_own(function))
+        stored = [n for n in own if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+        changed = [n for n in own if isinstance(n, (ast.Assign, ast.AugAssign))]
+        counting = [n for n in changed if counters.added_number(n) is not None]
+        added = {id(t): n for n in counting for t in counters.increments(n) if isinstance(t, ast.Name)}
+        given = {n.id for n in stored if id(n) not in added} | shared
+        given |= {n.arg for n in ast.walk(function.args) if isinstance(n, ast.arg)}
+        given |= {n.asname or n.name for n in own if isinstance(n, ast.alias)}
+        stored.sort(key=lambda n: n.lineno, reverse=True)
+        lines = {n.id: added[id(n)].lineno for n in stored if n.id not in given}
+        for name, line in lines.items():
+            around = [n.lineno for n in own if isinstance(n, LOOPS) and n.lineno < line <= n.end_lineno]
+            if around and not any(isinstance(n, ast.Nonlocal) for n in own):
+                message = "nothing gives `%s` a value before line %d adds to it" % (name, line)
+                fix = "above line %d, write `%s = 0`" % (min(around), name)
+                yield slip(line, "undefined", message, fix, name)
 
 
 OF_NAMES = (names.misspelt, objects.names_of_objects, objects.hidden_names, imports)
