@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from itertools import takewhile
+from itertools import pairwise, takewhile
 from pathlib import PurePosixPath
 
 from cmake_parser.ast import Command, Token
@@ -122,6 +122,7 @@ def repair_cmake(
     _move_project(files)
     _spell_catkin(files)
     _leave_out_modules(files)
+    _join_names(files)
     _spell_packages(files, {"find_package": "COMPONENTS", GENERATE: "DEPENDENCIES"})
     if not _calls_catkin(files, package):
         line = f"find_package(catkin REQUIRED COMPONENTS {needs})"
@@ -174,6 +175,21 @@ def _leave_out_modules(files: Files) -> None:
             text = replace_token(text, word, "")
         why = f"find_package(…) names {names}, and no package of ROS is called so"
         change_line(files, command, text, why, f"take {names} out of find_package(…)")
+
+
+def _join_names(files: Files) -> None:
+    """Write a package's name as one word in find_package(catkin …) where a space stands for its `_`: `std msgs`."""
+    for command in reversed(calls_of(files, "find_package")):  # places above stay
+        words, known = words_of(command), {*known_packages(), *noetic_messages()}
+        for first, second in reversed(list(pairwise(words))):
+            whole = f"{first.value}_{second.value}"
+            if whole in known and known.isdisjoint((first.value, second.value)):
+                text = replace_token(replace_token(cmake_text(files), second, ""), first, whole)
+                why = (
+                    f"find_package(…) names {first.value} and {second.value}, which are one package: {whole}"
+                )
+                fix = f"write {whole} in place of {first.value} and {second.value}"
+                change_line(files, command, text, why, fix)
 
 
 def _spell_catkin(files: Files) -> None:
