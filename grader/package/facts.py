@@ -23,8 +23,9 @@ from typing import Any, NamedTuple
 from grader.installable import OF_EVERY_ROS
 from grader.model.file_fault import Fault
 from grader.model.git_ignores import IgnoreLine
+from grader.model.launch_file import LaunchFile
 from grader.model.message_definitions import PARTS, parse_interface
-from grader.model.package import Interface, PackageFacts, Shebang, ShebangFault, SourceFile
+from grader.model.package import Interface, Manifest, PackageFacts, Shebang, ShebangFault, SourceFile
 from grader.model.python_slip import PythonSlip
 from grader.model.submission import SourcePackage, Submission
 from grader.package.cpp import SUFFIXES, cpp_slips, included_headers
@@ -288,23 +289,12 @@ def read_package(
         asked = executor.submit(check_syntax, package.folder, sources)
         # the parsers are slow to load, and are loaded while the child reads the scripts
         from grader.package.cmake import read_cmake  # noqa: PLC0415
-        from grader.package.launch import Beside, read_launch_files  # noqa: PLC0415
         from grader.package.manifest import read_manifest  # noqa: PLC0415
 
         manifest, manifest_fault = read_manifest(package.folder)
         cmake = read_cmake(package.folder, package.name)
-        names = (manifest.name if manifest else package.name, package.name)
         readable = [(entry.file.path, entry.path) for entry in _readable(entries)]
-        needed = (one.name for one in manifest.dependencies) if manifest else ()
-        packages = {
-            one.name: Beside(posixpath.relpath(one.path, package.path), one.folder, one.executable)
-            for one in beside
-            if one.name not in names
-        }
-        others = tuple(sorted(packages)[:OTHERS_MAX])
-        launch_files = read_launch_files(
-            package.folder, readable, names, commands, {*others, *needed}, beside=packages
-        )
+        launch_files, others = _read_launch(package, manifest, readable, commands, beside)
         report = asked.result()
     files = tuple(entry.file for entry in entries)
     texts = _texts(package.folder, files)
@@ -320,13 +310,30 @@ def read_package(
         hints=hints,
         slips=(
             *drop_slips_of_modules(report.slips, texts),
-            *cpp_slips(package.folder, (e.path for e in _readable(entries))),
+            *cpp_slips(package.folder, (p for _, p in readable)),
         ),
         interfaces=_interfaces(package.folder, _readable(entries)),
         asked=package.asked,
         beside=others,
         git_ignores=_read_git_ignores(package, (file.path for file in files)),
     )
+
+
+def _read_launch(
+    package: SourcePackage,
+    manifest: Manifest | None,
+    readable: Collection[tuple[str, str]],
+    commands: Collection[tuple[str, tuple[str, ...]]],
+    beside: Iterable[SourcePackage],
+) -> tuple[tuple[LaunchFile, ...], tuple[str, ...]]:
+    """Return the launch files, and the names of the packages `beside` it."""
+    from grader.package.launch import packages_beside, read_launch_files  # noqa: PLC0415 - slow to load
+
+    names = (manifest.name if manifest else package.name, package.name)
+    packages = packages_beside(package, names, beside)
+    others = tuple(sorted(packages)[:OTHERS_MAX])
+    known = {*others, *((one.name for one in manifest.dependencies) if manifest else ())}
+    return read_launch_files(package.folder, readable, names, commands, known, beside=packages), others
 
 
 def read_packages(submission: Submission, commands: Collection[tuple[str, tuple[str, ...]]]) -> PackageFacts:

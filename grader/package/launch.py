@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import posixpath
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from itertools import islice
@@ -12,6 +13,7 @@ from lxml import etree
 
 from grader.model.file_fault import Fault
 from grader.model.launch_file import LAUNCH_TAGS, LaunchFile, LaunchNode
+from grader.model.submission import SourcePackage
 from grader.package.launch_loader import KEPT_AS_WRITTEN, Scope, load, unknown_attributes, wanted
 from grader.package.reading import read_markup
 from grader.package.xml import line_of, parse_what_is_left, parse_xml
@@ -32,6 +34,17 @@ class Beside(NamedTuple):
     way: str
     folder: Path
     paths: Collection[str]
+
+
+def packages_beside(
+    package: SourcePackage, names: Collection[str], others: Iterable[SourcePackage]
+) -> dict[str, Beside]:
+    """Return the other packages of a submission by their names; `names` are those of the package itself."""
+    return {
+        one.name: Beside(posixpath.relpath(one.path, package.path), one.folder, one.executable)
+        for one in others
+        if one.name not in names
+    }
 
 
 Remaps = tuple[tuple[str, str], ...]

@@ -122,7 +122,6 @@ def repair_cmake(
     _move_project(files)
     _spell_catkin(files)
     _leave_out_modules(files)
-    _join_names(files)
     _spell_packages(files, {"find_package": "COMPONENTS", GENERATE: "DEPENDENCIES"})
     if not _calls_catkin(files, package):
         line = f"find_package(catkin REQUIRED COMPONENTS {needs})"
@@ -412,6 +411,7 @@ def _declare_exported(files: Files) -> None:
 def _spell_packages(files: Files, keywords: Mapping[str, str]) -> None:
     """Spell the packages that calls name behind these keywords as `package.xml` does, where there are none of those
     names."""
+    _join_names(files)
     declared = _declared(files)
     known = {*declared, *known_packages(), *noetic_messages(), *OF_ROS}
     listed = [(c, t) for name, k in keywords.items() for c in calls_of(files, name) for t in _listed(c, k)]
