@@ -295,7 +295,7 @@ def _gates(rubric: WrittenRubric) -> Iterator[Fault]:
             near = did_you_mean(name, known)
             yield ("gates", index, "criterion"), f'there is no criterion "{name}"{near}'
         elif isinstance(name, str) and known[name].get("bonus") is not None:
-            fault = f'"{name}" is a bonus, which nobody has to reach: name a criterion with points'
+            fault = f'"{name}" is a bonus, which no student has to reach: name a criterion with points'
             yield ("gates", index, "criterion"), fault
         elif isinstance(name, str) and known[name].get("visibility") == "hidden":
             fault = f'"{name}" is hidden: students could not see why points are missing'
