@@ -37,12 +37,7 @@ from grader.evidence.run import Run
 from grader.installable import PYTHON_2
 from grader.judging.cited_lines import LINE_CHARS, LINES_READ, LOOPS, OF_DATA, PLACES, loop_spins, lost_fields
 from grader.judging.facts import Facts, misspelt_sleeps, names_started, scripts_of, sources_of, wrong_rates
-from grader.judging.later_launch_faults import (
-    OF_LAUNCHES,
-    criterion_of_file,
-    later_in_launch,
-    later_launch_faults,
-)
+from grader.judging.later_launch_faults import OF_LAUNCHES, later_launch_faults
 from grader.judging.repeats_and_repairs import text_as_handed_in
 from grader.model.package import CMAKE, PackageFacts
 from grader.model.python_slip import PythonSlip
@@ -113,12 +108,8 @@ def add_later_faults(
             continue
         told = later.setdefault(verdict.blocked_by or criterion.id, [])
         if criterion.check in OF_LAUNCHES:
-            told += map(Fix, later_launch_faults(criterion, verdict, package, facts))
-            if verdict.blocked_by and criterion.check == "launch-runs":
-                own = criterion_of_file(criterion, verdicts, rubric)
-                for one in later_in_launch(criterion, package, facts):
-                    fix = Fix(one if own else f"for {criterion.id}, {one}")
-                    later.setdefault(own or verdict.blocked_by, []).append(fix)
+            for teller, text in later_launch_faults(criterion, verdicts, package, facts):
+                later.setdefault(teller, []).append(Fix(text))
         elif verdict.basis.unjudged or verdict.basis.of_machine or criterion.check in OF_TOPICS:
             own_later = Later(criterion, verdict, package, facts, moved)
             told += own_later.syntax(handed_in or package)

@@ -19,19 +19,24 @@ OF_LAUNCHES = ("launch-xml", "launch-runs", "launch-connects")
 
 
 def later_launch_faults(
-    criterion: Criterion, verdict: Verdict, package: PackageFacts, facts: Facts
-) -> Iterator[str]:
-    """Yield how what comes next in a criterion's launch file is fixed; arguments without a value where it is run."""
+    criterion: Criterion, verdicts: Mapping[str, Verdict], package: PackageFacts, facts: Facts
+) -> Iterator[tuple[str, str]]:
+    """Yield how what comes next in a criterion's launch file is fixed, each with the criterion that is to tell it."""
+    verdict = verdicts[criterion.id]
+    teller = verdict.blocked_by or criterion.id
     if criterion.check == "launch-xml":
-        if verdict.blocked_by:
-            yield from (f"for {criterion.id}, {one}" for one in _later_in_file(criterion, package))
-    elif not (verdict.blocked_by and criterion.check == "launch-runs"):
-        file = find_launch(package, str(criterion.parameters["launch"]))
+        for one in _later_in_file(criterion, package) if verdict.blocked_by else ():
+            yield teller, f"for {criterion.id}, {one}"
+    elif verdict.blocked_by and criterion.check == "launch-runs":
+        own = _criterion_of_file(criterion, verdicts, facts.rubric)
+        for one in _later_in_launch(criterion, package, facts):
+            yield own or teller, one if own else f"for {criterion.id}, {one}"
+    elif file := find_launch(package, str(criterion.parameters["launch"])):
         given = [word for start in facts.rubric.starts_of(criterion) for word in start.args]
-        yield from unset_arg_fixes(file, verdict.hint, given) if file is not None else ()
+        yield from ((teller, one) for one in unset_arg_fixes(file, verdict.hint, given))
 
 
-def criterion_of_file(launched: Criterion, verdicts: Mapping[str, Verdict], rubric: Rubric) -> str | None:
+def _criterion_of_file(launched: Criterion, verdicts: Mapping[str, Verdict], rubric: Rubric) -> str | None:
     """Return the criterion that is lost by the launch file itself: what comes next in the file is told there."""
     file = launched.parameters.get("launch")
     of_file = (c.id for c in rubric.criteria if c.scenario is None and c.parameters.get("launch") == file)
@@ -45,7 +50,7 @@ def _later_in_file(criterion: Criterion, package: PackageFacts) -> Iterator[str]
     yield from (fix for script in scripts if file is not None for fix in later_fixes(file, script))
 
 
-def later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) -> Iterator[str]:
+def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) -> Iterator[str]:
     """Yield what a launch file would be lost by next: what roslaunch said of it, and namespaces of the lab's nodes."""
     wanted, run = criterion.parameters, facts.runs.get(criterion.scenario or "")
     file, topic = find_launch(package, str(wanted.get("launch", ""))), str(wanted.get("topic") or "")

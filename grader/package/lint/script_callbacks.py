@@ -8,7 +8,7 @@ import ast
 import builtins
 import itertools
 
-from script_loops import CALLED_BACK, is_endless, is_short, lines_said
+from script_loops import CALLED_BACK, is_endless, is_short
 from script_names import (
     given_names,
 )
@@ -367,8 +367,8 @@ def waits_in(callback, inside, slow):
         elif is_long_sleep(one):
             again = sorted({n.lineno for n in inside if is_long_sleep(n)} - {line})[:SLEEPS_SHOWN]
             message = "the callback `%s` sleeps on line %d" % (callback.name, line)
-            message += " and again on %s" % lines_said(again) if again else ""
-            fix = "delete %s" % lines_said([line, *again])
+            message += " and again on %s" % listed(again) if again else ""
+            fix = "delete %s" % listed([line, *again])
         if message:
             yield slip(line, "callback-waits", message, fix, callback.name)
 

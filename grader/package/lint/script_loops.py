@@ -389,12 +389,6 @@ def publishes_twice(tree):
         yield slip(lines[1], "publish-twice", message, fix)
 
 
-def lines_said(numbers):
-    """Return `line 3` or `lines 3, 5 and 8`."""
-    *first, last = map(str, numbers)
-    return "lines %s and %s" % (", ".join(first), last) if first else "line " + last
-
-
 def is_short(sleep):
     return bool(sleep.args) and (constant(sleep.args[0], lambda node: node) or 1.0) < 0.1
 

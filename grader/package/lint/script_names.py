@@ -245,12 +245,12 @@ def meant_at_most(name, own):
 def of_module(near, node, tree, imported):
     """Return the name that is meant: where a class is meant by the name of its module, behind that one's name."""
     is_module = isinstance(parents_of(tree).get(node), ast.Attribute)
-    is_class = near in imported and near in NAMED_LIKE_CLASSES and node.id == near.capitalize()
+    is_class = near in imported and node.id == near.capitalize() and node.id in CLASSES.get(near, ())
     return "%s.%s" % (near, node.id) if is_class and not is_module else near
 
 
-NAMED_LIKE_CLASSES = ("queue", "decimal")
-"""Modules with a class of their name in capitals: `queue.Queue`."""
+CLASSES = {"queue": ("Queue",), "decimal": ("Decimal",), "threading": ("Thread", "Lock", "Event", "Timer")}
+"""Of modules of Python, classes that beginners write in lower case, or without their module."""
 
 
 def spelt_alike(name, own, attributes):

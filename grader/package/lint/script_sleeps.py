@@ -15,6 +15,7 @@ from script_tree import (
     dotted,
     functions_in,
     is_call,
+    listed,
     loop_around,
     names_in,
     slip,
@@ -114,12 +115,5 @@ def sleeps_twice(tree):
         sent = [{ast.dump(n.func) for one in part for n in calls_in(one, "publish")} for part in parts]
         if any(sent) and sum(map(len, sent)) == len(set().union(*sent)):
             lines = sorted(body[i].lineno for i in at)
-            again = "line %d" % lines[1] if len(lines) == 2 else "lines %s" % _numbers(lines[1:])
-            deleted = "line %d" % surplus[0] if len(surplus) == 1 else "lines %s" % _numbers(surplus)
-            message = "the loop sleeps on line %d and again on %s" % (lines[0], again)
-            yield slip(surplus[-1], "sleep-twice", message, "delete %s" % deleted)
-
-
-def _numbers(lines):
-    """Return `4, 5 and 6`."""
-    return " and ".join([", ".join(map(str, lines[:-1])), str(lines[-1])])
+            message = "the loop sleeps on line %d and again on %s" % (lines[0], listed(lines[1:]))
+            yield slip(surplus[-1], "sleep-twice", message, "delete %s" % listed(surplus))

@@ -382,17 +382,13 @@ def without_effect(tree):
                 yield slip(node.lineno, "compared", "`%s ==` compares and gives no value" % name, fix)
 
 
-CLASSES = {"queue": ("Queue",), "decimal": ("Decimal",), "threading": ("Thread", "Lock", "Event", "Timer")}
-"""Of modules of Python, classes that beginners import in lower case."""
-
-
 def classes_of_modules(tree):
     """`from queue import queue`: the class is meant, or the module where what it has is taken of it below."""
     named = [n for n in all_of(tree, ast.Name) if isinstance(n.ctx, ast.Load)]
     owners = {id(n.value) for n in all_of(tree, ast.Attribute)}
-    for node in (n for n in all_of(tree, ast.ImportFrom) if n.module in CLASSES and len(n.names) == 1):
+    for node in (n for n in all_of(tree, ast.ImportFrom) if n.module in names.CLASSES and len(n.names) == 1):
         one = node.names[0]
-        meant = next((c for c in CLASSES[node.module] if c.lower() == one.name), None)
+        meant = next((c for c in names.CLASSES[node.module] if c.lower() == one.name), None)
         uses = [n for n in named if n.id == (one.asname or one.name)]
         if meant is None or (any(id(n) in owners for n in uses) and one.name != node.module):
             continue

@@ -178,17 +178,14 @@ def _leave_out_modules(files: Files) -> None:
 
 def _join_names(files: Files) -> None:
     """Write a package's name as one word in find_package(catkin …) where a space stands for its `_`: `std msgs`."""
+    known = {*known_packages(), *noetic_messages()}
     for command in reversed(calls_of(files, "find_package")):  # places above stay
-        words, known = words_of(command), {*known_packages(), *noetic_messages()}
-        for first, second in reversed(list(pairwise(words))):
-            whole = f"{first.value}_{second.value}"
+        for first, second in reversed(list(pairwise(words_of(command)))):
+            whole, halves = f"{first.value}_{second.value}", f"{first.value} and {second.value}"
             if whole in known and known.isdisjoint((first.value, second.value)):
                 text = replace_token(replace_token(cmake_text(files), second, ""), first, whole)
-                why = (
-                    f"find_package(…) names {first.value} and {second.value}, which are one package: {whole}"
-                )
-                fix = f"write {whole} in place of {first.value} and {second.value}"
-                change_line(files, command, text, why, fix)
+                why = f"find_package(…) names {halves}, which are one package: {whole}"
+                change_line(files, command, text, why, f"write {whole} in place of {halves}")
 
 
 def _spell_catkin(files: Files) -> None:
