@@ -36,16 +36,16 @@ serve({
     "raised": (refuse, (KeyError,)),
     "hang": (loop, ()),
     "slow-in-c": (in_c, ()),
-    "memory": (lambda data: bytearray(b"x") * (30 << 20), ()),
+    "memory": (lambda data: bytearray(b"x") * (12 << 20), ()),
     "died": (lambda data: os._exit(7), ()),
-}, 0.3, 20 << 20)
+}, 0.6, 8 << 20)
 """
 
 
 @pytest.fixture
 def runner(monkeypatch: pytest.MonkeyPatch) -> Iterator[Runner]:
     monkeypatch.setitem(parent.COMMANDS, "grader", (sys.executable, "-c", FAULTY))
-    monkeypatch.setattr(parent, "CPU_S", 0.5)
+    monkeypatch.setattr(parent, "CPU_S", 1.0)
     monkeypatch.setattr(parent, "LOOK_S", 0.1)
     runner = Runner()
     yield runner
