@@ -87,6 +87,7 @@ def test_a_disk_that_is_full_keeps_the_older_result(out: Path) -> None:
     }
 
 
+@pytest.mark.full
 def test_temporary_files_without_room(out: Path, open_path: Path) -> None:
     tmp = open_path / "tmp"
     tmp.mkdir()
@@ -118,6 +119,7 @@ def test_limits_that_cannot_be_set(out: Path) -> None:
     assert result_in(out).error.kind == "host"
 
 
+@pytest.mark.full
 def test_too_little_memory_for_the_grader(out: Path) -> None:
     with grading(out, prefix=("prlimit", f"--as={165 << 20}")) as short:
         code = short.end()
@@ -131,6 +133,7 @@ def test_too_little_memory_for_the_grader(out: Path) -> None:
         assert code == 3
 
 
+@pytest.mark.full
 def test_a_recording_that_cannot_be_written_on(out: Path) -> None:
     """What goes wrong while a frame is taken must not be lost in the event loop: messages would be missing."""
     with grading(out, program=(sys.executable, "-c", WRITER)) as broken:
@@ -151,6 +154,7 @@ def test_a_roscore_that_does_not_start(out: Path, open_path: Path, own_locks: di
     assert "rosmaster is broken here" in next(c.message for c in result.criteria if c.id == "rate")
 
 
+@pytest.mark.full
 def test_a_sandbox_that_is_not_made(out: Path, open_path: Path, own_locks: dict[str, str]) -> None:
     """As where the kernel has no more namespaces to give: no process of the student's has run."""
     (open_path / "real").touch()

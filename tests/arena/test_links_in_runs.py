@@ -15,7 +15,7 @@ from tests.arena.support import SCRIPT, make_place, run
 
 pytestmark = pytest.mark.ros
 FACTS = PackageFacts.model_construct(slips=(), cmake=None, launch_files=(), files=())
-SANDBOXES = ["auto", "none"]
+SANDBOXES = ["auto", pytest.param("none", marks=pytest.mark.full)]
 TALKER = """
 import rospy
 from std_msgs.msg import Int32

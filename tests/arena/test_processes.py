@@ -14,7 +14,7 @@ from tests.arena.support import exit_of, make_place, printed, run_script
 from tests.arena.support import run as record
 
 pytestmark = pytest.mark.ros
-SANDBOXES = ["auto", "none"]
+SANDBOXES = ["auto", pytest.param("none", marks=pytest.mark.full)]
 NODE = "import rospy, sys, os, time\nrospy.init_node('node')\n"
 UP = (
     "from std_msgs.msg import Empty\nup = rospy.Publisher('up', Empty, latch=True, queue_size=1)\n"

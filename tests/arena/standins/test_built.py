@@ -78,7 +78,7 @@ def _run(place: ProcessEnvironment, tmp_path: Path, *start: Start) -> Run:
     )
 
 
-@pytest.mark.parametrize("sandbox", ["auto", "none"])
+@pytest.mark.parametrize("sandbox", ["auto", pytest.param("none", marks=pytest.mark.full)])
 def test_a_package_that_depends_on_stand_ins_builds_and_runs(tmp_path: Path, sandbox: str) -> None:
     depends = "".join(f"<depend>{name}</depend>" for name in DEPENDS)
     manifest = MANIFEST.replace("</package>", f"{depends}</package>")
@@ -94,6 +94,7 @@ def test_a_package_that_depends_on_stand_ins_builds_and_runs(tmp_path: Path, san
 @pytest.mark.skipif(
     not Path("/usr/share/gencpp").is_dir(), reason="gencpp, which makes C++ headers, is not installed"
 )
+@pytest.mark.full
 def test_a_cpp_node_includes_the_headers(tmp_path: Path) -> None:
     depends = "".join(f"<depend>{name}</depend>" for name in ("roscpp", "turtlesim", "std_srvs"))
     manifest = MANIFEST.replace("</package>", f"{depends}</package>")
