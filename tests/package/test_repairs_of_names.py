@@ -106,6 +106,56 @@ def test_names_that_get_a_value_for_nothing(right: str, wrong: str, says: str | 
         )
 
 
+@pytest.mark.parametrize(
+    ("lines", "right"),
+    [
+        (
+            ("c = c + 1", "if c > 127:", "    c = 0"),
+            ("c.data = c.data + 1", "if c.data > 127:", "    c.data = 0"),
+        ),
+        (
+            ("c += 1", "if c == 128:", "    c.data = 0"),
+            ("c.data += 1", "if c.data == 128:", "    c.data = 0"),
+        ),
+        (("c.data = c + 1",), ("c.data = c.data + 1",)),
+        (("c.data = (c.data + 1) % 128",), None),
+        (("c = Int8(c.data + 1)",), None),
+        (("c = other()", "c = c + 1"), None),
+    ],
+)
+def test_what_is_counted_is_the_field_of_a_message(
+    lines: tuple[str, ...], right: tuple[str, ...] | None
+) -> None:
+    head = "import rospy\nfrom std_msgs.msg import Int8\nrospy.init_node('n')\nc = Int8()\n"
+    tail = "\nrospy.Publisher('numbers', Int8, queue_size=1).publish(c)\n"
+    (found,) = list(examine([["a.py", head + "\n".join(lines) + tail]], [], {}, ""))
+    expected = [head + "\n".join(right) + tail] if right else []
+    assert [step["text"] for step in found["steps"]][-1:] == expected
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right"),
+    [
+        (
+            "import std_msgs\npub = rospy.Publisher('t', std_msgs.String)",
+            "import std_msgs.msg\npub = rospy.Publisher('t', std_msgs.msg.String)",
+        ),
+        ("import std_msgs\npub = rospy.Publisher('t', std_msgs.msg.String)", None),
+    ],
+)
+def test_classes_of_messages_are_in_their_module(wrong: str, right: str | None) -> None:
+    text = "import rospy\n{}\nrospy.init_node('a')\npub.publish('')\n"
+    (found,) = list(examine([["a.py", text.format(wrong)]], [], {}, ""))
+    assert [step["text"] for step in found["steps"]] == ([text.format(right)] if right else [])
+
+
+def test_a_class_that_is_called_as_one_of_rospy_has_other_members() -> None:
+    text = "import rospy\n\n\nclass Publisher:\n    def Publish(self):\n        self.pub = rospy.Publisher('t')\n"
+    text += "        self.pub.{}('')\n\n\nrospy.init_node('a')\nPublisher().Publish()\n"
+    (found,) = list(examine([["a.py", text.format("Publish")]], [], {}, ""))
+    assert [step["text"] for step in found["steps"]] == [text.format("publish")]
+
+
 def test_no_function_of_python_is_meant_where_it_would_get_no_value() -> None:
     text = "import rospy\nrospy.init_node('a')\nrospy.spin()\nmain()\n"
     (step,) = list(examine([["a.py", text]], [], {}, ""))

@@ -307,7 +307,10 @@ def _add_import(text: str, statement: str, module: str, name: str) -> str:
 
 
 def with_message_classes(text: str) -> Iterator[Step]:
-    """`std_msgs.msg.Sting(…)` and `std_msgs.mgs.String(…)`, for `std_msgs.msg.String(…)`."""
+    """`std_msgs.msg.Sting(…)`, `std_msgs.mgs.String(…)` and `std_msgs.String(…)`, for `std_msgs.msg.String(…)`."""
+    for step in _with_modules_of_messages(text):
+        text = step["text"]
+        yield step
     names = set(MESSAGES["std_msgs"].split())
     for node in (n for n in nodes_in(tree_of(text)) if isinstance(n, ast.Attribute)):
         owner, member, span = ast.unparse(node.value), node.attr, span_of(text.split("\n"), node)
@@ -325,3 +328,21 @@ def with_message_classes(text: str) -> Iterator[Step]:
                 yield step
                 yield from with_message_classes(step["text"])
             return
+
+
+def _with_modules_of_messages(text: str) -> Iterator[Step]:
+    """`import std_msgs` of a script that takes classes from it, each without the `msg` before it."""
+    tree, lines = tree_of(text), text.split("\n")
+    parts = [n for n in nodes_in(tree) if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)]
+    for package, names in MESSAGES.items():
+        of_package = [n for n in parts if last_name(n.value) == package]
+        classes = [n for n in of_package if n.attr in names.split()]
+        imports = [n for n in nodes_in(tree) if isinstance(n, ast.Import)]
+        places = [(n.lineno, a) for n in imports for a in n.names if (a.name, a.asname) == (package, None)]
+        if not places or not classes or classes != of_package:
+            continue
+        line, whole = places[0]
+        spans = [span_of(lines, n) for n in (whole, *(n.value for n in classes))]  # type: ignore[arg-type] # it has a place
+        after = edited(text, [(*span, f"{package}.msg") for span in spans if span is not None])
+        yield from step_to("module", line, text, after, NO_MESSAGES.format(package))
+        return

@@ -91,6 +91,7 @@ def with_members(text: str, known: Known) -> Iterator[Step]:
         _lost_values,
         _lost_places,
         _whole_messages,
+        _counted_messages,
         _values_behind,
         _lost_f,
     ):
@@ -191,9 +192,11 @@ def _misspelt_members(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
     tree, lines = tree_of(text), text.split("\n")
     kinds = {name: kind for name, kind in made_by(nodes_in(tree)).items() if kind}
     classes = [one for one in tree.body if isinstance(one, ast.ClassDef)]
-    own = {one.name: _members_of(one) for one in classes if {*map(ast.unparse, one.bases)} <= {"object"}}
+    plain = {one.name: _members_of(one) for one in classes if {*map(ast.unparse, one.bases)} <= {"object"}}
     named = [(one, getattr(one, "name", "")) for one in tree.body]
-    inside = {id(n): name for one, name in named if name in own for n in nodes_in(one)}
+    inside = {id(n): name for one, name in named if name in plain for n in nodes_in(one)}
+    made = (n for n in nodes_in(tree) if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call))
+    of_rospy = {ast.unparse(t) for n in made for t in n.targets if re.match(r"rospy\.", ast.unparse(n.value))}
     stored = {n.attr for n in nodes_in(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
     fields_of, lacking = known.fields(tree), _Lacking(tree)
     of_ros, of_data = _inside_messages(tree, kinds), _instead_of_data(tree)
@@ -202,6 +205,7 @@ def _misspelt_members(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
         members: Collection[str] = messages.get(id(node.value), ())
         of_text = isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
         owner = ast.unparse(node.value)
+        own = {} if owner in of_rospy else plain  # a class of the script may be called Publisher, too
         kind = inside.get(id(node), "") if owner == "self" else kinds.get(owner, owner.removesuffix("()"))
         fields = fields_of.get(kind, ()) if kind not in own else ()
         members = OF_TEXTS if of_text else own.get(kind) or MEMBERS.get(kind) or fields or members
@@ -355,6 +359,47 @@ def _whole_messages(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
             if span is not None and isinstance(one, ast.Name) and one.id not in stored:
                 why = f"`{one.id}` is the whole message, and no string can be added to it"
                 yield (span, f"str({one.id}.data)"), why
+
+
+def _counted_messages(text: str, _known: Known) -> Iterator[tuple[Edit, str]]:
+    """Yield the `count` of `count = count + 1`, `count > 127` and `count = 0`, for `count.data`, where it is made by
+    `count = Int8()`."""
+    tree, lines = tree_of(text), text.split("\n")
+    given: dict[str, list[ast.Assign]] = {}
+    for one in (n for n in nodes_in(tree) if isinstance(n, ast.Assign) and len(n.targets) == 1):
+        given.setdefault(ast.unparse(one.targets[0]), []).append(one)
+    for name, assigned in given.items():
+        made = [n for n in assigned if NUMBER_CLASS.fullmatch(last_name(getattr(n.value, "func", None)))]
+        counts = [n for n in assigned if _is_count(n.value, name)]
+        operands = [n for n in _operands(tree) if ast.unparse(n).removesuffix(".data") == name]
+        if not made or not operands or len(made) + len(counts) < len(assigned):
+            continue
+        whole = [n for n in (*operands, *(n.targets[0] for n in counts)) if ast.unparse(n) == name]
+        for node in sorted(whole, key=lambda n: (n.lineno, n.col_offset)):
+            if (span := span_of(lines, node)) is not None:
+                kind = last_name(getattr(made[0].value, "func", None))
+                yield (span, f"{name}.data"), f"`{name}` is the whole message ({kind}), and no number"
+
+
+NUMBER_CLASS = re.compile(r"U?Int(8|16|32|64)|Float(32|64)")
+
+
+def _is_count(value: ast.expr, name: str) -> bool:
+    """Return whether a value is a number, or what is calculated from the name or its `data`."""
+    if isinstance(value, ast.BinOp):
+        return ast.unparse(value.left).removesuffix(".data") == name
+    return isinstance(value, ast.Constant) and isinstance(value.value, int | float)
+
+
+def _operands(tree: ast.Module) -> Iterator[ast.expr]:
+    """Yield what is added up or compared."""
+    for node in nodes_in(tree):
+        if isinstance(node, ast.BinOp):
+            yield from (node.left, node.right)
+        elif isinstance(node, ast.Compare):
+            yield from (node.left, *node.comparators)
+        elif isinstance(node, ast.AugAssign):
+            yield node.target
 
 
 def _misspelt_keywords(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
