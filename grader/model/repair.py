@@ -130,6 +130,16 @@ def _added(before: str, after: str) -> list[str]:
     return [line.strip() for line in after.split("\n") if line not in old and line.strip()]
 
 
+def lines_to_write(line: int, before: str, after: str) -> str:
+    """Return the lines that are new, as code; of those from a line on that each take another's place, which they are:
+    `<launch>`, and `</launch>` on line 4."""
+    old, new = before.split("\n"), after.split("\n")
+    if len(old) != len(new):
+        return join_words(map(as_code, _added(before, after)))
+    numbered = [(n, one.strip()) for n, one in enumerate(new, start=line) if one not in old and one.strip()]
+    return ", and ".join(as_code(one) + f" on line {n}" * (n > line) for n, one in numbered)
+
+
 # Texts in quotes fit first, and stay as they are.
 TABS_INSIDE = re.compile(r"""("[^"]*"|'[^']*')|[ ]*\t[ \t]*""")
 
@@ -162,7 +172,7 @@ def _where_and_how(repair: Repair) -> tuple[str, str]:
             if named
             else (place_of(repair), repair.fix.removeprefix(f"on line {repair.line}, "))
         )
-    code = join_words(map(as_code, added))
+    code = lines_to_write(repair.line or 1, repair.before, repair.after)
     # Where a line is added, the line beside it is the first or the last of the new ones, unchanged.
     replaced, script = repair.before not in (new[0], new[-1]), repair.file.endswith(".py")
     if replaced:

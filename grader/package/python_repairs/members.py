@@ -369,7 +369,7 @@ def _counted_messages(text: str, _known: Known) -> Iterator[tuple[Edit, str]]:
     for one in (n for n in nodes_in(tree) if isinstance(n, ast.Assign) and len(n.targets) == 1):
         given.setdefault(ast.unparse(one.targets[0]), []).append(one)
     for name, assigned in given.items():
-        made = [n for n in assigned if NUMBER_CLASS.fullmatch(last_name(getattr(n.value, "func", None)))]
+        made = [n for n in assigned if last_name(getattr(n.value, "func", None)) in NUMBERS]
         counts = [n for n in assigned if _is_count(n.value, name)]
         operands = [n for n in _operands(tree) if ast.unparse(n).removesuffix(".data") == name]
         if not made or not operands or len(made) + len(counts) < len(assigned):
@@ -379,9 +379,6 @@ def _counted_messages(text: str, _known: Known) -> Iterator[tuple[Edit, str]]:
             if (span := span_of(lines, node)) is not None:
                 kind = last_name(getattr(made[0].value, "func", None))
                 yield (span, f"{name}.data"), f"`{name}` is the whole message ({kind}), and no number"
-
-
-NUMBER_CLASS = re.compile(r"U?Int(8|16|32|64)|Float(32|64)")
 
 
 def _is_count(value: ast.expr, name: str) -> bool:

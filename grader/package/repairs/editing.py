@@ -19,7 +19,7 @@ from typing import BinaryIO
 from grader.files import atomic_write, open_untrusted
 from grader.line_slips.python_habits import MERGED
 from grader.model.package import CMAKE, MANIFEST
-from grader.model.repair import Repair, RepairKind, added_lines, as_code, messages_of
+from grader.model.repair import Repair, RepairKind, added_lines, lines_to_write, messages_of
 from grader.package.lint.script_blocks import first_version
 from grader.package.reading import LEFT_OUT
 from grader.package.repairs.well_formed import well_formed
@@ -192,22 +192,13 @@ def repair_xml(files: Files, file: str, root: str, kind: RepairKind) -> bool:
         line, old, new = changed_lines(before, after)
         why = fault.explanation if fault is not None else strange.why if strange is not None else ""
         taken = " ".join(one.strip() for one in old.split("\n") if one not in new.split("\n")).strip()
-        fix = _written(line, old, new) or (f"delete `{taken}`" if taken else BLANKS_ABOVE)
+        written = lines_to_write(line, old, new)
+        fix = f"write {written}" if written else f"delete `{taken}`" if taken else BLANKS_ABOVE
         if fault is not None and re.match(r"(delete|write|make) line \d", fault.fix):
             fix = fault.fix
         place = f"line {fault.line if fault is not None and fault.line else line} of {file}"
         files.change(kind, file, after, f"{place}: {why}", fix)
     return text is not None and files.text(file) != text
-
-
-def _written(line: int, before: str, after: str) -> str:
-    """Return ``write `<launch>`, and `</launch>` on line 4``, of changed lines that begin at a line; empty where none
-    is new."""
-    old, new = before.split("\n"), after.split("\n")
-    numbers = [at for at, one in enumerate(new, start=line) if one not in old and one.strip()]
-    placed = len(old) == len(new)  # each stands in the place of one
-    written = [as_code(new[at - line].strip()) + f" on line {at}" * (placed and at > line) for at in numbers]
-    return f"write {', and '.join(written)}" if written else ""
 
 
 def _is_unicode(text: str) -> bool:
