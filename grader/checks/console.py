@@ -189,10 +189,11 @@ def _not_printed(
         end, ended = explain_end(one, run, package), f"it ended before it printed {params.words}"
         early = _called_early(one, asked, run)
         return _early_call(ended, early) if early else end.verdict(failed_or_blocked, f"{ended}: {end.cause}")
-    if error := explain_error(package, run):
-        return error.verdict(failed_or_blocked, f"{never}: {error.cause}")
     # What comes after Ctrl-C says how the program stops, not what it does.
     own = [line for line in lines if one.interrupt_ns is None or line.at_ns < one.interrupt_ns]
+    error = explain_error(package, run)
+    if error and not any(_has_words(line, params) for line in own):
+        return error.verdict(failed_or_blocked, f"{never}: {error.cause}")
     deaf = unheard(run, package)
     unheard_of = (
         failed_or_blocked(f"{never}: {deaf.message}", hint=deaf.hint).caused_by(deaf) if deaf else None
@@ -215,6 +216,15 @@ def _not_printed(
     lost = _of_client(asked, run)(f"{never}; it prints {shown(meant.text)!r}", hint=hint)
     lost = lost.about(said=meant.text).if_repeated()
     return lost.late() if waits else lost
+
+
+def _has_words(line: Line, params: PrintsParams) -> bool:
+    """Return whether all words of the text stand on the line, whatever is between them."""
+    asked, said = (
+        re.findall(r"[^\W\d_]+", text.lower())
+        for text in (params.text.replace(PLACE, ""), line.text[:LINE_CHARS_MAX])
+    )
+    return bool(asked) and set(asked) <= set(said)
 
 
 def _says_other(line: Line, one: Life, params: PrintsParams) -> bool:

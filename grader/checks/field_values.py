@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect
 from collections.abc import Collection, Sequence
 from itertools import pairwise
 from typing import Annotated, Any, Literal
@@ -376,6 +377,8 @@ def _why_first(
     sent = [c for c in sent if c.topic not in SYSTEM_TOPICS and not c.topic.startswith("/grader")]
     if beside or len(sent) != 1 or sent[0].topic == params.topic or len(sent[0].messages) <= len(found):
         return None
+    if bisect(sent[0].times_ns, found[0].time_ns) == 1:
+        return None  # the very first was answered
     topic, count = sent[0].topic, plural(len(sent[0].messages), "message")
     hint = f"publish for each message on {topic}: in the callback, below the `if` and not in it"
     return f"; {count} came on {topic}, and {len(found)} on {params.topic}", hint

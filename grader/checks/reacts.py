@@ -119,7 +119,9 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
         return _judge_silence(package, run, params)
     causes = _causes(run, params)
     own = run.student_channels(params.effect.topic)
-    effects = params.effect.read(own)
+    # what a node sends as it ends answers nothing
+    until_ns = observed_until_ns(run) or run.end_ns
+    effects = [one for one in params.effect.read(own) if one.time_ns <= until_ns]
     answers = _answers(run, causes, effects, params)
     instead = _instead(causes, effects, params) or _other_answer(answers, causes, effects, own, params)
     verdict = (
@@ -379,6 +381,7 @@ def _disturbed(
         )
         hint += f"{params.cause.words} comes"
     verdict = failed(message, hint=hint, measured=plural(count, "message"))
+    verdict = verdict.based_on(due=tuple((since, times[0]) for (since, _), times in wrong))
     # What comes again and again is not explained by a late machine, nor is what follows no cause.
     if len(wrong) > 1 or params.cause is None:
         return verdict

@@ -147,8 +147,10 @@ def charge_once(
     after it, as after one in a callback, or ends of it in another run. `judged` are the criteria that a repaired copy
     has judged."""
     charged, told = dict[str, str](), dict(verdicts)
-    # students see the hint of the one that is charged
-    for criterion in sorted(rubric.criteria, key=lambda c: (c.visibility != "visible", not c.points)):
+    # students see the hint of the one that is charged: where the rubric asks for it, the one that asks for no exception
+    for criterion in sorted(
+        rubric.criteria, key=lambda c: (c.visibility != "visible", not c.points, c.check != "callbacks-clean")
+    ):
         verdict = verdicts[criterion.id]
         is_whole = verdict.status is Status.FAIL and not verdict.score and criterion.penalty is None
         if not is_whole or criterion.scenario is None or not verdict.basis.charged_once:

@@ -380,6 +380,9 @@ def test_an_exception_is_charged_once(raised: bool, judged: str, blocked_by: str
     told = charge_once(rubric({**RATE, "requires": []}, {**CHATTER, "requires": []}), verdicts, {judged})
     assert told["rate"] == lost["a"]
     assert told["chatter"].blocked_by == blocked_by
+    asking = {**CHATTER, "requires": [], "check": "callbacks-clean", "with": {"process": "talker"}}
+    told = charge_once(rubric({**RATE, "requires": []}, asking), verdicts, {judged})
+    assert told["rate"].blocked_by == ("chatter" if blocked_by else "")
 
 
 def test_another_name_is_no_reason_for_silence() -> None:

@@ -152,7 +152,7 @@ def _index(message: str, source: str, marked: tuple[int, int] | None) -> Meaning
         return f"`{name}` has no element {index}", fix
     if index.isdecimal():
         parts = plural(int(index) + 1, "element")
-        if name.endswith("ranges"):  # of a laser, whose scans all have as many
+        if name.endswith("ranges") and index != "0":  # of a laser, whose scans all have as many
             hint = (
                 f"choose a smaller index than {index}: they begin at 0, and the last one is `len({name}) - 1`"
             )

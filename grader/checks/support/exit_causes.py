@@ -260,17 +260,23 @@ def _not_run(life: Life, run: Run, package: PackageFacts) -> Ending | None:
 def explain_error(
     package: PackageFacts, run: Run, *, only: Collection[str] | None = None, during: Sequence[Span] = ()
 ) -> Ending | None:
-    """Return the last traceback before Ctrl-C, or `during` these stretches, of the student's processes, or of those of
-    these names; None where there is none."""
-    found = [
-        t
-        for one in lives(run)
-        if only is None or one.name in only
-        for from_ns, until_ns in during or [(one.start_ns, one.interrupt_ns or run.end_ns + 1)]
-        for t in process_tracebacks(run, one.name, after_ns=from_ns, before_ns=until_ns)
-        if not is_rospys_own(t)
+    """Return the last traceback before Ctrl-C, or in at least half of the stretches `during`, of the student's
+    processes, or of those of these names; None where there is none."""
+    own = [one for one in lives(run) if only is None or one.name in only]
+    spans = [[(one, *span) for one in own] for span in during]
+    by_span = [
+        [
+            t
+            for one, from_ns, until_ns in span
+            for t in process_tracebacks(run, one.name, after_ns=from_ns, before_ns=until_ns)
+            if not is_rospys_own(t)
+        ]
+        for span in spans or [[(one, one.start_ns, one.interrupt_ns or run.end_ns + 1) for one in own]]
     ]
-    return explain_traceback(found[-1], package) if found else None
+    found = [one for here in by_span for one in here]
+    # what fails at one of many times does not explain the others
+    is_often = 2 * sum(map(bool, by_span)) >= len(by_span)
+    return explain_traceback(found[-1], package) if found and is_often else None
 
 
 def explain_by_exception(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
