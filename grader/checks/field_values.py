@@ -252,6 +252,11 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
         near = near_texts(wrong[0].values, params.value)
         verdict = _other_value(wrong, found, run, params).seeking("quoted", *near)
         verdict = verdict if verdict.basis.wrong else verdict.of_value(nan=nan)
+        ending = explain_early_end(package, run) if params.when == "last" else None
+        if ending is not None and not ending.by_itself:  # it may have come to another value
+            verdict = ending.verdict(
+                failed_or_blocked, f"{verdict.message}, as the node ended: {ending.cause}"
+            )
     else:
         count = f"all of {plural(len(found), 'message')}" if params.when == "every" else which
         verdict = passed(f"{params.field} of {params.topic} is {params.words} in {count}")

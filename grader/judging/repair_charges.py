@@ -48,6 +48,9 @@ TAG = re.compile(r"<(\w+)>[^<>]*</\1>")
 NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
+PARAMETER = re.compile(r"~?[\w/]*\w")
+
+
 def is_unmade(found: Verdict | CriterionResult) -> bool:
     """Return whether a script is lost because the build failed that was to make a program of it."""
     return found.mistake is not None and found.mistake.kind == "not-made"
@@ -88,13 +91,17 @@ def charge_repairs(
         if repair.kind in OF_SYNTAX and failed_by_it:
             continue  # that the copy shows nothing of that criterion is no reason to charge another
         possible = [c for c in criteria if repair in needs[c.id] and _may_ask_for(first[c.id], repair)]
+        if repair.kind in {"topic-name", "service-name"}:  # where a value came, its topic is not to blame
+            possible = [c for c in possible if not first[c.id].basis.wrong] or possible
         named = [c for c in possible if repair.kind in NAMES and _names(c, repair)]
         failing = [c for c in possible if first[c.id].status is not Status.BLOCKED]
         # where nothing was printed, the line that is cited would print it, and is not to blame
         citing = [c for c in failing if cites_file(first[c.id], repair) and not first[c.id].basis.silent]
         builds = [c for c in possible if repair.kind in OF_BUILDS and c.check == BUILD]
         counting = [c.id for c in (*builds, *named, *citing, *failing, *possible) if c.points > 0]
-        other = [name for name in counting if name not in misnamed]
+        # names of two kinds are two mistakes
+        taken = {name for one in charges if repair.kind in NAMES - {one.kind} for name in charges[one]}
+        other = [name for name in counting if name not in misnamed | taken]
         charges[repair] = set((counting if named else other or counting)[:1])
         misnamed |= charges[repair] if named else set()
     # A field's new name in the code is no mistake beside that in its definition, whose fix names the file.
@@ -368,9 +375,17 @@ def is_next_fault(one: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> boo
     found = {(c.file, c.line) for c in one.citations if isinstance(c, FileCitation) and c.file in files}
     again = cited_lines(copy.citations)
     again -= lines_read_now(repairs)
-    in_repaired = found != set() or one.basis.unjudged or any(is_told(repair, one.hint) for repair in repairs)
+    unread = any(_names_new(repair, one.hint) and not _names_new(repair, copy.hint) for repair in repairs)
+    in_repaired = found != set() or one.basis.unjudged or unread
+    in_repaired = in_repaired or any(is_told(repair, one.hint) for repair in repairs)
     shown = not copy.basis.unjudged or (one.basis.unjudged and found != set())
     return in_repaired and shown and not found & again and _is_other_fault(one, copy)
+
+
+def _names_new(repair: Repair, hint: str) -> bool:
+    """Return whether the hint has the name of a parameter that the repair puts in place."""
+    before, after, said = (set(PARAMETER.findall(text)) for text in (repair.before, repair.after, hint))
+    return repair.kind == "parameter-name" and not said.isdisjoint(after - before)
 
 
 def lines_read_now(repairs: Iterable[Repair]) -> set[tuple[str, int]]:

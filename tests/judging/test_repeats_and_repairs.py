@@ -10,7 +10,7 @@ import pytest
 from grader.evidence.run import Run
 from grader.judging import judge
 from grader.judging.judge import judge_all_runs
-from grader.judging.repair_charges import charge_repairs
+from grader.judging.repair_charges import charge_repairs, is_next_fault
 from grader.judging.repeats_and_repairs import (
     drop_unrepeated_losses,
     is_used_by,
@@ -21,7 +21,7 @@ from grader.judging.repeats_and_repairs import (
     with_names_as_handed_in,
 )
 from grader.model.repair import Repair
-from grader.model.verdict import FileCitation, failed
+from grader.model.verdict import FileCitation, failed, failed_or_blocked
 from grader.package.launch import parse_launch_files
 from tests.support.rubrics import ALL, GOOD_RUN, NODE, PACKAGE, SCENARIO, SCRIPT, on_copy, rubric
 from tests.support.timeline import build_runs
@@ -351,3 +351,38 @@ def test_a_field_and_its_name_in_the_code_are_one_mistake() -> None:
     asked = rubric(*(one for one in ALL if one["id"] in lost))
     needs = {"node": (field,), "rate": (field, code)}
     assert charge_repairs(asked, lost, needs.keys(), needs) == {field: {"node"}, code: {"node"}}
+
+
+@pytest.mark.parametrize(
+    ("hint", "is_next"), [("write 0 in place of -1", True), ("read it with rospy.get_param('~width')", False)]
+)
+def test_what_a_parameter_hides_is_told_of_the_copy_that_reads_it(hint: str, is_next: bool) -> None:
+    """Without a line that is cited: where it is published says nothing of the parameter."""
+    read = Repair(
+        kind="parameter-name",
+        file="scripts/mapper.py",
+        line=4,
+        before="width = rospy.get_param('width')",
+        after="width = rospy.get_param('~width')",
+        message="the parameter width should be ~width",
+        fix="width = rospy.get_param('~width')",
+    )
+    one = failed(
+        "data is [-1, -1], not [0]; no node reads /map/width", hint="read it with rospy.get_param('~width')"
+    )
+    assert is_next_fault(one, failed("data is -1, not 0", hint=hint), [read]) is is_next
+
+
+def test_names_of_two_kinds_are_told_where_each_is_seen() -> None:
+    """A value that came is no reason to doubt its topic; one criterion is not charged with both."""
+    common = {"file": "src/talker.py", "message": "another name", "fix": "the name"}
+    topic = Repair(kind="topic-name", line=4, before="'/chatter'", after="'chatter'", **common)
+    parameter = Repair(kind="parameter-name", line=6, before="'word'", after="'~word'", **common)
+    cited = (FileCitation(file="src/talker.py", line=6),)
+    lost = {
+        "chatter": failed("data is 'none', not 'one'", hint="").of_value(nan=False),
+        "rate": failed_or_blocked("no message came on /lab/text", hint="").about(citations=cited),
+    }
+    asked = rubric(*({**one, "requires": []} for one in ALL if one["id"] in lost))
+    needs = dict.fromkeys(lost, (topic, parameter))
+    assert charge_repairs(asked, lost, needs.keys(), needs) == {topic: {"rate"}, parameter: {"chatter"}}
