@@ -213,7 +213,11 @@ def _not_printed(
         return silent.late() if waits else silent
     meant = max(own, key=lambda line: SequenceMatcher(None, params.words, line.text[:LINE_CHARS_MAX]).ratio())
     hint = _of_whole_answer(meant, params) or unfilled(meant.text) or hint
-    lost = _of_client(asked, run)(f"{never}; it prints {shown(meant.text)!r}", hint=hint)
+    called = {e.topic for _, e in run.actors if e.action == "serve"}
+    # what comes with an answer cannot be printed where nothing was called
+    uncalled = bool(params.numbers and asked) and called.isdisjoint(asked)
+    kind = failed_or_blocked if uncalled else _of_client(asked, run)
+    lost = kind(f"{never}; it prints {shown(meant.text)!r}", hint=hint)
     lost = lost.about(said=meant.text).if_repeated()
     return lost.late() if waits else lost
 

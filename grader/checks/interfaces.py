@@ -32,6 +32,7 @@ from grader.model.verdict import FileCitation, Verdict, failed, passed
 from grader.wording import closest, join_words, on_lines, plural
 
 FAULTS_SHOWN = 3
+NEW_NAMES = "then write the new name"
 FILE_PATTERN = r"^(msg/\w+\.msg|srv/\w+\.srv|action/\w+\.action)$"
 FieldType = Annotated[str, Field(pattern=r"^[A-Za-z]\w*(/[A-Za-z]\w*)?(\[\d*\])?$"), Refers("field")]
 
@@ -146,7 +147,7 @@ def _fixes(faults: list[_Fault]) -> Iterator[str]:
     for fault in dict.fromkeys(faults):
         yield f"on line {fault.line}, {fault.hint}" if fault.line and len(faults) > 1 else fault.hint
     if renamed := sum(fault.renames for fault in faults):
-        yield f"then write the new name{'s' if renamed > 1 else ''} in your programs too"
+        yield f"{NEW_NAMES}{'s' if renamed > 1 else ''} in your programs too"
 
 
 def _words(fields: Iterator[InterfaceField] | list[InterfaceField] | tuple[InterfaceField, ...]) -> str:

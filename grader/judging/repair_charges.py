@@ -13,6 +13,7 @@ from collections.abc import Set as AbstractSet
 from graphlib import TopologicalSorter
 from pathlib import PurePosixPath
 
+from grader.checks.interfaces import NEW_NAMES
 from grader.checks.support.text import IN_PLACE_OF_ALL, texts_in
 from grader.model.message_definitions import PARTS
 from grader.model.package import CMAKE, MANIFEST
@@ -223,6 +224,8 @@ def charged_verdict(
     if any(one not in [*told, *beside] for one in repairs):
         clauses = [clause for clause in clauses if any(is_told(one, clause) for one in told)]
     hints = clauses + advice_on(one for one in repairs if one not in told)
+    if not any(one.kind == "missing-call" for one in repairs):  # the copy renames nothing in the code
+        hints += [c for c in verdict.hint.split("; ") if c.startswith(NEW_NAMES) and c not in hints]
     said = verdict.message
     unsaid = [one for one in repairs if one.kind == "node-name" or not _is_said(one, verdict)]
     words = [said, *(one for one in messages_of(unsaid) if (_PLACE.sub("", one) or one) not in said)]

@@ -9,7 +9,7 @@ from pathlib import PurePath
 
 from grader.checks import Check
 from grader.checks.support.text import texts_in
-from grader.judging.repair_charges import is_unmade
+from grader.judging.repair_charges import BUILD, is_unmade
 from grader.model.verdict import Status, Verdict, cited_lines, inconclusive
 from grader.rubric.model import Criterion, Rubric
 
@@ -143,9 +143,9 @@ def charge_once(
     rubric: Rubric, verdicts: Mapping[str, Verdict], judged: Collection[str] = ()
 ) -> dict[str, Verdict]:
     """Return the verdicts, with those blocked that lost all of their points to what another one has lost its own to
-    already: an exception, or a topic that no node hears. `requires` names nothing that is lost where the node goes on
-    after it, as after one in a callback, or ends of it in another run. `judged` are the criteria that a repaired copy
-    has judged."""
+    already: an exception, a topic that no node hears, what the build did not make, a definition. `requires` names
+    nothing that is lost where the node goes on after it, as after one in a callback, or ends of it in another run.
+    `judged` are the criteria that a repaired copy has judged."""
     charged, told = dict[str, str](), dict(verdicts)
     # students see the hint of the one that is charged: where the rubric asks for it, the one that asks for no exception
     for criterion in sorted(
@@ -153,12 +153,29 @@ def charge_once(
     ):
         verdict = verdicts[criterion.id]
         is_whole = verdict.status is Status.FAIL and not verdict.score and criterion.penalty is None
-        if not is_whole or criterion.scenario is None or not verdict.basis.charged_once:
+        if not is_whole or criterion.scenario is None or criterion.id in judged:
             continue
-        root = charged.setdefault(verdict.basis.cause, criterion.id)
-        if root != criterion.id and criterion.id not in judged and root not in judged:
+        root = _of_files(rubric, verdicts, verdict)
+        if not root and verdict.basis.charged_once:
+            root = charged.setdefault(verdict.basis.cause, criterion.id)
+        if root and root != criterion.id:
             told[criterion.id] = _blocked(verdict, root, f"blocked by {root}: {verdict.message}")
-    return told
+    return {name: _at_root(verdict, told) for name, verdict in told.items()}
+
+
+def _of_files(rubric: Rubric, verdicts: Mapping[str, Verdict], verdict: Verdict) -> str:
+    """Return the criterion of the files that is lost to the same; "" where there is none."""
+    check = BUILD if verdict.basis.unbuilt else verdict.basis.judged_by
+    lost = (c.id for c in rubric.criteria if c.check == check and verdicts[c.id].status is Status.FAIL)
+    return next(lost, "")
+
+
+def _at_root(verdict: Verdict, told: Mapping[str, Verdict]) -> Verdict:
+    """Return a blocked criterion as one that is blocked by what blocks the one that it is blocked by."""
+    if not (above := verdict.blocked_by) or not (root := told[above].blocked_by):
+        return verdict
+    message = verdict.message.replace(f"blocked by {above}: ", f"blocked by {root}: ", 1)
+    return verdict.model_copy(update={"message": message, "hint": f"fix {root} first", "blocked_by": root})
 
 
 def _blocked(verdict: Verdict, root: str, message: str, *, timing: bool = False) -> Verdict:

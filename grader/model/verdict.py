@@ -163,6 +163,8 @@ class Basis(Record):
     """What a process ended of, in words that are the same in every verdict that rests on it."""
     charged_once: bool = False
     """The same cause costs one criterion its points, and blocks the others that lost theirs to it."""
+    judged_by: str = ""
+    """The check of what it was lost to: a lost criterion that has it is charged alone."""
     meant: str = ""
     """The file that is told to become the one that is missing."""
     said: str = ""

@@ -11,7 +11,7 @@ from grader.checks.support.exit_causes import Ending
 from grader.judging import judge
 from grader.judging.requirements import charge_once
 from grader.model.result import CriterionResult
-from grader.model.verdict import Status, Verdict, failed, partial
+from grader.model.verdict import Status, Verdict, failed, partial, passed
 from grader.package.launch import parse_launch_files
 from grader.rubric.message_fields import said_types
 from tests.support.rubrics import (
@@ -383,6 +383,26 @@ def test_an_exception_is_charged_once(raised: bool, judged: str, blocked_by: str
     asking = {**CHATTER, "requires": [], "check": "callbacks-clean", "with": {"process": "talker"}}
     told = charge_once(rubric({**RATE, "requires": []}, asking), verdicts, {judged})
     assert told["rate"].blocked_by == ("chatter" if blocked_by else "")
+
+
+@pytest.mark.parametrize(
+    ("basis", "root"), [({"unbuilt": True}, "build"), ({"judged_by": "definition"}, "fields")]
+)
+def test_what_the_files_are_lost_to_is_charged_there(basis: dict[str, object], root: str) -> None:
+    """What is blocked by a criterion that is blocked itself names the root of both."""
+    of_file = {"file": "msg/Num.msg", "fields": {"num": "int64"}}
+    asked = [{"id": "build", "check": "build"}, {"id": "fields", "check": "definition", "with": of_file}]
+    rated, said = ({**one, "requires": []} for one in (RATE, CHATTER))
+    lost = failed("it is lost", hint="x")
+    blocked = lost.model_copy(
+        update={"status": Status.BLOCKED, "message": "blocked by rate: it is lost", "blocked_by": "rate"}
+    )
+    verdicts = {"build": lost, "fields": lost, "rate": lost.based_on(**basis), "chatter": blocked}
+    told = charge_once(rubric(*asked, rated, said), verdicts)
+    assert {told[name].blocked_by for name in ("rate", "chatter")} == {root}
+    assert told["chatter"].message.startswith(f"blocked by {root}: ")
+    passed_files = {**verdicts, "build": passed("x"), "fields": passed("x")}
+    assert charge_once(rubric(*asked, rated, said), passed_files) == passed_files
 
 
 def test_another_name_is_no_reason_for_silence() -> None:

@@ -97,7 +97,7 @@ def test_messages_that_are_not_there_are_named_where_catkin_sees_no_package() ->
             "inconclusive",
             "nothing for you to do: tell your instructor",
         ),
-        ("/w/src/lab1/src/mean.cpp:3:1: error: 'x' was not declared", "fail", "first get the build to pass"),
+        ("/w/src/lab1/src/mean.cpp:3:1: error: 'x' was not declared", "blocked", "fix build first"),
     ],
 )
 def test_a_program_that_the_build_did_not_make_is_no_missing_script(
@@ -115,7 +115,8 @@ def test_a_program_that_the_build_did_not_make_is_no_missing_script(
     runs = build_runs({"runs": {"talker": {"outcome": "ended", "graph": []}}, "package": package})
     runs |= built(package, exit_code=1, said=[said])
     found = {c.id: c for c in judge(rubric(*asked, scenarios={"talker": scenario}), runs)}
-    assert found["node"].message.startswith("talker was not started: the build did not make the program mean")
+    told = found["node"].message.removeprefix("blocked by build: ")
+    assert told.startswith("talker was not started: the build did not make the program mean")
     assert (found["node"].status.value, found["node"].hint.startswith(hint)) == (status, True)
 
 

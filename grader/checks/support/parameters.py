@@ -248,7 +248,7 @@ def explain_by_unread_parameter(check: Check, package: PackageFacts, run: Run, v
     hint += _asked_before(run, own[0][1] if own else "", f"~{last}" if above in run.student_nodes() else name)
     if _is_too_early(run):
         hint = "move `rospy.init_node(…)` above the line that reads it: before, the node has no name"
-    if own and own[0][1] == f"{own[0][0]}/{last}" and above not in run.student_nodes():
+    if own and own[0][1].rpartition("/")[0] == own[0][0] and above not in run.student_nodes():
         hint = _named(own[0][0], above)
     sets = join_words(f"{one.name} to {one.value!r}" for one in unread[:UNREAD_SHOWN])
     them = "it" if len(unread) == 1 else "them"

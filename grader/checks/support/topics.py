@@ -548,7 +548,8 @@ def misfit(run: Run, topic: str = "") -> Verdict | None:
     # A mistake of the rubric is not the student's.
     if note.detail.startswith(UNSENDABLE):
         return inconclusive(message, hint=f"{NOTHING_TO_DO}tell your instructor")
-    return failed(message, hint="use the handout's names and types in the .msg file, and build again")
+    lost = failed(message, hint="use the handout's names and types in the .msg file, and build again")
+    return lost.based_on(judged_by="definition")
 
 
 def _judge_refused(run: Run, topic: str) -> Verdict | None:
