@@ -46,8 +46,9 @@ MANIFEST = """<package format="2"><name>{}</name><version>0.0.0</version><descri
 <buildtool_depend>catkin</buildtool_depend></package>
 """
 LAUNCH_SUFFIXES = {".launch", ".test", ".xml"}
-LAUNCH_FILES_MAX, LAUNCH_BYTES_MAX = 50, 100_000
+FILES_MAX, BYTES_MAX = 100, 100_000
 IN_LAUNCH_FILES = re.compile(r"\$\(find\s+([\w.-]+)\s*\)|\bpkg\s*=\s*[\"']([\w.-]+)[\"']")
+IN_SCRIPTS = re.compile(r"^[ \t]*(?:from|import)[ \t]+(\w+)\.(?:msg|srv)\b", re.MULTILINE)
 ELF = b"\x7fELF"
 MEMBERS_MAX = 50_000
 _TOO_MANY = f"what the build left is more than {MEMBERS_MAX} files"
@@ -151,7 +152,7 @@ def run_in_place(workspace: Workspace, sandbox: Sandbox) -> None:
 def needed_packages(submission: Submission, course: Collection[str] = ()) -> list[SourcePackage]:
     """Return the lab's packages and those of the submission that they need, the lab's first; none of the `course`'s.
     They need what their manifests declare, and of what catkin sees in the same workspace, what their launch files and
-    CMakeLists.txt name."""
+    CMakeLists.txt name and of which their scripts import messages."""
     needed = [submission.package, *submission.also]
     others = {
         p.name: p for p in submission.packages if p.name not in {*(one.name for one in needed), *course}
@@ -167,16 +168,19 @@ def needed_packages(submission: Submission, course: Collection[str] = ()) -> lis
 
 
 def _named_packages(package: SourcePackage) -> set[str]:
-    """Return the words of launch files and of `CMakeLists.txt` that may name packages."""
+    """Return the words of launch files, scripts and `CMakeLists.txt` that may name packages."""
     names: set[str] = set()
-    found = (path for path in package.folder.rglob("*") if path.suffix in LAUNCH_SUFFIXES)
-    for path in sorted(islice(found, LAUNCH_FILES_MAX)):
-        data = read_markup(package.folder, path.relative_to(package.folder).as_posix(), LAUNCH_BYTES_MAX)
+    found = (path for path in package.folder.rglob("*") if path.suffix in {".py", *LAUNCH_SUFFIXES})
+    for path in sorted(islice(found, FILES_MAX)):
+        data = read_markup(package.folder, path.relative_to(package.folder).as_posix(), BYTES_MAX)
         text = data.decode("utf-8", "replace") if isinstance(data, bytes) else ""
+        if path.suffix == ".py":
+            names.update(IN_SCRIPTS.findall(text))
+            continue
         begin, *rest = text.split("<!--")
         text = "".join([begin, *(part.partition("-->")[2] for part in rest)])
         names |= {one for pair in IN_LAUNCH_FILES.findall(text) for one in pair if one}
-    data = read_markup(package.folder, "CMakeLists.txt", LAUNCH_BYTES_MAX)
+    data = read_markup(package.folder, "CMakeLists.txt", BYTES_MAX)
     for command in (commands_of(data) or ()) if isinstance(data, bytes) else ():
         if command.identifier.lower() == "find_package":
             names |= {str(token.value) for token in command.args if token.kind != "COMMENT"}

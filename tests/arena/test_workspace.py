@@ -113,6 +113,8 @@ NEEDED = {
         "src/other",
         False,
     ),
+    "messages": ("src/a.py", "import rospy\nfrom other.msg import Level\n", "src/other", True),
+    "module": ("src/a.py", "import other\n# from other.msg import Level\n", "src/other", False),
     "comment-of-cmake": ("CMakeLists.txt", "# find_package(other)", "src/other", False),
     "other-workspace": ("launch/a.launch", "<node pkg='other'/>", "old/src/other", False),
 }
