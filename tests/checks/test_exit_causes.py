@@ -255,8 +255,8 @@ pytestmark = pytest.mark.usefixtures("without_processes")
     ],
 )  # fmt: skip
 def test_the_hint_is_the_line_as_it_should_be(tmp_path, line, source, error, hint):
-    end = explained(tmp_path, {"src/talker.py": SCRIPT}, ("src/talker.py", line, source), error=error)
-    assert end.hint == hint
+    frame = ("src/talker.py", line + 1, source)  # below the first line that the arena writes
+    assert explained(tmp_path, {"src/talker.py": SCRIPT}, frame, error=error).hint == hint
 
 
 @pytest.mark.parametrize(("first", "line"), [("", 3), ("#!/usr/bin/env python3\n", 4)])

@@ -569,10 +569,14 @@ def is_rospys_own(found: Traceback) -> bool:
 
 
 def _lines_added(package: PackageFacts, path: str) -> int:
-    """Return how many lines the script that ran has more than the one handed in: a missing first line is added."""
+    """Return how many lines the script that ran has more than the one handed in: a missing first line is added to a
+    node's, which names its node, or which publishes or subscribes and is not just imported."""
     file = package.file(path)
-    is_node = any(slip.file == path and slip.kind == "node-name" for slip in package.slips)
-    return int(is_node and file is not None and file.shebang is None and not file.link_problem)
+    if file is None or file.shebang is not None or file.link_problem:
+        return 0
+    imported = any(path in other.imports for other in package.files)
+    kinds = {"node-name"} if imported else {"node-name", "publisher-type", "subscriber-type"}
+    return int(any(slip.file == path and slip.kind in kinds for slip in package.slips))
 
 
 def _place(found: Traceback, package: PackageFacts) -> FileCitation | None:
