@@ -12,8 +12,9 @@ macro(standin_package name)
         add_custom_target(${target})
       endif()
     endforeach()
-    find_package(gencpp QUIET NO_MODULE)
-    if(GENCPP_BIN)
+    # find_package(gencpp …) would bring add_message_files(…) along, which a package has to ask for itself
+    set(standin_ros ${catkin_DIR}/../../..)
+    if(EXISTS ${standin_ros}/lib/gencpp/gen_cpp.py)
       standin_headers(${name})
     endif()
   endif()
@@ -27,8 +28,8 @@ macro(standin_headers name)
   foreach(definition ${standin_definitions})
     execute_process(
       COMMAND
-        ${PYTHON_EXECUTABLE} ${GENCPP_BIN} ${definition} -p ${name} -o ${standin_include}/${name}
-        -I${name}:${${name}_DIR}/../msg -Istd_msgs:${std_msgs_DIR}/../msg -e ${GENCPP_TEMPLATE_DIR}
+        ${PYTHON_EXECUTABLE} ${standin_ros}/lib/gencpp/gen_cpp.py ${definition} -p ${name} -o ${standin_include}/${name}
+        -I${name}:${${name}_DIR}/../msg -Istd_msgs:${standin_ros}/share/std_msgs/msg -e ${standin_ros}/share/gencpp
       OUTPUT_QUIET ERROR_QUIET)
   endforeach()
   set(${name}_INCLUDE_DIRS ${standin_include})
