@@ -13,6 +13,14 @@ pytestmark = pytest.mark.usefixtures("without_processes")
 UNDEFINED = {
     "message": ("p = rospy.Publisher('a', Int32)\nfor i in range(3):\n    number.data = i\n    p.publish(number)\n",
                 "nothing in the file gives `number` a value: above line 4, create the message: `number = Int32()`"),
+    "spin-once-in-loop": (
+        "while not rospy.is_shutdown():\n    rospy.sleep(1)\n    rospy.spinOnce()\n",
+        "threads of its own: delete line 4",
+    ),
+    "spin-once-alone": ("while 1:\n    ros.spin_once()\n", "line 3, write `rospy.spin()` instead of `ros.spin_once()`"),
+    "spin-once-last": ("rospy.spinOnce()\n", "line 2, write `rospy.spin()` instead of `rospy.spinOnce()`"),
+    "ok": ("while ros.ok():\n    pass\n", "line 2, write `not rospy.is_shutdown()` instead of `ros.ok()`"),
+    "own-ok": ("def f(answer):\n    return answer.ok()\n", ""),
     "misspelt-import": ("import mathh\nx = math.sin(1)\n", "`math` is not imported: write `import math` at the top"),
     "unread": ("p = rospy.Publisher('a', Int32)\nhello_str = 'hi'\np.publish(hello)\n",
                "`hello` a value, and nothing reads `hello_str`: on line 4, write hello_str instead of hello"),

@@ -91,7 +91,8 @@ def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
         return _other_types(wrong[1], wrong[2])
     if wrong := _NO_ATTRIBUTE.search(found.message):
         source = found.innermost.source
-        meant = _call_of_ros_2(wrong[2], source) or _field_of_number(found, wrong[1])
+        of_line = ((s.message, s.fix) for s in package.slips if s.name == f"{wrong[1]}.{wrong[2]}")
+        meant = next(of_line, None) or _call_of_ros_2(wrong[2], source) or _field_of_number(found, wrong[1])
         return meant or _other_attributes(package, wrong[1], wrong[2], source)
     if wrong := re.match(r"(\w+) is not an attribute of (\w+)$", found.message):
         known = fields_of(package, wrong[2])

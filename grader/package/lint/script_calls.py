@@ -12,9 +12,11 @@ from script_tree import (
     all_of,
     argument,
     called_name,
+    calls_in,
     dotted,
     is_call,
     is_call_alone,
+    of_roscpp,
     parents_of,
     slip,
     statements_of,
@@ -24,6 +26,23 @@ from script_tree import (
 
 TAKES_LATER = (*FUNCTIONS, ast.ClassDef)
 """What stands in these runs when they are called."""
+
+
+def calls_of_roscpp(tree):
+    """`rospy.spinOnce()`, where rospy runs callbacks in threads of its own, and `rospy.ok()`."""
+    stays = calls_in(tree, "spin") or [
+        n for n in all_of(tree, ast.While) if calls_in(n.test, "is_shutdown", "ok")
+    ]
+    for node in of_roscpp(tree):
+        owner, name = dotted(node.func.value), node.func.attr
+        statement = parents_of(tree)[node]
+        alone = len(getattr(parents_of(tree).get(statement), "body", ())) == 1
+        instead = "not rospy.is_shutdown()" if name == "ok" else "" if stays and not alone else "rospy.spin()"
+        fix = "on line %d, write `%s` instead of `%s.%s()`" % (node.lineno, instead, owner, name)
+        fix = fix if instead else "delete line %d" % node.lineno
+        other = "has `is_shutdown()`" if name == "ok" else "runs callbacks in threads of its own"
+        message = "rospy has no `%s`: it %s" % (name, other)
+        yield slip(node.lineno, "undefined", message, fix, "rospy.%s" % name if owner == "rospy" else owner)
 
 
 def locks_taken_twice(tree):

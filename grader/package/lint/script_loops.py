@@ -538,5 +538,8 @@ def goes_on(handler):
 
 
 def is_shutdown(node):
-    """Whether it is `rospy.is_shutdown`, and no attribute that a base class may have."""
-    return dotted(node).rpartition(".")[2] == "is_shutdown" and dotted(node) != "self.is_shutdown"
+    """Whether it is `rospy.is_shutdown`, or `ok` as in roscpp, and no attribute that a base class may have."""
+    name = dotted(node)
+    return name in ("rospy.ok", "ros.ok") or (
+        name.rpartition(".")[2] == "is_shutdown" and name != "self.is_shutdown"
+    )

@@ -18,6 +18,7 @@ from script_tree import (
     dotted,
     lines_from,
     names_in,
+    of_roscpp,
     parents_of,
     published_type,
     slip,
@@ -77,7 +78,8 @@ def misspelt(tree):
     unknown = [n for n in names if n.id not in known or id(n) in odd][:USES_LIMIT]
     strays = sorted({n.lineno for n in unknown if id(n) in outside and (n.id == "self" or n.id not in known)})
     yield from slips_outside(strays)
-    unknown = [n for n in unknown if id(n) not in outside or n.lineno not in strays]
+    told = {id(n.func.value) for n in of_roscpp(tree)}
+    unknown = [n for n in unknown if (id(n) not in outside or n.lineno not in strays) and id(n) not in told]
     of_classes = {id(n) for one in tree.body if isinstance(one, ast.ClassDef) for n in ast.walk(one)}
     for node in unknown:
         kind, line, message = "undefined", node.lineno, ""
@@ -127,6 +129,8 @@ def meant_for(node, tree, known, fitting, attributes):
         return "__name__"
     if node.id in known | OLD_NAMES:
         return ""
+    if node.id in ("ros", "rclpy") and "rospy" in fitting:
+        return "rospy"
     around = parents_of(tree).get(node)
     # what an object has is not meant by `name` in `self.name = name`
     others = attributes.difference(map(dotted, getattr(around, "targets", ())))

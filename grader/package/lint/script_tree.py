@@ -54,6 +54,13 @@ def calls_in(node, *names):
     return [n for n in getattr(node, "all_nodes", None) or ast.walk(node) if is_call(n, *names)]
 
 
+def of_roscpp(node):
+    """Return the calls of what roscpp has and rospy has not: `rospy.spinOnce()`, `ros.ok()`."""
+    return [
+        n for n in calls_in(node, "spinOnce", "spin_once", "ok") if dotted(n.func.value) in ("rospy", "ros")
+    ]
+
+
 def functions_in(tree):
     """Return the functions and methods of a module by their names."""
     return {n.name: n for n in all_of(tree, ast.FunctionDef)}
