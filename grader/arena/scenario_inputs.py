@@ -24,6 +24,7 @@ PROBE_SHAPES = (
 number is one that a lab counts."""
 # With fewer, there is no place in the middle for a value that comes twice.
 VALUES_FOR_ONE_TWICE = 4
+INTEGER_MAX = 10_000
 PAUSE_BEFORE_SAME = 3
 # The system's randomness: a student's process cannot work out the next values from those that it has seen.
 _random = random.SystemRandom()
@@ -90,8 +91,10 @@ def _repeat_one(values: list[str | int]) -> None:
 
 
 def _integers(probe: Probe, count: int, low: int, high: int) -> Iterator[int]:
-    """Yield so many integers that differ from each other and from those of `among`."""
+    """Yield so many integers that differ from each other and from those of `among`, none so large that a node which
+    adds or doubles them gets more than the type holds."""
     taken = set(probe.among)
+    low, high = max(low, -INTEGER_MAX), min(high, INTEGER_MAX)
     for _ in range(min(count, high - low + 1 - len(taken))):
         value = _random.randint(low, high)
         while value in taken:

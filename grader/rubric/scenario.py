@@ -109,7 +109,7 @@ class Probe(Record):
     text: Annotated[int, Field(ge=0)] = 0
     """How many random strings; if there are four or more, one comes twice in a row."""
     integers: Annotated[int, Field(ge=0)] = 0
-    """How many random values in the type's range; if there are four or more, one comes twice in a row."""
+    """How many random values in the type's range, within ±10 000; of four or more, one comes twice in a row."""
     among: tuple[int, ...] = ()
     """Values that have to be among the random ones."""
     values: tuple[Any, ...] = ()

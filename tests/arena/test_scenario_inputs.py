@@ -61,6 +61,14 @@ def test_one_of_many_numbers_comes_twice_in_a_row() -> None:
     assert {-128, 0, 127} <= set(values)
 
 
+@pytest.mark.parametrize(("kind", "largest"), [("Int8", 127), ("Int16", 10_000), ("UInt64", 10_000)])
+def test_the_sum_and_the_double_of_made_up_numbers_fit_a_wide_type(kind: str, largest: int) -> None:
+    numbers = Probe(topic="/n", type=f"std_msgs/{kind}", integers=100)
+    values = [shot.value for shot in make_shots((numbers,))]
+    assert largest // 2 < max(values) <= largest
+    assert -largest <= min(values)
+
+
 def test_topics_take_turns() -> None:
     numbers = Probe(topic="/n", type="std_msgs/Int8", integers=3)
     shots = make_shots((CHATTER, numbers))
