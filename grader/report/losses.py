@@ -126,12 +126,12 @@ def _joined(criterion: CriterionResult, scripts: Sequence[CriterionResult]) -> C
     found = [one.mistake for one in scripts if one.mistake]
     paths = [one.name for one in found]
     if criterion.check == INSTALL:
-        # The build runs each by the right Python, but its first line stays wrong.
+        # The build runs each by the right Python, whatever its mode, but its first line stays wrong.
         unstarted = [one for one in scripts if one.mistake and one.mistake.kind == "cannot-be-run"]
         why = _by_text(
             (one.message.partition("; ")[0].removeprefix(f"{_path(one)} "), one) for one in unstarted
         )
-        fixes = _by_text((one.hint, one) for one in unstarted if one.hint)
+        fixes = _by_text((re.sub(r"(^|; )chmod \+x [^;]*", "", one.hint), one) for one in unstarted)
         then = f"makes {join_words(paths)} executable"
         if why:
             then = f"makes {'programs' if len(paths) > 1 else 'a program'} of {join_words(paths)}"
@@ -141,6 +141,7 @@ def _joined(criterion: CriterionResult, scripts: Sequence[CriterionResult]) -> C
         more = [
             fix if all(path in fix for path in of) else f"in {join_words(of)}, {fix}"
             for fix, of in fixes.items()
+            if fix
         ]
         lines = (c for one in unstarted for c in one.citations if isinstance(c, FileCitation))
         update = {

@@ -183,6 +183,10 @@ def test_scripts_that_the_build_would_make_executable_are_told_with_their_instal
     )
     (loss,) = arrange(result(criteria=(*lines, install)), rubric()).lost
     assert loss.criterion.message == f"{message}; src/a.py and src/b.py cannot be run: there is no `#!` line"
+    both = (one.model_copy(update={"hint": f"write #!/bin/x; {one.hint}"}) for one in lines)
+    (loss,) = arrange(result(criteria=(*both, install)), rubric()).lost
+    end = "makes programs of src/a.py and src/b.py; in src/a.py and src/b.py, write #!/bin/x"
+    assert loss.criterion.hint == f"write src/a.py src/b.py; the build then {end}"
     other = install.model_copy(update={"message": "catkin_install_python(…) does not name src/a.py"})
     told = arrange(result(criteria=(*BITS, other)), rubric()).lost
     assert [(one.criterion.id, one.points) for one in told] == [("install", 15), ("listener-executable", 5)]
