@@ -317,9 +317,10 @@ def cite_word_of_call(verdict: Verdict, build: Run) -> Verdict:
         code = text.partition("#")[0]
         if written.search(code):
             place = of_call[0].model_copy(update={"line": number})
+            cited = (place if one is of_call[0] else one for one in verdict.citations)
             update = {
                 "message": f"{verdict.message[: found.start('line')]}{number}{verdict.message[found.end('line') :]}",
-                "citations": tuple(place if one is of_call[0] else one for one in verdict.citations),
+                "citations": tuple(dict.fromkeys(cited)),  # a repair may have cited the line
             }
             return verdict.model_copy(update=update)
         if ")" in code:

@@ -475,9 +475,9 @@ def test_a_call_of_catkins_that_is_commented_out_is_named(call: str, cited: bool
 def test_a_script_that_a_call_names_is_shown_on_its_own_line(text: str, line: int) -> None:
     build, _ = commented(text)
     why = "CMakeLists.txt: line {}: scr/a.py is named, but does not exist; the script is src/a.py"
-    lost = partial(0.5, why.format(1), citations=(FileCitation(file="CMakeLists.txt", line=1),))
-    found = cite_word_of_call(lost, build)
-    assert (found.message, found.citations[0].line) == (why.format(line), line)  # type: ignore[union-attr]
+    of_call, repaired = (FileCitation(file="CMakeLists.txt", line=one) for one in (1, line))
+    found = cite_word_of_call(partial(0.5, why.format(1), citations=(of_call, repaired)), build)
+    assert (found.message, set(found.citations)) == (why.format(line), {repaired})
 
 
 MANIFEST_LINES = (

@@ -356,7 +356,7 @@ def _replace_stray(files: Files, own: Sequence[str], path: str) -> bool:
             given = _plain(token.value)
             same = re.sub(r"[\\/]", "", given) == path.replace("/", "")
             if given not in own and (same or _is_about(PurePosixPath(given).name, name)):
-                why = f"{token.value} does not exist; the script is {path}"
+                why = f"{token.value} is named, but does not exist; the script is {path}"
                 change_word(files, token, path, why, f"write {path} instead of {token.value}")
                 return True
     return False
