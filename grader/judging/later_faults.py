@@ -459,7 +459,7 @@ class Later:
             yield Fix(f"write %s instead of {place[0]} on {_line(right[0])}")
         unheard = not self._ran or not (isinstance(self._run, Run) and probes_on(self._run, self._topic))
         if not unheard or template == VALUE:
-            yield from self._unprinted() if unheard and len(heard) <= 1 else ()
+            yield from self._unprinted(heard) if unheard and len(heard) <= 1 else ()
             return
         if right and len(heard) == 1 and self._has_no_field(right[0]) and ".data`" not in self._verdict.hint:
             yield Fix(f"print the `data` of the message on {_line(right[0])}")
@@ -493,9 +493,10 @@ class Later:
         """Return the other lines that make a message of the slip's type, and none for another publisher."""
         return lines_making(self._lines(slip.file)[:LINES_READ], slip, self._of("publisher"))
 
-    def _unprinted(self) -> Iterator[Fix]:
+    def _unprinted(self, heard: Sequence[PythonSlip]) -> Iterator[Fix]:
+        topics = {self._topic.strip("/"), *(one.message.strip("/") for one in heard)}
         for slip in self._of("not-printed", "printed-in-part"):
-            if slip.name.strip("/") == self._topic.strip("/"):
+            if slip.name.strip("/") in topics:
                 yield Fix(f"{slip.fix}: {slip.message}", (slip.fix,))
 
     def _fields(self, wanted: str, slip: PythonSlip) -> Iterator[Fix]:

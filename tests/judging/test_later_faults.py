@@ -179,6 +179,10 @@ CASES: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str,
     "listener's words behind another topic": (
         "hears", DEAF, [NODE | ROOT, HEARS], [slip("subscriber", "hello"), slip("prints", "{}got {data}", 7)],
         f"; then print 'I heard <message>' on line 7 of {FILE}, not '<value>got <message>'"),
+    "what is not printed behind another topic": (
+        "hears", DEAF, [NODE | ROOT, HEARS | {"with": {"topic": "/chatter"}}],
+        [slip("subscriber", "hello"), slip("not-printed", "line 7 prints nothing", name="hello", fix="print it")],
+        "; then print it: line 7 prints nothing"),
     "two copies of one name behind an error": (
         "node", DIES, [NODE | ROOT, COPIES], [slip("node-name", "talker", 11)],
         f"write anonymous=True on line 11 of {FILE}, since two of it run at once"),
