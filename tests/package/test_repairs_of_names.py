@@ -149,6 +149,14 @@ def test_classes_of_messages_are_in_their_module(wrong: str, right: str | None) 
     assert [step["text"] for step in found["steps"]] == ([text.format(right)] if right else [])
 
 
+def test_a_field_of_another_message_is_none_of_a_scan() -> None:
+    text = "import rospy\nfrom sensor_msgs.msg import LaserScan, Range\n\n\ndef hear(m):\n    print(m.range)\n\n\n"
+    text += "rospy.init_node('n')\nrospy.Subscriber('scan', {}, hear)\nrospy.spin()\n"
+    for kind, field in (("LaserScan", "ranges"), ("Range", "range")):
+        (found,) = list(examine([["a.py", text.format(kind)]], [], {}, ""))
+        assert ([text.format(kind), *(s["text"] for s in found["steps"])][-1]).count(f"print(m.{field})") == 1
+
+
 def test_a_class_that_is_called_as_one_of_rospy_has_other_members() -> None:
     text = "import rospy\n\n\nclass Publisher:\n    def Publish(self):\n        self.pub = rospy.Publisher('t')\n"
     text += "        self.pub.{}('')\n\n\nrospy.init_node('a')\nPublisher().Publish()\n"

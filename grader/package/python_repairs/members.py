@@ -55,6 +55,12 @@ OF_MESSAGES = tuple(FIELD_NAMES.split())
 """What belongs to messages of `OF_ROS`, without names of three letters and less, and to their times."""
 OF_ROS = tuple(f"{one}_msgs.msg" for one in ("std", "geometry", "nav", "sensor"))
 
+OF_SCANS = (
+    *("header", "angle_min", "angle_max", "angle_increment", "time_increment", "scan_time"),
+    *("range_min", "range_max", "ranges", "intensities"),
+)
+"""The fields of LaserScan, since another message has `range`."""
+
 NUMBERS = [f"{kind}{bits}" for kind in ("Int", "UInt", "Float") for bits in (8, 16, 32, 64)]
 OF_ONE_FIELD = frozenset(("Bool", "Byte", "Char", "String", *NUMBERS))
 """The messages of std_msgs that have `data` alone."""
@@ -200,7 +206,8 @@ def _misspelt_members(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
     stored = {n.attr for n in nodes_in(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
     fields_of, lacking = known.fields(tree), _Lacking(tree)
     of_ros, of_data = _inside_messages(tree, kinds), _instead_of_data(tree)
-    messages = {**_messages_of_callbacks(tree, fields_of), **of_ros}
+    heard = _messages_of_callbacks(tree, {"LaserScan": OF_SCANS, **fields_of})
+    messages = {**of_ros, **{use: fields for use, fields in heard.items() if fields}}
     for node in (n for n in nodes_in(tree) if isinstance(n, ast.Attribute)):
         members: Collection[str] = messages.get(id(node.value), ())
         of_text = isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
