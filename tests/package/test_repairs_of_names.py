@@ -150,8 +150,8 @@ def test_classes_of_messages_are_in_their_module(wrong: str, right: str | None) 
 
 
 def test_a_field_of_another_message_is_none_of_a_scan() -> None:
-    text = "import rospy\nfrom sensor_msgs.msg import LaserScan, Range\n\n\ndef hear(m):\n    print(m.range)\n\n\n"
-    text += "rospy.init_node('n')\nrospy.Subscriber('scan', {}, hear)\nrospy.spin()\n"
+    text = "import rospy\nfrom sensor_msgs.msg import {0}\n\n\ndef hear(m):\n    print(m.range)\n\n\n"
+    text += "rospy.init_node('n')\nrospy.Subscriber('scan', {0}, hear)\nrospy.spin()\n"
     for kind, field in (("LaserScan", "ranges"), ("Range", "range")):
         (found,) = list(examine([["a.py", text.format(kind)]], [], {}, ""))
         assert ([text.format(kind), *(s["text"] for s in found["steps"])][-1]).count(f"print(m.{field})") == 1

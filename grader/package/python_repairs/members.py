@@ -206,8 +206,7 @@ def _misspelt_members(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
     stored = {n.attr for n in nodes_in(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
     fields_of, lacking = known.fields(tree), _Lacking(tree)
     of_ros, of_data = _inside_messages(tree, kinds), _instead_of_data(tree)
-    heard = _messages_of_callbacks(tree, {"LaserScan": OF_SCANS, **fields_of})
-    messages = {**of_ros, **{use: fields for use, fields in heard.items() if fields}}
+    messages = {**_messages_of_callbacks(tree, fields_of), **of_ros, **_heard_scans(tree)}
     for node in (n for n in nodes_in(tree) if isinstance(n, ast.Attribute)):
         members: Collection[str] = messages.get(id(node.value), ())
         of_text = isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
@@ -303,6 +302,25 @@ def _messages_of_callbacks(
         for use in nodes_in(function)
         if isinstance(use, ast.Name) and use.id == function.args.args[-1].arg
     }
+
+
+def _heard_scans(tree: ast.Module) -> dict[int, Collection[str]]:
+    """Return the fields of a scan, by the identity of each use of what a function takes and whose `range` is asked for,
+    in a script whose only message with ranges is that one."""
+    nodes = list(nodes_in(tree))
+    classes = {
+        a.name
+        for n in nodes
+        if isinstance(n, ast.ImportFrom) and n.module == "sensor_msgs.msg"
+        for a in n.names
+    }
+    taken = {n.arg for n in nodes if isinstance(n, ast.arg)}
+    parts = [
+        n for n in nodes if isinstance(n, ast.Attribute) and n.attr == "range" and last_name(n.value) in taken
+    ]
+    is_plain = all(isinstance(n.value, ast.Name) and isinstance(n.ctx, ast.Load) for n in parts)
+    is_scan = "LaserScan" in classes and classes.isdisjoint({"Range", "*"})
+    return dict.fromkeys((id(n.value) for n in parts), OF_SCANS) if is_scan and is_plain else {}
 
 
 def _inside_messages(tree: ast.Module, kinds: Mapping[str, str]) -> dict[int, Collection[str]]:
