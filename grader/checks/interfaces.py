@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
 from grader.checks.support.scripts import OF_FILES, cmake_calls
-from grader.checks.support.text import shown
+from grader.checks.support.text import near_names, shown
 from grader.model.file_fault import Fault
 from grader.model.message_definitions import (
     BUILT_IN,
@@ -139,6 +139,9 @@ def _unlisted(found: Interface | None, package: PackageFacts) -> str:
     if not name or "FILES" not in words or name in words or any("$" in word for word in words):
         return ""
     place = f"line {calls[-1].line} of {calls[-1].file}"
+    near = near_names(name, words) or [word for word in words if name.startswith(f"{word}.")]
+    if near:
+        return f"in {command}(…), {place}, write {name} instead of {near[0]}"
     return f"list {name} in {command}(…), {place}: the build makes nothing of it yet"
 
 

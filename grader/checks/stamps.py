@@ -138,8 +138,9 @@ def _stamp_fields(value: Mapping[str, Any]) -> tuple[float, bool, str | None]:
 
 
 def _now(params: StampsParams) -> str:
-    item, _, name = _name(params).rpartition("[*].")
-    return f"set it just before each publish: {'msg.' if not item else 'each '}{name} = {NOW}"
+    items, _, name = _name(params).rpartition("[*].")
+    each = f", in each of its {items}: `….{name} = {NOW}`" if items else f": msg.{name} = {NOW}"
+    return f"set it just before each publish{each}"
 
 
 def _nothing_to_judge(

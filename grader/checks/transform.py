@@ -198,8 +198,12 @@ def _not_sent(
     ]
     ended = None if near else no_node(package, run, f"{params.name} is not sent")
     other = f" ({shown(join_words(near))})" if near else ""
+    instead = _frames_instead(edges, wanted)
+    meant = [(one, name) for one in instead for name in near_names(one, wanted)]
+    if len(instead) == len(meant) == 1:
+        hint = "write '{1}' in place of '{0}'".format(*meant[0])
     verdict = failed(f"{params.name} is not sent; there is {_edge_words(edges)}{other}", hint=hint)
-    return ended or verdict.seeking("quoted", *_frames_instead(edges, wanted))
+    return ended or verdict.seeking("quoted", *instead)
 
 
 def _swapped_there(package: PackageFacts, verdict: Verdict, wanted: tuple[str, str]) -> Verdict:
@@ -213,7 +217,8 @@ def _swapped_there(package: PackageFacts, verdict: Verdict, wanted: tuple[str, s
     if len(named) != 1:
         return verdict
     one = named[0]
-    hint = f"on line {one.line} of {one.file}, swap '{wanted[0]}' and '{wanted[1]}'"
+    where = one.fix or f"line {one.line}"
+    hint = f"on {where} of {one.file}, swap '{wanted[0]}' and '{wanted[1]}'"
     return verdict.explained(f"see line {one.line} of {one.file}", hint, (one.place,))
 
 

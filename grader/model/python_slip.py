@@ -120,7 +120,8 @@ class PythonSlip(Placed, Record):
       drawn at random by the call that `message` names.
     - `rate-as-time`: a time that is given a rate, or the other way round, by its name: a slip only where what it times
       comes far too seldom.
-    - `frames`: two texts that are given next to each other, `message` and `name`, in a script that sends transforms.
+    - `frames`: two texts that are given next to each other, `message` and `name`, in a script that sends transforms
+      (`fix`: on which lines, if on two).
     - `start-value`, `added-first`: where a counter, `name`, gets its first number, `message`, and where a loop adds one
       to it before it publishes (`fix`: which lines to move).
     - `way-number`: the only line that gives a variable `name` its number, `message`, which is a `distance` or a `time`

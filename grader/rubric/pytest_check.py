@@ -336,7 +336,12 @@ def _judge_tests(outcome: SessionOutcome, params: PytestParams) -> Verdict:
 def _score_tests(counted: list[TestOutcome], score: float) -> Verdict:
     lost = [t for t in counted if t.outcome == "failed"]
     passing = f"{len(counted) - len(lost)} of {len(counted)} tests pass"
-    what_to_do = dict.fromkeys(t.hint for t in lost if t.hint)
+    with_hint = {t.hint: t for t in reversed(lost) if t.hint}
+    # what the first test came to is told in the message, what another one raised only here
+    what_to_do = [
+        hint if t is lost[0] or " raises " not in t.message else f"{t.name}: {t.message}: {hint}"
+        for hint, t in reversed(with_hint.items())
+    ]
     untold = [t for t in lost if not t.hint]
     same = {
         message: [t for t in untold if t.message == message]

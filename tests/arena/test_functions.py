@@ -159,6 +159,7 @@ def test_functions_are_called_and_judged_from_the_evidence(tmp_path: Path) -> No
         ("long", "long(): gives back more than"),
         ("deep", "deep(): its answer cannot be read"),
         ("none", f"{FILE} has no function none, only forward (line 9), divide (line 14), count (line 18)"),
+        ("Count", f"{FILE} has no function Count; line 18 calls it count"),
         ("stay", "stay(): it did not end within its time"),
     ],
 )

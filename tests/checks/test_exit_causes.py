@@ -427,6 +427,24 @@ def test_a_float_for_the_seconds_of_a_stamp_is_told_with_its_line(tmp_path):
     assert found.hint == "on line 1, write `msg.header.stamp = rospy.Time.now()`"
 
 
+def test_arguments_that_are_texts_are_told_with_all_of_their_lines(tmp_path):
+    """Python names the first field alone; an argument that the call does not get is none of them."""
+    text = "x = sys.argv[1]\ny = sys.argv[2]\nname = sys.argv[3]\nadd(x, y)\n"
+    error = "rospy.service.SerializationError: field a must be an integer type"
+    found = explained(tmp_path, {"node.py": text}, ("node.py", 4, "add(x, y)"), error=error)
+    assert found.hint == "on line 1, write `x = int(sys.argv[1])`; on line 2, write `y = int(sys.argv[2])`"
+
+
+def test_what_a_script_raises_itself_is_no_riddle_of_pythons(tmp_path):
+    found = explained(
+        tmp_path,
+        {"node.py": "raise Exception('far')\n"},
+        ("node.py", 1, "raise Exception('far')"),
+        error="Exception: far",
+    )
+    assert found.hint.startswith("the script raises this itself")
+
+
 def test_a_message_of_the_other_package_is_told_with_its_import(tmp_path):
     source = "from lab.msg import Reading"
     package = package_of(tmp_path / "lab", {"node.py": source})

@@ -341,6 +341,11 @@ CASES = {
         ["build-line"], "write add_service_files instead of add_message_files",
         after={CMAKELISTS: "add_service_files(FILES Two.srv)"},
     ),
+    "own-service-without-its-suffix": Case(
+        {**SERVICE, CMAKELISTS: SERVICE_CMAKE.replace("Two.srv", "Two")},
+        ["build-line"], "write Two.srv instead of Two",
+        after={CMAKELISTS: "add_service_files(FILES Two.srv)"},
+    ),
     "own-service-with-two-dashes": Case(
         {**SERVICE, "srv/Two.srv": "int64 a\n--\nint64 b\n", CMAKELISTS: SERVICE_CMAKE},
         ["build-line"], "line 2 does not divide its parts: that takes three of `-`",

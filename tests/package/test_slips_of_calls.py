@@ -141,16 +141,21 @@ def test_frames_that_are_given_to_each_other(lines: tuple[str, str], tmp_path: P
 @pytest.mark.parametrize(
     ("text", "found"),
     [
-        ("b.sendTransform(stamped('odom', 'base'))", [(1, "odom", "base")]),
-        ("b.sendTransform(t)\nt.child_frame_id = 'base'\nt.header.frame_id = 'odom'", [(2, "odom", "base")]),
+        ("b.sendTransform(stamped('odom', 'base'))", [(1, "odom", "base", "")]),
+        (
+            "b.sendTransform(t)\nt.child_frame_id = 'base'\nt.header.frame_id = 'odom'",
+            [(2, "odom", "base", "lines 2 and 3")],
+        ),
         ("b.sendTransform(t)\nx = buffer.lookup_transform('odom', 'base', t)", []),
         ("say('odom', 'base')", []),
     ],
 )
-def test_two_frames_beside_each_other(text: str, found: list[tuple[int, str, str]], tmp_path: Path) -> None:
+def test_two_frames_beside_each_other(
+    text: str, found: list[tuple[int, str, str, str]], tmp_path: Path
+) -> None:
     (tmp_path / "a.py").write_text(text + "\n")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "frames"]
-    assert [(s.line, s.message, s.name) for s in slips] == found
+    assert [(s.line, s.message, s.name, s.fix) for s in slips] == found
 
 
 @pytest.mark.parametrize(

@@ -128,7 +128,9 @@ def answer(folder, request, modules, changed):  # noqa: PLR0911 - each answer is
                 return dict(describe(error, folder), imports=name)
         called = getattr(modules[name], function, None)
         if not callable(called):
-            return {"missing": "{} has no function {}{}".format(name, function, others(modules[name]))}
+            return {
+                "missing": "{} has no function {}{}".format(name, function, others(modules[name], function))
+            }
         given = called(*decode(request["args"]), **dict(decode(request["kwargs"])))
     except BaseException as error:  # noqa: BLE001 - whatever the package's code raises, SystemExit too
         return describe(error, folder)
@@ -162,10 +164,13 @@ def load(path, source=None):
     return module
 
 
-def others(module):
-    """Return which functions the file has instead, with their lines."""
+def others(module, asked):
+    """Return which functions the file has instead, with their lines; the one alone that differs by its capitals."""
     given = [f for f in vars(module).values() if hasattr(f, "__code__")]
     found = [f for f in given if f.__module__ == module.__name__]
+    for f in found:
+        if f.__name__.lower() == asked.lower():
+            return "; line {} calls it {}".format(f.__code__.co_firstlineno, f.__name__)
     shown = ["{} (line {})".format(f.__name__, f.__code__.co_firstlineno) for f in found[:OTHERS_MAX]]
     return ", only " + ", ".join(shown) if shown else ""
 

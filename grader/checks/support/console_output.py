@@ -467,6 +467,12 @@ class Traceback(NamedTuple):
         """The innermost of these; one without a file where there is none."""
         return self.own_frames[-1] if self.own_frames else Frame("", 0)
 
+    @property
+    def is_of_timer(self) -> bool:
+        """Whether a timer's own thread divides by its period."""
+        innermost = self.frames[-1].file if self.frames else ""
+        return self.kind == "ZeroDivisionError" and innermost.endswith("/rospy/timer.py")
+
 
 def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
     """Return every traceback, also the bare `File …` form of a syntax error. One that was cut short is left out."""

@@ -152,12 +152,10 @@ def _index(message: str, source: str, marked: tuple[int, int] | None) -> Meaning
         return f"`{name}` has no element {index}", fix
     if index.isdecimal():
         parts = plural(int(index) + 1, "element")
+        fewer, last = f"`{name}` has fewer than {parts}", f"the last one is `len({name}) - 1`"
         if name.endswith("ranges") and index != "0":  # of a laser, whose scans all have as many
-            hint = (
-                f"choose a smaller index than {index}: they begin at 0, and the last one is `len({name}) - 1`"
-            )
-            return f"`{name}` has fewer than {parts}", hint
-        return f"`{name}` has fewer than {parts}", f"check `len({name}) > {index}` first: {NUMBER_OF_PARTS}"
+            return fewer, f"choose a smaller index than {index}: they begin at 0, and {last}"
+        return fewer, f"check `len({name}) > {index}` first: {NUMBER_OF_PARTS}"
     own = f"keep `{index}` below `len({name})`, or give `{name}` more elements"
     hint = f"check `len({name})` first: {NUMBER_OF_PARTS}" if index.startswith("-") else own
     return f"`{name}` has no element {index}", hint
@@ -429,12 +427,14 @@ def _future(message: str, source: str, _marked: tuple[int, int] | None) -> Meani
 def no_number(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
     """Return where a text comes from that a message takes for a number; None for what is published."""
     kind = "int" if "integer" in found.message else "float"
-    read = next((s for s in package.slips if (s.file, s.kind) == (place.file, "argument-text")), None)
-    if read is not None:
-        fix = read.fix
+    texts = [s for s in package.slips if (s.file, s.kind) == (place.file, "argument-text")]
+    said = " ".join(frame.source for frame in found.own_frames)
+    # Python names the first of them alone
+    if reads := [s for s in texts if re.search(rf"\b{re.escape(s.name)}\b", said)] or texts[:1]:
+        fix = "; ".join(f"on line {s.line}, write `{s.fix}`" for s in reads)
         if kind == "float":
             fix = fix.replace("map(int, ", "map(float, ").replace("= int(", "= float(")
-        return "a command-line argument is a string", f"on line {read.line}, write `{fix}`"
+        return "a command-line argument is a string", fix
     if ".publish(" in found.innermost.source:
         return None
     fix = f"turn the value into one first: {as_number(kind, found.own_frames[-1].source)}"

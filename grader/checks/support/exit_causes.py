@@ -80,6 +80,10 @@ from grader.wording import NOTHING_TO_DO, ON_THE_MACHINE, join_words, on_lines
 OTHER_NAMES_SHOWN = 3
 """Names of the same script that are not defined either."""
 MAIN = "`if __name__ == '__main__':`"
+LOOK_THERE = "look at that line: the last words say what Python cannot do there"
+RAISED = (
+    "the script raises this itself: is it the exception that the handout asks for, and its condition right?"
+)
 RUN_IT = "run it by itself with rosrun, and read what it prints last"
 BY_ROSCPP = -5
 """With which roslaunch sees a program end that roscpp ends: SIGTRAP, which not every system's `signal` has."""
@@ -355,7 +359,7 @@ def _known_meaning(found: Traceback, place: FileCitation | None, package: Packag
         or _slip(found, package)
         or _asks_for_input(found, place, package)
         or old_encoding(package, found.kind, {one.file for one in found.frames})
-        or CAUSES.get(found.kind, ("", "look at that line: the last words say what Python cannot do there"))
+        or CAUSES.get(found.kind, ("", RAISED if found.innermost.source.startswith("raise ") else LOOK_THERE))
     )
 
 
@@ -530,15 +534,7 @@ def _callback(found: Traceback, place: FileCitation | None, package: PackageFact
 
 def _of_timer(found: Traceback, package: PackageFacts) -> PythonSlip | None:
     """The timer whose thread divides by its period, 0, before its callback is called once."""
-    return next((s for s in package.slips if s.name == "zero" and _is_timers(found)), None)
-
-
-def _is_timers(found: Traceback) -> bool:
-    return (
-        found.kind == "ZeroDivisionError"
-        and bool(found.frames)
-        and found.frames[-1].file.endswith("/rospy/timer.py")
-    )
+    return next((s for s in package.slips if s.name == "zero" and found.is_of_timer), None)
 
 
 def process_tracebacks(
@@ -563,7 +559,7 @@ def is_rospys_own(found: Traceback) -> bool:
     if found.innermost.source.startswith("raise ") and _is_answer(found):
         return True
     race = found.kind == "ROSException" and any(said in found.message for said in RACES)
-    if _is_timers(found) or (found.kind == "TypeError" and _ARITY.match(found.message)):
+    if found.is_of_timer or (found.kind == "TypeError" and _ARITY.match(found.message)):
         return False  # a timer's period, or a callback that takes other values: rospy's line uses it
     return race or (bool(found.frames) and not found.own_frames)
 

@@ -202,8 +202,9 @@ def frames_named(tree):
     for pair in texts.values():
         if len(pair) == 2:
             child, parent = sorted(pair, key=lambda n: frame_field(n)[1])
-            line = min(parent.lineno, child.lineno)
-            yield slip(line, "frames", text_of(parent.value), "", text_of(child.value))
+            lines = sorted({parent.lineno, child.lineno})
+            both = "lines %d and %d" % (lines[0], lines[-1]) if len(lines) > 1 else ""
+            yield slip(lines[0], "frames", text_of(parent.value), both, text_of(child.value))
     for call in all_of(tree, ast.Call):
         words = [text_of(one) for one in [*call.args, *(k.value for k in call.keywords)]]
         if sum(map(bool, words)) == 2 and called_name(call) not in LOOK_UPS:

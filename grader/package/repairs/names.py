@@ -221,11 +221,15 @@ def _each(field: str, names: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401 
 
 
 def is_near(name: str, wanted: str) -> bool:
-    """Return whether `name` is a slip of `wanted`: one letter, capitals, or a leading slash."""
+    """Return whether `name` is a slip of `wanted`: one letter, capitals, a leading slash, or no `.msg` behind it."""
     if name == wanted or min(len(name), len(wanted)) < SHORTEST:
         return False
     one, other = (text.casefold().lstrip("/~") for text in (name, wanted))
-    return one == other or is_one_edit(one, other)
+    return (
+        one == other
+        or is_one_edit(one, other)
+        or other in {f"{one}{end}" for end in (".msg", ".srv", ".action")}
+    )
 
 
 SHORTEST = 3
