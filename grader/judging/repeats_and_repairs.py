@@ -220,7 +220,8 @@ def _at_new_paths(verdict: Verdict, repairs: Iterable[Repair]) -> Verdict:
 def _without_others(verdict: Verdict, others: Sequence[Repair], charged: Sequence[Repair]) -> Verdict:
     """Return the loss as blocked where what was found is in lines that other repairs made readable, or is repaired by
     these alone: the criterion that these are charged to tells it."""
-    theirs = any(repair_charges.is_told(one, verdict.hint) for one in others)
+    of_build = verdict.basis.unbuilt and any(one.kind in repair_charges.OF_BUILDS for one in others)
+    theirs = of_build or any(repair_charges.is_told(one, verdict.hint) for one in others)
     own = any(repair_charges.is_told(one, verdict.hint) for one in charged)
     lines = repair_charges.lines_read_now(others)
     if cited_lines(verdict.citations).isdisjoint(lines) and (own or not theirs):

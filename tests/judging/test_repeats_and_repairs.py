@@ -23,7 +23,7 @@ from grader.judging.repeats_and_repairs import (
 from grader.model.repair import Repair
 from grader.model.verdict import FileCitation, failed, failed_or_blocked
 from grader.package.launch import parse_launch_files
-from tests.support.rubrics import ALL, GOOD_RUN, NODE, PACKAGE, SCENARIO, SCRIPT, on_copy, rubric
+from tests.support.rubrics import ALL, GOOD_RUN, NODE, PACKAGE, SCENARIO, SCRIPT, built, on_copy, rubric
 from tests.support.timeline import build_runs
 from tests.support.timeline_facts import complete_facts
 
@@ -386,3 +386,44 @@ def test_names_of_two_kinds_are_told_where_each_is_seen() -> None:
     asked = rubric(*({**one, "requires": []} for one in ALL if one["id"] in lost))
     needs = dict.fromkeys(lost, (topic, parameter))
     assert charge_repairs(asked, lost, needs.keys(), needs) == {topic: {"rate"}, parameter: {"chatter"}}
+
+
+def test_what_the_build_did_not_make_is_no_fault_of_a_node_that_has_another_one() -> None:
+    """The node is charged with what it lacks once it is built."""
+    lacking = [
+        "Traceback (most recent call last):",
+        '  File "/ws/src/lab1/src/numeric_talker.py", line 2, in <module>',
+        "ModuleNotFoundError: No module named 'lab1'",
+    ]
+    console = {"process": "talker", "stream": "stderr", "at_s": 0.2, "every_s": 0.001, "lines": lacking}
+    died = {"processes": [{"name": "talker", "script": SCRIPT["path"], "exit_s": 0.3, "exit_code": 1}]}
+    package = {
+        **PACKAGE,
+        "name": "lab1",
+        "manifest": {},
+        "interfaces": [{"path": "msg/Num.msg", "fields": []}],
+    }
+    line = Repair(
+        kind="build-line",
+        file="msg/Num.msg",
+        line=1,
+        before="boolean on",
+        after="bool on",
+        message="line 1 of msg/Num.msg: there is no field type boolean",
+        fix="write `bool on`",
+    )
+    spin = Repair(
+        kind="missing-call",
+        file=SCRIPT["path"],
+        line=9,
+        before="talk()",
+        after="talk()\nrospy.spin()",
+        message="it ends as soon as it is set up",
+        fix="write rospy.spin()",
+    )
+    first = {**died, "console": [console], "outcome": "ended"}
+    runs = build_runs({"runs": {"talker": first}, "package": package}) | built(package, exit_code=1)
+    good = build_runs({"runs": {"talker": GOOD_RUN}, "package": package}) | built(package, exit_code=0)
+    asked = rubric({"id": "build", "check": "build"}, {**NODE, "requires": []})
+    found = {c.id: c for c in judge(asked, runs | on_copy(good, line, spin))}
+    assert found["node"].message == spin.message
