@@ -202,7 +202,7 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
         return not_started("the listener").about(measured="not started")
     subscribed = topics_with(run, "subscribers")
     measured = f"subscribed to {join_words(subscribed)}" if subscribed else "no subscription"
-    differing = refused_type(run, topic)
+    differing = refused_type(run, topic, package)
     end = explain_early_end(package, run)
     # A refused type is a cause of its own, whatever ended the node later.
     if end is not None and differing is None:

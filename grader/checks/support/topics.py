@@ -345,8 +345,9 @@ def _heard_topics(run: Run) -> list[str]:
     return [topic for topic in sent if topic in others]
 
 
-def refused_type(run: Run, topic: str) -> Verdict | None:
-    """Return the verdict where the grader's publisher had to refuse a node, which asked for another type."""
+def refused_type(run: Run, topic: str, package: PackageFacts | None = None) -> Verdict | None:
+    """Return the verdict where the grader's publisher had to refuse a node, which asked for another type; with the line
+    that subscribes, where the package is given and has one."""
     asked = next((e for _, e in run.actors if e.action == "note" and e.topic == topic and e.type), None)
     if asked is None:
         return None
@@ -359,7 +360,7 @@ def refused_type(run: Run, topic: str) -> Verdict | None:
         of_types, _, name = asked.value.partition("/")
         hint = f"{hint}, with `{imports(of_types, name, 'msg')}` at the top"
         hint = "; ".join(filter(None, (hint, fields_to_read(asked.type or "", asked.value))))
-    return failed(message, hint=hint)
+    return failed(message, hint=hint, citations=named_at(package, run, "subscriber", topic) if package else ())
 
 
 def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
@@ -377,14 +378,14 @@ def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
     }
     # Subscribed and never connected: their types may differ.
     heard = [topic for topic in topics if topic not in missed and topic not in connected]
-    if refused := next(filter(None, (refused_type(run, topic) for topic in heard)), None):
+    if refused := next(filter(None, (refused_type(run, topic, package) for topic in heard)), None):
         return refused
     near = next(((topic, found) for topic in missed if (found := near_names(topic, others))), None)
     # A node need not hear every topic: one that is missed counts if all are, or if a name is nearly the same.
     if not missed or not run.student_nodes() or (near is None and len(missed) < len(topics)):
         return None
     topic, found = near or (missed[0], offered.get(missed[0], others))
-    if refused := refused_type(run, topic):
+    if refused := refused_type(run, topic, package):
         return refused
     if topic in TF_TOPICS:
         fills = "`listener = tf2_ros.TransformListener(buffer)` fills the buffer"
