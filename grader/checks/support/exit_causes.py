@@ -61,6 +61,7 @@ from grader.checks.support.text import (
     NEEDS_NETWORK,
     NO_INPUT,
     OFFLINE,
+    PAUSE,
     SPIN,
     VALUE_SLOT,
     explain_arguments,
@@ -474,14 +475,16 @@ def _asks_for_input(
         instead = f"write {value} in place of `{number[0]}…))`"
     elif "once" in asks.values():
         instead = "write a value in the code in place of `input()`"
-    if found.kind == "EOFError" and instead:
-        return CAUSES["EOFError"][0], instead
-    if found.kind != "EOFError" or place is None or place.file not in rated:
+    has_rate = place is not None and place.file in rated
+    if found.kind != "EOFError" or not (instead or has_rate):
         return None
-    in_place = f"{NO_INPUT}; {fixes[0]}" if fixes else NO_INPUT
-    if "paused" in asks.values():
-        return CAUSES["EOFError"][0], in_place
-    return CAUSES["EOFError"][0], f"{in_place}, and make sure that the loop calls `sleep()` of its Rate"
+    in_place = instead or (f"{NO_INPUT}; {fixes[0]}" if fixes else NO_INPUT)
+    # what is typed is what such a loop waits for
+    waits = "" in asks.values() or (not instead and "paused" not in asks.values())
+    pause = (
+        "make sure that the loop calls `sleep()` of its Rate" if has_rate else f"pause in the loop: {PAUSE}"
+    )
+    return CAUSES["EOFError"][0], f"{in_place}, and {pause}" if waits else in_place
 
 
 def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
