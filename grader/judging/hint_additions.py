@@ -68,6 +68,21 @@ OF_FILES = ("build", "cmake", "manifest")
 """Checks whose criterion takes the advice: it is of the package as a whole."""
 
 
+_RENAMES = re.compile(r", or rename (?P<names>/[^;]*?) if that is meant to be it")
+
+
+def keep_other_names(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdict:
+    """Return a verdict whose hint renames no topic and no service that another criterion asks for."""
+    asked = {text for c in rubric.criteria if c.id != criterion.id for text in texts_in(c.parameters)}
+
+    def free(found: re.Match[str]) -> str:
+        names = [name for name in re.findall(r"/[\w/]+", found["names"]) if name not in asked]
+        return f", or rename {join_words(names, 'or')} if that is meant to be it" if names else ""
+
+    hint = _RENAMES.sub(free, verdict.hint)
+    return verdict if hint == verdict.hint else verdict.model_copy(update={"hint": hint})
+
+
 def add_advice(
     results: Sequence[CriterionResult], package: PackageFacts, rubric: Rubric
 ) -> tuple[CriterionResult, ...]:

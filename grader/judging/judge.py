@@ -55,6 +55,7 @@ from grader.judging.hint_additions import (
     choose_hint_language,
     compile_command,
     fill_slots,
+    keep_other_names,
     lab_names,
     name_connections,
     name_other_imports,
@@ -366,7 +367,7 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
         found = fill_slots(choose_hint_language(found, criterion, facts), criterion, facts.rubric)
         found = name_other_imports(name_other_lines(found, facts), criterion, facts)
         found = allow_typing(name_other_parameters(found, criterion, facts), criterion, facts)
-        found = name_connections(found, facts)
+        found = keep_other_names(name_connections(found, facts), criterion, facts.rubric)
         found = _with_package_name(found, criterion, facts)
         found = name_same_file(name_rospy(found, criterion, facts), criterion, facts)
         return _without_git(found, facts.package)

@@ -396,14 +396,13 @@ class Later:
         lines = [one.line for one in published if f"/{one.message.lstrip('/')}" == self._topic]
         if self._in_comment() or "of its base class" in self._verdict.message:  # which may have the publisher
             return
-        if len(published) == 1 and not lines and not self._ran:
-            other = published[0]
-            if f"/{other.message.lstrip('/')}" in self._topics_of_others():
-                yield Fix(
-                    f"add a publisher of {kind} on {self._topic}: {other.file} has only the one of {other.message}"
-                )
-                return
-            yield Fix(f"publish on {self._topic} on {_line(published[0])}, not on {published[0].message}")
+        other = published[0] if len(published) == 1 and not lines else None
+        if other is not None and f"/{other.message.lstrip('/')}" in self._topics_of_others():
+            has = f"{other.file} has only the one of {other.message}"
+            yield from [] if self._ran else [Fix(f"add a publisher of {kind} on {self._topic}: {has}")]
+            return
+        if other is not None and not self._ran:
+            yield Fix(f"publish on {self._topic} on {_line(other)}, not on {other.message}")
         own = [one for one in self._of("publisher-type") if one.message == kind.rpartition("/")[2]]
         named = self._ran and {one.line for one in own} & {one.line for one in published}
         if len(published) > 1 and not lines and not named:

@@ -135,8 +135,16 @@ def _is_simulated(criterion: Criterion, rubric: Rubric) -> bool:
 
 
 def _may_ask_for(found: Verdict, repair: Repair) -> bool:
-    """Return whether what was repaired can lose a criterion; what keeps a script from starting, where it is named."""
+    """Return whether what was repaired can lose a criterion; what keeps a script from starting, where it is named, and
+    what an `except` names, where an exception came so far."""
+    if is_of_handler(repair):
+        return fails_in(found, repair)
     return repair.kind not in DONE_BEFORE_RUNS or PurePosixPath(repair.file).name in found.message
+
+
+def is_of_handler(repair: Repair) -> bool:
+    """Return whether the line names what it catches: no run reaches the name without an exception."""
+    return repair.before.lstrip().startswith("except ") and repair.kind in SEEN_IN_RUNS
 
 
 def fails_in(found: Verdict, repair: Repair) -> bool:

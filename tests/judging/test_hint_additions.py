@@ -19,6 +19,7 @@ from grader.judging.hint_additions import (
     allow_typing,
     choose_hint_language,
     fill_slots,
+    keep_other_names,
     name_connections,
     name_other_imports,
     name_other_parameters,
@@ -559,3 +560,15 @@ def test_what_needs_the_network_behind_a_question_is_named(line: str, lines: str
     told = f"; then leave out what connects to another machine on {lines}, as a graded node is offline"
     assert name_connections(verdict, facts).hint == f"write a value{told if lines else ''}"
     assert name_connections(failed(f"it ended: {why}", hint="write a value"), facts).hint == "write a value"
+
+
+def test_no_topic_is_renamed_that_another_criterion_asks_for() -> None:
+    lab = load_rubric("leeds-comp3631-lab1").rubric
+    chatter = next(c for c in lab.criteria if c.id == "chatter")
+    hint = "add a publisher, or rename {} if that is meant to be it"
+    for others, left in (
+        ("/numeric_chatter", "add a publisher"),
+        ("/numeric_chatter or /wrods", hint.format("/wrods")),
+    ):
+        verdict = failed("no message came on /chatter", hint=hint.format(others))
+        assert keep_other_names(verdict, chatter, lab).hint == left

@@ -356,6 +356,11 @@ def test_two_faults_of_one_criterion_are_both_its_hint() -> None:
     )
 
 
+def test_what_an_except_names_costs_nothing_without_an_exception() -> None:
+    name = TABS.model_copy(update={"kind": "missing-call", "before": "except rospy.ROSInteruptException:"})
+    assert judged(DIED, GOOD_RUN, TOPIC, name)["rate"].repaired.repairs == (TOPIC,)
+
+
 def test_a_private_name_is_charged_where_the_rubric_asks_for_it() -> None:
     private = TOPIC.model_copy(update={"before": "pub = rospy.Publisher('~chatter', String)"})
     found = judged(DIED, GOOD_RUN, TABS, private)
