@@ -173,18 +173,20 @@ def loops_that_never_go_round(tree):
 
 
 def waits_without_not(tree):
-    """`while stop.wait(1):` around what is published: a loop until an event comes, which lacks its `not`."""
-    made = {dotted(t) for n in all_of(tree, ast.Assign) if called_name(n.value) == "Event" for t in n.targets}
-    for loop in all_of(tree, ast.While) if made else ():
-        name = dotted(loop.test.func.value) if is_call(loop.test, "wait", "is_set") else ""
-        if name in made and calls_in(loop, "publish"):
-            asked = "%s.%s(…)" % (name, loop.test.func.attr)
-            message = "the loop on line %d runs only once `%s` is set: a `not` is missing" % (
-                loop.lineno,
-                name,
-            )
+    """`while stop.wait(1):` and `while self.stopped:` around what is published: a loop until an event comes, or until
+    what a function for `on_shutdown` sets, which lacks its `not`."""
+    given, late = all_of(tree, ast.Assign), set(run_at_the_end(tree))
+    made = {dotted(t) for n in given if called_name(n.value) == "Event" for t in n.targets}
+    begins = {dotted(t): getattr(n.value, "value", None) for n in given if n not in late for t in n.targets}
+    flags = {name for name in set_at_the_end(tree) if begins.get(name) is False}
+    for loop in all_of(tree, ast.While) if made or flags else ():
+        asks = is_call(loop.test, "wait", "is_set")
+        name = dotted(loop.test.func.value if asks else loop.test)
+        if name in (made if asks else flags) and calls_in(loop, "publish"):
+            asked = "%s.%s(…)" % (name, loop.test.func.attr) if asks else name
+            message = "the loop on line %d runs only once `%s` is set: a `not` is missing"
             fix = "on line %d, write `while not %s:`" % (loop.lineno, asked)
-            yield slip(loop.lineno, "loop-left", message, fix, asked)
+            yield slip(loop.lineno, "loop-left", message % (loop.lineno, name), fix, asked if asks else "")
 
 
 def lacking_loops(tree):
@@ -480,17 +482,23 @@ def deaf_loops(tree):
 
 def set_at_the_end(tree):
     """Return the names of what the functions given to `on_shutdown(…)` set: `self.stopped = True`, `stop.set()`."""
-    functions, calls = functions_in(tree), calls_in(tree, "on_shutdown")
-    given = [one for call in calls for one in argument(call, 0, "h")]
+    given = [one for call in calls_in(tree, "on_shutdown") for one in argument(call, 0, "h")]
     names = {dotted(one.value) for one in given if isinstance(one, ast.Attribute) and one.attr == "set"}
-    run = {functions.get(dotted(one).rpartition(".")[2]) for one in given} - {None}
-    run.update(one for one in given if isinstance(one, ast.Lambda))
-    for n in (n for one in run for n in ast.walk(one)):
+    for n in run_at_the_end(tree):
         if isinstance(getattr(n, "ctx", None), ast.Store):
             names.add(dotted(n))
         elif is_call(n, "set"):
             names.add(dotted(n.func.value))
     return names
+
+
+def run_at_the_end(tree):
+    """Return what is in the functions given to `on_shutdown(…)`."""
+    functions, calls = functions_in(tree), calls_in(tree, "on_shutdown")
+    given = [one for call in calls for one in argument(call, 0, "h")]
+    run = {functions.get(dotted(one).rpartition(".")[2]) for one in given} - {None}
+    run.update(one for one in given if isinstance(one, ast.Lambda))
+    return [n for one in run for n in ast.walk(one)]
 
 
 def counts_down(loop):
