@@ -157,6 +157,12 @@ CASES = {
         ["node-name"], 'name="talker" should be name="talkers"', after={LAUNCHED: 'ns="left"'},
         wanted=asking(nodes=(), launched=(("lab.launch", "/left/talkers"),)),
     ),
+    "private-parameter-of-a-node-in-a-namespace": Case(
+        {LAUNCHED: '<launch>\n<group ns="left">\n'
+         + NODE.replace("/>", '>\n<param name="colour" value="red"/></node>') + "</group>\n</launch>\n"},
+        ["parameter-name"], 'name="colour" should be name="color"', after={LAUNCHED: '<param name="color" value='},
+        wanted=asking(params=("/talker/color",)),
+    ),
     "launched-by-another-file": Case(
         {LAUNCHED: LAUNCH.replace(NODE, NODE.replace('name="talker"', 'name="talker2"'))}, [],
         wanted=asking(nodes=(), launched=(("other.launch", "/talker"),)),

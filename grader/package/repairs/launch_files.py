@@ -139,7 +139,9 @@ def _own_name(files: Files, given: str) -> str:
 def _repair_params(files: Files, launch: LaunchFile, wanted: Wanted) -> None:
     there = {param.name for param in launch.params}
     for param in launch.params:
-        right = next((w for w in wanted.params if w not in there and is_near(param.name, w)), "")
+        # a node's own parameter is the same one in another namespace
+        names = (param.name, f"/{'/'.join(param.name.split('/')[-2:])}")
+        right = next((w for w in wanted.params if w not in there and any(is_near(n, w) for n in names)), "")
         if right and param.file == launch.path and param.name not in wanted.params:
             old, new = param.name.rpartition("/")[2], right.rpartition("/")[2]
             _set_attribute(files, launch.path, param.line, (param.attribute, old, new), kind="parameter-name")
