@@ -26,6 +26,7 @@ def said(text: str, tmp_path: Path, callback: str = "cb") -> list[tuple[str, str
     [
         ("    pass", "the callback `cb` on line 1 prints nothing", "`rospy.loginfo(m.data)`"),
         ("    number = m.data", "the callback `cb` on line 1 prints nothing", "`rospy.loginfo(m.data)`"),
+        ("    global n\n    n += m.data\n    p.publish(n)", "`cb` on line 1 prints nothing", "`rospy.loginfo(m.data)`"),
         ("    global n\n    n += 1\n    print('heard', n)", "line 4 prints `n`", "on line 4, print `m.data`"),
         ("    print(rospy.get_caller_id() + ' I heard')", "line 2 prints has nothing of the message", "`m.data`"),
         ("    rospy.logdebug('%d', m.data)", "`logdebug` on line 2 shows nothing", "write `rospy.loginfo`"),
@@ -77,8 +78,8 @@ def test_a_callback_that_shows_some_or_something_else(body: str, message: str, t
         "    if not rospy.is_shutdown():\n        print(m.data)",
         "    try:\n        print(m.data)\n    except Exception:\n        pass",
         # what may be printed elsewhere is not told
-        "    global v\n    v = m.data",
-        "    global v\n    v = m.data\n    rospy.logdebug('heard')",
+        "    global v\n    v = m.data\ndef show():\n    print(v)",
+        "    global v\n    v = m.data\n    rospy.logdebug('heard')\ndef show():\n    print(v)",
         "    seen.append(m.data)",
         "    logging.info('heard %s', m.data)",
         "    cb2(m)",

@@ -228,7 +228,7 @@ class Printing:
         if not self.prints:
             debug = any(called_name(n).startswith("logdebug") and self.of_message(n) for n in self.nodes)
             kept = self.kept(tree) if self.shared else None
-            return kept or (self.silent(level) if debug or not self.shared else None)
+            return kept or (self.silent(level) if debug or not self.is_read(tree) else None)
         return self.another()
 
     def logged(self, tree):
@@ -274,6 +274,12 @@ class Printing:
                 message += ", and not each message when it comes"
                 return call.lineno, "printed-in-part", message, "print `%s` in %s" % (self.value, self.name)
         return self.kept_for_another(tree)
+
+    def is_read(self, tree):
+        """Whether anything outside of the callback reads what it keeps."""
+        kept, own = set(self.shared), set(map(id, self.nodes))
+        read = (n for n in walk(tree) if isinstance(getattr(n, "ctx", None), ast.Load) and id(n) not in own)
+        return bool(kept) and any(dotted(n) in kept for n in read)
 
     def dropped(self, tree):
         """What the callback puts into a queue that keeps a few messages only, for a loop to print."""
