@@ -24,6 +24,8 @@ from grader.rubric.model import Criterion, Rubric
 from grader.wording import join_words
 
 BUILD, INSTALL = "build", "cmake-install"
+OF_EXCEPTIONS = "callbacks-clean"
+"""The check that asks for what others are lost by where a callback fails."""
 OF_PACKAGES = {MANIFEST, CMAKE}
 
 NAMES = {
@@ -70,7 +72,9 @@ def charge_repairs(
     misnamed: set[str] = set()
     by_id = {c.id: c for c in rubric.criteria}
     order = TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order()
-    criteria = [by_id[name] for name in order if name in better]
+    criteria = sorted(
+        (by_id[name] for name in order if name in better), key=lambda c: c.check != OF_EXCEPTIONS
+    )
     criteria_of_runs = [c for c in rubric.criteria if c.scenario is not None and c.points > 0]
     needed = dict.fromkeys(one for repairs in needs.values() for one in repairs)
     # Names first: `misnamed` keeps other repairs from their criteria.
