@@ -34,6 +34,7 @@ from grader.checks.support.parameters import (
     without_system_params,
 )
 from grader.checks.support.scripts import add_hint, find_script
+from grader.checks.support.text import near_names
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.launch_file import LaunchFile, LaunchLoad, LaunchNode, LaunchParam

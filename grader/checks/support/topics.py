@@ -360,9 +360,8 @@ def refused_type(run: Run, topic: str, package: PackageFacts | None = None) -> V
         of_types, _, name = asked.value.partition("/")
         hint = f"{hint}, with `{imports(of_types, name, 'msg')}` at the top"
         hint = "; ".join(filter(None, (hint, fields_to_read(asked.type or "", asked.value))))
-    return failed(
-        message, hint=hint, citations=named_at(package, run, "subscriber", topic) if package else ()
-    )
+    cited = named_at(package, run, "subscriber", topic) if package else ()
+    return failed(message, hint=hint, citations=cited)
 
 
 def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
