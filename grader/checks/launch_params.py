@@ -347,17 +347,7 @@ def _wrong_value(
         return None
     missing = [name for name in wanted if place + name not in before]
     if missing:
-        known = [place + name for name in wanted if place + name in before]
-        verb = "is" if len(missing) == 1 else "are"
-        message = f"{join_words(place + name for name in missing)} {verb} not set, only {join_words(known)}"
-        hint = "write one <param> for each inside the <node>, with exactly these names"
-        names = [param.name for param in file.params]
-        again = [p for p in file.params if names.count(p.name) > 1 and p.name.rpartition("/")[2] in wanted]
-        if len(again) > 1:
-            lines = on_lines(p.line for p in again)
-            hint = f"{lines} give the same name: {_renamed(again, missing, wanted)}"
-        cited = tuple(p.place for p in again)
-        return failed(message, hint=hint, citations=cited)
+        return _missing(file, before, place, missing, wanted)
     others = [name for name, value in wanted.items() if not _fits(before[place + name], value)]
     name = others[0]
     read = {p.name.removeprefix(place): p for p in file.params if p.name in {place + one for one in others}}
@@ -376,6 +366,29 @@ def _wrong_value(
     if len(read) == len(others) and all(p.value != str(wanted[key]) for key, p in read.items()):
         hint = "; ".join(f'on line {p.line}, write value="{wanted[k]}" for {k}' for k, p in read.items())
     return failed(message, hint=hint, citations=cited)
+
+
+def _missing(
+    file: LaunchFile, before: Mapping[str, Any], place: str, missing: list[str], wanted: Wanted
+) -> Verdict:
+    """Of some parameters that are not there: what the launch file calls them, and which of the others are wrong."""
+    known = [name for name in wanted if name not in missing]
+    verb = "is" if len(missing) == 1 else "are"
+    message = f"{join_words(place + name for name in missing)} {verb} not set"
+    message += f", only {join_words(place + name for name in known)}"
+    named = [(param, param.name.rpartition("/")[2]) for param in file.params]
+    names = [param.name for param in file.params]
+    again = [param for param, name in named if names.count(param.name) > 1 and name in wanted]
+    if len(again) > 1:  # the values of the others may be those of the copies
+        hint = f"{on_lines(p.line for p in again)} give the same name: {_renamed(again, missing, wanted)}"
+        return failed(message, hint=hint, citations=tuple(p.place for p in again))
+    near = [(param, n) for param, name in named if name not in wanted for n in near_names(name, missing)]
+    hint = "; ".join(f'on line {param.line}, write name="{name}"' for param, name in near)
+    hint = hint or "write one <param> for each inside the <node>, with exactly these names"
+    wrong = [name for name in known if not _fits(before[place + name], wanted[name])]
+    message += "".join(f"; {place}{name} is {_value_text(before[place + name])}" for name in wrong)
+    hint += "".join(f"; {name} has to be {_value_text(wanted[name])}" for name in wrong)
+    return failed(message, hint=hint, citations=tuple(param.place for param, _ in near))
 
 
 def _elsewhere(before: Mapping[str, Any], node: str, wanted: Wanted) -> Verdict:
