@@ -23,6 +23,7 @@ LOOP = "pub = rospy.Publisher('n', Int8)\nn = 0\nwhile not rospy.is_shutdown():\
         ("    if n % 2:\n        pub.publish(n)\n    else:\n        pub.publish(n)\n    n += 1\n", ""),
         ("    if n % 2:\n        n += 1\n        pub.publish(n)\n",
          "line 6 publishes only under the condition on line 4"),
+        ("    if pub.get_num_connections() == 0:\n        pub.publish(n)\n", "line 5 publishes only under the condition on line 4"),
         ("    if pub.get_num_connections():\n        pub.publish(n)\n    n += 1\n", ""),
         ("    heard = pub.get_num_connections()\n    if heard > 0:\n        pub.publish(n)\n", ""),
         ("    if self.last is not None:\n        pub.publish(self.last)\n", ""),

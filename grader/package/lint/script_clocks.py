@@ -153,7 +153,10 @@ def waits_for_it(test, calls, source):
     values = [value for name in names_in(test) for value in source.bound.get(name, ())[:TOPICS_LIMIT]]
     there = test.left if isinstance(test, ast.Compare) and isinstance(test.ops[0], ast.IsNot) else test
     sent = {name for call in calls for one in call.args for name in names_in(one)}
-    return dotted(there) in sent or any(calls_in(one, "get_num_connections") for one in (test, *values))
+    none = isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not)
+    none = none or (isinstance(test, ast.Compare) and isinstance(test.ops[0], (ast.Eq, ast.Lt, ast.LtE)))
+    asks = any(calls_in(one, "get_num_connections") for one in (test, *values))
+    return dotted(there) in sent or (asks and not none)
 
 
 def left_out(one, calls, topic, *, alone):
