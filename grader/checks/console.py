@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from difflib import SequenceMatcher
 from pathlib import PurePosixPath
 from typing import Annotated
@@ -213,13 +213,16 @@ def _not_printed(
         return silent.late() if waits else silent
     meant = max(own, key=lambda line: SequenceMatcher(None, params.words, line.text[:LINE_CHARS_MAX]).ratio())
     hint = _of_whole_answer(meant, params) or unfilled(meant.text) or hint
-    called = {e.topic for _, e in run.actors if e.action == "serve"}
     # what comes with an answer cannot be printed where nothing was called
-    uncalled = bool(params.numbers and asked) and called.isdisjoint(asked)
-    kind = failed_or_blocked if uncalled else _of_client(asked, run)
+    kind = failed_or_blocked if params.numbers and _uncalled(asked, run) else _of_client(asked, run)
     lost = kind(f"{never}; it prints {shown(meant.text)!r}", hint=hint)
     lost = lost.about(said=meant.text).if_repeated()
     return lost.late() if waits else lost
+
+
+def _uncalled(asked: Collection[str], run: Run) -> bool:
+    """Return whether none of the services that are asked for was called."""
+    return bool(asked) and not any(e.action == "serve" and e.topic in asked for _, e in run.actors)
 
 
 def _has_words(line: Line, params: PrintsParams) -> bool:

@@ -120,8 +120,7 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
     causes = _causes(run, params)
     own = run.student_channels(params.effect.topic)
     # what a node sends as it ends answers nothing
-    until_ns = observed_until_ns(run) or run.end_ns
-    effects = [one for one in params.effect.read(own) if one.time_ns <= until_ns]
+    effects = [e for e in params.effect.read(own) if e.time_ns <= (observed_until_ns(run) or run.end_ns)]
     answers = _answers(run, causes, effects, params)
     instead = _instead(causes, effects, params) or _other_answer(answers, causes, effects, own, params)
     verdict = (

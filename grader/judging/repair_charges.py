@@ -49,8 +49,6 @@ MADE_BY_BUILDS = {".msg", ".srv", ".action", ".c", ".cc", ".cpp", ".cxx"}
 _PLACE = re.compile(r"^line \d+ of [^:]+: ")
 TAG = re.compile(r"<(\w+)>[^<>]*</\1>")
 NUMBER = re.compile(r"\d+(\.\d+)?")
-
-
 PARAMETER = re.compile(r"~?[\w/]*\w")
 
 
@@ -72,9 +70,8 @@ def charge_repairs(
     misnamed: set[str] = set()
     by_id = {c.id: c for c in rubric.criteria}
     order = TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order()
-    criteria = sorted(
-        (by_id[name] for name in order if name in better), key=lambda c: c.check != OF_EXCEPTIONS
-    )
+    criteria = [by_id[name] for name in order if name in better]
+    criteria.sort(key=lambda c: c.check != OF_EXCEPTIONS)
     criteria_of_runs = [c for c in rubric.criteria if c.scenario is not None and c.points > 0]
     needed = dict.fromkeys(one for repairs in needs.values() for one in repairs)
     # Names first: `misnamed` keeps other repairs from their criteria.
@@ -95,15 +92,9 @@ def charge_repairs(
         failed_by_it = [c for c in criteria_of_runs if c.id not in better and fails_in(first[c.id], repair)]
         if repair.kind in OF_SYNTAX and failed_by_it:
             continue  # that the copy shows nothing of that criterion is no reason to charge another
-        possible = [c for c in criteria if repair in needs[c.id] and _may_ask_for(first[c.id], repair)]
-        if repair.kind in {"topic-name", "service-name"}:  # where a value came, its topic is not to blame
-            possible = [c for c in possible if not first[c.id].basis.wrong] or possible
-        named = [c for c in possible if repair.kind in NAMES and _names(c, repair)]
-        failing = [c for c in possible if first[c.id].status is not Status.BLOCKED]
-        # where nothing was printed, the line that is cited would print it, and is not to blame
-        citing = [c for c in failing if cites_file(first[c.id], repair) and not first[c.id].basis.silent]
-        builds = [c for c in possible if repair.kind in OF_BUILDS and c.check == BUILD]
-        counting = [c.id for c in (*builds, *named, *citing, *failing, *possible) if c.points > 0]
+        possible = _possible([c for c in criteria if repair in needs[c.id]], first, repair)
+        named = any(repair.kind in NAMES and _names(c, repair) for c in possible)
+        counting = [c.id for c in _nearest_first(possible, first, repair) if c.points > 0]
         # names of two kinds are two mistakes
         taken = {name for one in charges if repair.kind in NAMES - {one.kind} for name in charges[one]}
         other = [name for name in counting if name not in misnamed | taken]
@@ -131,6 +122,25 @@ def _asking(
     return sought or [c for c in asking if _names(c, repair)] or asking
 
 
+def _possible(criteria: Iterable[Criterion], first: Mapping[str, Verdict], repair: Repair) -> list[Criterion]:
+    """Return the criteria that what was repaired can lose."""
+    possible = [c for c in criteria if _may_ask_for(first[c.id], repair)]
+    without_values = [c for c in possible if not first[c.id].basis.wrong]
+    # where a value came, its topic is not to blame
+    return (repair.kind in {"topic-name", "service-name"} and without_values) or possible
+
+
+def _nearest_first(
+    possible: Sequence[Criterion], first: Mapping[str, Verdict], repair: Repair
+) -> Iterator[Criterion]:
+    yield from (c for c in possible if repair.kind in OF_BUILDS and c.check == BUILD)
+    yield from (c for c in possible if repair.kind in NAMES and _names(c, repair))
+    failing = [c for c in possible if first[c.id].status is not Status.BLOCKED]
+    # where nothing was printed, the line that is cited would print it, and is not to blame
+    yield from (c for c in failing if cites_file(first[c.id], repair) and not first[c.id].basis.silent)
+    yield from (*failing, *possible)
+
+
 def _is_simulated(criterion: Criterion, rubric: Rubric) -> bool:
     """Return whether a program, the simulator, runs beside the scripts: its clock is the one to go by."""
     return criterion.scenario is not None and any(
@@ -149,6 +159,11 @@ def _may_ask_for(found: Verdict, repair: Repair) -> bool:
 def is_of_handler(repair: Repair) -> bool:
     """Return whether the line names what it catches: no run reaches the name without an exception."""
     return repair.before.lstrip().startswith("except ") and repair.kind in SEEN_IN_RUNS
+
+
+def without_idle(repairs: Iterable[Repair], charges: Mapping[Repair, AbstractSet[str]]) -> tuple[Repair, ...]:
+    """Return the repairs without those of what an `except` names that no criterion was lost by."""
+    return tuple(one for one in repairs if charges.get(one) or not is_of_handler(one))
 
 
 def fails_in(found: Verdict, repair: Repair) -> bool:
@@ -236,8 +251,7 @@ def charged_verdict(
     if any(one not in [*told, *beside] for one in repairs):
         clauses = [clause for clause in clauses if any(is_told(one, clause) for one in told)]
     hints = clauses + advice_on(one for one in repairs if one not in told)
-    if not any(one.kind == "missing-call" for one in repairs):  # the copy renames nothing in the code
-        hints += [c for c in verdict.hint.split("; ") if c.startswith(NEW_NAMES) and c not in hints]
+    hints += _new_names(verdict, repairs, hints)
     said = verdict.message
     unsaid = [one for one in repairs if one.kind == "node-name" or not _is_said(one, verdict)]
     words = [said, *(one for one in messages_of(unsaid) if (_PLACE.sub("", one) or one) not in said)]
@@ -262,6 +276,13 @@ def charged_verdict(
         untold_of = tuple(one for one in verdict.basis.sought if one.kind not in {"call", "uncalled"})
         verdict = verdict.based_on(sought=untold_of)
     return verdict.model_copy(update=update)
+
+
+def _new_names(verdict: Verdict, repairs: Iterable[Repair], told: Collection[str]) -> list[str]:
+    """Return the hints on names in the code that the copy does not rename."""
+    if any(one.kind == "missing-call" for one in repairs):
+        return []
+    return [one for one in verdict.hint.split("; ") if one.startswith(NEW_NAMES) and one not in told]
 
 
 def _is_said(repair: Repair, verdict: Verdict) -> bool:

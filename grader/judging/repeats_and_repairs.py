@@ -162,10 +162,7 @@ def apply_repaired_copy(
     charges = repair_charges.charge_repairs(rubric, first, better, needs)
     for criterion in rubric.criteria:
         charged = tuple(one for one in repairs if criterion.id in charges.get(one, ()))
-        needed = tuple(
-            one for one in needs[criterion.id] if charges.get(one) or not repair_charges.is_of_handler(one)
-        )
-        needed = needed or charged
+        needed = repair_charges.without_idle(needs[criterion.id], charges) or charged
         if criterion.id not in better or not needed:
             continue
         verdict, copy = first[criterion.id], on_copy[criterion.id]

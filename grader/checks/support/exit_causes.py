@@ -82,9 +82,7 @@ OTHER_NAMES_SHOWN = 3
 """Names of the same script that are not defined either."""
 MAIN = "`if __name__ == '__main__':`"
 LOOK_THERE = "look at that line: the last words say what Python cannot do there"
-RAISED = (
-    "the script raises this itself: is it the exception that the handout asks for, and its condition right?"
-)
+RAISED = "the script raises this itself: is it what the handout asks for, and its condition right?"
 RUN_IT = "run it by itself with rosrun, and read what it prints last"
 BY_ROSCPP = -5
 """With which roslaunch sees a program end that roscpp ends: SIGTRAP, which not every system's `signal` has."""
@@ -278,10 +276,9 @@ def explain_error(
         ]
         for span in spans or [[(one, one.start_ns, one.interrupt_ns or run.end_ns + 1) for one in own]]
     ]
-    found = [one for here in by_span for one in here]
+    found = [here[-1] for here in by_span if here]
     # what fails at one of many times does not explain the others
-    is_often = 2 * sum(map(bool, by_span)) >= len(by_span)
-    return explain_traceback(found[-1], package) if found and is_often else None
+    return explain_traceback(found[-1], package) if found and 2 * len(found) >= len(by_span) else None
 
 
 def explain_by_exception(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
@@ -461,16 +458,13 @@ def _asks_for_input(
 ) -> tuple[str, str] | None:
     """Return the cause and the hint of a script that asks for input once, or has a Rate already."""
     rated = {one.file for one in package.slips if one.kind.startswith("rate-")}
-    asks = {s.line: s.name for s in package.slips if s.kind == "input" and place and s.file == place.file}
-    asking = sorted(asks)
-    source = found.innermost.source
-    fixes = [s.fix for s in package.slips if s.kind == "input" and place and s.file == place.file and s.fix]
-    instead = ""
-    if len(asking) > 1:
-        instead = f"write values in the code in place of each `input()`: {on_lines(asking)}"
+    own = [s for s in package.slips if s.kind == "input" and place and s.file == place.file]
+    asks, fixes, instead = {s.line: s.name for s in own}, [s.fix for s in own if s.fix], ""
+    if len(asks) > 1:
+        instead = f"write values in the code in place of each `input()`: {on_lines(sorted(asks))}"
     elif fixes and fixes[0].startswith("publish …"):
         instead = fixes[0].replace("…", VALUE_SLOT, 1)
-    elif number := _NUMBER_ASKED.search(source):
+    elif number := _NUMBER_ASKED.search(found.innermost.source):
         value = "a number in the code" if "once" in asks.values() else VALUE_SLOT
         instead = f"write {value} in place of `{number[0]}…))`"
     elif "once" in asks.values():
@@ -481,9 +475,8 @@ def _asks_for_input(
     in_place = instead or (f"{NO_INPUT}; {fixes[0]}" if fixes else NO_INPUT)
     # what is typed is what such a loop waits for
     waits = "" in asks.values() or (not instead and "paused" not in asks.values())
-    pause = (
-        "make sure that the loop calls `sleep()` of its Rate" if has_rate else f"pause in the loop: {PAUSE}"
-    )
+    pause = "make sure that the loop calls `sleep()` of its Rate"
+    pause = pause if has_rate else f"pause in the loop: {PAUSE}"
     return CAUSES["EOFError"][0], f"{in_place}, and {pause}" if waits else in_place
 
 
