@@ -8,7 +8,7 @@ import ast
 import builtins
 import itertools
 
-from script_loops import CALLED_BACK, is_endless, is_short
+from script_loops import CALLED_BACK, ENDING, is_endless, is_short
 from script_names import (
     given_names,
 )
@@ -212,10 +212,27 @@ def wrong_callback(own, call, tree, bound, values):
     if bound and len(given) == values and "self" not in given:
         message = "`%s` is a method, so its first parameter has to be `self`" % own.name
         return message, "write `def %s(%s):`" % (own.name, ", ".join(["self", *given]))
+    if with_args := fix_of_args(own, call, tree, bound):
+        return "", with_args
     kept = [name for name in given if not bound or name != "self"]
     spare = [unknown_name(own, tree) or VALUES.get(called_name(call), "msg"), "args"]
     kept = ["self"] * bound + (kept + spare[len(kept) :])[:values]
     return "", "write `def %s(%s):`%s" % (own.name, ", ".join(kept), made_response(own, call, kept))
+
+
+def fix_of_args(own, call, tree, bound):
+    """Return what to write where a Subscriber leaves out the `callback_args` that another one of the same callback has;
+    "" where it does not."""
+    for other in calls_in(tree, "Subscriber") if called_name(call) == "Subscriber" else ():
+        given = argument(other, 3, "callback_args")
+        names = [dotted(one) for each in (call, other) for one in argument(each, 2, "callback")]
+        if not given or len(set(names)) > 1 or takes(own, bound) != (2, 2):
+            continue
+        own_topic = text_of(call.args[0]) if call.args and text_of(given[0]) == text_of(other.args[0]) else ""
+        what = "`callback_args=%r`" % own_topic if own_topic else "`callback_args`, with a value of its own,"
+        fix = "on line %d, write %s as the last argument of `Subscriber(…)`, as on line %d"
+        return fix % (call.lineno, what, other.lineno)
+    return ""
 
 
 def unknown_name(own, tree):
@@ -301,10 +318,6 @@ def takes(function, bound):
     own = 1 if bound and not of_class else 0
     least = len(given) - len(function.args.defaults) - own
     return least, 99 if function.args.vararg else len(given) - own
-
-
-ENDING = ("signal_shutdown", "exit", "quit", "_exit")
-"""Calls that end the node."""
 
 
 def ending_callbacks(tree):

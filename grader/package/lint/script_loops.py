@@ -38,7 +38,8 @@ from script_values import CLOCKS
 CALLED_BACK = {"Subscriber": "callback", "Service": "handler"}
 """What calls a function of the script's, and the name of that argument."""
 
-
+ENDING = ("signal_shutdown", "exit", "quit", "_exit")
+"""Calls that end the node."""
 MAKES = ("init_node", "Publisher", "Subscriber", "Service")
 LEAVES = (ast.Return, ast.Raise, ast.Yield, ast.YieldFrom)
 """A function with one of these may go on, or is a generator, whose call runs nothing."""
@@ -252,12 +253,22 @@ def stopped_loops(tree):
             yield slip(loop.lineno, "loop-left", message, fix)
         # what is done again and again, or in several places, ends by no loop in it
         ends = not turned[loop][1] and not is_part
-        left = next((n for n in loop.body if isinstance(n, (ast.Break, ast.Return))), None) if ends else None
+        left = next(filter(way_out, loop.body), None) if ends else None
         if left is not None:
-            word = "break" if isinstance(left, ast.Break) else "return"
-            message = "the loop ends the first time around, at the %s on line %d" % (word, left.lineno)
+            message = "the loop ends the first time around, at the %s on line %d" % (
+                way_out(left),
+                left.lineno,
+            )
             fix = "remove it from line %d, or put it inside an `if`" % left.lineno
             yield slip(left.lineno, "loop-left", message, fix)
+
+
+def way_out(statement):
+    """Return how a statement leaves a loop: "break", "return", "sys.exit()"; "" where it does not."""
+    if isinstance(statement, (ast.Break, ast.Return)):
+        return type(statement).__name__.lower()
+    call = statement.value if isinstance(statement, ast.Expr) else None
+    return "%s()" % dotted(call.func) if called_name(call) in ENDING else ""
 
 
 def is_of_robot(tree):
