@@ -12,7 +12,7 @@ import keyword
 import os
 import re
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
 
 from grader.line_slips.python_habits import (
@@ -388,6 +388,27 @@ def _with_quote(line: str, message: str, column: int | None) -> Iterator[str]:
     cut = end.start() if end else len(line)
     yield line[:cut] + quote + line[cut:]
     yield line + quote
+
+
+_QUOTE = re.compile(r"(\b[rRfFbBuU]{1,2})?[\"']")
+_TEXT_LINES_MAX = 5
+
+
+def text_of_many_lines(lines: Sequence[str], at: int) -> Iterator[list[str]]:
+    """Yield the lines with a text that begins on line `at` and goes on below it, each part in quotes of its own."""
+    opened = _QUOTE.search(_TEXT.sub(lambda found: "." * len(found[0]), lines[at][:LINE_CHARS_MAX]))
+    if opened is None:
+        return
+    quote = opened[0][-1]
+    for last in range(at + 1, min(at + _TEXT_LINES_MAX, len(lines))):
+        parts = [f"{lines[at].rstrip()} {quote}"]
+        for line in lines[at + 1 : last + 1]:
+            text = line.strip()
+            parts.append(f"{line[: len(line) - len(line.lstrip())]}{opened[0]}{text} {quote}")
+        parts[-1] = parts[-1].removesuffix(f" {quote}")
+        if quote in lines[last]:
+            yield [*lines[:at], *parts, *lines[last + 1 :]]
+            return
 
 
 def _parses(line: str) -> bool:

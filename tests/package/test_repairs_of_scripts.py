@@ -218,6 +218,8 @@ CASES = {
     "colon": Case(swapped(TALKER, ("is_shutdown():", "is_shutdown()")), ["python-syntax"], "line 9"),
     "bracket": Case(swapped(TALKER, ("queue_size=10)", "queue_size=10")), ["python-syntax"], "never closed"),
     "quote": Case(swapped(TALKER, ("'talker')", "'talker)")), ["python-syntax"], "line 6 of src/talker.py: a quote"),
+    "text-over-lines": Case(swapped(TALKER, ("'talker')", "'tal\n        ker')")), ["python-syntax"],
+        "write `rospy.init_node('tal '`", after={TALKER: "    rospy.init_node('tal '\n        'ker')\n"}),
     "typographic": Case(swapped(TALKER, ("'talker'", "\u2018talker\u2019")), ["python-syntax"], "typographic quote"),
     "no-such-future-above-a-print-with-brackets": Case(
         swapped(TALKER, ("import rospy\n", "from __future__ import print_functions\nimport rospy\n"),

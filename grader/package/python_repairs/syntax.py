@@ -19,6 +19,7 @@ from grader.line_slips.python import (
     PLAIN,
     corrections,
     reason_of_line,
+    text_of_many_lines,
     without_brace,
     without_comment_sign,
     without_texts,
@@ -205,6 +206,7 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
         yield from _with_global_first(text, error["line"])
     yield from _in_their_blocks(lines, at, error["message"])
     yield from (("python2", candidate) for candidate in as_python3(lines, at))
+    yield from (("token", "\n".join(candidate)) for candidate in text_of_many_lines(lines, at))
     if any(map(without_brace, lines[: at + 1])):
         yield "braces", _without_braces(lines)
     for line in dict.fromkeys((at, max(at - 1, 0))):
