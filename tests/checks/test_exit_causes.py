@@ -95,7 +95,7 @@ pytestmark = pytest.mark.usefixtures("without_processes")
         (6, "text = 'at ' + where", 'TypeError: can only concatenate str (not "Point") to str',
          "write `str(where.x)` instead of `where`"),
         (6, "n = int(msg)", "TypeError: int() argument must be a string, a bytes-like object or a number, not 'Int8'",
-         "take its field, as in `msg.data`"),
+         "write `msg.data` instead of `msg`"),
         (6, "scan.ranges[i] = 0.0", "TypeError: 'tuple' object does not support item assignment",
          "write `scan.ranges = list(scan.ranges)` first"),
         (6, "print(msg.data.x)", "AttributeError: 'Point' object has no attribute 'data'",

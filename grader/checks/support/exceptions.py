@@ -16,6 +16,7 @@ from grader.checks.support.rospy_calls import (
     line_tree,
     message_operand,
     no_items,
+    only_value,
     rewritten,
     uncalled_proxy,
 )
@@ -294,11 +295,8 @@ def _nested_index(message: str, source: str) -> Meaning | None:
         r"'(?:int|float)' object (?:is not subscriptable|does not support item assignment)", message
     ):
         return None
-    nested = [
-        n
-        for n in ast.walk(line_tree(source))
-        if isinstance(n, ast.Subscript) and isinstance(n.value, ast.Subscript)
-    ]
+    parts = (n for n in ast.walk(line_tree(source)) if isinstance(n, ast.Subscript))
+    nested = [n for n in parts if isinstance(n.value, ast.Subscript)]
     if len(nested) != 1 or not isinstance(inner := nested[0].value, ast.Subscript):
         return None
     flat, row, column = (ast.unparse(part) for part in (inner.value, inner.slice, nested[0].slice))
@@ -311,8 +309,9 @@ def _nested_index(message: str, source: str) -> Meaning | None:
 def _no_number(message: str, source: str) -> Meaning | None:
     """Of a whole message, or a text, where a number is wanted."""
     if (whole := _WHOLE.search(message)) and (kind := whole[whole.lastindex or 0]) != "NoneType":
-        data = kind in noetic_messages()["std_msgs"]
-        hint = "take its field, as in `msg.data`" if data else "take one of its fields"
+        name = only_value(source) if kind in noetic_messages()["std_msgs"] else None
+        hint = "take one of its fields" if name is None else "take its field, as in `msg.data`"
+        hint = f"write `{name}.data` instead of `{name}`" if name else hint
         return f"this is the whole message ({kind})", hint
     if re.match(
         r"expected \[\w+\] but got \[std_msgs/\w+\]", message

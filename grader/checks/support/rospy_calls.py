@@ -469,14 +469,19 @@ def whole_message(found: Traceback, package: PackageFacts) -> Meaning | None:
     if len(kinds) != 1 or len(fields[0]) != 1 or (fields[0] == ("data",) and _OF_TWO.search(found.message)):
         return None
     frame = found.innermost
-    tree = line_tree(frame.source[slice(*frame.marked)] if frame.marked else frame.source)
-    inner = [n.func for n in ast.walk(tree) if isinstance(n, ast.Call)]
-    inner += [n.value for n in ast.walk(tree) if isinstance(n, ast.Attribute)]
-    names = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and n not in inner}
-    if len(names) != 1:
-        return None
-    name = shown(names.pop())
-    return f"`{name}` is the whole message ({kinds[0]})", f"write `{name}.{fields[0][0]}` instead of `{name}`"
+    name = only_value(frame.source[slice(*frame.marked)] if frame.marked else frame.source)
+    hint = f"write `{name}.{fields[0][0]}` instead of `{name}`"
+    return (f"`{name}` is the whole message ({kinds[0]})", hint) if name else None
+
+
+def only_value(source: str) -> str:
+    """Return the name that stands in a line for a value as a whole; "" where there is not one."""
+    nodes = list(ast.walk(line_tree(source)))
+    inner = [n.func for n in nodes if isinstance(n, ast.Call)]
+    inner += [n.value for n in nodes if isinstance(n, ast.Attribute)]
+    loaded = (n for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load))
+    names = {n.id for n in loaded if n not in inner}
+    return shown(names.pop()) if len(names) == 1 else ""
 
 
 def of_typed_text(found: Traceback, file: str, package: PackageFacts) -> tuple[str, str] | None:
