@@ -165,6 +165,15 @@ def test_a_module_of_the_students_own_is_told_from_one_that_is_not_there(tmp_pat
     assert hint in end.hint
 
 
+def test_a_module_that_the_build_made_a_program_of_is_told(tmp_path):
+    made = "/home/student/catkin_ws/devel/lib/lab"
+    frames = [(f"{made}/talker.py", 15, "exec(…)"), ("src/talker.py", 4, "from texts import say")]
+    error = f"ImportError: cannot import name 'say' from 'texts' ({made}/texts.py)"
+    end = explained(tmp_path, dict.fromkeys(["src/talker.py", "src/texts.py"], SCRIPT), *frames, error=error)
+    assert "catkin_install_python makes a program of src/texts.py" in end.cause
+    assert "sys.path.insert(0, os.path.dirname(__file__))" in end.hint
+
+
 @pytest.mark.parametrize(
     ("line", "owner", "hint"),
     [

@@ -371,9 +371,13 @@ def _as_in_python_3(name: str, source: str) -> str:
     return f"write {right} instead of {name}"
 
 
+_RELAYED = re.compile(r"cannot import name '\w+' from '(\w+)' \(/\S*/devel/lib/")
+
+
 def _own_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """Return why Python does not find a file of the package's own, and what lets it."""
-    asked = NO_MODULE.search(found.message)
+    relayed = _RELAYED.match(found.message)
+    asked = relayed or NO_MODULE.search(found.message)
     script = path_in_package(package, found.innermost.file)
     if asked is None or script is None:
         return None
@@ -397,6 +401,8 @@ def _own_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | No
     if file.parent != folder:
         cause = cause if instead else f"{file} is in another folder, and Python looks beside {script}"
         place = f"os.path.join({place}, '{posixpath.relpath(str(file.parent), str(folder))}')"
+    elif relayed:
+        cause = f"catkin_install_python makes a program of {file}, and Python finds that in place of it"
     elif instead:
         pass
     elif any("/devel/lib/" in frame.file for frame in found.frames):
