@@ -41,7 +41,7 @@ from grader.checks.support.launch_slips import (
     starts_built,
 )
 from grader.checks.support.scripts import CPP_SUFFIXES, RIGHT_SHEBANG, add_hint, find_script, programs
-from grader.checks.support.shell_scripts import find_obstacle, value_given
+from grader.checks.support.shell_scripts import find_obstacle, unclosed_quote, value_given
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
@@ -486,7 +486,8 @@ def _obstacle(package: PackageFacts, build: Run, file: LaunchFile, params: Opens
     for node in _shells(package, file):
         source = find_script(package, node.type or "")
         lines = build.file_lines(source.path) if source is not None else ()
-        found = find_obstacle(lines, params.program, params.urls[0], given=bool(node.args))
+        given = bool(node.args)
+        found = unclosed_quote(lines) or find_obstacle(lines, params.program, params.urls[0], given=given)
         if source is not None and found is not None:
             return Slip(source.path, found.number, found.why, found.fix)
     return None

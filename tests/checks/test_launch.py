@@ -9,7 +9,7 @@ import pytest
 from grader.checks.support.launch import died, finished, is_exact, name_pattern, refusal, why_died
 from grader.checks.support.launch_slips import right_remap
 from grader.checks.support.parameters import explain_yaml, explain_yaml_line
-from grader.checks.support.shell_scripts import find_obstacle, value_given
+from grader.checks.support.shell_scripts import find_obstacle, unclosed_quote, value_given
 from grader.evidence.run import Run
 from grader.judging.facts import NO_PACKAGE
 from grader.model.file_fault import Fault
@@ -330,4 +330,17 @@ def test_what_keeps_a_shell_script_from_its_page(
     script: str, given: bool, told: tuple[int, str] | None
 ) -> None:
     found = find_obstacle(script.splitlines(), "firefox", PAGE, given=given)
+    assert (found and (found.number, found.fix)) == told
+
+
+@pytest.mark.parametrize(
+    ("script", "told"),
+    [
+        ('#!/bin/bash\nURL="https://a\necho "it is $URL"\n', (2, 'on line 2, write `URL="https://a"`')),
+        ("echo 'a\nfirefox page\n", (1, "on line 1, write `echo 'a'`")),
+        ('# it\'s a page\necho "two\nlines"\nfirefox page\n', None),
+    ],
+)
+def test_a_quote_that_a_shell_script_never_closes(script: str, told: tuple[int, str] | None) -> None:
+    found = unclosed_quote(script.splitlines())
     assert (found and (found.number, found.fix)) == told

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 ARGUMENT = re.compile(r"\$(?:[1-9@*#]|\{[1-9@*#]\})")
 """What is given on the script's command line, or how much that is."""
+CHARS_MAX = 20_000
 _OPENS = re.compile(r"\s*(if|for|while|until|case|select)\b|.*\(\)\s*\{")
 _CLOSES = re.compile(r"\s*(?:fi|done|esac|\})(?=[\s;&|)]|$)")
 _TURNS = re.compile(r"\s*(?:else|elif)\b")
@@ -55,6 +58,24 @@ def find_obstacle(lines: Sequence[str], program: str, url: str, *, given: bool) 
         if _OPENS.match(line) and not _CLOSED.search(line):
             stack.append((number, line))
     return None
+
+
+def unclosed_quote(lines: Sequence[str]) -> Line | None:
+    """Return the first line that opens a quote of a script in which one is never closed."""
+    if _is_closed("\n".join(lines)[:CHARS_MAX]):
+        return None
+    for number, line in enumerate(lines, 1):
+        quote = next((one for one in "\"'" if not _is_closed(line) and _is_closed(line + one)), "")
+        if quote:
+            why = f"the quote {quote} is opened and never closed"
+            return Line(number, why, f"on line {number}, write `{line.strip()}{quote}`")
+    return None
+
+
+def _is_closed(text: str) -> bool:
+    with suppress(ValueError):
+        return shlex.split(text, comments=True) is not None
+    return False
 
 
 def _without_arguments(
