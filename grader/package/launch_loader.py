@@ -381,11 +381,13 @@ _TOLD_APART = re.compile(r"\d|[xyz]\b|[xyz](?=_)|(?<=_)[xyz]|(?<![^\W_])[a-z](?!
 
 
 def _is_slip(asked: str, name: str) -> bool:
-    """Return whether one letter, or capitals, tell the names of two arguments apart: not a digit or an axis, nor all
-    they have."""
+    """Return whether one letter, capitals or a shorter form tell the names of two arguments apart: not a digit or an
+    axis, nor all they have."""
     one, other = asked.lower(), name.lower()
     on_purpose = one != other and _TOLD_APART.sub("", one) == _TOLD_APART.sub("", other)
-    return len(one) > PAIR and not on_purpose and (one == other or is_one_edit(one, other))
+    short, longer = sorted((one, other), key=len)
+    is_form = len(short) > PAIR and longer.startswith(short) and longer[len(short) :].isalpha()
+    return len(one) > PAIR and not on_purpose and (one == other or is_form or is_one_edit(one, other))
 
 
 def _with_arg(element: etree._Element, scope: Scope) -> Scope:

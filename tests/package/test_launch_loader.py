@@ -266,6 +266,8 @@ def test_arguments_that_a_run_gives_decide_the_names(tmp_path: Path) -> None:
     [
         ("hearrer", "hearer", True),
         ("Talker", "talker", True),
+        ("out", "output", True),
+        ("map", "map_file", False),
         ("x_pose", "y_pose", False),
         ("robot_a", "robot_b", False),
         ("robot1", "robot2", False),

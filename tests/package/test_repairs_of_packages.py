@@ -190,6 +190,8 @@ CASES = {
         {LAUNCHED: '<launch>\n  <arg name="from" default="turtlesim"/>\n'
                    '  <node pkg="$(arg from)" type="talker.py" name="talker"/>\n</launch>\n'}, []),
     "pkg": Case(swapped(LAUNCHED, ('pkg="lab"', 'pkg="laab"')), ["package-name"], 'pkg="laab" should be'),
+    "pkg-found": Case(swapped(LAUNCHED, ('pkg="lab"', 'pkg="$(find lab)"')), ["package-name"],
+        'write pkg="lab" instead of pkg="$(find lab)"'),
     "manifest-name": Case(swapped(XML, (">lab<", ">lab_<")), ["package-name"], "the package is called lab_"),
     "folder-launched": Case({XML: MANIFEST.replace(">lab<", ">our_lab<"),
                          CMAKELISTS: CMAKE.replace("lab", "our_lab")},

@@ -347,7 +347,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         ("def f(m):\n    pass\nrospy.Subscriber('a', A, f, 3)\n",
          [("callback-values", 1, "write `def f(m, args):`")]),
         ("def f(m, t):\n    print(m, t)\nrospy.Subscriber('a', A, f)\nrospy.Subscriber('b', B, f, 'b')\n",
-         [("callback-values", 1, "on line 3, write `callback_args='a'` as the last argument of `Subscriber(…)`, as on")]),
+         [("callback-values", 1, "on line 3, write `callback_args='a'` as the last argument of `Subscriber(…)`")]),
         ("def f(m, t):\n    print(m, t)\nrospy.Subscriber('a', A, f)\nrospy.Subscriber('b', B, f, 2)\n",
          [("callback-values", 1, "on line 3, write `callback_args`, with a value of its own, as the last argument")]),
         ("def hear(m):\n    print(m)\ndef run():\n    rospy.Subscriber('a', A, run)\n    rospy.spin()\nrun()\n",

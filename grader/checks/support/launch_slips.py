@@ -250,11 +250,8 @@ def _slip_of_node(package: PackageFacts, node: LaunchNode, said: str) -> Slip | 
         return _lacking(package, node, missing)
     pkg, name = str(node.pkg), str(node.type)
     if path := next((a for a in ("pkg", "type") if "$(find" in str(getattr(node, a))), None):
-        return _slip(
-            node,
-            f"{path} is a path",
-            f'write pkg="{package.name}" and type="<file>.py": names only, without folders',
-        )
+        of_type = f' and type="{PurePosixPath(name).name}"' if "/" in name else ""
+        return _slip(node, f"{path} is a path", f'write pkg="{package.name}"{of_type}: only the name')
     if UNRESOLVED in pkg + name:
         return None
     if owner := owner_of(package, node):

@@ -19,6 +19,7 @@ from grader.package.repairs.yaml_files import namespace_wanted
 from grader.wording import the_same_on
 
 TAG_LINES_MAX = 20
+_FIND = re.compile(r"\$\(find +([\w-]+) *\)")
 _COMMENT = re.compile(r"<!--.*?(?:-->|\Z)", re.DOTALL)
 NO_SCRIPTS = (".launch", ".xml", ".txt", ".yaml", ".yml", ".md", ".test", *CPP)
 
@@ -53,13 +54,10 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
     for launch, node, place in _with_places(package, "pkg"):
         pkg, kind = node.pkg or "", node.type or ""
         runs_own = bool({kind, f"{kind}.py"} & (scripts if pkg in ours else programs))
+        found = _FIND.fullmatch(pkg)
         # Which package another `$(…)` is, only the call of roslaunch decides.
-        if (
-            pkg != own
-            and "$(" not in pkg
-            and (pkg in ours or pkg not in others)
-            and (is_near(pkg, own) or runs_own)
-        ):
+        is_another = "$(" not in pkg and pkg != own and (pkg in ours or pkg not in others)
+        if (found and found[1] in ours) or (is_another and (is_near(pkg, own) or runs_own)):
             file, line, attribute = place or (launch.path, node.line, "pkg")
             _set_attribute(files, file, line, (attribute, pkg, own), kind="package-name")
     for launch in package.launch_files:
@@ -122,7 +120,7 @@ def _complete_node(files: Files, file: str, node: LaunchNode, own: str, scripts:
 def _repair_find(files: Files, file: str, own: str, others: Collection[str]) -> None:
     """Replace what is nearly the package's name in each `$(find …)` of a launch file, and is none of the `others`."""
     text = _COMMENT.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), files.text(file) or "")
-    for place in re.finditer(r"\$\(find +([\w-]+) *\)", text):
+    for place in _FIND.finditer(text):
         if is_near(found := place[1], own) and found not in others:
             after = re.sub(rf"(\$\(find +){re.escape(found)}(?= *\))", rf"\g<1>{own}", files.text(file) or "")
             line = text[: place.start()].count("\n") + 1
