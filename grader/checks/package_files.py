@@ -126,6 +126,10 @@ def _lost_folder(package: PackageFacts, folder: str, params: LayoutParams) -> Sl
     nowhere = bool(own) and all(find_script(package, s) is None for s in own)
     below = [path for path in (*params.files, *params.scripts) if path.startswith(f"{folder}/")]
     fix = add_folder_hint(package, folder, below)
+    outside = re.compile(rf"\S+ is at (\S*\b{re.escape(folder)}/)\S+, outside of the package: .* to (\S+/)")
+    if found := next(filter(None, map(outside.match, package.hints)), None):
+        what = f"there is no folder {folder}/, but {found[1]}, outside of the package"
+        return Slip(what, f"move {found[1]} to {found[2]}")
     return Slip(f"there is no folder {folder}/", fix, explained=nowhere)
 
 

@@ -63,7 +63,7 @@ def choose_package(candidates: list[Candidate], wanted: WantedPackage) -> Choice
     chosen, known = choice.package, {choice.package.name, *(one.name for one in wanted.each)}
     others = [c for c in candidates if c.has_manifest and c.name not in known][:COPIES_LOOKED_AT]
     hints = (*_name_taken(chosen, candidates, wanted), *_in_another_package(chosen, others, wanted))
-    return replace(choice, hints=(*choice.hints, *hints))
+    return replace(choice, hints=(*choice.hints, *hints, *_outside_of_it(chosen, wanted)))
 
 
 def _name_taken(chosen: Candidate, candidates: list[Candidate], wanted: WantedPackage) -> Iterator[str]:
@@ -235,6 +235,18 @@ def _in_another_package(chosen: Candidate, others: list[Candidate], wanted: Want
             )
             yield f"{printable(name)} is at {there}: {fix}"
         missing -= places.keys()
+
+
+def _outside_of_it(chosen: Candidate, wanted: WantedPackage) -> Iterator[str]:
+    """Yield the lab's files that the package lacks and that lie beside its folder; each begins with its name."""
+    if chosen.path == ".":
+        return
+    missing = wanted.files - _files_of(chosen.folder, wanted.files)
+    above = PurePosixPath(chosen.path).parent
+    for name, path in sorted(_places_of(chosen.folder.parent, missing, near=True).items()):
+        if "/" in path and path.partition("/")[0] != chosen.folder.name:
+            where, into = (printable(str(PurePosixPath(one, path))) for one in (above, chosen.path))
+            yield f"{printable(name)} is at {where}, outside of the package: move it to {into}"
 
 
 def _launch_changes(other: Candidate, path: str, chosen: Candidate, wanted: WantedPackage) -> str:

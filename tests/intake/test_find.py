@@ -308,6 +308,10 @@ def test_what_another_copy_has_and_the_graded_one_has_not_is_named(tmp_path):
             ],
         ),
         ({"week1/scripts/other.py": ""}, []),
+        (
+            {"launch/lab.launch": "", "lab1/scripts/talker.py": ""},
+            ["lab.launch is at launch/lab.launch, outside of the package: move it to lab1/launch/lab.launch"],
+        ),
     ],
 )
 def test_what_another_package_has_and_the_lab_s_own_has_not_is_named(beside, told, tmp_path):
