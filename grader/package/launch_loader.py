@@ -241,7 +241,7 @@ class _Loader:
             if asked not in scope.args and len(found) < _UNSET_MAX:
                 meant = next((one for one in islice(scope.args, _UNSET_MAX) if _is_slip(asked, one)), "")
                 arg = LaunchArg(name=asked, declared=False, file=file, line=line, meant=meant)
-                found.setdefault((file, asked), arg)
+                found.setdefault((file, f"{asked}:{line}" if meant else asked), arg)
 
     def _note_unresolved(self, element: etree._Element, scope: Scope) -> None:
         """Note a `$(…)` that is none of roslaunch's, or that finds a package of nearly this one's name."""

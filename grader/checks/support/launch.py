@@ -349,7 +349,7 @@ def _unset_args(text: str, package: PackageFacts) -> Absence | None:
         return None
     args = lacking[0]
     lines = sorted({arg.line for arg in args})
-    names = join_words(f"$(arg {arg.name})" for arg in args)
+    names = join_words(dict.fromkeys(f"$(arg {arg.name})" for arg in args))
     where = f"{on_lines(lines)} of {args[0].file}"
     declares = join_words(f'<arg name="{arg.name}" default="…"/>' for arg in args)
     verb = "uses" if len(lines) == 1 else "use"
