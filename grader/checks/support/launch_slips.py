@@ -262,8 +262,8 @@ def _slip_of_node(package: PackageFacts, node: LaunchNode, said: str) -> Slip | 
     if unfound or (near and pkg not in package.others and pkg not in known_packages()):
         fix = f'write pkg="{package.name}"'
         then = "" if has_program(package, name) else _no_program(package, node, (package,)).fix
-        of_type = then.startswith("write type=")
-        fix += f" and {then.removeprefix('write ')}" if of_type else f"; then {then}" if then else ""
+        is_type = then.startswith("write type=")
+        fix += f" and {then.removeprefix('write ')}" if is_type else f"; then {then}" if then else ""
         slip = _slip(node, f"there is no {name} in a package {pkg}", fix)
         # Where the launch file has the name of the folder or of project(…), the manifest is at fault.
         return slip._replace(of_manifest=pkg in {_folder(package), *_projects(package)}, lacks=name)
