@@ -123,11 +123,12 @@ def settings(
             value = param.value if param.made_up is None else made_up(_EXAMPLES[param.made_up])
             found.append(Setting(_absolute(param.name or ""), value, "made up" if param.made_up else "given"))
             continue
-        leaves, remark = _file(find(param.file))
+        leaves, alike, remark = _file(find(param.file))
         remarks += [f"{param.file}: {remark}"] if remark else []
         found += [Setting(name, value, f"made up, for {param.file}") for name, value in leaves.items()]
         lacking = [name for name in map(_absolute, param.also) if name not in leaves]
-        found += [Setting(name, made_up(""), f"made up, {NOT_IN_FILE} {param.file}") for name in lacking]
+        detail = f"made up, {NOT_IN_FILE} {param.file}"
+        found += [Setting(name, made_up(alike.get(name.rpartition("/")[2], "")), detail) for name in lacking]
     return found, remarks
 
 
@@ -189,17 +190,18 @@ class _UnreadableError(ValueError):
     """Why nothing comes of a file, in a few words."""
 
 
-def _file(path: Path | None) -> tuple[dict[str, Any], str]:
-    """Return values made up for the file's leaves, by their names, or why there are none."""
+def _file(path: Path | None) -> tuple[dict[str, Any], dict[str, Any], str]:
+    """Return values made up for the file's leaves, by their names, what the file has by the last part of each name, in
+    lists too, and why there are none."""
     data = read_untrusted(path, FILE_BYTES_MAX + 1) if path else None
     try:
         leaves = dict(_leaves(_content(data), "", 0))
         _check_size(list(leaves.values()))
-        return {name: made_up(value) for name, value in leaves.items()}, ""
+        return {name: made_up(value) for name, value in leaves.items()}, dict(_by_key(leaves)), ""
     except _UnreadableError as error:
-        return {}, str(error)
+        return {}, {}, str(error)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        return {}, f"not YAML: {str(error).splitlines()[0]}"
+        return {}, {}, f"not YAML: {str(error).splitlines()[0]}"
 
 
 def _content(data: bytes | None) -> dict[Any, Any]:
@@ -243,6 +245,15 @@ def _leaves(content: Mapping[Any, Any], prefix: str, depth: int) -> Iterator[tup
             yield name, value
         else:
             yield name, str(value)
+
+
+def _by_key(leaves: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield each leaf, and those in lists, by the last part of its name. The lists are of a checked size."""
+    for name, value in leaves.items():
+        for item in value if isinstance(value, list) else ():
+            if isinstance(item, dict):
+                yield from _by_key(dict(_leaves(item, "", 0)))
+        yield name.rpartition("/")[2], value
 
 
 def _absolute(name: str) -> str:
