@@ -1,4 +1,4 @@
-"""What the sides of a sum are that Python cannot add."""
+"""What the sides of a sum or a comparison are that Python cannot add or compare."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 from contextlib import suppress
 
 from grader.checks.support.console_output import Frame, Traceback
-from grader.checks.support.rospy_calls import fields_of
+from grader.checks.support.rospy_calls import fields_of, line_tree
 from grader.checks.support.text import shown
 from grader.line_slips.python import parsed
 from grader.model.package import PackageFacts
@@ -16,9 +16,17 @@ _ADDED = re.compile(
     r"can only concatenate str \(not \"(\w+)\"\) to str|unsupported operand type\(s\) for \+=?: '(\w+)' and '(\w+)'"
 )
 
+_COMPARED = re.compile(
+    r"not supported between instances of '(?:(str)' and '(?:int|float)|(?:int|float)' and 'str)'"
+)
+_BY_SIZE = (ast.Lt, ast.LtE, ast.Gt, ast.GtE)
+
 
 def explain_operand(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
-    """A text or a message and something else are added: which of both does not fit, where Python marks the place."""
+    """A text or a message and something else are added, or text is compared with a number: which of both does not fit,
+    where Python marks the place."""
+    if compared := _compared_text(found):
+        return compared
     if not (match := _ADDED.search(found.message)) or {"Time", "Duration"}.intersection(match.groups()):
         return None
     of_text = bool(match[1]) or "str" in match.groups()
@@ -35,6 +43,21 @@ def explain_operand(found: Traceback, package: PackageFacts) -> tuple[str, str] 
         whole = f"{other or 'one side'} is the whole message ({kind})"
         return whole, f"write `{value}` instead of `{other or 'msg'}`"
     return _beside_text(other, kind) if of_text else None
+
+
+def _compared_text(found: Traceback) -> tuple[str, str] | None:
+    match, line = _COMPARED.search(found.message), re.sub(r"^\s*el(?=if\b)", "", found.innermost.source)
+    sides = [
+        n.left if match[1] else n.comparators[0]
+        for n in (ast.walk(line_tree(line)) if match else ())
+        if match and isinstance(n, ast.Compare) and len(n.ops) == 1 and isinstance(n.ops[0], _BY_SIZE)
+    ]
+    if len(sides) != 1:
+        return None
+    side, text = sides[0], shown(ast.unparse(sides[0]))
+    made = isinstance(side, ast.Call) and getattr(side.func, "id", "") == "str" and len(side.args) == 1
+    number = shown(ast.unparse(side.args[0])) if isinstance(side, ast.Call) and made else f"float({text})"
+    return f"`{text}` is text, and is compared with a number", f"write `{number}` instead of `{text}`"
 
 
 def _beside_text(other: str, kind: str) -> tuple[str, str]:
