@@ -116,7 +116,13 @@ def _asking(
     if repair.kind in OF_BUILDS:  # of a file with several faults, those that speak of this line
         new = _new_words(repair)
         better_by_it = better - {c.id for c in rubric.criteria if c.check == INSTALL}
-        told = {c.id for c in asking if is_told(repair, first[c.id].hint)}
+        at_line = (repair.file, repair.line)  # all that there is to go by where only a comma goes
+        told = {
+            c.id
+            for c in asking
+            if is_told(repair, first[c.id].hint)
+            or (not new and at_line in cited_lines(first[c.id].citations))
+        }
         asking = [c for c in asking if c.id in better_by_it | told or new & words_of(first[c.id].message)]
     sought = [c for c in asking if _seeks(first[c.id], repair)]
     return sought or [c for c in asking if _names(c, repair)] or asking
