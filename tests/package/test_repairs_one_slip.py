@@ -229,6 +229,7 @@ SLIPS = {
         ("rospy.is_shutdown", "rospy,is_shutdown", "a dot belongs behind `rospy`"),
         ("world %s", "world s", "the string has no `%` in it"),
         ("' % rospy", "' & rospy", "and not `&`"),
+        ("' % rospy", "', rospy", "the comma makes several values of `text`, which is to be text"),
         ("rospy.get_time()", "rospy.get_time)", "its opening bracket is missing"),
         ("rospy.get_time()", "rospy.get_time(", "is opened on this line and never closed"),
         ("pub.publish", "pu.publish", "pu is not defined"),

@@ -11,7 +11,7 @@ from __future__ import annotations
 import ast
 import builtins
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from itertools import chain, pairwise
 from typing import NamedTuple, TypeGuard
@@ -28,6 +28,7 @@ from grader.package.python_repairs.syntax import (
     tree_of,
 )
 
+PAIR = 2
 GIVEN_ONE = ("Rate", "sleep", "Duration", "init_node", "loginfo", "logwarn", "logerr")
 CALLED = frozenset({"is_shutdown", "sleep", "spin"})
 QUOTED = re.compile(r"[\w.]+\.(sleep|spin)\([\w.]*\)")
@@ -188,6 +189,7 @@ def _wrong_arguments(tree: ast.Module, kinds: list[str]) -> Iterator[Argument]:
     rates = {ast.unparse(target) for target, value in values if _called(value) == "Rate"}
     published = {ast.unparse(target): kind for target, value in values if (kind := _published_type(value))}
     yield from _published_nothing(tree)
+    yield from _behind_commas(tree)
     for call in (n for n in nodes_in(tree) if isinstance(n, ast.Call)):
         name = _called(call)
         owner = ast.unparse(call.func.value) if isinstance(call.func, ast.Attribute) else ""
@@ -285,10 +287,32 @@ def _published_together(call: ast.Call, kind: str) -> Iterator[Argument]:
     if NUMBERS.fullmatch(kind) and len(values) == 1 and _is_text(text):
         yield Argument([(call, f"{ast.unparse(call.func)}({ast.unparse(values[0])})")], why)
     elif kind == "String" and values and _is_text(text) and _has_no_other_places(text.value, len(values)):
-        given = ", ".join(map(ast.unparse, values))
-        given = given if isinstance(values[0], ast.Name | ast.Call) and not values[1:] else f"({given})"
-        places = repr(text.value) if "%" in text.value else _with_places(text.value, len(values))
-        yield Argument([(call, f"{ast.unparse(call.func)}({places} % {given})")], why)
+        yield Argument([(call, f"{ast.unparse(call.func)}({_formatted(text.value, values)})")], why)
+
+
+def _behind_commas(tree: ast.Module) -> Iterator[Argument]:
+    """Of `text = 'a %s', b`, where the text is published."""
+    calls = (n for n in nodes_in(tree) if isinstance(n, ast.Call) and _called(n) in {"publish", "String"})
+    published = {
+        call.args[0].id for call in calls if len(call.args) == 1 and isinstance(call.args[0], ast.Name)
+    }
+    for node in (n for n in nodes_in(tree) if isinstance(n, ast.Assign) and len(n.targets) == 1):
+        target, value = node.targets[0], node.value
+        if not isinstance(value, ast.Tuple) or not isinstance(target, ast.Name) or len(value.elts) < PAIR:
+            continue
+        text, *values = value.elts
+        if target.id in published and _is_text(text) and _has_no_other_places(text.value, len(values)):
+            right = _formatted(text.value, values)
+            yield Argument(
+                [(value, right)], f"the comma makes several values of `{target.id}`, which is to be text"
+            )
+
+
+def _formatted(text: str, values: Sequence[ast.expr]) -> str:
+    """Return how a text is written with these values in it."""
+    given = ", ".join(map(ast.unparse, values))
+    given = given if isinstance(values[0], ast.Name | ast.Call) and not values[1:] else f"({given})"
+    return f"{repr(text) if '%' in text else _with_places(text, len(values))} % {given}"
 
 
 def _has_no_other_places(text: str, count: int) -> bool:
