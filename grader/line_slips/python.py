@@ -390,7 +390,7 @@ def _with_quote(line: str, message: str, column: int | None) -> Iterator[str]:
     yield line + quote
 
 
-_QUOTE = re.compile(r"(\b[rRfFbBuU]{1,2})?[\"']")
+_QUOTE = re.compile(r"(?<!\w)[rRfFbBuU]{0,2}[\"']")
 _TEXT_LINES_MAX = 5
 
 
