@@ -25,6 +25,7 @@ pytestmark = pytest.mark.usefixtures("without_processes")
             "if 100 <= self.n:\n    self.n = 0",
             [("100", "reset-limit", 1), ("0", "reset-value", 2)],
         ),
+        ("if n == 128:\n    n = -128", [("128", "reset-limit", 1), ("-128", "reset-value", 2)]),
         ("if n > 127:\n    m = 1", []),
         ("if n > 127:\n    n = m", []),
         ("'%d' % n", []),

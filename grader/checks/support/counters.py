@@ -460,7 +460,9 @@ def _where_reset(verdict: Verdict, turn: Step, written: Sequence[PythonSlip], pa
         return verdict
     limits = f"ends its range at {slip.message}" if slip.name else f"compares it with {slip.message}"
     does = "" if wrong_value else f" {limits}"
-    message = f"{verdict.message} ({slip.file}, line {slip.line}{does})"
+    by_type = OVERFLOWS in verdict.message and wrong_value  # which the line makes, and no type
+    said = RESETS_TO.format(significant(turn.before), significant(turn.after), params.minimum)
+    message = f"{said if by_type else verdict.message} ({slip.file}, line {slip.line}{does})"
     right = params.minimum if wrong_value else params.maximum
     hint = f"on line {slip.line}, write {right} instead of {slip.message}"
     if not wrong_value:
@@ -473,6 +475,10 @@ def _limit_hint(slip: PythonSlip, params: WrapParams) -> str:
     if slip.name == "range":
         return f"on line {slip.line}, let the range end at {most + 1}: {most} is its last number then"
     return f"let it count up to {most} there: `if counter > {most}`, or `% {most + 1}`, on line {slip.line}"
+
+
+OVERFLOWS = "overflows to"
+RESETS_TO = "after {} the counter resets to {}, not to {}"
 
 
 def whose_turn(step: Step, count: Count, run: Run, params: WrapParams) -> Literal["program", "flood", "lost"]:
@@ -499,9 +505,9 @@ def bad_turn_message(step: Step, turns: list[Step], params: WrapParams) -> str:
         return f"the counter resets too late, from {significant(late.before)} to {significant(late.after)}: {comes}"
     # With a maximum of 127, int8 goes on at -128: the type's range made it turn, and no line of the script.
     if step.after == -(high + 1):
-        return f"the counter overflows to {after}, as a signed integer of this size does: {comes}"
+        return f"the counter {OVERFLOWS} {after}, as a signed integer of this size does: {comes}"
     if step.before >= high - 1:
-        return f"after {before} the counter resets to {after}, not to {low}"
+        return RESETS_TO.format(before, after, low)
     if step.after == low:
         return f"the counter resets too early: {comes}"
     return f"the counter goes back before it has reached {high}: {comes}"

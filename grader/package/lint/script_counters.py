@@ -51,13 +51,13 @@ def resets(tree):
             test = list(ast.walk(node.test if isinstance(node, ast.If) else node.value.test))
             names = {ast.dump(part) for part in test if isinstance(part, (ast.Name, ast.Attribute))}
             values = [value for name, value in done if ast.dump(name).replace("Store()", "Load()") in names]
-            value = next((value for value in values if whole(value) is not None), None)
+            value = next((value for value in values if signed(value) is not None), None)
             asked = test if value is not None else []
         for part in asked:
             if whole(part) is not None:
                 yield slip(part.lineno, "reset-limit", "%d" % whole(part), fix)
         if value is not None:
-            yield slip(value.lineno, "reset-value", "%d" % whole(value))
+            yield slip(value.lineno, "reset-value", "%d" % signed(value))
 
 
 def limits_of_ranges(tree):
