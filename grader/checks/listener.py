@@ -37,6 +37,7 @@ from grader.checks.support.text import (
     near_names,
     python_or_cpp,
     refuse_others,
+    rename_if_meant,
     shown,
     subscriber,
     unfilled,
@@ -273,7 +274,7 @@ def _never_subscribed(package: PackageFacts, run: Run, topic: str, subscribed: S
         other = f"{other}, on {copied}"
         hint = f"write {topic} on the one of {copied} whose callback is for it"
     elif len(subscribed) == 1 and not near and not probes_on(run, subscribed[0]):
-        hint = f"{hint}, or rename {subscribed[0]} if that is meant to be it"
+        hint += rename_if_meant(subscribed)
     meant = near or (subscribed if len(subscribed) == 1 else [])
     end: SlipKind = "subscriber" if subscribed else "publisher"
     named = next(iter(meant), "" if subscribed else topic)

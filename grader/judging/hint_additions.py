@@ -28,7 +28,17 @@ from grader.checks.support.scripts import (
     names_script,
     programs,
 )
-from grader.checks.support.text import RATE_SLOT, TYPE_SLOT, VALUE_SLOT, code_of, in_language, shown, texts_in
+from grader.checks.support.text import (
+    RATE_SLOT,
+    RENAME_IF_MEANT,
+    TYPE_SLOT,
+    VALUE_SLOT,
+    code_of,
+    in_language,
+    rename_if_meant,
+    shown,
+    texts_in,
+)
 from grader.evidence.events import PACKAGE_RUN
 from grader.installable import noetic_messages
 from grader.judging.cited_lines import LINE_CHARS, LINES_READ
@@ -68,18 +78,14 @@ OF_FILES = ("build", "cmake", "manifest")
 """Checks whose criterion takes the advice: it is of the package as a whole."""
 
 
-_RENAMES = re.compile(r", or rename (?P<names>/[^;]*?) if that is meant to be it")
-
-
 def keep_other_names(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdict:
     """Return a verdict whose hint renames no topic and no service that another criterion asks for."""
     asked = {text for c in rubric.criteria if c.id != criterion.id for text in texts_in(c.parameters)}
 
-    def free(found: re.Match[str]) -> str:
-        names = [name for name in re.findall(r"/[\w/]+", found["names"]) if name not in asked]
-        return f", or rename {join_words(names, 'or')} if that is meant to be it" if names else ""
+    def without_asked(found: re.Match[str]) -> str:
+        return rename_if_meant([name for name in re.findall(r"/[\w/]+", found["names"]) if name not in asked])
 
-    hint = _RENAMES.sub(free, verdict.hint)
+    hint = RENAME_IF_MEANT.sub(without_asked, verdict.hint)
     return verdict if hint == verdict.hint else verdict.model_copy(update={"hint": hint})
 
 

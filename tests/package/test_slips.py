@@ -171,10 +171,10 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("loop-left", 6, "at the sys.exit() on line 6: remove it from line 6")]),
         (node("    e = threading.Event()\n    while e.wait(1):\n        p.publish(1)\n") + CALLED,
          [("fills", 4, ""),
-          ("loop-left", 5, "runs only once `e` is set: a `not` is missing: on line 5, write `while not e.wait(…):`")]),
+          ("loop-left", 5, "runs only after `e` is set: a `not` is missing: on line 5, write `while not e.wait(…):`")]),
         ("def end():\n    global off\n    off = True\n"
          + node("    rospy.on_shutdown(end)\n    while off:\n        p.publish(1)\n") + "off = False\n" + CALLED,
-         [("loop-left", 8, "runs only once `off` is set: a `not` is missing: on line 8, write `while not off:`")]),
+         [("loop-left", 8, "runs only after `off` is set: a `not` is missing: on line 8, write `while not off:`")]),
         (node("    for i in range(4):\n        t.angular.z = i\n        p.publish(t)\n") + CALLED,
          [("loop-left", 4, "call rospy.spin() below line 6")]),
         ("def drive(x, y):\n    while on:\n        p.publish(x)\nmain()\n",

@@ -460,9 +460,10 @@ def _where_reset(verdict: Verdict, turn: Step, written: Sequence[PythonSlip], pa
         return verdict
     limits = f"ends its range at {slip.message}" if slip.name else f"compares it with {slip.message}"
     does = "" if wrong_value else f" {limits}"
-    by_type = OVERFLOWS in verdict.message and wrong_value  # which the line makes, and no type
-    said = RESETS_TO.format(significant(turn.before), significant(turn.after), params.minimum)
-    message = f"{said if by_type else verdict.message} ({slip.file}, line {slip.line}{does})"
+    said = verdict.message
+    if turn.after == _overflowed(params):  # the line makes it turn there, and not the type's range
+        said = RESETS_TO.format(significant(turn.before), significant(turn.after), params.minimum)
+    message = f"{said} ({slip.file}, line {slip.line}{does})"
     right = params.minimum if wrong_value else params.maximum
     hint = f"on line {slip.line}, write {right} instead of {slip.message}"
     if not wrong_value:
@@ -477,7 +478,11 @@ def _limit_hint(slip: PythonSlip, params: WrapParams) -> str:
     return f"let it count up to {most} there: `if counter > {most}`, or `% {most + 1}`, on line {slip.line}"
 
 
-OVERFLOWS = "overflows to"
+def _overflowed(params: WrapParams) -> int:
+    """Return what comes after the maximum where the type's range makes the counter turn: int8 goes on at -128."""
+    return -(params.maximum + 1)
+
+
 RESETS_TO = "after {} the counter resets to {}, not to {}"
 
 
@@ -503,9 +508,8 @@ def bad_turn_message(step: Step, turns: list[Step], params: WrapParams) -> str:
         if late is None:
             return f"the counter never resets: {comes}, and it keeps counting"
         return f"the counter resets too late, from {significant(late.before)} to {significant(late.after)}: {comes}"
-    # With a maximum of 127, int8 goes on at -128: the type's range made it turn, and no line of the script.
-    if step.after == -(high + 1):
-        return f"the counter {OVERFLOWS} {after}, as a signed integer of this size does: {comes}"
+    if step.after == _overflowed(params):
+        return f"the counter overflows to {after}, as a signed integer of this size does: {comes}"
     if step.before >= high - 1:
         return RESETS_TO.format(before, after, low)
     if step.after == low:

@@ -407,6 +407,10 @@ def ended_soon(run: Run, nodes: Iterable[LaunchNode], topic: str) -> list[Launch
     return ended if together_s(run, topic) < CONNECTED_WITHIN_S else []
 
 
+NOT_BEGUN = re.compile(r" never runs| runs only (?:when|after) ")
+"""What is told of a loop whose condition does not hold when the script reaches it."""
+
+
 def ended_by_itself(
     package: PackageFacts, run: Run, file: LaunchFile, ended: Sequence[LaunchNode]
 ) -> Verdict:
@@ -420,7 +424,7 @@ def ended_by_itself(
     else:
         cited = tuple(FileCitation(file=n.file or file.path, line=n.line) for n in ended)
         verdict = failed(message, hint=f"keep it alive: end with {SPIN}", citations=cited)
-    if left is not None and ("never runs" in left.message or "runs only" in left.message):
+    if left is not None and NOT_BEGUN.search(left.message):
         return verdict.if_repeated()  # it ends as soon on any machine
     # on a quicker machine, the others may connect to it before it ends
     return excused(verdict.if_repeated(), run, run.start_ns, run.end_ns, why_late)

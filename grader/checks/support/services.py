@@ -14,7 +14,7 @@ from grader.checks.support.processes import (
     life_of,
     plain_type,
 )
-from grader.checks.support.text import SERVICE, SPIN, near_names, service_call, shown
+from grader.checks.support.text import SERVICE, SPIN, near_names, rename_if_meant, service_call, shown
 from grader.checks.support.topics import no_node, why_unreached
 from grader.evidence.events import MISFIT, NO_ANSWER
 from grader.evidence.run import Run
@@ -105,7 +105,7 @@ def not_offered(package: PackageFacts, run: Run, service: str) -> Verdict:
         return failed(f"no node offers {service}: {slip.message}", hint=hint, citations=(slip.place,))
     others = f"; it offers {join_words(found)}" if found else ""
     hint = f"add {service_call(service, '…, callback')} before the loop or {SPIN}"
-    hint += f", or rename {join_words(found, 'or')} if that is meant to be it" if found else ""
+    hint += rename_if_meant(found)
     return failed(f"no node offers {service}{others}", hint=hint)
 
 

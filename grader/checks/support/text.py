@@ -5,14 +5,14 @@ from __future__ import annotations
 import difflib
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from typing import Literal
 
 from pydantic import AfterValidator
 
 from grader.untrusted_text import visible, without_colours
-from grader.wording import is_one_edit, plural, shorten
+from grader.wording import is_one_edit, join_words, plural, shorten
 
 SIMILARITY = 0.8
 IN_PLACE_OF_ALL = "in place of all of it"
@@ -161,6 +161,15 @@ Language = Literal["python", "cpp"]
 
 # Letters of Unicode's private use, which stand in no other text.
 _PAIR = re.compile("\ue000([^\ue000-\ue002]*)\ue001([^\ue000-\ue002]*)\ue002")
+
+
+RENAME_IF_MEANT = re.compile(r", or rename (?P<names>/[^;]*?) if that is meant to be it")
+
+
+def rename_if_meant(names: Collection[str]) -> str:
+    """Return what to put behind the hint that a topic or a service has to be added, where these may be meant to be it:
+    `RENAME_IF_MEANT` finds it again."""
+    return f", or rename {join_words(names, 'or')} if that is meant to be it" if names else ""
 
 
 def python_or_cpp(python: str, cpp: str) -> str:

@@ -33,6 +33,7 @@ from grader.checks.support.text import (
     near_names,
     publisher,
     python_or_cpp,
+    rename_if_meant,
     shown,
     subscriber,
 )
@@ -238,7 +239,7 @@ def _not_advertised(
     meant = [name for name, type_ in published.items() if kind and type_ == plain_type(kind)] or list(
         published
     )
-    hint += "" if topic in TF_TOPICS else f", or rename {join_words(meant, 'or')} if that is meant to be it"
+    hint += "" if topic in TF_TOPICS else rename_if_meant(meant)
     verdict = of_node(f"{what}; the node publishes on {join_words(published)}", measured=measured, hint=hint)
     return verdict.about(citations=named_at(package, run, "publisher", meant[0]), said=meant[0])
 

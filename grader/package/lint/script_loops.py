@@ -185,7 +185,7 @@ def waits_without_not(tree):
         name = dotted(loop.test.func.value if asks else loop.test)
         if name in (made if asks else flags) and calls_in(loop, "publish"):
             asked = "%s.%s(…)" % (name, loop.test.func.attr) if asks else name
-            message = "the loop on line %d runs only once `%s` is set: a `not` is missing"
+            message = "the loop on line %d runs only after `%s` is set: a `not` is missing"
             fix = "on line %d, write `while not %s:`" % (loop.lineno, asked)
             yield slip(loop.lineno, "loop-left", message % (loop.lineno, name), fix, asked if asks else "")
 

@@ -27,8 +27,8 @@ from grader.package.python_repairs.syntax import (
     step_to,
     tree_of,
 )
+from grader.wording import PAIR
 
-PAIR = 2
 GIVEN_ONE = ("Rate", "sleep", "Duration", "init_node", "loginfo", "logwarn", "logerr")
 CALLED = frozenset({"is_shutdown", "sleep", "spin"})
 QUOTED = re.compile(r"[\w.]+\.(sleep|spin)\([\w.]*\)")

@@ -305,8 +305,8 @@ def _messages_of_callbacks(
 
 
 def _heard_scans(tree: ast.Module) -> dict[int, Collection[str]]:
-    """Return the fields of a scan, by the identity of each use of what a function takes and whose `range` is asked for,
-    in a script whose only message with ranges is that one."""
+    """Return the fields of a scan, by the identity of each parameter of a function that is asked for its `range`, in a
+    script that imports LaserScan and not Range."""
     nodes = list(nodes_in(tree))
     classes = {
         a.name
