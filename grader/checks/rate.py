@@ -374,7 +374,7 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
     others = _goes_on(found, run, params)
     # A loop that still publishes on another topic was not left.
     kinds: tuple[SlipKind, ...] = ("spin-in-loop", "unregistered", "stuck")
-    kinds = kinds if others else (*kinds, "loop-left")
+    kinds = kinds if others else (*kinds, "never-begun", "loop-left")
     if slip := next(iter(_slips(run, package, params, *kinds)), None):
         return failed(f"{message}: {slip.message}", hint=slip.fix, citations=(slip.place,))
     if end := explain_error(package, run):

@@ -242,8 +242,8 @@ class Later:
                 yield Fix(f"{slip.fix} ({slip.file})", (slip.fix,))
         for slip in self._of("main-guard"):
             yield Fix(f"write {MAIN} on {_line(slip)}", (f"on {_line(slip)}, write {MAIN}",))
-        for slip in (one for one in self._of("loop-left") if one.name):
-            yield Fix(f"write `while not {slip.name}():` on {_line(slip)}", (slip.fix,))
+        for slip in self._of("never-begun"):
+            yield Fix(f"{slip.fix} ({slip.file})", (slip.fix,))
 
     def _built(self) -> Iterator[Fix]:
         """Sources of C++, and messages, that are not there: CMake asks for them only once it has found all packages."""
@@ -320,8 +320,7 @@ class Later:
                 owner = "self." if (slip.file, slip.line) in of_self else ""
                 yield Fix(f"on {_line(slip)}, {slip.fix.replace(slip.name, owner + slip.name, 1)}")
         for slip in self._of("loop-left") if not self._ran else ():
-            if not slip.name:
-                yield Fix(f"{slip.fix}, since {slip.message}", (slip.fix,))
+            yield Fix(f"{slip.fix}, since {slip.message}", (slip.fix,))
         for path in sorted(self._paths) if not self._ran else ():
             lines = [line[:LINE_CHARS] for line in self._lines(path)]
             yield from self._rate_of_lines(path, lines, significant(hz))

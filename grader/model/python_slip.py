@@ -11,7 +11,7 @@ from grader.model.verdict import Placed
 SlipKind = Literal[
     "not-called", "input", "no-clock", "misspelt", "rate-parameter", "rate-number", "rate-random", "reset-value",
     "reset-limit", "set-in-loop", "reset-early", "never-called", "main-guard", "never-reached", "spin-in-loop",
-    "loop-left", "ends-node", "sleep-outside", "sleep-twice", "callback-called", "callback-missing",
+    "never-begun", "loop-left", "ends-node", "sleep-outside", "sleep-twice", "callback-called", "callback-missing",
     "callback-values", "callback-waits", "defined-twice", "subscribed-again", "clock-value", "queue-size", "deaf",
     "deaf-loop", "node-name", "no-init", "commented-out", "publisher", "publisher-type", "subscriber",
     "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes", "prints",
@@ -61,9 +61,10 @@ class PythonSlip(Placed, Record):
     - `read-late`: the first of the lines that such a loop, or `spin()`, holds up until the node ends, where one of them
       reads a parameter; `name` is the last.
     - `spin-in-loop`: a loop that publishes and waits in `spin()`.
+    - `never-begun`: a loop whose condition, `name`, does not hold when the script reaches it: a `not` is missing, or a
+      variable begins with the other value.
     - `loop-left`: a loop that ends in its first turn, or after a number of them, or a callback that ends the node, or
-      the only `publish(…)`, above a loop that waits or in none; `name` is the function that it asks, where a `not` is
-      missing.
+      the only `publish(…)`, above a loop that waits or in none.
     - `ends-node`: a callback that ends the node, at least sometimes, or what leaves its loop upon an exception; a slip
       only if the node ended by itself.
     - `sleep-outside`, `sleep-twice`: a loop whose `sleep()` is outside it, or that only makes its Rate, or that

@@ -148,8 +148,8 @@ CASES: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str,
          slip("object", "", name="__init__", fix="on line 5, write `__init__` instead of `init`")],
         "; then on line 5, write `__init__` instead of `init`"),
     "a loop that lacks its not": (
-        "node", DIES, TALKER, [slip("loop-left", "", name="rospy.is_shutdown", fix="on line 5, write …")],
-        f"; then write `while not rospy.is_shutdown():` on line 5 of {FILE}"),
+        "node", DIES, TALKER, [slip("never-begun", "", name="rospy.is_shutdown", fix="on line 5, write …")],
+        f"; then on line 5, write … ({FILE})"),
     "a loop of so many turns": (
         "node", DIES, TALKER, [slip("loop-left", "it ends after a fixed number of rounds", fix="write `while …`")],
         "; then write `while …`, since it ends after a fixed number of rounds"),

@@ -171,10 +171,10 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("loop-left", 6, "at the sys.exit() on line 6: remove it from line 6")]),
         (node("    e = threading.Event()\n    while e.wait(1):\n        p.publish(1)\n") + CALLED,
          [("fills", 4, ""),
-          ("loop-left", 5, "runs only after `e` is set: a `not` is missing: on line 5, write `while not e.wait(…):`")]),
+          ("never-begun", 5, "runs only after `e` is set: a `not` is missing: on line 5, write `while not e.wait(")]),
         ("def end():\n    global off\n    off = True\n"
          + node("    rospy.on_shutdown(end)\n    while off:\n        p.publish(1)\n") + "off = False\n" + CALLED,
-         [("loop-left", 8, "runs only after `off` is set: a `not` is missing: on line 8, write `while not off:`")]),
+         [("never-begun", 8, "runs only after `off` is set: a `not` is missing: on line 8, write `while not off:`")]),
         (node("    for i in range(4):\n        t.angular.z = i\n        p.publish(t)\n") + CALLED,
          [("loop-left", 4, "call rospy.spin() below line 6")]),
         ("def drive(x, y):\n    while on:\n        p.publish(x)\nmain()\n",
@@ -265,7 +265,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (node("    for i in range(4):\n        p.publish(1)\n        rospy.sleep(1)\n    p.publish(0)\n") + CALLED,
          [("loop-left", 4, "call rospy.spin() below line 7")]),
         *((node(f"    while rospy.is_shutdown() {end}:\n        p.publish(1)\n") + CALLED,
-           [("loop-left", 4, "on line 4, write `while not rospy.is_shutdown():`")])
+           [("never-begun", 4, "on line 4, write `while not rospy.is_shutdown():`")])
           for end in ("!= 0", "== True", "is True")),
         (node("    for i in range(9):\n        p.publish(i)\n") + CALLED, [("loop-left", 4, "put it inside a `while")]),
         (node("    while not rospy.is_shutdown() and n < 9:\n        p.publish(1)\n") + CALLED,

@@ -308,7 +308,7 @@ LIKE_SLIPS = {
 @pytest.mark.parametrize("text", LIKE_SLIPS.values(), ids=LIKE_SLIPS)
 def test_a_line_that_looks_like_a_slip_and_is_right(text: str, tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(text, encoding="utf-8")
-    kinds = {"wrong-value", "loop-left", "object", "callback-values"}
+    kinds = {"wrong-value", "never-begun", "loop-left", "object", "callback-values"}
     told = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind in kinds]
     assert [s.message for s in told if "had not been reached" not in s.message] == []
 
@@ -349,9 +349,9 @@ UNHEARD = "def hear(msg):\n    print(msg.data)\ndef other(msg):\n    print(msg.d
             "from rospy import Subscriber\nclass Subscriber:\n    pass\nSubscriber('a', Int8, print)\n",
             {"defined-twice"},
         ),
-        ("while rospy.is_shutdown():\n    pub.publish(1)\n", {"loop-left"}),
-        ("over = True\nwhile not over:\n    pub.publish(1)\n", {"loop-left"}),
-        ("self.go = False\nwhile self.go:\n    pub.publish(1)\n", {"loop-left"}),
+        ("while rospy.is_shutdown():\n    pub.publish(1)\n", {"never-begun"}),
+        ("over = True\nwhile not over:\n    pub.publish(1)\n", {"never-begun"}),
+        ("self.go = False\nwhile self.go:\n    pub.publish(1)\n", {"never-begun"}),
         ("over = True\nover = False\nwhile not over:\n    pub.publish(1)\n", set()),
         ("over = True\ndef stop(over):\n    while not over:\n        pub.publish(1)\n", set()),
         ("over, n = True, 1\nwhile not over:\n    pub.publish(1)\n", set()),
@@ -364,7 +364,7 @@ UNHEARD = "def hear(msg):\n    print(msg.data)\ndef other(msg):\n    print(msg.d
 )
 def test_slips_that_hide_what_was_meant(tmp_path, text, kinds):
     (tmp_path / "a.py").write_text(text)
-    looked_for = {"subscribed-again", "defined-twice", "loop-left", "sleep-outside"}
+    looked_for = {"subscribed-again", "defined-twice", "never-begun", "loop-left", "sleep-outside"}
     found = [
         s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind in looked_for or "after it" in s.message
     ]

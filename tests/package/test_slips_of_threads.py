@@ -18,6 +18,7 @@ KINDS = {
     "runs-out",
     "base-unmade",
     "callback-called",
+    "never-begun",
     "loop-left",
     "ends-node",
     "not-printed",

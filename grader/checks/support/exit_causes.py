@@ -240,7 +240,8 @@ def _not_run(life: Life, run: Run, package: PackageFacts) -> Ending | None:
     if script is not None and script.shebang_fault == "empty-file":
         cited = (FileCitation(file=script.path, line=1),)
         return Ending("its file is empty", f"write the node in {script.path}", cited, by_itself=True)
-    kinds = ("main-guard", "not-called", "never-called", "loop-left", "commented-out", "no-init", "ends-node")
+    calls = ("main-guard", "not-called", "never-called")
+    kinds = (*calls, "never-begun", "loop-left", "commented-out", "no-init", "ends-node")
     own = [s for s in package.slips if s.file == life.start.script and s.kind in kinds]
     slips = [
         s

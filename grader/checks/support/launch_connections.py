@@ -407,10 +407,6 @@ def ended_soon(run: Run, nodes: Iterable[LaunchNode], topic: str) -> list[Launch
     return ended if together_s(run, topic) < CONNECTED_WITHIN_S else []
 
 
-NOT_BEGUN = re.compile(r" never runs| runs only (?:when|after) ")
-"""What is told of a loop whose condition does not hold when the script reaches it."""
-
-
 def ended_by_itself(
     package: PackageFacts, run: Run, file: LaunchFile, ended: Sequence[LaunchNode]
 ) -> Verdict:
@@ -418,13 +414,14 @@ def ended_by_itself(
     alone = "itself" if len(ended) == 1 else "themselves"
     message = f"{join_words(n.full_name for n in ended)} came up and ended by {alone} before others connected"
     scripts = {one.path for n in ended if (one := own_script(package, n)) is not None}
-    left = next((s for s in package.slips if s.kind == "loop-left" and s.file in scripts), None)
+    kinds = ("never-begun", "loop-left")
+    left = next((s for s in package.slips if s.kind in kinds and s.file in scripts), None)
     if left is not None:
         verdict = failed(f"{message}: {left.message}", hint=left.fix, citations=(left.place,))
     else:
         cited = tuple(FileCitation(file=n.file or file.path, line=n.line) for n in ended)
         verdict = failed(message, hint=f"keep it alive: end with {SPIN}", citations=cited)
-    if left is not None and NOT_BEGUN.search(left.message):
+    if left is not None and left.kind == "never-begun":
         return verdict.if_repeated()  # it ends as soon on any machine
     # on a quicker machine, the others may connect to it before it ends
     return excused(verdict.if_repeated(), run, run.start_ns, run.end_ns, why_late)

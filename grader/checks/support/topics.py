@@ -267,8 +267,12 @@ def _judge_advertised(
         return _commented_out(message, slip, of_node)
     # A node that hears something may have good reason to publish on a condition only.
     kinds: tuple[SlipKind, ...] = ("never-published", *(() if _heard_topics(run) else ("published-in-part",)))
-    never = (s for s in run_slips(package, run, "loop-left") if "runs only" in s.message)
-    if told := _unused_publisher(package, run, topic, kinds) or reads_keys(package, run) or next(never, None):
+    never = run_slips(package, run, "never-begun")
+    if (
+        told := _unused_publisher(package, run, topic, kinds)
+        or reads_keys(package, run)
+        or next(iter(never), None)
+    ):
         verdict = of_node(f"{message}: {told.message}", measured="no message", hint=told.fix)
         return verdict.about(citations=(told.place,))
     return _by_what_is_heard(run, message, of_node)

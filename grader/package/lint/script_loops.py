@@ -170,7 +170,7 @@ def loops_that_never_go_round(tree):
             message = "the loop on line %d runs only when the node should end: a `not` is missing"
             message, asks = message % block.lineno, dotted(ending.func)
             fix = "on line %d, write `while not %s():`" % (block.lineno, asks)
-            yield slip(block.lineno, "loop-left", message, fix, asks)
+            yield slip(block.lineno, "never-begun", message, fix, asks)
 
 
 def waits_without_not(tree):
@@ -187,7 +187,7 @@ def waits_without_not(tree):
             asked = "%s.%s(…)" % (name, loop.test.func.attr) if asks else name
             message = "the loop on line %d runs only after `%s` is set: a `not` is missing"
             fix = "on line %d, write `while not %s:`" % (loop.lineno, asked)
-            yield slip(loop.lineno, "loop-left", message % (loop.lineno, name), fix, asked if asks else "")
+            yield slip(loop.lineno, "never-begun", message % (loop.lineno, name), fix, asked)
 
 
 def lacking_loops(tree):

@@ -368,7 +368,7 @@ def flagged_loops(tree):
             message = "the loop on line %d never runs: `%s` is %s from line %d on"
             message %= (loop.lineno, dotted(flag), negated, found[0].lineno)
             fix = "write %s on line %d" % (not negated, found[0].lineno)
-            yield slip(loop.lineno, "loop-left", message, fix, dotted(flag))
+            yield slip(loop.lineno, "never-begun", message, fix, dotted(flag))
 
 
 def kept_velocities(tree):
