@@ -26,6 +26,7 @@ from grader.checks.support.processes import (
     named_at,
     not_started,
     run_slips,
+    where_named,
 )
 from grader.checks.support.text import (
     IN_OWN_WORDS,
@@ -260,7 +261,11 @@ def _never_subscribed(package: PackageFacts, run: Run, topic: str, subscribed: S
     spare = run_slip(package, run, "callback-missing")
     callback = (spare.name if spare else "") or "callback"
     call = subscriber(topic, f"{TYPE_SLOT}, {callback}")
-    hint = f"name the topic {topic} in {call}" if near else f"add {call}"
+    meant = near or (subscribed if len(subscribed) == 1 else [])
+    end: SlipKind = "subscriber" if subscribed else "publisher"
+    name = next(iter(meant), "" if subscribed else topic)
+    cited = named_at(package, run, end, name) if name else ()
+    hint = f"name the topic {topic} {where_named(cited, call)}" if near else f"add {call}"
     publishes = topic in topics_with(run, "publishers")
     if not subscribed and publishes:
         other = f", but publishes on {topic}, as a talker does"
@@ -275,10 +280,6 @@ def _never_subscribed(package: PackageFacts, run: Run, topic: str, subscribed: S
         hint = f"write {topic} on the one of {copied} whose callback is for it"
     elif len(subscribed) == 1 and not near and not probes_on(run, subscribed[0]):
         hint += rename_if_meant(subscribed)
-    meant = near or (subscribed if len(subscribed) == 1 else [])
-    end: SlipKind = "subscriber" if subscribed else "publisher"
-    named = next(iter(meant), "" if subscribed else topic)
-    cited = named_at(package, run, end, named) if named else ()
     verdict = failed(f"the node never subscribes to {topic}{other}", hint=hint, citations=cited)
     return verdict.about(said=" ".join(meant))
 

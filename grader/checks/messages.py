@@ -43,6 +43,8 @@ from grader.wording import plural
 ENOUGH = 3
 _HOURS = re.compile(r"\d:[0-5]\d:$")
 """Hours and minutes before the seconds: a time, and not one in seconds."""
+_FUNCTION = re.compile(r"<(?:built-in )?(?:function|bound method|method) (?:\w+\.)*(\w+)")
+"""What Python prints of a function that is not called, and its name."""
 _LAST_NUMBER = re.compile(rf".*?({NUMBER})\D*", re.DOTALL)
 SECONDS_CHARS_MAX = 60
 UNFILLED = ("%s", "%d", "%f", "{}", "{0}")
@@ -118,6 +120,7 @@ def _misfit(
     count = sum(len(c.data) for c in heard)
     found = loose.fullmatch(text)
     part = in_one_line(found[1]) if found and found.groups() else ""
+    function = _FUNCTION.match(part)
     said = f"{in_one_line(text)!r}, not '{in_words(params.template)}'"
     what, unit = ("time", " in seconds") if SECONDS in params.template else ("count", "")
     # Placeholders first: they, too, are not a number where the time belongs.
@@ -125,8 +128,10 @@ def _misfit(
         message = f"a message reads {in_one_line(text)!r}: its placeholder was never filled in"
     elif more := _behind(part):
         message = f"a message has {more!r} after the {what}: {said}"
-    elif part.startswith(("<function ", "<bound method ", "<built-in ")):
-        message = f"a message says {part!r} where the {what} belongs: a function without its brackets `()` is no number"
+    elif function:
+        message = (
+            f"a message says {part!r} where the {what} belongs: `{function[1]}` is named, but not called"
+        )
     elif part:
         message = f"a message says {part!r} where the {what}{unit} belongs: {said}"
     else:
@@ -134,8 +139,10 @@ def _misfit(
     message += f" ({len(wrong)} of {count} are wrong)" if len(wrong) < count else ""
     cited = cite(run, params.topic, at_ns, at_ns)
     hint = f"publish {code_of(params.template)}"
+    if function:
+        hint = f"write `{function[1]}()`, with its brackets, where that text is made"
     timed = SECONDS in params.template
-    if timed and len(wrong) > 1 and len({said for _, said in wrong}) == 1:
+    if timed and not function and len(wrong) > 1 and len({said for _, said in wrong}) == 1:
         hint += ", made in the loop for each message"
     verdict = failed(message, hint=hint, citations=(cited,)).about(said=in_one_line(text))
     right = timed and _tells_time(package, run, heard)

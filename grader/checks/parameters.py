@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
+from pathlib import PurePosixPath
 from typing import Annotated, Any
 
 from grader.checks.registry import Refers, check
@@ -154,11 +155,10 @@ def _not_printed(
     own = [e for _, e in run.params if e.action == "set" and run.is_student_node(e.caller_id)]
     early = next((e for e in own if [absolute_name(e.name)] == missing and is_printed(e.value, lines)), None)
     if early is None:
-        lost, stuck = (
-            _share_printed(params, missing, message, log_param(missing[0])),
-            run_slip(package, run, "stuck"),
-        )
-        return lost.explained(stuck.message, stuck.fix, (stuck.place,)) if stuck is not None else lost
+        lost = _share_printed(params, missing, message, log_param(missing[0]))
+        stuck = run_slip(package, run, "stuck")
+        lost = lost.explained(stuck.message, stuck.fix, (stuck.place,)) if stuck is not None else lost
+        return lost if texts else _of_no_node(package, run, lost)
     hint = f"read {missing[0]} into a variable above the line that sets it, and print that variable"
     why = f"{message}: it is set to that value before it is read"
     cited = named_at(package, run, "sets-parameter", missing[0])
@@ -343,7 +343,17 @@ def _not_logged(package: PackageFacts, run: Run, params: ParamsSetParams) -> Ver
     message = f"{params.name} is set to {params.value}, but the new value is never printed"
     if end := explain_failure(package, run):
         return end.verdict(failed, f"{message}: the node ended with {end.cause}")
-    return failed(message, hint=log_param(params.name))
+    lost = failed(message, hint=log_param(params.name))
+    return lost if printed_lines(run) else _of_no_node(package, run, lost)
+
+
+def _of_no_node(package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
+    """Explain what is not printed by a script that is no node, where it is none: rospy does not show its log then."""
+    if (slip := run_slip(package, run, "no-init")) is None:
+        return verdict
+    name = PurePosixPath(slip.file).stem
+    hint = f"in {slip.file}, call `rospy.init_node('{name}')` above the first line that logs something"
+    return verdict.explained(f"{slip.message}, and without a node nothing is logged", hint, (slip.place,))
 
 
 class ParamValueParams(Record):

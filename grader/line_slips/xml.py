@@ -100,6 +100,8 @@ _PATTERNS = (
     (rf"^(\s*)[^\w\s<]?(NAMES)(?=(?:{_QUOTED}*|\s[^<>]*)\s*/?>)", r"\1<\2", "the `<` of the tag is missing"),
     (r"(<(NAMES)\b[^<>]*>[^<>]+)<\2>", r"\1</\2>", "the `/` of the closing tag is missing"),
     (r"^(\s*)<(NAMES)>\s*$", r"\1</\2>", "the `/` of the closing tag is missing"),
+    (r"(<(NAMES)\b[^<>]*(?<!/)>[^<>]*)<\2\s*/>", r"\1</\2>", "a closing tag is written `</{1}>`: its `/` comes first"),
+    (r"^(\s*)<(NAMES)\s*/>\s*$", r"\1</\2>", "a closing tag is written `</{1}>`: its `/` comes first"),
     (r"(<(NAMES)\b[^<>]*>[^<>]*)</>", r"\1</\2>", "the name of the closing tag is missing"),
     (r"<>([^<>]*</(NAMES)>)", r"<\2>\1", "the name of the tag is missing"),
 )  # fmt: skip

@@ -42,8 +42,8 @@ class PythonSlip(Placed, Record):
       given for, or an imported name that a class hides.
     - `float-index`: an index is worked out with `/`, which makes a float.
     - `hides-class`: a message is given the name of its class: `String = String()`.
-    - `no-effect`, `compared`: a statement such as `++i`, or `i == 0`; or a loop that publishes what only a line above
-      it made, `name`.
+    - `no-effect`, `compared`: a statement such as `++i`, or `i == 0` or `i % 128`, which were to reset it; or a loop
+      that publishes what only a line above it made, `name`.
     - `stuck`: a line that waits for what never comes, or where a thread, a process or a task is made whose work never
       gets anywhere.
     - `runs-out`: `next(…)` of a generator that has only so many values.

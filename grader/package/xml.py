@@ -403,7 +403,9 @@ def _slips_near(at: int, message: str, text: str, root: str) -> Iterator[LineSli
     lines = text.split("\n")
     mismatch = re.search(_MISMATCH, message)
     opened, closed = (mismatch[1], mismatch[3]) if mismatch else ("", "")
-    begun = re.compile(rf"\s*[^\w\s<]?(?:{re.escape(closed)}\b[^<]*|/{re.escape(opened)}\s*)>")
+    begun = re.compile(
+        rf"\s*(?:[^\w\s<]?(?:{re.escape(closed)}\b[^<]*|/{re.escape(opened)}\s*)|<{re.escape(opened)}\s*/)>"
+    )
     told = [at, *map(int, re.findall(r"line (\d+)", message))]
     hidden = re.compile(rf"\s*<!--+\s*<{re.escape(closed)}\b[^<>]*(?<!/)>\s*--+>")
     told += [n for n, line in enumerate(lines, 1) if mismatch and (begun.match(line) or hidden.match(line))]

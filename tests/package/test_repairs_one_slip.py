@@ -110,6 +110,7 @@ SLIPS = {
         ("lab</name>", "lab<//name>", "`/` is there twice"),
         ("lab</name>", "lab>/name>", "a closing tag begins with `</`"),
         ("lab</name>", "lab</>", "the name of the closing tag is missing"),
+        ("lab</name>", "lab<name/>", "a closing tag is written `</name>`: its `/` comes first"),
         ("<name>lab", "<>lab", "the name of the tag is missing"),
         ("<depend>rospy", "<depend>rosy", "there is no package rosy"),
         ("0.0.0", "0.00", "this is not a version"),
@@ -139,6 +140,7 @@ SLIPS = {
         ('name="talker"/>', 'name=="talker"" />', "`=` is there twice"),
         ('<node pkg="lab" type="t', '<node pkh="lab" type="t', "`<node>` has no attribute `pkh`"),
         ("</launch>", "</>", "the name of the closing tag is missing"),
+        ("</launch>", "<launch/>", "write `</launch>`"),
     ],
     CMAKELISTS: [
         ("(VERSION", "(VERION", "it is VERSION"),

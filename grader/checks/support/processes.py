@@ -168,6 +168,11 @@ def named_at(package: PackageFacts, run: Run, kind: SlipKind, name: str) -> tupl
     return tuple(found) if len(found) == 1 else ()
 
 
+def where_named(named: tuple[FileCitation, ...], call: str) -> str:
+    """Return where a name is written: `on line 5 of scripts/talker.py`, or in a call where no one line is known."""
+    return f"on line {named[0].line} of {named[0].file}" if len(named) == 1 else f"in {call}"
+
+
 def is_written_as(written: str, topic: str) -> bool:
     """Return whether a name in the source can be that of a topic, in whatever namespace the node is."""
     return written.rpartition("/")[2].lstrip("~") == topic.rpartition("/")[2]

@@ -21,6 +21,7 @@ from grader.checks.support.processes import (
     run_scripts,
     run_slips,
     taken_off,
+    where_named,
 )
 from grader.checks.support.recorder_losses import all_lost
 from grader.checks.support.scripts import programs, sources_made
@@ -191,9 +192,10 @@ def _judge_misnamed(
         near = near_names(topic, own) or near
     if not near:
         return None
-    hint = f"name the topic {topic} in {PUBLISHER}"
+    named = named_at(package, run, "publisher", near[0])
+    hint = f"name the topic {topic} {where_named(named, PUBLISHER)}"
     verdict = of_node(f"{what}; the node publishes on {join_words(near)}", measured=measured, hint=hint)
-    return verdict.about(citations=named_at(package, run, "publisher", near[0]))
+    return verdict.about(citations=named)
 
 
 def _namespaced_node(package: PackageFacts, run: Run, topic: str) -> LaunchNode | None:

@@ -35,10 +35,11 @@ def resets(tree):
     or behind a `%`, or in the `range(…)` of a loop that publishes.
     """
     added = {id(n.right): n.left for n in all_of(tree, ast.BinOp) if isinstance(n.op, ast.Add)}
+    alone = {n.value for n in all_of(tree, ast.Expr)}  # of what is computed there, nothing is kept
     yield from limits_of_ranges(tree)
     for node in walk(tree):
         value, done, asked, fix = None, (), [], ""
-        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod) and node not in alone:
             asked = [node.right]
             fix = in_brackets(added.get(id(node)), node)
         elif isinstance(node, ast.AugAssign) and isinstance(node.op, ast.Mod):

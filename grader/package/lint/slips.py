@@ -352,6 +352,9 @@ def is_there(module):
         return False
 
 
+SIGNS = {ast.Add: "+", ast.Sub: "-", ast.Mod: "%"}
+
+
 def without_effect(tree):
     """Statements that compute something and keep nothing of it: `++i`, `i + 1`, `i == 0`; and `i = i`."""
     for node in walk(tree):
@@ -366,12 +369,8 @@ def without_effect(tree):
             if same and "..." not in name:
                 message = "`%s%s` changes nothing in Python" % (2 * sign, name)
                 yield slip(node.lineno, "no-effect", message, "write `%s %s= 1`" % (name, sign))
-        elif isinstance(value, ast.BinOp) and isinstance(value.op, (ast.Add, ast.Sub)):
-            name, sign = dotted(value.left), "+" if isinstance(value.op, ast.Add) else "-"
-            if "..." not in name and isinstance(value.right, ast.Constant):
-                parts = (name, sign, value.right.value)
-                message, fix = "`%s %s %r` alone changes nothing" % parts, "write `%s %s= %r`" % parts
-                yield slip(node.lineno, "no-effect", message, fix)
+        elif isinstance(value, ast.BinOp) and type(value.op) in SIGNS:
+            yield from computed_alone(node, value)
         elif isinstance(value, ast.Compare) and isinstance(value.ops[0], ast.Eq):
             name = dotted(value.left)
             if "..." not in name:
@@ -380,6 +379,25 @@ def without_effect(tree):
                 fix = "write `%s = %s`" % (name, right)
                 fix = "write `%s =` in place of `%s ==`" % (name, name) if "..." in right else fix
                 yield slip(node.lineno, "compared", "`%s ==` compares and gives no value" % name, fix)
+
+
+def computed_alone(node, value):
+    """`i + 1`, `(i + 1) % 128`, and `i % 128` and `i - 128`, which were to reset `i`, as lines of their own."""
+    sign, left, number = SIGNS[type(value.op)], value.left, value.right
+    is_sum = sign == "%" and isinstance(left, ast.BinOp) and isinstance(left.op, ast.Add)
+    name, numbers = dotted(left.left if is_sum else left), [number, *([left.right] if is_sum else ())]
+    if "..." in name or not all(isinstance(one, ast.Constant) for one in numbers):
+        return
+    counted = "(%s + %r)" % (name, left.right.value) if is_sum else name
+    text = "%s %s %r" % (counted, sign, number.value)
+    fix = "%s = %s" % (name, text) if is_sum else "%s %s= %r" % (name, sign, number.value)
+    back = not is_sum and (sign == "%" or (sign == "-" and number.value != 1))
+    yield slip(
+        node.lineno,
+        "compared" if back else "no-effect",
+        "`%s` alone changes nothing" % text,
+        "write `%s`" % fix,
+    )
 
 
 def classes_of_modules(tree):
